@@ -15,7 +15,8 @@ import numpy as np
 class StepMap:
     """Linear map and energies of a step as functions of y = (z, z', f, a).
 
-    The entries of y are coordinates, rates and constant accelerations (n,), and the drive (m,) at nodes.
+    The entries of y are coordinates, rates and constant accelerations (n,), and the drive (m,) at
+    nodes.
 
     - change: (2 n, 2 n) change of (z, z') per (z, z') at the start
     - push, drive: (2 n, n), (2 n, m) change of (z, z') per f and per a

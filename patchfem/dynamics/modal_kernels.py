@@ -23,7 +23,18 @@ NOT_FINITE = 3
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def free_increment(motion, modal_system, port, table, i):
-    """Return the increment [m] of the slide of a port in a step without interface forces."""
+    """Return the increment of the slide of a port in a step without interface forces [m].
+
+    Parameters
+    ----------
+    motion, modal_system, table, i
+        See the top of the module.
+    port : int
+
+    Returns
+    -------
+    float
+    """
     n = motion.shape[1]
     reach = modal_system.reach
     increment = table[i, 8 * n + 3 + port]
@@ -192,7 +203,18 @@ def write_accelerations(motion, modal_system, drive, accel, out):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def safe_point(low, high, guess):
-    """Return `guess` if it lies inside (low, high), else the midpoint."""
+    """Return `guess` if it lies inside (low, high), else the midpoint.
+
+    Parameters
+    ----------
+    low, high : float
+        Interval.
+    guess : float
+
+    Returns
+    -------
+    float
+    """
     if low < guess < high and np.isfinite(guess):
         return guess
     return 0.5 * (low + high)
@@ -296,7 +318,17 @@ def write_interface(row, force, energy, slip, output, travel, stored, ledger):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def count_iterations(n_iterations, work, ledger):
-    """Add the iterations of a step, negative if it failed, and its friction work [J] to the ledger."""
+    """Add the iterations of a step and its friction work to the ledger.
+
+    Parameters
+    ----------
+    n_iterations : int
+        Less than 0 if the step failed.
+    work : float
+        Friction work of the step [J].
+    ledger : ndarray
+        See `ledger.LedgerPositions`; it is changed.
+    """
     ledger[LEDGER.n_iterations] += abs(n_iterations)
     ledger[LEDGER.max_iterations] = max(ledger[LEDGER.max_iterations], abs(n_iterations))
     ledger[LEDGER.n_unconverged] += 1.0 if n_iterations < 0 else 0.0

@@ -1,9 +1,9 @@
 """Exact step of damped modes under any drive and interface forces constant over the step.
-
-The step is computed from the matrix exponential of each mode, or of all modes together where damping couples them, so
-resonance without damping, rigid modes and overdamped modes need no special case (report, eqs 3.5-3.10, with i w_i where
-3.7 and 3.9 print i w). The effect of the drive and the energies of a step are sums over its Gauss points, exact to
-round-off for a drive that is smooth in the step; where modes are much faster than the step, `doubling` computes it.
+ The step is computed from the matrix exponential of each mode, or of all modes together where
+damping couples them, so resonance without damping, rigid modes and overdamped modes need no special
+case (report, eqs 3.5-3.10, with i w_i where 3.7 and 3.9 print i w). The effect of the drive and the
+energies of a step are sums over its Gauss points, exact to round-off for a drive that is smooth in
+the step; where modes are much faster than the step, `doubling` computes it.
 """
 
 from dataclasses import dataclass, replace
@@ -29,12 +29,12 @@ SHORT_STEP_RATE_TIME = 4.0  # fastest rate times length of the short step that i
 class Propagator:
     """Coefficients of a step of dt [s] for n coordinates and p ports.
 
-    free (4, n): z and z' at the end per z and z' at the start (zz, zv, vz, vv); push (2, n): both per modal
-    acceleration, constant over the step; dense (2 n, 3 n): the same for (z, z', acceleration) where damping
-    couples the coordinates, else (0, 0). reach (p, 2 n): displacement of every port in a free motion;
-    beta (p, p) [m/N]: displacement of the ports against unit port forces; rows (p, n): the ports. loss (6, n) or
-    dense_loss (3 n, 3 n): viscous loss of a step as a quadratic form of (z, z', acceleration). drive: see `tables`;
-    steps: number per period.
+    free (4, n): z and z' at the end per z and z' at the start (zz, zv, vz, vv); push (2, n): both
+    per modal acceleration, constant over the step; dense (2 n, 3 n): the same for (z, z',
+    acceleration) where damping couples the coordinates, else (0, 0). reach (p, 2 n): displacement
+    of every port in a free motion; beta (p, p) [m/N]: displacement of the ports against unit port
+    forces; rows (p, n): the ports. loss (6, n) or dense_loss (3 n, 3 n): viscous loss of a step as
+    a quadratic form of (z, z', acceleration). drive: see `tables`; steps: number per period.
     """
 
     dt: float
@@ -51,11 +51,25 @@ class Propagator:
     parts: dict
 
     def tables(self, drive, first: int, count: int) -> np.ndarray:
-        """Return the rows (count, 8 n + 3 + p) of the steps from number `first` on.
+        """Return a row of coefficients for each of some steps.
 
-        Columns: contribution of the drive to z and z' (n, n); linear forms in (z, z', acceleration) of the work of the drive
-        (3 n) and of the viscous loss (3 n) [J]; constant terms of both [J]; the drive at the end of the step [m s-2];
-        displacement of every port due to the drive (p) [m].
+        The columns are the contribution of the drive to z and z' (n, n); linear forms in (z, z',
+        acceleration) of the work of the drive (3 n) and of the viscous loss (3 n) [J]; the constant
+        terms of both [J]; the drive at the end of the step [m s-2]; the displacement of every port
+        due to the drive (p) [m].
+
+        Parameters
+        ----------
+        drive
+        first : int
+            Number of the first step.
+        count : int
+            Number of steps.
+
+        Returns
+        -------
+        ndarray
+            (count, 8 n + 3 + p).
         """
         start = (first + np.arange(count)) * self.dt
         a = drive.values((start[:, None] + self.nodes).ravel()).reshape(count, -1)
@@ -82,11 +96,23 @@ class Propagator:
 
 
 def make_propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Propagator:
-    """Return the Propagator of `steps_per_cycle` equal steps of the drive's period.
+    """Return the propagator of equal steps of the period of a drive.
 
-    rows: ports (p, n), slide per coordinate; None: the interfaces. Steps of large omega dt take up to 48 Gauss points;
-    where that is not enough, a short step is doubled. The last few propagators are cached, because the runs that
-    estimate errors use the same ones again.
+    Steps of large omega dt take up to MAX_GAUSS_POINTS Gauss points; where these do not suffice, a
+    short step is doubled. The last few propagators are cached, because the runs that estimate
+    errors use the same ones again.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive
+    steps_per_cycle : int
+    rows : array_like, optional
+        (p, n) ports, slide per coordinate; the interfaces by default.
+
+    Returns
+    -------
+    Propagator
     """
     if rows is None and modes.omega.size <= MAX_CACHED_COORDINATES:
         return _make_for_interfaces(_Basis(modes), drive.period, steps_per_cycle)
@@ -197,8 +223,8 @@ def _gauss_rule(dt: float, count: int) -> tuple:
 def _integrate_by_doubling(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tuple:
     """Compute a step that is long compared to the periods of the modes, by doubling.
 
-    fastest, slowest [1/s]: rates of the modes and of the drive. Returns (blocks at the end, push, parts, quadratic form
-    of the loss) and the nodes.
+    fastest, slowest [1/s]: rates of the modes and of the drive. Returns (blocks at the end, push,
+    parts, quadratic form of the loss) and the nodes.
     """
     times = max(0, int(np.ceil(np.log2(fastest * dt / SHORT_STEP_RATE_TIME))))
     count = int(
@@ -288,7 +314,8 @@ def _free_motion_uncoupled(omega, zeta, t) -> tuple:
 def matrix_exponentials(a) -> np.ndarray:
     """Return the matrix exponentials (k, m, m) of matrices a (k, m, m), by scaling and squaring.
 
-    The Taylor series of order 13 of a matrix with a norm below 1/4 has an error of (1/4)^14/14! = 4e-20.
+    The Taylor series of order 13 of a matrix with a norm below 1/4 has an error of (1/4)^14/14! =
+    4e-20.
     """
     norm = float(np.abs(a).sum(axis=2).max()) if a.size else 0.0
     halvings = max(0, int(np.ceil(np.log2(max(4 * norm, 1e-300)))))
@@ -305,8 +332,8 @@ def matrix_exponentials(a) -> np.ndarray:
 def _motion_per_acceleration(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
     """Return the motion (z, z') after dt [s] per constant modal acceleration.
 
-    Each has the shape (n,), or (n, n) where damping couples the coordinates. The first one is the integral of zv, which
-    avoids cancellation in a short step.
+    Each has the shape (n,), or (n, n) where damping couples the coordinates. The first one is the
+    integral of zv, which avoids cancellation in a short step.
     """
     return np.tensordot(weight, free_motion(modes, nodes)[1], 1), free_motion(
         modes, np.array([dt])

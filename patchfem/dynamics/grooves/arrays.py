@@ -34,7 +34,8 @@ class ClimbPositions(NamedTuple):
 
     Of the step that was tried last:
 
-    - mean_force, stiffness: mean force against the relative displacement [N] and its derivative [N/m]
+    - mean_force, stiffness: mean force against the relative displacement [N] and its derivative
+    [N/m]
     - along_force: mean force along the flank [N]
     - mean_slope, path_ratio: height and path along the flank over the relative displacement [1]
     - trial_vertical: mean vertical force [N]

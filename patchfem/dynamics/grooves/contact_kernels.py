@@ -43,7 +43,21 @@ def find_slope(flank, q):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean_path_ratio(flank, q, dq):
-    """Return the mean of sqrt(1 + t^2) over dq [m] from q [m], by Gauss's rule of three points."""
+    """Return the mean of sqrt(1 + t^2) over an increment, by Gauss's rule of three points.
+
+    Parameters
+    ----------
+    flank : ndarray
+        (6,) see `arrays.FlankNumbers`.
+    q : float
+        Relative displacement [m].
+    dq : float
+        Increment of the relative displacement [m].
+
+    Returns
+    -------
+    float
+    """
     path = 0.0
     for k in range(-1, 2):
         t = find_slope(flank, q + 0.5 * dq * (1 + k * GAUSS_POINT))
@@ -53,7 +67,23 @@ def mean_path_ratio(flank, q, dq):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean_slope_and_path(flank, q, dq):
-    """Return the mean slope dz/dq and the mean of sqrt(1 + t^2) over dq [m] from q [m]."""
+    """Return the mean slope dz/dq of a flank and its mean path ratio over an increment.
+
+    Parameters
+    ----------
+    flank : ndarray
+        (6,) see `arrays.FlankNumbers`.
+    q : float
+        Relative displacement [m].
+    dq : float
+        Increment of the relative displacement [m].
+
+    Returns
+    -------
+    mean_slope : float
+    path_ratio : float
+        Mean of sqrt(1 + t^2).
+    """
     half = 0.5 * flank[FLANK.wave_number] * dq
     middle = flank[FLANK.wave_number] * (q + 0.5 * dq) - flank[FLANK.phase]
     share = sin(half) / half if abs(half) > MIN_PHASE else 1 - half * half / 6
@@ -120,7 +150,18 @@ def write_resistance(pulled, gain, middle, dt, flank, at):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def write_mean_force(dq, q, dt, c):
-    """Write the mean force over dq [m] in dt [s] and its derivative [N/m] into c.climb."""
+    """Write the mean force over an increment and its derivative [N/m] into c.climb.
+
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    q : float
+        Relative displacement [m].
+    dt : float
+        Duration of the step [s].
+    c : ClimbingPoints
+    """
     ds, flat, end = climb_flank(dq, q, dt, c.flank, c.climb)
     pulled, gain = points.solve_friction(ds, flat, end, dt, c)
     write_resistance(pulled, gain, q + 0.5 * dq, dt, c.flank, c.climb)
@@ -165,7 +206,29 @@ def solve_step(free, beta, q, v, dt, c, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def apply_increment(dq, q, v, dt, c, goal):
-    """Return the mean force [N] over a prescribed dq [m] in dt [s], and True."""
+    """Return the mean force over a prescribed increment; the memory stays as it is.
+
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    q : float
+        Relative displacement [m].
+    v : float
+        Relative velocity at the start of the step [m/s].
+    dt : float
+        Duration of the step [s].
+    c : ClimbingPoints
+    goal : float
+        Tolerance of the residual [N].
+
+    Returns
+    -------
+    force : float
+        Path mean [N].
+    is_solved : bool
+        Always true.
+    """
     t = find_slope(c.flank, q)
     points.start_step(c, v * sqrt(1 + t * t), dt)
     write_mean_force(dq, q, dt, c)

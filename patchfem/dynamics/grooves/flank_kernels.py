@@ -77,19 +77,55 @@ def release_direction(numbers, turn):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_motion(numbers, memory, way, y):
-    """Return the distance and the speed of the next kink of the rates: they have none."""
+    """Return the path to the next kink of the rates and its speed: there is none.
+
+    Parameters
+    ----------
+    numbers : ndarray
+        (9,) see `LawNumbers`.
+    memory : ndarray
+        Memory of the law, which it does not need.
+    way : float
+        Direction of the motion.
+    y : ndarray
+        (l,) states of the law.
+
+    Returns
+    -------
+    path, speed : float
+        Infinite, and 0.
+    """
     return inf, 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state_rates(numbers, memory, turn, dq, v, y, out):
-    """Return the force F [N]; write the rates of the states into out.
+    """Return the force F [N] and write the rates of the states.
 
-    F and the normal force are written into turn.
+    F and the normal force are written into turn. With the acceleration q'' = a - F s, where a is
+    that without F, V = N + m (t q'' + t' q'^2) and F = V c are linear in F with c = (t + phi)/(1 -
+    phi t): F (1 + m t c s) = c (N + m (t' q'^2 + t a)).
 
-    With the acceleration q'' = a - F s, where a is that without F, V = N + m (t q'' + t' q'^2) and
-    F = V c are linear in F with c = (t + phi)/(1 - phi t): F (1 + m t c s) = c (N + m (t' q'^2 + t
-    a)).
+    Parameters
+    ----------
+    numbers : ndarray
+        (9,) see `LawNumbers`.
+    memory : ndarray
+        Memory of the law, which it does not need.
+    turn : ndarray
+        (10,) see `smooth.arrays.TurnPositions`.
+    dq : float
+        Path since the start of the motion in this direction [m].
+    v : float
+        Relative velocity [m/s].
+    y : ndarray
+        (l,) states of the law.
+    out : ndarray
+        (l,) rates of the states, which are written.
+
+    Returns
+    -------
+    float
     """
     steep, bend = find_flank_slope(numbers, turn[TURN.slide])
     load = numbers[LAW.load]
@@ -125,7 +161,23 @@ def state_rates(numbers, memory, turn, dq, v, y, out):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_memory(numbers, memory, q, v):
-    """Return the last force, the energy of height and lifted mass, and q."""
+    """Return the last force, the energy of height and lifted mass, and the relative displacement.
+
+    Parameters
+    ----------
+    numbers : ndarray
+        (9,) see `LawNumbers`.
+    memory : ndarray
+        Memory of the law, which it does not need.
+    q : float
+        Relative displacement [m].
+    v : float
+        Relative velocity at the start of the step [m/s].
+
+    Returns
+    -------
+    Reading
+    """
     half = sin(0.5 * (numbers[LAW.wave_number] * q - numbers[LAW.phase]))
     rise = find_flank_slope(numbers, q)[0] * v
     height = 2 * numbers[LAW.load] * numbers[LAW.amplitude] * half * half
@@ -134,5 +186,26 @@ def read_memory(numbers, memory, q, v):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def end_motion(numbers, memory, turn, dq, v, y):
-    """Return nan: the energy dissipated follows from the work."""
+    """Return NaN, because the energy dissipated follows from the work.
+
+    Parameters
+    ----------
+    numbers : ndarray
+        (9,) see `LawNumbers`.
+    memory : ndarray
+        Memory of the law, which it does not need.
+    turn : ndarray
+        (10,) see `smooth.arrays.TurnPositions`.
+    dq : float
+        Path since the start of the motion in this direction [m].
+    v : float
+        Relative velocity [m/s].
+    y : ndarray
+        (l,) states of the law.
+
+    Returns
+    -------
+    float
+        NaN.
+    """
     return nan

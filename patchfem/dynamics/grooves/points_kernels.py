@@ -31,7 +31,16 @@ SHEAR_GOAL = 1e-13
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_step(c, v, dt):
-    """Start a step of dt [s] at the velocity v [m/s] along the flank."""
+    """Start a step.
+
+    Parameters
+    ----------
+    c : ClimbingPoints
+    v : float
+        Velocity along the flank [m/s].
+    dt : float
+        Duration of the step [s].
+    """
     set_middle_length(v, dt, c)
 
 
@@ -124,7 +133,21 @@ def find_stiffness(c):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_inverse_form(hess, p, workspace):
-    """Return p . hess^-1 p for p (n,) and a factorised matrix."""
+    """Return p . hess^-1 p.
+
+    Parameters
+    ----------
+    hess : ndarray
+        (n, n) factorised matrix.
+    p : ndarray
+        (n,).
+    workspace : ndarray
+        (n,).
+
+    Returns
+    -------
+    float
+    """
     for k in range(p.size):
         workspace[k] = p[k]
     return solve_factorised(hess, workspace)

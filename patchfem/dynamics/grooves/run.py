@@ -16,7 +16,7 @@ from ...friction.protocol import Element
 from ..ledger import LEDGER
 from ..march.models import coulomb_model
 from ..smooth import run as smooth
-from ..smooth.arrays import COUNT, NOW, WORK
+from ..smooth.arrays import COUNT, SCALAR, WORK
 from .climbing import FlankModel, GroovesRun, check_lifted_mass
 
 # relative tolerance of a step
@@ -136,14 +136,15 @@ class SampledRun(GroovesRun):
         least = self.smooth_motion.arrays.work[WORK.sizes]
         least[:n] = REST_RATIO / g.wave_number
         least[n : 2 * n] = (
-            REST_RATIO / g.wave_number * self.smooth_motion.arrays.now[NOW.fastest_rate]
+            REST_RATIO / g.wave_number * self.smooth_motion.arrays.scalars[SCALAR.fastest_rate]
         )
         self.booked = self._read_sums()
 
     def _read_sums(self) -> np.ndarray:
         """Return the sums of the motion, six energies and counts.
 
-        They are work of the drive, viscous loss, its |work|, friction loss [J], steps, and friction work [J].
+        They are work of the drive, viscous loss, its |work|, friction loss [J], steps, and friction
+        work [J].
         """
         y = self.smooth_motion.arrays.state
         own = self.smooth_motion.record.counters

@@ -13,7 +13,20 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def evaluate_slide(re, im, angle):
-    """Return value, first and second derivative of Re sum X_k exp(i k angle)."""
+    """Return value, first and second derivative of Re sum X_k exp(i k angle).
+
+    Parameters
+    ----------
+    re, im : ndarray
+        (H + 1,) parts of the harmonics X_k [m].
+    angle : float
+        [rad].
+
+    Returns
+    -------
+    tuple of float
+        [m].
+    """
     c = np.cos(angle)
     s = np.sin(angle)
     value = re[0]

@@ -101,9 +101,20 @@ class Group:
         return np.array([sum(law.total for law in laws) for laws in self.laws])
 
     def tracks(self, q, omega: float, samples: int = 0) -> list:
-        """Return the Track of every row from the harmonics (i, H + 1) [m] of the slides.
+        """Return the Track of every row.
 
-        samples: per cycle; 0 for those of the group, or as many as H needs.
+        Parameters
+        ----------
+        q : ndarray
+            (i, H + 1) harmonics of the slides [m].
+        omega : float
+            [rad/s].
+        samples : int, optional
+            Per cycle; 0 for those of the group, or as many as H needs.
+
+        Returns
+        -------
+        list of Track
         """
         n = samples or self.samples or self.samples_for(q.shape[1] - 1)
         values = synthesis(q, n)

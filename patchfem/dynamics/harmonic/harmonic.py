@@ -1,17 +1,16 @@
 """Harmonic balance under a sine, with the interface rows as unknowns.
 
 The linear part is exact.
-
-With theta = omega t every quantity is x(theta) = Re sum_k X_k exp(i k theta), k = 0..H, and the modes are condensed to
-the rows that touch: q_k = q_k(drive) - G_k F_k, G_k = faces (Omega^2 - k^2 omega^2 + i k omega D)^-1 faces^T/m. The
-contact is any callable from the harmonics of the slides to those of the forces with their Jacobian (alternating
-frequency/time), so the laws stay outside. Harmonics above H of the force that the contact returns tell what the
-truncation leaves out.
-
-A mode that a harmonic finds without stiffness and damping (a rigid mode at k = 0, an undamped one at its own frequency)
-has no receptance: its coordinate becomes an unknown of its own and the balance of its forces an equation of its own.
-
-Method: Krack & Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019; damped Newton: Deuflhard 2004.
+ With theta = omega t every quantity is x(theta) = Re sum_k X_k exp(i k theta), k = 0..H, and the
+modes are condensed to the rows that touch: q_k = q_k(drive) - G_k F_k, G_k = faces (Omega^2 - k^2
+omega^2 + i k omega D)^-1 faces^T/m. The contact is any callable from the harmonics of the slides to
+those of the forces with their Jacobian (alternating frequency/time), so the laws stay outside.
+Harmonics above H of the force that the contact returns tell what the truncation leaves out.
+ A mode that a harmonic finds without stiffness and damping (a rigid mode at k = 0, an undamped one
+at its own frequency) has no receptance: its coordinate becomes an unknown of its own and the
+balance of its forces an equation of its own.
+ Method: Krack & Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019; damped Newton:
+Deuflhard 2004.
 """
 
 from dataclasses import dataclass
@@ -303,9 +302,24 @@ class Balance:
         )
 
     def free_residual(self, free, c, omega: float, level: float, force) -> complex:
-        """Return the residual of a coordinate c [m] without receptance, over omega^2.
+        """Return the residual of a coordinate without receptance, over omega^2.
 
-        free: (k, left, stiffness) of the coordinate.
+        Parameters
+        ----------
+        free : tuple
+            (k, left, stiffness) of the coordinate.
+        c : float
+            Coordinate [m].
+        omega : float
+            [rad/s].
+        level : float
+            Amplitude of the drive [m s-2].
+        force : ndarray
+            (i, K + 1) harmonics of the forces [N].
+
+        Returns
+        -------
+        complex
         """
         k, left, stiffness = free
         drive = left @ self.modes.base if k == 1 else 0.0
@@ -329,9 +343,26 @@ class Balance:
     def is_rounding(
         self, here: System, left, omega: float, level: float, harmonics: int, size: float
     ) -> bool:
-        """Return whether what a step leaves of the residual is round-off.
+        """Return whether the residual that a step leaves is round-off.
 
-        A least-squares step can vanish where nothing balances. size: of the unknowns [m].
+        A least-squares step can vanish where nothing balances.
+
+        Parameters
+        ----------
+        here : LinearPart
+        left : ndarray
+            Residual after the step [m].
+        omega : float
+            [rad/s].
+        level : float
+            Amplitude of the drive [m s-2].
+        harmonics : int
+        size : float
+            Size of the unknowns [m].
+
+        Returns
+        -------
+        bool
         """
         low = self.lift.shape[1] * (2 * harmonics + 1)
         push = float(np.linalg.norm(here.fold.force) * np.linalg.norm(self.rows)) / (

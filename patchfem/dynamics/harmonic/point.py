@@ -113,7 +113,8 @@ class Periodic:
 def friction_force(laws: tuple, sampled: list) -> np.ndarray:
     """Return the force (N,) [N] of the laws of a row at its samples, without an interlock.
 
-    The interlock of [structure.bonded] is a spring parallel to the contact, so its force is not friction.
+    The interlock of [structure.bonded] is a spring parallel to the contact, so its force is not
+    friction.
     """
     friction = [one.force for law, one in zip(laws, sampled) if not isinstance(law, Interlock)]
     return sum(friction or [one.force for one in sampled])

@@ -52,9 +52,20 @@ class StaticMotion(NamedTuple):
 
 
 def find_loops(laws, u: float, samples: int) -> Loops:
-    """Return the loops of the laws on one row at an amplitude u >= 0 [m] of its slide.
+    """Return the loops of the laws on one row at an amplitude of its slide.
 
-    samples: of a cycle, for laws without a closed form.
+    Parameters
+    ----------
+    laws : sequence
+        Laws on one row.
+    u : float
+        Amplitude of the slide, >= 0 [m].
+    samples : int
+        Samples of a cycle, for laws without a closed form.
+
+    Returns
+    -------
+    Loops
     """
     found = [
         Loops(*map(float, masing_loop(law.stiffness, law.limit_slide, u)))

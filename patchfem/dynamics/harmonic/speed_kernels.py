@@ -7,9 +7,16 @@ from ...friction.laws import tanh_kernels as law
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def sample_forces(num, speed, force, slope):
-    """Write force [N] and slope [N s/m] of a law at velocities (N,) [m/s].
+    """Write force and slope of a law at velocities.
 
-    num: (1, k) numbers of the law.
+    Parameters
+    ----------
+    num : ndarray
+        (1, k) numbers of the law.
+    speed : ndarray
+        (N,) velocities [m/s].
+    force, slope : ndarray
+        (N,) force [N] and slope [N s/m], which are written.
     """
     for i in range(speed.size):
         force[i], slope[i] = law.mean_force(num[0], num[0], 0.0, speed[i], 0.0, 1.0)

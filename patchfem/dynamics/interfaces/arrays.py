@@ -128,8 +128,8 @@ class PressedPoints(
     - pressed: (2, m) nodal forces at both ends of the step [N]
     - modes: (r, m) shear modes at all points, none for pieces that are rigid in shear
     - under: (m,) numbers of the points under load, in the order in which they stand in the other
-      fields, which are those of `ShearedPoints`; there they have the memory after half of the change of
-      load, and the mean load
+      fields, which are those of `ShearedPoints`; there they have the memory after half of the
+      change of load, and the mean load
     """
 
     __slots__ = ()
@@ -201,8 +201,8 @@ class ShearedLists(
       pressure moves with the upper one
     - places: (m,) of the points at rest [m]
 
-    The other fields are those of `ShearedPoints`: weight (m,) has the friction limits [N], the first
-    four rows of points are named in `shear_lists_kernels`.
+    The other fields are those of `ShearedPoints`: weight (m,) has the friction limits [N], the
+    first four rows of points are named in `shear_lists_kernels`.
     """
 
     __slots__ = ()

@@ -44,16 +44,59 @@ def solve_step(free, beta, q, v, dt, c, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def apply_increment(dq, q, v, dt, c, goal):
-    """Return the mean force [N] over a prescribed increment dq [m] in dt [s], and True."""
+    """Return the mean force over a prescribed increment; the memory stays as it is.
+
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    q : float
+        Relative displacement [m].
+    v : float
+        Relative velocity at the start of the step [m/s].
+    dt : float
+        Duration of the step [s].
+    c : arrays.Element
+    goal : float
+        Tolerance of the residual [N].
+
+    Returns
+    -------
+    force : float
+        Path mean [N].
+    is_solved : bool
+        Always true.
+    """
     c.eps[0] = law.step_bond_length(c.num[0], c.mem[0], v, dt)
     return law.mean_force(c.num[0], c.mem[0], q, dq, c.eps[0], dt)[0], True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, q, v0, v1, dt, c):
-    """Move the memory by a solved step; returns the energy dissipated [J] and True.
+    """Move the memory by a solved step.
 
-    force: path mean over dq [N]; v0, v1: velocities at both ends of the step [m/s].
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    force : float
+        Path mean over dq [N].
+    q : float
+        Relative displacement [m].
+    v0 : float
+        Velocity at the start of the step [m/s].
+    v1 : float
+        Velocity at the end of the step [m/s].
+    dt : float
+        Duration of the step [s].
+    c : arrays.Element
+
+    Returns
+    -------
+    loss : float
+        Energy dissipated [J].
+    is_solved : bool
+        Always true.
     """
     c.last[1] = c.last[0]
     c.last[0] = dq
@@ -62,5 +105,23 @@ def commit_step(dq, force, q, v0, v1, dt, c):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_state(c, q, v):
-    """Return force [N], stored energy [J] and slip [m] at q [m] and v [m/s]."""
+    """Return force, stored energy and slip of the element.
+
+    Parameters
+    ----------
+    c : arrays.Element
+    q : float
+        Relative displacement [m].
+    v : float
+        Relative velocity at the start of the step [m/s].
+
+    Returns
+    -------
+    force : float
+        [N].
+    energy : float
+        Stored energy [J].
+    slip : float
+        [m].
+    """
     return law.read_memory(c.num[0], c.mem[0], q, v)

@@ -21,10 +21,26 @@ MAX_OWED_RATIO = 1e-4
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_mean_and_slope(dq, c, v0, dt):
-    """Return the path-mean weight of a list over dq [m] and its slope [1/m].
+    """Return the path-mean weight of a list and its slope.
 
-    The slope of a form other than FORM_MOMENTS is that of a mean whose force depends on the
-    displacement alone; it may be below 0.
+    The slope of a form other than FORM_MOMENTS is that of a mean whose force depends on the displacement
+    alone; it may be less than 0.
+
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    c : arrays.BondList
+    v0 : float
+        Velocity at the start of the step [m/s].
+    dt : float
+        Duration of the step [s].
+
+    Returns
+    -------
+    mean : float
+    slope : float
+        [1/m].
     """
     if c.law[LAW.form] == FORM_MOMENTS:
         mean, slope = list_slope(dq, c, v0, dt)
@@ -38,9 +54,24 @@ def find_mean_and_slope(dq, c, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_force_and_slope(dq, c, v0, dt):
-    """Return the path-mean force of a list over dq [m] and its slope [N/m].
+    """Return the path-mean force of a list and its slope.
 
-    A slope of 0 is unknown.
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    c : arrays.BondList
+    v0 : float
+        Velocity at the start of the step [m/s].
+    dt : float
+        Duration of the step [s].
+
+    Returns
+    -------
+    force : float
+        [N].
+    slope : float
+        [N/m]; 0 where it is unknown.
     """
     scale = c.force[0]
     if c.law[LAW.form] == FORM_MOMENTS:
@@ -82,7 +113,29 @@ def solve_step(free, beta, q, v, dt, c, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def apply_increment(dq, q, v, dt, c, goal):
-    """Return the mean force [N] over a prescribed increment dq [m] in dt [s], and True."""
+    """Return the mean force over a prescribed increment; the memory stays as it is.
+
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    q : float
+        Relative displacement [m].
+    v : float
+        Relative velocity at the start of the step [m/s].
+    dt : float
+        Duration of the step [s].
+    c : arrays.BondList
+    goal : float
+        Tolerance of the residual [N].
+
+    Returns
+    -------
+    force : float
+        Path mean [N].
+    is_solved : bool
+        Always true.
+    """
     return find_force_and_slope(dq, c, v, dt)[0], True
 
 
@@ -137,7 +190,25 @@ def add_list_energies(work, before, limit, c):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_state(c, q, v):
-    """Return force [N], stored energy [J] and slip [m] of the list at q [m]."""
+    """Return force, stored energy and slip of the list.
+
+    Parameters
+    ----------
+    c : arrays.BondList
+    q : float
+        Relative displacement [m].
+    v : float
+        Relative velocity at the start of the step [m/s].
+
+    Returns
+    -------
+    force : float
+        [N].
+    energy : float
+        Stored energy [J].
+    slip : float
+        [m].
+    """
     force = c.force[0] * c.status[STATUS.force]
     return (
         force,

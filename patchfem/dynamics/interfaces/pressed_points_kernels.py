@@ -82,7 +82,23 @@ def press_points(kind, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_friction_force(dq, kind, contact):
-    """Return the path-mean friction force [N] and its slope [N/m] for a rigid increment dq [m]."""
+    """Return the path-mean friction force and its slope for a rigid increment.
+
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    kind : int
+        Kind of the law of the points, PLASTIC or POINTS.
+    contact : arrays.PressedPoints
+
+    Returns
+    -------
+    force : float
+        [N].
+    slope : float
+        [N/m].
+    """
     set_slides(dq, contact.b, contact)
     force = write_forces(kind, False, contact)
     slope = 0.0
@@ -114,7 +130,29 @@ def solve_step(free, beta, q, v, dt, c, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def apply_increment(dq, q, v, dt, c, goal):
-    """Return the mean force [N] over a prescribed increment dq [m], and whether it was found."""
+    """Return the mean force over a prescribed increment; the memory stays as it is.
+
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    q : float
+        Relative displacement [m].
+    v : float
+        Relative velocity at the start of the step [m/s].
+    dt : float
+        Duration of the step [s].
+    c : arrays.PressedPoints
+    goal : float
+        Tolerance of the residual [N].
+
+    Returns
+    -------
+    force : float
+        Path mean [N].
+    is_solved : bool
+        Whether it was found.
+    """
     _, force, count = solve_step(dq, 0.0, q, v, dt, c, goal)
     return force, count >= 0
 
@@ -140,15 +178,52 @@ def commit_step(dq, force, q, v0, v1, dt, c):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_state(c, q, v):
-    """Return friction force [N], stored energy [J] and slip [m] at q [m]."""
+    """Return force, stored energy and slip of points and pieces.
+
+    Parameters
+    ----------
+    c : arrays.PressedPoints
+    q : float
+        Relative displacement [m].
+    v : float
+        Relative velocity at the start of the step [m/s].
+
+    Returns
+    -------
+    force : float
+        [N].
+    energy : float
+        Stored energy [J].
+    slip : float
+        [m].
+    """
     return read_points(int(c.force[LAW_KIND]), c, q)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_points(dq, used, v0, v1, dt, kind, contact):
-    """Move the memory by a solved step; returns the energy dissipated [J].
+    """Move the memory of the points by a solved step.
 
-    It includes that of the changing load.
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    used : float
+        Path-mean force over dq [N].
+    v0 : float
+        Velocity at the start of the step [m/s].
+    v1 : float
+        Velocity at the end of the step [m/s].
+    dt : float
+        Duration of the step [s].
+    kind : int
+        Kind of the law of the points, PLASTIC or POINTS.
+    contact : arrays.PressedPoints
+
+    Returns
+    -------
+    float
+        Energy dissipated [J], that of the changing load included.
     """
     length = contact.force[BOND_LENGTH]
     memory = contact.memory
@@ -246,7 +321,25 @@ def elastic_energy(kind, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_points(kind, contact, q):
-    """Return friction force [N], stored energy [J] and slip [m]."""
+    """Return friction force, stored energy and slip of points and pieces.
+
+    Parameters
+    ----------
+    kind : int
+        Kind of the law of the points, PLASTIC or POINTS.
+    contact : arrays.PressedPoints
+    q : float
+        Relative displacement [m].
+
+    Returns
+    -------
+    force : float
+        [N].
+    energy : float
+        Stored energy [J].
+    slip : float
+        [m].
+    """
     mu = contact.force[MU_STATIC]
     length = contact.force[BOND_LENGTH]
     memory = contact.memory

@@ -1,12 +1,11 @@
 """A contact of bond points behind shear modes, `arrays.ShearedPoints` (compiled).
 
 The load is constant.
-
-For most of a cycle of gross slip all points drag: their bonds are those of a slide without end,
+ For most of a cycle of gross slip all points drag: their bonds are those of a slide without end,
 and a further slide in the same direction has the force weight length load at every point, whatever
-its size. Such a step has a closed form in the modes alone (`solve_dragging_step`). The slide of a point is
-that of the holder minus psi^T b at all times. `march.loop_kernels` calls the functions of every
-contact.
+its size. Such a step has a closed form in the modes alone (`solve_dragging_step`). The slide of a
+point is that of the holder minus psi^T b at all times. `march.loop_kernels` calls the functions of
+every contact.
 """
 
 from ...compiled.jit import njit
@@ -56,9 +55,22 @@ def solve_step(free, beta, q, v, dt, c, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_dragging_step(free, beta, c):
-    """Return whether all points drag on in this step; c.y[0] is then its solution.
+    """Solve a step in which all points drag.
 
-    It solves kappa (b + db/2) = psi^T f.
+    The solution is that of kappa (b + db/2) = psi^T f.
+
+    Parameters
+    ----------
+    free : float
+        Increment without friction [m].
+    beta : float
+        Compliance of the modes in the step [m/N].
+    c : arrays.ShearedPoints
+
+    Returns
+    -------
+    bool
+        Whether all points drag on in this step; c.y[0] is then its solution.
     """
     way = c.flow[DRAG_DIRECTION]
     y = c.y[0]
@@ -75,7 +87,29 @@ def solve_dragging_step(free, beta, c):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def apply_increment(dq, q, v, dt, c, goal):
-    """Return the mean force [N] over a prescribed increment, and whether it was found."""
+    """Return the mean force over a prescribed increment; the memory stays as it is.
+
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    q : float
+        Relative displacement [m].
+    v : float
+        Relative velocity at the start of the step [m/s].
+    dt : float
+        Duration of the step [s].
+    c : arrays.ShearedPoints
+    goal : float
+        Tolerance of the residual [N].
+
+    Returns
+    -------
+    force : float
+        Path mean [N].
+    is_solved : bool
+        Whether it was found.
+    """
     c.flow[DRAG_DIRECTION] = 0.0
     set_middle_length(v, dt, c)
     c.y[0, 0] = dq
@@ -85,7 +119,31 @@ def apply_increment(dq, q, v, dt, c, goal):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, q, v0, v1, dt, c):
-    """Move points and pieces by a solved step; returns the energy dissipated [J] and True."""
+    """Move points and pieces by a solved step.
+
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    force : float
+        Path mean over dq [N].
+    q : float
+        Relative displacement [m].
+    v0 : float
+        Velocity at the start of the step [m/s].
+    v1 : float
+        Velocity at the end of the step [m/s].
+    dt : float
+        Duration of the step [s].
+    c : arrays.ShearedPoints
+
+    Returns
+    -------
+    loss : float
+        Energy dissipated [J].
+    is_solved : bool
+        Always true.
+    """
     way = c.flow[DRAG_DIRECTION]
     length = c.eps[1]
     lost = 0.0
@@ -149,9 +207,20 @@ def move_points_short(c, length):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def move_points(c, loose, length):
-    """Move all points by slides of any size; returns twice the energy dissipated [J].
+    """Move all points by slides of any size.
 
-    loose: half the elastic range of their bonds [m]; length: of a bond [m].
+    Parameters
+    ----------
+    c : arrays.ShearedPoints
+    loose : float
+        Half the elastic range of the bonds [m].
+    length : float
+        Bond length [m].
+
+    Returns
+    -------
+    float
+        Twice the energy dissipated [J].
     """
     points = c.points
     lost = 0.0
@@ -175,7 +244,25 @@ def move_points(c, loose, length):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def read_state(c, q, v):
-    """Return force [N], stored energy [J] and slip [m] of points and pieces."""
+    """Return force, stored energy and slip of points and pieces.
+
+    Parameters
+    ----------
+    c : arrays.ShearedPoints
+    q : float
+        Relative displacement [m].
+    v : float
+        Relative velocity at the start of the step [m/s].
+
+    Returns
+    -------
+    force : float
+        [N].
+    energy : float
+        Stored energy [J].
+    slip : float
+        [m].
+    """
     way = c.flow[DRAG_DIRECTION]
     energy = 0.0
     slip = c.flow[TOTAL_SLIDE]

@@ -47,7 +47,29 @@ def solve_step(free, beta, q, v, dt, c, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def apply_increment(dq, q, v, dt, c, goal):
-    """Return the mean force [N] over a prescribed increment, and whether it was found."""
+    """Return the mean force over a prescribed increment; the memory stays as it is.
+
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    q : float
+        Relative displacement [m].
+    v : float
+        Relative velocity at the start of the step [m/s].
+    dt : float
+        Duration of the step [s].
+    c : arrays.ShearedLists
+    goal : float
+        Tolerance of the residual [N].
+
+    Returns
+    -------
+    force : float
+        Path mean [N].
+    is_solved : bool
+        Whether it was found.
+    """
     start_step(dt, c)
     c.y[0, 0] = dq
     force, count = solver.minimise(dq, 0.0, 0, False, c, goal)
@@ -110,7 +132,25 @@ def stored_energy(c):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_state(c, q, v):
-    """Return force [N], stored energy [J] and slip [m] of lists and pieces."""
+    """Return force, stored energy and slip of lists and pieces.
+
+    Parameters
+    ----------
+    c : arrays.ShearedLists
+    q : float
+        Relative displacement [m].
+    v : float
+        Relative velocity at the start of the step [m/s].
+
+    Returns
+    -------
+    force : float
+        [N].
+    energy : float
+        Stored energy [J].
+    slip : float
+        [m].
+    """
     force = 0.0
     total = 0.0
     slip = c.flow[TOTAL_SLIDE]

@@ -115,7 +115,18 @@ def start_step(dt, c):
 def write_forces(kind, ending, c):
     """Write path-mean force [N] and slope [N/m] of every point at its slide.
 
-    Returns the friction force [N].
+    Parameters
+    ----------
+    kind : int
+        Kind of the law of the points, PLASTIC or POINTS.
+    ending : bool
+        Whether the pieces spring back while the holder stands.
+    c : arrays.ShearedLists
+
+    Returns
+    -------
+    float
+        Friction force [N].
     """
     points = c.points
     dt = c.time[0]

@@ -49,7 +49,18 @@ def are_slides_short(c, length):
 def write_forces(kind, ending, c):
     """Write force [N] and slope [N/m] >= 0 of every point at its slide.
 
-    Returns the friction force [N].
+    Parameters
+    ----------
+    kind : int
+        Kind of the law of the points, PLASTIC or POINTS.
+    ending : bool
+        Whether the pieces spring back while the holder stands.
+    c : arrays.ShearedPoints
+
+    Returns
+    -------
+    float
+        Friction force [N].
     """
     points = c.points
     weight = c.weight
@@ -69,7 +80,23 @@ def write_forces(kind, ending, c):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def write_general_forces(kind, ending, c, length):
-    """Write the forces of `write_forces` for any law and slide, at a bond length [m]."""
+    """Write the forces of `write_forces` for any law and slide.
+
+    Parameters
+    ----------
+    kind : int
+        Kind of the law of the points, PLASTIC or POINTS.
+    ending : bool
+        Whether the pieces spring back while the holder stands.
+    c : arrays.ShearedPoints
+    length : float
+        Bond length [m].
+
+    Returns
+    -------
+    float
+        Friction force [N].
+    """
     points = c.points
     weight = c.weight
     loose = c.growth[5] * length

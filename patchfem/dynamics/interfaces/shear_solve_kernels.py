@@ -7,12 +7,11 @@ STEP_DAMPING (db - db of the step before) is added, which removes two thirds of 
 changes a smooth motion to second order. With `ending` the pieces spring back while the holder
 stands: kappa (b + db) = psi^T f with the forces after the slide, which only loses energy as long
 as a force grows with the slide.
-
-Both are minima of convex functions where no slope of a point is below 0; Newton's method with a
-line search finds them. The forces of some laws may decrease as their points slide, and then
-several minima exist: the one found lies downhill from where the last steps lead, to which pieces
-without mass would jump. c is an `arrays.ShearedPoints`, or a tuple with its fields from `weight` on.
-`law` has the forces of the points; `march.instances` compiles this text for each.
+ Both are minima of convex functions where no slope of a point is below 0; Newton's method with a
+line search finds them. The forces of some laws may decrease as their points slide, and then several
+minima exist: the one found lies downhill from where the last steps lead, to which pieces without
+mass would jump. c is an `arrays.ShearedPoints`, or a tuple with its fields from `weight` on. `law`
+has the forces of the points; `march.instances` compiles this text for each.
 """
 
 import numpy as np
@@ -42,15 +41,30 @@ MAX_ITERATIONS = 1000 if FORCE_MAY_FALL else 200
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def set_middle_length(v, dt, c):
-    """Set the bond length in the middle of a step that begins with the velocity v [m/s]."""
+    """Set the bond length in the middle of a step.
+
+    Parameters
+    ----------
+    v : float
+        Relative velocity at the start of the step [m/s].
+    dt : float
+        Duration of the step [s].
+    c : arrays.ShearedPoints
+    """
     c.eps[1] = grow(c.eps[0], v, v, abs(v) * dt / 2, dt / 2, c.growth)[0]
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def set_slides(q, moved, c):
-    """Write the slides [m] of the points.
+    """Write the slides of the points [m].
 
-    The holder slides by q and the coordinates move by `moved` (r,).
+    Parameters
+    ----------
+    q : float
+        Slide of the holder [m].
+    moved : ndarray
+        (r,) increments of the coordinates [m].
+    c : arrays.ShearedPoints
     """
     psi = c.psi
     points = c.points
@@ -75,7 +89,21 @@ def set_slides(q, moved, c):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def project_onto_modes(row, psi, points, count, out):
-    """Write psi^T of a row of the points, (r,), into out (1 + r,) from its second entry on."""
+    """Write psi^T of a row of the points.
+
+    Parameters
+    ----------
+    row : int
+        Row of the points.
+    psi : ndarray
+        (r, m) shear modes.
+    points : ndarray
+        (8, m) see `shear_points_kernels`.
+    count : int
+        Number of points under load.
+    out : ndarray
+        (1 + r,); the entries from the second on are written.
+    """
     r = psi.shape[0]
     for k in range(0, r - 3, 4):
         one = 0.0
@@ -101,9 +129,30 @@ def project_onto_modes(row, psi, points, count, out):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def write_gradient(y, free, beta, kind, ending, c, out):
-    """Write the residual (1 + r,) at y = (dq, db); returns the friction force [N].
+    """Write the residual of a step.
 
     With beta = 0 or `ending` the slide of the holder is prescribed.
+
+    Parameters
+    ----------
+    y : ndarray
+        (1 + r,) trial solution (dq, db) [m].
+    free : float
+        Increment without friction [m].
+    beta : float
+        Compliance of the modes in the step [m/N].
+    kind : int
+        Kind of the law of the points, PLASTIC or POINTS.
+    ending : bool
+        Whether the pieces spring back while the holder stands.
+    c : arrays.ShearedPoints
+    out : ndarray
+        (1 + r,) residual [N], which is written.
+
+    Returns
+    -------
+    float
+        Friction force [N].
     """
     part = 1.0 if ending else 0.5
     calm = 0.0 if ending else STEP_DAMPING
@@ -121,9 +170,19 @@ def write_gradient(y, free, beta, kind, ending, c, out):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def write_hessian(beta, ending, c, hess):
-    """Write the lower triangle of the Hessian (1 + r, 1 + r) from the slopes of the points.
+    """Write the Hessian of a step from the slopes of the points.
 
-    It overwrites their forces.
+    It overwrites the forces of the points.
+
+    Parameters
+    ----------
+    beta : float
+        Compliance of the modes in the step [m/N].
+    ending : bool
+        Whether the pieces spring back while the holder stands.
+    c : arrays.ShearedPoints
+    hess : ndarray
+        (1 + r, 1 + r), of which the lower triangle is written.
     """
     psi = c.psi
     points = c.points

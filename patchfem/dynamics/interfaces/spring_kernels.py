@@ -18,9 +18,31 @@ from ...friction.protocol_kernels import step_bond_length as step_bond_length
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean_force(numbers, memory, q, dq, eps, dt):
-    """Return the path-mean force [N] of the springs over dq [m], and its slope over dq [N/m].
+    """Return the path-mean force of the springs and its slope.
 
-    It is (V(q + dq) - V(q))/dq, written without cancellation; memory, eps and dt are not used.
+    It is (V(q + dq) - V(q))/dq, written without cancellation.
+
+    Parameters
+    ----------
+    numbers : ndarray
+        (4,) see the top of the module.
+    memory : ndarray
+        Not used.
+    q : float
+        Relative displacement [m].
+    dq : float
+        Increment of the relative displacement [m].
+    eps : float
+        Not used.
+    dt : float
+        Not used.
+
+    Returns
+    -------
+    force : float
+        [N].
+    slope : float
+        Over dq [N/m].
     """
     b = q + dq
     cubic = 0.25 * numbers[1]
@@ -45,13 +67,54 @@ def mean_force(numbers, memory, q, dq, eps, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def update_memory(numbers, memory, dq, force, v0, v1, dt, eps):
-    """Return the dissipated energy, which is 0 J for springs."""
+    """Return the dissipated energy, which is 0 for springs.
+
+    Parameters
+    ----------
+    numbers : ndarray
+        Not used.
+    memory : ndarray
+        Not used.
+    dq : float
+        Increment of the relative displacement [m].
+    force : float
+        Path mean over dq [N].
+    v0 : float
+        Not used.
+    v1 : float
+        Not used.
+    dt : float
+        Not used.
+    eps : float
+        Not used.
+
+    Returns
+    -------
+    float
+        0 J.
+    """
     return 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_memory(numbers, memory, q, v):
-    """Return the force, the stored energy V(q) and the slide q of the springs."""
+    """Return the force, the stored energy V(q) and the slide of the springs.
+
+    Parameters
+    ----------
+    numbers : ndarray
+        (4,) see the top of the module.
+    memory : ndarray
+        Not used.
+    q : float
+        Relative displacement [m].
+    v : float
+        Not used.
+
+    Returns
+    -------
+    Reading
+    """
     force = numbers[1] * q**3
     energy = 0.25 * numbers[1] * q**4
     stiffness = numbers[2]

@@ -10,7 +10,7 @@ Between two reversals of q' all terms are smooth, so steps of Dormand and Prince
 dense output of order 7.
 
 Events. Every reversal, every kink of the law or of the drive, and the travel of the output end a
-step. Newton's method on the length of the step finds the event (`loop_kernels.locate_end`), so it
+step. Newton's method on the length of the step finds the event (`loop_kernels.locate_event`), so it
 is as exact as a step.
 
 In: `core.ModalBasis`, a drive, an `Element` whose law offers its rates (`friction.protocol`) or is

@@ -28,11 +28,13 @@ class WorkRows(NamedTuple):
     trial: int = 25
 
 
-class NowPositions(NamedTuple):
-    """Positions in `MotionArrays.now`.
+class ScalarPositions(NamedTuple):
+    """Positions in `MotionArrays.scalars`.
 
-    - time, step, first_step: time, length of the next step and of the first one after a reversal [s]
-    - origin, start_loss: relative displacement [m] and friction loss [J] at the start of the motion in this direction
+    - time, step, first_step: time, length of the next step and of the first one after a reversal
+    [s]
+    - origin, start_loss: relative displacement [m] and friction loss [J] at the start of the motion
+    in this direction
     - max_coordinate, max_rate: recent maximum of coordinates [m] and rates [m/s]
     - fastest_rate: rate of the fastest mode or of the drive [1/s]
     - stage: 0 before the start, 1 after it, 2 where the motion was left at a reversal
@@ -90,10 +92,13 @@ class TurnPositions(NamedTuple):
 
     - direction: of the motion, 0 in stick
     - kink_path: path to the next kink of the law [m], infinite without one
-    - is_above_knee, knee_velocity: whether the speed is above that of a kink, and that speed [m/s], 0 without one
-    - free_acceleration, inverse_mass, slide: for a law that holds, the acceleration [m s-2] without its force, the
+    - is_above_knee, knee_velocity: whether the speed is above that of a kink, and that speed [m/s],
+    0 without one
+    - free_acceleration, inverse_mass, slide: for a law that holds, the acceleration [m s-2] without
+    its force, the
       acceleration per newton [1/kg] that its force takes away, and the relative displacement [m]
-    - force, normal_force, release_direction: what a law that holds answers, [N], [N], and the direction in which it
+    - force, normal_force, release_direction: what a law that holds answers, [N], [N], and the
+    direction in which it
       lets go, 0 where it holds
     """
 
@@ -109,7 +114,7 @@ class TurnPositions(NamedTuple):
     release_direction: int = 9
 
 
-class StepEnds(NamedTuple):
+class StepEvents(NamedTuple):
     """Events that end a step.
 
     - stop: the velocity vanishes
@@ -135,7 +140,7 @@ class CallStatus(NamedTuple):
     - full: the rows for reversals or parts are used up; the next call goes on
     - not_finite: the state is not finite
     - no_step: no step, however short, meets the tolerance
-    - paused: MAX_TRIES steps were tried; the next call goes on
+    - paused: MAX_TRIED_STEPS steps were tried; the next call goes on
     - lifted: the normal force of a law that holds has vanished
     """
 
@@ -150,15 +155,15 @@ class CallStatus(NamedTuple):
 
 MODE = ModeRows()
 WORK = WorkRows()
-NOW = NowPositions()
+SCALAR = ScalarPositions()
 COUNT = CounterPositions()
 TURN = TurnPositions()
-END = StepEnds()
+EVENT = StepEvents()
 STATUS = CallStatus()
 # points of a part of a step at which its samples are taken
 N_NODES = 9
 # these points as fractions of the part, which are Chebyshev points of the second kind
-NODE_PLACES = (1 - np.cos(np.pi * np.arange(N_NODES) / (N_NODES - 1))) / 2
+NODE_FRACTIONS = (1 - np.cos(np.pi * np.arange(N_NODES) / (N_NODES - 1))) / 2
 
 
 class MotionArrays(NamedTuple):
@@ -169,10 +174,11 @@ class MotionArrays(NamedTuple):
     - segments: (p, 12) segments of the drive, see `events.positions_kernels.SegmentColumns`
     - numbers, memory: numbers of the law (1, k), its memory and a copy to work with (2, m)
     - turn: (10,) see `TurnPositions`
-    - state: (N,) coordinates [m], rates [m/s], states of the law, then work of the drive, viscous loss and friction
+    - state: (N,) coordinates [m], rates [m/s], states of the law, then work of the drive, viscous
+    loss and friction
       work [J]
     - work: (26, N) slopes of the 16 stages, then see `WorkRows`
-    - now: (15,) see `NowPositions`
+    - scalars: (15,) see `ScalarPositions`
     """
 
     modes: np.ndarray
@@ -183,20 +189,21 @@ class MotionArrays(NamedTuple):
     turn: np.ndarray
     state: np.ndarray
     work: np.ndarray
-    now: np.ndarray
+    scalars: np.ndarray
 
 
 class MotionRecord(NamedTuple):
     """What is recorded of a motion.
 
-    A sample (2 n + 7,) has the time, coordinates, rates, relative displacement and velocity, force, slip, energy in the
-    interface and friction work [J].
+    A sample (2 n + 7,) has the time, coordinates, rates, relative displacement and velocity, force,
+    slip, energy in the interface and friction work [J].
 
-    - cycles: (4, c) smallest and largest output of every cycle, and real and imaginary part of the output at the
+    - cycles: (4, c) smallest and largest output of every cycle, and real and imaginary part of the
+    output at the
       frequency of the cycle [m], NaN where it is not wanted
     - samples: (s, 2 n + 7) at the times in their first column
     - turns: (r, 2 n + 7) at reversals
-    - parts: (k, N_NODES, 2 n + 7) at NODE_PLACES of the parts of steps
+    - parts: (k, N_NODES, 2 n + 7) at NODE_FRACTIONS of the parts of steps
     - counters: (10,) see `CounterPositions`
     - workspace: (N,)
     """

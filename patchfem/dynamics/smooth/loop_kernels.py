@@ -14,100 +14,147 @@ from ...friction.flags_kernels import NJIT_INTERNAL, NJIT_NO_REFCOUNT
 from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps
 from . import watch_kernels as watch
-from .arrays import COUNT, END, MODE, NOW, STATUS, TURN, WORK
+from .arrays import COUNT, EVENT, MODE, SCALAR, STATUS, TURN, WORK
 
 # bounds of the ratio of a step to the one before
 MIN_STEP_FACTOR = 0.2
 MAX_STEP_FACTOR = 8.0
 # safety factor of the length of the next step
 STEP_SAFETY = 0.9
-# value of now[NOW.stage] where the motion was left at a reversal
+# value of scalars[SCALAR.stage] where the motion was left at a reversal
 AT_REVERSAL = 2.0
 # cycles over which a maximum of coordinates and rates fades
 FADING_CYCLES = 3.0
 # tried steps of a call; they take a tenth of a second, in which compiled code hears no signal
-MAX_TRIES = 50_000
-# progress in time that MAX_TRIES steps must make, over the time of the fastest motion
+MAX_TRIED_STEPS = 50_000
+# progress in time that MAX_TRIED_STEPS steps must make, over the time of the fastest motion
 MIN_PROGRESS = 1e-3
 # fraction of a period within which two events are at the same time
 INSTANT_FRACTION = 1e-13
 # fraction of a period that a step in stick may take, because no other criterion limits it
 MAX_STUCK_STEP = 0.02
-# a motion that has not moved on since a stop: it is at the stop, or was found to go in the other direction
+# states of a motion since a stop: it has moved, it is at the stop, or it is there and its direction was changed
+NOT_AT_STOP = 0
 AT_STOP = 1
-FLIPPED = 2
+DIRECTION_CHANGED = 2
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def distance_to_end(motion, what, y, slopes, travel):
-    """Return the distance of a state to an end, > 0 before it, its rate [1/s] and its round-off.
+def distance_to_event(motion, event, y, slopes, travel):
+    """Return the distance of a state to an event, its rate and its round-off.
 
-    what: a number of `StepEnds`; slopes: of the state y.
+    Parameters
+    ----------
+    motion : MotionArrays
+    event : int
+        A number of `StepEvents`.
+    y : ndarray
+        (N,) state.
+    slopes : ndarray
+        (N,) slopes of the state.
+    travel : float
+        Largest displacement of the output [m].
+
+    Returns
+    -------
+    distance : float
+        Greater than 0 before the event.
+    rate : float
+        [1/s].
+    round_off : float
     """
     n = motion.modes.shape[1]
-    way = motion.turn[TURN.direction]
+    direction = motion.turn[TURN.direction]
     q, v = steps.find_slide(motion, y)
     gain = 0.0
     for i in range(n):
         gain += motion.modes[MODE.slide, i] * slopes[n + i]
-    if what == END.stop:
-        return way * v, way * gain, speed_round_off(motion)
-    if what == END.kink:
-        path = way * (q - motion.now[NOW.origin])
+    if event == EVENT.stop:
+        return direction * v, direction * gain, speed_round_off(motion)
+    if event == EVENT.kink:
+        path = direction * (q - motion.scalars[SCALAR.origin])
         return (
             motion.turn[TURN.kink_path] - path,
-            -way * v,
-            1e-15 * (motion.now[NOW.max_coordinate] + motion.turn[TURN.kink_path]),
+            -direction * v,
+            1e-15 * (motion.scalars[SCALAR.max_coordinate] + motion.turn[TURN.kink_path]),
         )
-    if what == END.knee:
+    if event == EVENT.knee:
         side = 1.0 if motion.turn[TURN.is_above_knee] > 0 else -1.0
         floor = motion.turn[TURN.knee_velocity]
-        return side * (way * v - floor), side * way * gain, 1e-12 * floor
+        return side * (direction * v - floor), side * direction * gain, 1e-12 * floor
     # a set-valued law writes the remaining margin of its hold and of its load after its loss
-    if what >= END.release:
-        return slopes[2 * n + what - END.release + 1], 0.0, 0.0
+    if event >= EVENT.release:
+        return slopes[2 * n + event - EVENT.release + 1], 0.0, 0.0
     x, w = watch.find_output(motion, y)
     return travel - abs(x), -w if x > 0 else w, 1e-13 * travel
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def can_end(motion, what, travel):
-    """Return whether this event can occur in the motion."""
-    if what == END.kink:
+def can_occur(motion, event, travel):
+    """Return whether this event can occur in the motion.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    event : int
+        A number of `StepEvents`.
+    travel : float
+        Largest displacement of the output [m].
+
+    Returns
+    -------
+    bool
+    """
+    if event == EVENT.kink:
         return motion.turn[TURN.kink_path] < np.inf
-    if what == END.knee:
+    if event == EVENT.knee:
         return motion.turn[TURN.knee_velocity] > 0
-    if what >= END.release:
-        return law.IS_SET_VALUED and (what == END.lift or motion.turn[TURN.direction] == 0)
-    return motion.turn[TURN.direction] != 0 if what == END.stop else travel < np.inf
+    if event >= EVENT.release:
+        return law.IS_SET_VALUED and (event == EVENT.lift or motion.turn[TURN.direction] == 0)
+    return motion.turn[TURN.direction] != 0 if event == EVENT.stop else travel < np.inf
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def find_first_end(motion, h, travel, skip):
-    """Return the first event inside a step of h [s], and a guess of its fraction of the step.
+def find_first_event(motion, h, travel, skip):
+    """Find the first event inside a step.
 
     Cubics through both ends of the step give the guess.
 
-    skip: an event that is ignored. Without an event END.none and 1 are returned.
+    Parameters
+    ----------
+    motion : MotionArrays
+    h : float
+        Length of the step [s].
+    travel : float
+        Largest displacement of the output [m].
+    skip : int
+        An event that is ignored.
+
+    Returns
+    -------
+    event : int
+        EVENT.none where no event lies in the step.
+    fraction : float
+        Guess of the fraction of the step at which it occurs; 1 without an event.
     """
-    found = END.none
+    found = EVENT.none
     where = 1.0
-    for what in range(END.stop, END.lift + 1 if law.IS_SET_VALUED else END.travel + 1):
-        if what == skip or not can_end(motion, what, travel):
+    for event in range(EVENT.stop, EVENT.lift + 1 if law.IS_SET_VALUED else EVENT.travel + 1):
+        if event == skip or not can_occur(motion, event, travel):
             continue
-        b, rate_b, noise = distance_to_end(
-            motion, what, motion.work[WORK.trial], motion.work[12], travel
+        b, rate_b, noise = distance_to_event(
+            motion, event, motion.work[WORK.trial], motion.work[12], travel
         )
         if b >= -noise:
             continue
-        a, rate_a, _ = distance_to_end(motion, what, motion.state, motion.work[0], travel)
+        a, rate_a, _ = distance_to_event(motion, event, motion.state, motion.work[0], travel)
         a = max(a, 0.0)
         low = 0.0
         high = 1.0
         p = rate_a * h
         r = rate_b * h
         if a == 0:
-            low = high = find_return(p, b, r)
+            low = high = find_cubic_return(p, b, r)
         for _ in range(40 if a > 0 else 0):
             s = 0.5 * (low + high)
             remainder = 1 - s
@@ -118,20 +165,30 @@ def find_first_end(motion, h, travel, skip):
                 low = s
             else:
                 high = s
-        if found == END.none or high < where:
-            found = what
+        if found == EVENT.none or high < where:
+            found = event
             where = high
     return found, where
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def find_return(p, b, r):
+def find_cubic_return(p, b, r):
     """Return the fraction at which a cubic from 0 to b < 0 comes back to 0 from above.
 
-    It is 0 where the cubic is nowhere above.
+    Without the root at the start the cubic is p + mid s + big s^2; the root at which that decreases
+    counts.
 
-    p, r: its slopes at the ends over the step. Without the root at the start it is p + mid s + big
-    s^2; the root where that decreases counts.
+    Parameters
+    ----------
+    p, r : float
+        Slopes of the cubic at the ends, per step.
+    b : float
+        Its value at the end, less than 0.
+
+    Returns
+    -------
+    float
+        0 where the cubic is nowhere positive.
     """
     mid = 3 * b - 2 * p - r
     big = p + r - 2 * b
@@ -139,24 +196,42 @@ def find_return(p, b, r):
     if root < 0:
         return 0.0
     root = sqrt(root)
-    s = -(mid + root) / (2 * big) if mid > 0 else 2 * p / (root - mid) if root > mid else 0.0
+    s = 0.0
+    if mid > 0:
+        s = -(mid + root) / (2 * big)
+    elif root > mid:
+        s = 2 * p / (root - mid)
     return s if 0 < s < 1 else 0.0
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def locate_end(motion, h, what, share, travel):
-    """Return the length [s] of the step that ends at an event, by guarded Newton iterations.
+def locate_event(motion, h, event, fraction, travel):
+    """Return the length of the step that ends at an event, by guarded Newton iterations.
 
-    h: length [s] of a step beyond the event; share: guess of its fraction. work[WORK.trial]
-    becomes the state there.
+    Parameters
+    ----------
+    motion : MotionArrays
+    h : float
+        Length of a step beyond the event [s].
+    event : int
+        A number of `StepEvents`.
+    fraction : float
+        Guess of its fraction of the step.
+    travel : float
+        Largest displacement of the output [m].
+
+    Returns
+    -------
+    float
+        [s]; work[WORK.trial] becomes the state there.
     """
     low = 0.0
     high = h
-    at = max(share, 1e-12) * h
+    at = max(fraction, 1e-12) * h
     for turn in range(60):
         steps.take_step(motion, at)
-        value, rate, noise = distance_to_end(
-            motion, what, motion.work[WORK.trial], motion.work[12], travel
+        value, rate, noise = distance_to_event(
+            motion, event, motion.work[WORK.trial], motion.work[12], travel
         )
         if value > 0:
             low = at
@@ -165,32 +240,52 @@ def locate_end(motion, h, what, share, travel):
         new = at - value / rate if rate < 0 else 0.5 * (low + high)
         # a motion that leaves rest is within round-off of it too; it must not end there, or it would rest for ever
         there = abs(value) <= noise and rate < 0
-        if there or abs(new - at) <= 2e-16 * (motion.now[NOW.time] + at) or high - low <= 1e-15 * h:
+        if (
+            there
+            or abs(new - at) <= 2e-16 * (motion.scalars[SCALAR.time] + at)
+            or high - low <= 1e-15 * h
+        ):
             break
         at = new if low < new < high and turn < 20 else 0.5 * (low + high)
     return at
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def locate_release(motion, h, what, travel):
-    """Return the length [s] of the step that ends just after a law lets go.
+def locate_release(motion, h, event, travel):
+    """Return the length of the step that ends just after a law lets go.
 
-    The distance at the end of a step of h [s] is negative. Method: regula falsi with halved ends
-    (Illinois), then bisection. work[WORK.trial] becomes the state there.
+    Method: regula falsi with halved ends (Illinois), then bisection.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    h : float
+        Length of a step at whose end the distance is negative [s].
+    event : int
+        A number of `StepEvents`.
+    travel : float
+        Largest displacement of the output [m].
+
+    Returns
+    -------
+    float
+        [s]; work[WORK.trial] becomes the state there.
     """
-    a = max(distance_to_end(motion, what, motion.state, motion.work[0], travel)[0], 0.0)
-    b = distance_to_end(motion, what, motion.work[WORK.trial], motion.work[12], travel)[0]
+    a = max(distance_to_event(motion, event, motion.state, motion.work[0], travel)[0], 0.0)
+    b = distance_to_event(motion, event, motion.work[WORK.trial], motion.work[12], travel)[0]
     low = 0.0
     high = h
     for turn in range(80):
-        if high - low <= 1e-15 * (motion.now[NOW.time] + high) or high - low <= 1e-13 * h:
+        if high - low <= 1e-15 * (motion.scalars[SCALAR.time] + high) or high - low <= 1e-13 * h:
             break
         at = low + (high - low) * a / (a - b) if turn < 25 and a > b else 0.5 * (low + high)
         at = min(max(at, low + 1e-3 * (high - low)), high - 1e-3 * (high - low)) if turn < 4 else at
         if not low < at < high:
             at = 0.5 * (low + high)
         steps.take_step(motion, at)
-        value = distance_to_end(motion, what, motion.work[WORK.trial], motion.work[12], travel)[0]
+        value = distance_to_event(motion, event, motion.work[WORK.trial], motion.work[12], travel)[
+            0
+        ]
         if value < 0:
             high = at
             b = value
@@ -204,7 +299,7 @@ def locate_release(motion, h, what, travel):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def find_dip(motion, h):
+def find_speed_dip(motion, h):
     """Return the fraction of a step of h [s] at which the speed may dip below zero.
 
     It is 0 where it does not.
@@ -213,19 +308,30 @@ def find_dip(motion, h):
     """
     if motion.turn[TURN.direction] == 0:
         return 0.0
-    a, p, _ = distance_to_end(motion, END.stop, motion.state, motion.work[0], np.inf)
-    b, r, _ = distance_to_end(motion, END.stop, motion.work[WORK.trial], motion.work[12], np.inf)
+    a, p, _ = distance_to_event(motion, EVENT.stop, motion.state, motion.work[0], np.inf)
+    b, r, _ = distance_to_event(
+        motion, EVENT.stop, motion.work[WORK.trial], motion.work[12], np.inf
+    )
     return find_cubic_dip(a, p * h, b, r * h)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_cubic_dip(a, p, b, r):
-    """Return the fraction at which a positive cubic may dip below zero, 0 if none.
+    """Return the fraction at which a positive cubic may fall below zero.
 
-    a, b: its values at the ends, both > 0.
+    The cubic errs by s^2 (1 - s)^2 of the fourth derivative/24, so a minimum near zero counts.
 
-    p, r: its slopes at the ends over the step. The cubic errs by s^2 (1 - s)^2 of the fourth
-    derivative/24, so a minimum near zero counts.
+    Parameters
+    ----------
+    a, b : float
+        Values of the cubic at the ends, both greater than 0.
+    p, r : float
+        Its slopes at the ends, per step.
+
+    Returns
+    -------
+    float
+        0 where it does not.
     """
     if p >= 0 or r <= 0 or a <= 0 or b <= 0:
         return 0.0
@@ -246,29 +352,30 @@ def find_cubic_dip(a, p, b, r):
 def speed_round_off(motion):
     """Return the round-off of the velocity [m/s], below which the interface is at rest."""
     return 4e-16 * (
-        motion.now[NOW.max_rate] + motion.now[NOW.fastest_rate] * motion.now[NOW.max_coordinate]
+        motion.scalars[SCALAR.max_rate]
+        + motion.scalars[SCALAR.fastest_rate] * motion.scalars[SCALAR.max_coordinate]
     )
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def start_direction(motion, way):
+def start_direction(motion, direction):
     """Start the motion in a direction from the present state: states of the law, and slopes."""
     n = motion.modes.shape[1]
     q, v = steps.find_slide(motion, motion.state)
-    motion.now[NOW.origin] = q
-    motion.turn[TURN.direction] = way
+    motion.scalars[SCALAR.origin] = q
+    motion.turn[TURN.direction] = direction
     states = motion.state[2 * n : motion.state.size - 3]
     motion.turn[TURN.kink_path], floor = law.start_motion(
-        motion.numbers[0], motion.memory[0], way, states
+        motion.numbers[0], motion.memory[0], direction, states
     )
-    motion.turn[TURN.is_above_knee] = 1.0 if way * v > floor else 0.0
+    motion.turn[TURN.is_above_knee] = 1.0 if direction * v > floor else 0.0
     motion.turn[TURN.knee_velocity] = floor
-    steps.write_slopes(motion, motion.now[NOW.time], motion.state, motion.work[0])
+    steps.write_slopes(motion, motion.scalars[SCALAR.time], motion.state, motion.work[0])
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def end_direction(motion, record):
-    """End the motion in one direction: update the memory of the law and add what it dissipated."""
+    """End the motion in one direction: update the memory of the law and add event it dissipated."""
     n = motion.modes.shape[1]
     size = motion.state.size
     q, v, _, before, _ = watch.read_interface(motion, motion.state)
@@ -276,21 +383,21 @@ def end_direction(motion, record):
         motion.numbers[0],
         motion.memory[0],
         motion.turn,
-        q - motion.now[NOW.origin],
+        q - motion.scalars[SCALAR.origin],
         v,
         motion.state[2 * n : size - 3],
     )
     if np.isnan(lost):
-        lost = motion.state[size - 1] - motion.now[NOW.start_loss] - before
-        motion.now[NOW.start_loss] = motion.state[size - 1] - before
+        lost = motion.state[size - 1] - motion.scalars[SCALAR.start_loss] - before
+        motion.scalars[SCALAR.start_loss] = motion.state[size - 1] - before
     record.counters[COUNT.friction_loss] += lost
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def choose_direction(motion):
-    """Return the direction of a motion that starts, by velocity, acceleration or what follows."""
+    """Return the direction of a motion that starts, by velocity, acceleration or event follows."""
     n = motion.modes.shape[1]
-    t = motion.now[NOW.time]
+    t = motion.scalars[SCALAR.time]
     v = steps.find_slide(motion, motion.state)[1]
     if v != 0:
         return 1.0 if v > 0 else -1.0
@@ -304,7 +411,9 @@ def choose_direction(motion):
         if gain != 0:
             return 1.0 if gain > 0 else -1.0
         if look == 0:
-            steps.write_slopes(motion, t + motion.now[NOW.step], motion.state, motion.work[1])
+            steps.write_slopes(
+                motion, t + motion.scalars[SCALAR.step], motion.state, motion.work[1]
+            )
     return 1.0
 
 
@@ -312,7 +421,7 @@ def choose_direction(motion):
 def find_release_direction(motion):
     """Return the direction in which a law lets go of the interface at rest, or 0."""
     motion.turn[TURN.direction] = 0.0
-    steps.write_slopes(motion, motion.now[NOW.time], motion.state, motion.work[0])
+    steps.write_slopes(motion, motion.scalars[SCALAR.time], motion.state, motion.work[0])
     return motion.turn[TURN.release_direction]
 
 
@@ -340,11 +449,11 @@ def reverse_or_continue(motion, period):
     direction of its velocity an instant after the stop, v + a t + j t^2/2.
     """
     n = motion.modes.shape[1]
-    t = motion.now[NOW.time]
-    way = -motion.turn[TURN.direction]
-    start_direction(motion, way)
+    t = motion.scalars[SCALAR.time]
+    direction = -motion.turn[TURN.direction]
+    start_direction(motion, direction)
     ahead = INSTANT_FRACTION * period
-    near = 1e-3 * motion.now[NOW.step]
+    near = 1e-3 * motion.scalars[SCALAR.step]
     gain = 0.0
     later = 0.0
     for c in range(motion.state.size):
@@ -355,35 +464,61 @@ def reverse_or_continue(motion, period):
         later += motion.modes[MODE.slide, i] * motion.work[1, n + i]
     v = steps.find_slide(motion, motion.state)[1]
     jerk = (later - gain) / near
-    if way * (v + ahead * (gain + 0.5 * ahead * jerk)) >= 0:
+    if direction * (v + ahead * (gain + 0.5 * ahead * jerk)) >= 0:
         return True
-    start_direction(motion, -way)
+    start_direction(motion, -direction)
     return False
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def accept_step(motion, h, record):
-    """Move on by the step of h [s] in work[WORK.trial]."""
+    """Move the state by the step in work[WORK.trial].
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    h : float
+        Length of the step [s].
+    record : MotionRecord
+    """
     n = motion.modes.shape[1]
     fade = 1 - min(h / (FADING_CYCLES * record.counters[COUNT.period]), 1.0)
-    motion.now[NOW.max_coordinate] *= fade
-    motion.now[NOW.max_rate] *= fade
+    motion.scalars[SCALAR.max_coordinate] *= fade
+    motion.scalars[SCALAR.max_rate] *= fade
     for c in range(motion.state.size):
         motion.state[c] = motion.work[WORK.trial, c]
         motion.work[0, c] = motion.work[12, c]
     if law.IS_SET_VALUED and motion.turn[TURN.direction] == 0:
         stop_slide(motion)
     for i in range(n):
-        motion.now[NOW.max_coordinate] = max(motion.now[NOW.max_coordinate], abs(motion.state[i]))
-        motion.now[NOW.max_rate] = max(motion.now[NOW.max_rate], abs(motion.state[n + i]))
-    motion.now[NOW.time] += h
+        motion.scalars[SCALAR.max_coordinate] = max(
+            motion.scalars[SCALAR.max_coordinate], abs(motion.state[i])
+        )
+        motion.scalars[SCALAR.max_rate] = max(
+            motion.scalars[SCALAR.max_rate], abs(motion.state[n + i])
+        )
+    motion.scalars[SCALAR.time] += h
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def try_step(motion, h, tolerance, record):
-    """Take a step of at most h [s] whose error meets the tolerance.
+    """Take a step whose error meets the tolerance.
 
-    Returns its length and the next one [s].
+    Parameters
+    ----------
+    motion : MotionArrays
+    h : float
+        Largest length [s].
+    tolerance : float
+        Relative tolerance of a step.
+    record : MotionRecord
+
+    Returns
+    -------
+    h : float
+        Length of the step [s]; 0 where no step meets the tolerance.
+    next_step : float
+        Length of the next step [s].
     """
     if law.IS_SET_VALUED:
         h = min(
@@ -396,7 +531,7 @@ def try_step(motion, h, tolerance, record):
         steps.take_step(motion, h)
         error = steps.estimate_error(motion, h, tolerance)
         if error <= 1:
-            dip = find_dip(motion, h)
+            dip = find_speed_dip(motion, h)
             if dip == 0:
                 grow = (
                     MAX_STEP_FACTOR
@@ -416,40 +551,48 @@ def try_step(motion, h, tolerance, record):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def pass_end(motion, record, what):
-    """Go on after the end of a step: in the other direction, or with the next branch of the law."""
+def pass_event(motion, record, event):
+    """Continue after an event: in the other direction, or with the next branch of the law.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    record : MotionRecord
+    event : int
+        A number of `StepEvents`.
+    """
     n = motion.modes.shape[1]
-    if law.IS_SET_VALUED and what in (END.stop, END.release):
+    if law.IS_SET_VALUED and event in (EVENT.stop, EVENT.release):
         stop_slide(motion)
         end_direction(motion, record)
-        way = find_release_direction(motion)
-        start_direction(motion, way)
-        if way != 0 or what == END.stop:
+        direction = find_release_direction(motion)
+        start_direction(motion, direction)
+        if direction != 0 or event == EVENT.stop:
             watch.write_sample(
                 motion,
-                motion.now[NOW.time],
+                motion.scalars[SCALAR.time],
                 motion.state,
                 record.turns[int(record.counters[COUNT.n_turns])],
             )
             record.counters[COUNT.n_turns] += 1
-    elif what == END.stop:
+    elif event == EVENT.stop:
         if n == 1:
             motion.state[1] = 0.0  # removes the round-off of the velocity
         end_direction(motion, record)
         if reverse_or_continue(motion, record.counters[COUNT.period]):
             watch.write_sample(
                 motion,
-                motion.now[NOW.time],
+                motion.scalars[SCALAR.time],
                 motion.state,
                 record.turns[int(record.counters[COUNT.n_turns])],
             )
             record.counters[COUNT.n_turns] += 1
-    elif what == END.kink:
+    elif event == EVENT.kink:
         end_direction(motion, record)
         start_direction(motion, motion.turn[TURN.direction])
-    elif what == END.knee:
+    elif event == EVENT.knee:
         motion.turn[TURN.is_above_knee] = 1 - motion.turn[TURN.is_above_knee]
-        steps.write_slopes(motion, motion.now[NOW.time], motion.state, motion.work[0])
+        steps.write_slopes(motion, motion.scalars[SCALAR.time], motion.state, motion.work[0])
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -457,52 +600,117 @@ def start_from_state(motion, record):
     """Start a motion from the present state."""
     n = motion.modes.shape[1]
     for i in range(n):
-        motion.now[NOW.max_coordinate] = max(motion.now[NOW.max_coordinate], abs(motion.state[i]))
-        motion.now[NOW.max_rate] = max(motion.now[NOW.max_rate], abs(motion.state[n + i]))
+        motion.scalars[SCALAR.max_coordinate] = max(
+            motion.scalars[SCALAR.max_coordinate], abs(motion.state[i])
+        )
+        motion.scalars[SCALAR.max_rate] = max(
+            motion.scalars[SCALAR.max_rate], abs(motion.state[n + i])
+        )
     start_direction(motion, choose_direction(motion))
     record.counters[COUNT.max_stored] = watch.stored_energy(motion, motion.state)
-    motion.now[NOW.start_loss] = (
+    motion.scalars[SCALAR.start_loss] = (
         motion.state[motion.state.size - 1] - watch.read_interface(motion, motion.state)[3]
     )
-    motion.now[NOW.stage] = 1.0
+    motion.scalars[SCALAR.stage] = 1.0
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def take_samples(motion, record):
     """Write the samples that are due at the present time."""
     at = int(record.counters[COUNT.next_sample])
-    while at < record.samples.shape[0] and record.samples[at, 0] <= motion.now[NOW.time]:
-        watch.write_sample(motion, motion.now[NOW.time], motion.state, record.samples[at])
+    while at < record.samples.shape[0] and record.samples[at, 0] <= motion.scalars[SCALAR.time]:
+        watch.write_sample(motion, motion.scalars[SCALAR.time], motion.state, record.samples[at])
         at += 1
     record.counters[COUNT.next_sample] = at
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def resume(motion):
-    """Return AT_STOP where the motion was left at a reversal because no row was free, else 0."""
-    fresh = AT_STOP if motion.now[NOW.stage] == AT_REVERSAL else 0
-    motion.now[NOW.stage] = 1.0
-    return fresh
+def find_stop_state(motion):
+    """Return AT_STOP where the motion was left at a reversal because no row was free, else NOT_AT_STOP."""
+    stop_state = AT_STOP if motion.scalars[SCALAR.stage] == AT_REVERSAL else NOT_AT_STOP
+    motion.scalars[SCALAR.stage] = 1.0
+    return stop_state
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def locate_first_end(motion, taken, what, share, travel):
-    """Return the length [s] of a tried step up to the first end in it, and what ends it."""
-    while what != END.none:
+def locate_first_event(motion, taken, event, fraction, travel):
+    """Return the length of a tried step up to the first event in it, and that event.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    taken : float
+        Length of the tried step [s].
+    event : int
+        A number of `StepEvents`.
+    fraction : float
+        Guess of the fraction of the step at which the event occurs.
+    travel : float
+        Largest displacement of the output [m].
+
+    Returns
+    -------
+    taken : float
+        Length of the step [s].
+    event : int
+    """
+    while event != EVENT.none:
         taken = (
-            locate_end(motion, taken, what, share, travel)
-            if what < END.release
-            else locate_release(motion, taken, what, travel)
+            locate_event(motion, taken, event, fraction, travel)
+            if event < EVENT.release
+            else locate_release(motion, taken, event, travel)
         )
-        other, share = find_first_end(motion, taken, travel, what)
-        if other == END.none:
+        other, fraction = find_first_event(motion, taken, travel, event)
+        if other == EVENT.none:
             break
-        what = other
-    return taken, what
+        event = other
+    return taken, event
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def meets_tolerance(motion, taken, tolerance, record):
+    """Return whether a step that an event has shortened meets the tolerance, else shorten the next one.
+
+    The stages of the longer tried step may have missed strong curvature near the event.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    taken : float
+        Length of the step [s].
+    tolerance : float
+        Relative tolerance of a step.
+    record : MotionRecord
+
+    Returns
+    -------
+    bool
+    """
+    error = steps.estimate_error(motion, taken, tolerance)
+    if error > 1:
+        motion.scalars[SCALAR.step] = taken * max(STEP_SAFETY * error**-0.125, MIN_STEP_FACTOR)
+        record.counters[COUNT.refused] += 1
+        return False
+    return True
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def count_tried_steps(record):
+    """Return the number of steps that were accepted or refused."""
+    return record.counters[COUNT.accepted] + record.counters[COUNT.refused]
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def has_free_rows(record):
+    """Return whether a step can record its reversal and its parts."""
+    if record.counters[COUNT.n_turns] >= record.turns.shape[0]:
+        return False
+    n_rows = record.parts.shape[0]
+    return n_rows == 0 or n_rows >= record.counters[COUNT.n_parts] + watch.MAX_PARTS
 
 
 @njit(error_model="numpy", cache=True, nogil=True, **NJIT_NO_REFCOUNT)
-def advance(motion, record, until, edge, tolerance, travel):
+def advance_motion(motion, record, until, edge, tolerance, travel):
     """Move on to a time, or to the end of a segment of the drive.
 
     Parameters
@@ -522,90 +730,97 @@ def advance(motion, record, until, edge, tolerance, travel):
         A number of `CallStatus`. After `full` and `paused` the next call goes on as if the motion
         had not been left.
     """
-    if motion.now[NOW.stage] == 0:
+    if motion.scalars[SCALAR.stage] == 0:
         start_from_state(motion, record)
     end = min(until, edge)
-    fresh = resume(motion)
-    if motion.now[NOW.slope_segment] != motion.now[NOW.segment]:  # the drive has changed
-        steps.write_slopes(motion, motion.now[NOW.time], motion.state, motion.work[0])
-        motion.now[NOW.slope_segment] = motion.now[NOW.segment]
+    stop_state = find_stop_state(motion)
+    if motion.scalars[SCALAR.slope_segment] != motion.scalars[SCALAR.segment]:
+        # the drive has changed
+        steps.write_slopes(motion, motion.scalars[SCALAR.time], motion.state, motion.work[0])
+        motion.scalars[SCALAR.slope_segment] = motion.scalars[SCALAR.segment]
     take_samples(motion, record)
-    begun = motion.now[NOW.time]
-    tried = record.counters[COUNT.accepted] + record.counters[COUNT.refused]
-    while motion.now[NOW.time] < end:
-        full = (
-            record.counters[COUNT.n_turns] >= record.turns.shape[0]
-            or 0 < record.parts.shape[0] < record.counters[COUNT.n_parts] + watch.MAX_PARTS
+    begin = motion.scalars[SCALAR.time]
+    n_before = count_tried_steps(record)
+    while motion.scalars[SCALAR.time] < end:
+        is_full = not has_free_rows(record)
+        is_spent = (
+            count_tried_steps(record) - n_before > MAX_TRIED_STEPS
+            and stop_state != DIRECTION_CHANGED
         )
-        spent = (
-            record.counters[COUNT.accepted] + record.counters[COUNT.refused] - tried > MAX_TRIES
-            and fresh != FLIPPED
-        )
-        if spent and motion.now[NOW.time] - begun < MIN_PROGRESS / motion.now[NOW.fastest_rate]:
+        progress = motion.scalars[SCALAR.time] - begin
+        if is_spent and progress < MIN_PROGRESS / motion.scalars[SCALAR.fastest_rate]:
             return STATUS.no_step
-        if full or spent:
-            motion.now[NOW.stage] = AT_REVERSAL if fresh > 0 else 1.0
-            return STATUS.full if full else STATUS.paused
-        remaining = end - motion.now[NOW.time]
-        whole = motion.now[NOW.step] >= remaining * (1 - 1e-9)
-        h, wanted = try_step(
-            motion, remaining if whole else motion.now[NOW.step], tolerance, record
+        if is_full or is_spent:
+            motion.scalars[SCALAR.stage] = AT_REVERSAL if stop_state > 0 else 1.0
+            return STATUS.full if is_full else STATUS.paused
+        remaining = end - motion.scalars[SCALAR.time]
+        is_last = motion.scalars[SCALAR.step] >= remaining * (1 - 1e-9)
+        h, next_step = try_step(
+            motion, remaining if is_last else motion.scalars[SCALAR.step], tolerance, record
         )
         if h <= 1e-16 * end:
             return STATUS.no_step
-        taken = h
-        what, share = find_first_end(motion, h, travel, END.none)
-        if (
-            what == END.stop
-            and fresh > 0
-            and share * h < INSTANT_FRACTION * record.counters[COUNT.period]
-        ):
-            if fresh == FLIPPED:  # the motion stops in both directions, which a smooth law excludes
+        event, fraction = find_first_event(motion, h, travel, EVENT.none)
+        is_at_stop = (
+            event == EVENT.stop
+            and stop_state > 0
+            and fraction * h < INSTANT_FRACTION * record.counters[COUNT.period]
+        )
+        if is_at_stop:
+            # the motion stops in both directions, which a smooth law excludes
+            if stop_state == DIRECTION_CHANGED:
                 return STATUS.no_step
             start_direction(motion, -motion.turn[TURN.direction])
-            fresh = FLIPPED
+            stop_state = DIRECTION_CHANGED
             continue
-        taken, what = locate_first_end(motion, taken, what, share, travel)
-        # the stages of the longer tried step may have missed strong curvature near the event, so the error of the
-        # shortened step is checked as well
-        if what != END.none:
-            error = steps.estimate_error(motion, taken, tolerance)
-            if error > 1:
-                motion.now[NOW.step] = taken * max(STEP_SAFETY * error**-0.125, MIN_STEP_FACTOR)
-                record.counters[COUNT.refused] += 1
-                continue
+        taken, event = locate_first_event(motion, h, event, fraction, travel)
+        if event != EVENT.none and not meets_tolerance(motion, taken, tolerance, record):
+            continue
         watch.record_step(motion, taken, record)
         accept_step(motion, taken, record)
-        if whole and taken == remaining:
-            motion.now[NOW.time] = end
-        motion.now[NOW.step] = (
-            max(wanted, motion.now[NOW.step]) if whole and h == remaining else wanted
-        )
-        if fresh == AT_STOP:
-            motion.now[NOW.first_step] = wanted
-        fresh = 0
+        if is_last and taken == remaining:
+            motion.scalars[SCALAR.time] = end
+        if is_last and h == remaining:
+            motion.scalars[SCALAR.step] = max(next_step, motion.scalars[SCALAR.step])
+        else:
+            motion.scalars[SCALAR.step] = next_step
+        if stop_state == AT_STOP:
+            motion.scalars[SCALAR.first_step] = next_step
+        stop_state = NOT_AT_STOP
         if not np.isfinite(motion.state[0]):
             return STATUS.not_finite
-        if what == END.travel or what == END.lift:
-            return STATUS.travel if what == END.travel else STATUS.lifted
-        if what != END.none:
-            pass_end(motion, record, what)
-            if what == END.stop or what == END.release:
-                fresh = AT_STOP
-                motion.now[NOW.step] = min(motion.now[NOW.first_step], motion.now[NOW.step])
+        if event == EVENT.travel or event == EVENT.lift:
+            return STATUS.travel if event == EVENT.travel else STATUS.lifted
+        if event != EVENT.none:
+            pass_event(motion, record, event)
+            if event == EVENT.stop or event == EVENT.release:
+                stop_state = AT_STOP
+                motion.scalars[SCALAR.step] = min(
+                    motion.scalars[SCALAR.first_step], motion.scalars[SCALAR.step]
+                )
     take_samples(motion, record)
     return STATUS.finished
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def read_state(motion, record, row):
-    """Write the sample of the present state into row.
-
-    Returns the energy of modes and interface [J].
+    """Write the sample of the present state.
 
     The memory of the law moves to this state, so it is called on a copy of the motion.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    record : MotionRecord
+    row : ndarray
+        (2 n + 7,) sample, which is written.
+
+    Returns
+    -------
+    float
+        Energy of modes and interface [J].
     """
     out = watch.stored_energy(motion, motion.state)
-    watch.write_sample(motion, motion.now[NOW.time], motion.state, row)
+    watch.write_sample(motion, motion.scalars[SCALAR.time], motion.state, row)
     end_direction(motion, record)
     return out

@@ -1,7 +1,7 @@
 """Measures of the last cycles of a motion, from its steps as polynomials.
 
 Each part of a step is the polynomial through its samples at Chebyshev points
-(`arrays.NODE_PLACES`), so a number that is smooth inside the part is known to as many digits as
+(`arrays.NODE_FRACTIONS`), so a number that is smooth inside the part is known to as many digits as
 the step itself. Peaks are the maxima of the polynomials, integrals those of the polynomials.
 Source: Trefethen, Approximation Theory and Approximation Practice (2013), ch. 5 and 19.
 """
@@ -13,13 +13,13 @@ from numpy.polynomial import chebyshev
 
 from ...core import IntegratedMeasures, InterfaceLoop
 from ...structure.drive_sizes import is_sinusoidal
-from .arrays import N_NODES, NODE_PLACES
+from .arrays import N_NODES, NODE_FRACTIONS
 
 # fractions of a step between which slip begins or ends at most once; two are close to the ends, as a stick may be short
-FINE_PLACES = np.sort(np.append((1 - np.cos(np.pi * np.arange(25) / 24)) / 2, [1e-3, 1 - 1e-3]))
+FINE_FRACTIONS = np.sort(np.append((1 - np.cos(np.pi * np.arange(25) / 24)) / 2, [1e-3, 1 - 1e-3]))
 # fractions of a step among which a maximum is searched for; a parabola through three is right to 1e-11 of its rise
-FINEST_PLACES = np.linspace(0.0, 1.0, 257)
-# steps with the largest values at FINE_PLACES, in which a maximum is searched for
+FINEST_FRACTIONS = np.linspace(0.0, 1.0, 257)
+# steps with the largest values at FINE_FRACTIONS, in which a maximum is searched for
 MAX_CANDIDATES = 6
 # rise of a number above its values at the nodes over its range in the step, at most
 MAX_RISE_RATIO = 0.5
@@ -37,20 +37,20 @@ SLIDE_TOL = 1e-13
 REST_SPEED_RATIO = 1e-7
 
 
-def interpolation_matrix(places) -> np.ndarray:
-    """Return the matrix (p, N_NODES) from values at NODE_PLACES to those elsewhere.
+def make_interpolation_matrix(fractions) -> np.ndarray:
+    """Return the matrix (p, N_NODES) from values at NODE_FRACTIONS to those elsewhere.
 
-    places: fractions (p,) of a step.
+    fractions: (p,) of a step.
     """
-    return chebyshev.chebvander(2 * np.asarray(places) - 1, N_NODES - 1) @ TO_CHEBYSHEV
+    return chebyshev.chebvander(2 * np.asarray(fractions) - 1, N_NODES - 1) @ TO_CHEBYSHEV
 
 
-def evaluate_powers(terms, share):
+def evaluate_powers(terms, fraction):
     """Evaluate k polynomials in powers of 2 fraction - 1 at fractions (k,).
 
     terms: (k, N_NODES) coefficients.
     """
-    x = 2 * share - 1
+    x = 2 * fraction - 1
     out = terms[:, -1]
     for power in range(N_NODES - 2, -1, -1):
         out = out * x + terms[:, power]
@@ -65,17 +65,17 @@ def apply_matrix(values, matrix) -> np.ndarray:
     return np.einsum("kj,pj->kp", values, matrix)
 
 
-# matrix from values at NODE_PLACES to Chebyshev coefficients
-TO_CHEBYSHEV = np.linalg.inv(chebyshev.chebvander(2 * NODE_PLACES - 1, N_NODES - 1))
+# matrix from values at NODE_FRACTIONS to Chebyshev coefficients
+TO_CHEBYSHEV = np.linalg.inv(chebyshev.chebvander(2 * NODE_FRACTIONS - 1, N_NODES - 1))
 # matrix from values to slopes over a step
-TO_SLOPES = chebyshev.chebvander(2 * NODE_PLACES - 1, N_NODES - 2) @ (
+TO_SLOPES = chebyshev.chebvander(2 * NODE_FRACTIONS - 1, N_NODES - 2) @ (
     2 * chebyshev.chebder(TO_CHEBYSHEV)
 )
 # matrix from values to coefficients of powers of 2 fraction - 1
-TO_POWERS = np.linalg.inv(np.vander(2 * NODE_PLACES - 1, N_NODES, increasing=True))
-TO_FINE = interpolation_matrix(FINE_PLACES)
-TO_FINEST = interpolation_matrix(FINEST_PLACES)
-TO_GAUSS = interpolation_matrix(GAUSS_POINTS)
+TO_POWERS = np.linalg.inv(np.vander(2 * NODE_FRACTIONS - 1, N_NODES, increasing=True))
+TO_FINE = make_interpolation_matrix(FINE_FRACTIONS)
+TO_FINEST = make_interpolation_matrix(FINEST_FRACTIONS)
+TO_GAUSS = make_interpolation_matrix(GAUSS_POINTS)
 
 
 class StepParts:
@@ -109,7 +109,7 @@ class StepParts:
             ]
         seen = apply_matrix(values[steps], TO_FINEST)
         every = np.arange(len(steps))
-        at = np.clip(np.argmax(seen, axis=1), 1, FINEST_PLACES.size - 2)
+        at = np.clip(np.argmax(seen, axis=1), 1, FINEST_FRACTIONS.size - 2)
         left, mid, right = (seen[every, at + side] for side in (-1, 0, 1))
         bend = np.minimum(left - 2 * mid + right, 0.0)
         rise = np.where(
@@ -139,7 +139,21 @@ class StepParts:
         return complex(2 / self.length.sum() * np.sum(values * self.carrier**number))
 
     def mean(self, name: str, begin: float, end: float) -> float:
-        """Return the time mean of a number from `begin` to `end` [s]."""
+        """Return the time mean of a quantity.
+
+        Parameters
+        ----------
+        name : str
+            Name of a quantity of the response.
+        begin : float
+            [s].
+        end : float
+            [s].
+
+        Returns
+        -------
+        float
+        """
         length = np.maximum(self.length, 1e-300)  # a step at an event has the length 0
         low, high = (np.clip((edge - self.begin) / length, 0.0, 1.0) for edge in (begin, end))
         part = np.flatnonzero(high > low)
@@ -156,7 +170,10 @@ class StepParts:
                 * self.length[k]
                 * float(
                     GAUSS_WEIGHTS
-                    @ (interpolation_matrix(low[k] + size * GAUSS_POINTS) @ self.values(name)[k])
+                    @ (
+                        make_interpolation_matrix(low[k] + size * GAUSS_POINTS)
+                        @ self.values(name)[k]
+                    )
                 )
             )
         return total / (end - begin)
@@ -193,15 +210,17 @@ class StepParts:
         still, slip, slide, begin, length = (
             one[shows] for one in (still, slip, slide, self.begin, self.length)
         )
-        last_moving = np.maximum.accumulate(np.where(still, 0, np.arange(FINE_PLACES.size)), axis=1)
+        last_moving = np.maximum.accumulate(
+            np.where(still, 0, np.arange(FINE_FRACTIONS.size)), axis=1
+        )
         beside = np.maximum(last_moving, np.argmin(still, axis=1)[:, None])
         seen = np.take_along_axis((moves - SLIP_FRACTION * slides)[shows], beside, axis=1)
         before = seen[:, :-1]
         after = seen[:, 1:]
         turns = (before < 0) != (after < 0)
         steps, at = np.nonzero(turns)
-        low = FINE_PLACES[at]
-        high = FINE_PLACES[at + 1]
+        low = FINE_FRACTIONS[at]
+        high = FINE_FRACTIONS[at + 1]
         below = before[steps, at] < 0
         one, other = (apply_matrix(rates[steps], TO_POWERS) for rates in (slip, slide))
         for _ in range(N_BISECTIONS):
@@ -212,8 +231,8 @@ class StepParts:
             ) == below
             low = np.where(same, middle, low)
             high = np.where(same, high, middle)
-        part = (before < 0) * np.diff(FINE_PLACES) * ~turns
-        part[steps, at] = np.where(below, low - FINE_PLACES[at], FINE_PLACES[at + 1] - low)
+        part = (before < 0) * np.diff(FINE_FRACTIONS) * ~turns
+        part[steps, at] = np.where(below, low - FINE_FRACTIONS[at], FINE_FRACTIONS[at + 1] - low)
         times = begin[steps] + low * length[steps]
         between = np.flatnonzero((seen[:-1, -1] < 0) & (seen[1:, 0] >= 0))
         return float((part.sum(axis=1) * length).sum()), np.append(times[below], begin[between + 1])
@@ -243,24 +262,24 @@ def measure_parts(response, drive, ends) -> tuple:
         name: [parts.find_maximum(way * parts.values(name)) for way in (1, -1)]
         for name in ("acceleration", "force", "slip", "output")
     }
-    gain, unsure = max(peaks["acceleration"])
-    pull, loose = max(peaks["force"])
+    gain, peak_error = max(peaks["acceleration"])
+    max_force, force_error = max(peaks["force"])
     slip, swing = ((up + down) / 2 for (up, _), (down, _) in (peaks["slip"], peaks["output"]))
-    held, starts = parts.find_sticks()
+    stuck_time, starts = parts.find_sticks()
     loop = InterfaceLoop(
         parts.harmonic("slide"),
         parts.harmonic("force"),
         after[3] - before[3],
         2 * slip,
-        min(held, parts.time[-1, -1] - parts.time[0, 0]),
-        pull,
+        min(stuck_time, parts.time[-1, -1] - parts.time[0, 0]),
+        max_force,
     )
     phases = 2 * np.pi * starts / period % np.pi
     return IntegratedMeasures(
         swing, gain, parts.drift(), _acceleration_harmonics(parts, drive, ends), (loop,), phases
     ), {
-        "absolute_acceleration_peak": unsure,
-        "friction_force_peak": loose,
+        "absolute_acceleration_peak": peak_error,
+        "friction_force_peak": force_error,
     }
 
 

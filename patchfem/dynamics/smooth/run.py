@@ -17,7 +17,7 @@ from ..events.positions_kernels import KIND, SEGMENT
 from ..integrated import make_histories
 from ..march.march import MarchResult
 from ..periodicity import FIRST_CHECK, bound_remaining_change
-from .arrays import COUNT, N_NODES, NOW, STATUS, WORK, MotionArrays, MotionRecord
+from .arrays import COUNT, N_NODES, SCALAR, STATUS, WORK, MotionArrays, MotionRecord
 from .reader import measure_parts
 
 # samples of a cycle in the window
@@ -25,11 +25,11 @@ SAMPLES_PER_CYCLE = 400
 # samples of the window of a run that is shorter than a cycle
 MIN_SAMPLES = 101
 # rows for reversals that one call of the loop fills
-TURNS_PER_CALL = 4096
+REVERSALS_PER_CALL = 4096
 # rows for parts of steps that one call of the loop fills
 PARTS_PER_CALL = 1024
 # reversals that are kept from before the window
-MAX_KEPT_TURNS = 400_000
+MAX_KEPT_REVERSALS = 400_000
 # tolerance of the last cycles over that of the run, as they are read inside the steps, where the error is larger
 LAST_TOLERANCE_RATIO = 0.01
 # windows whose phasors are kept; a steady amplitude takes five (`response.settling.extrapolate_steady_amplitudes`)
@@ -40,7 +40,7 @@ FIRST_STEP_RATIO = 1e-3
 MAX_REPEAT_CHANGE = 10.0
 # change of the extremes between two cycles over MAX_REPEAT_CHANGE, as their steps lie at other times
 MAX_CYCLE_RATIO = 10.0
-HERE = "dynamics.smooth"
+FOLDER = "dynamics.smooth"
 
 
 @cache
@@ -50,10 +50,10 @@ def load_loop(law: str, say=None):
     say: is called before it is compiled.
     """
     law = compiled.load(law, say)
-    steps = compiled.instantiate(f"{HERE}.step_kernels", {"law": law})
-    watch = compiled.instantiate(f"{HERE}.watch_kernels", {"law": law, "steps": steps})
+    steps = compiled.instantiate(f"{FOLDER}.step_kernels", {"law": law})
+    watch = compiled.instantiate(f"{FOLDER}.watch_kernels", {"law": law, "steps": steps})
     return compiled.instantiate(
-        f"{HERE}.loop_kernels", {"law": law, "steps": steps, "watch": watch}
+        f"{FOLDER}.loop_kernels", {"law": law, "steps": steps, "watch": watch}
     )
 
 
@@ -61,17 +61,17 @@ def load_loop(law: str, say=None):
 class SmoothResult(MarchResult):
     """Result of the smooth engine: that of a march, and statistics of the integrator.
 
-    - fine: measures of the last cycles, integrated over their steps
-    - unsure: errors of peaks [unit of the measure] by measure
-    - turned: the last cycles with samples at reversals
-    - repeat_change: change that the motion would still make, over its size, where its last cycles
-      stand for others
+    - integrated: measures of the last cycles, integrated over their steps
+    - peak_errors: errors of peaks [unit of the measure] by measure
+    - with_reversals: histories of the last cycles with samples at reversals
+    - repeat_change: change that the motion would still make, over its size, where cycles were
+    skipped
     - tolerance: relative tolerance of its steps
     """
 
-    fine: IntegratedMeasures | None = None
-    unsure: dict = field(default_factory=dict)
-    turned: Response | None = None
+    integrated: IntegratedMeasures | None = None
+    peak_errors: dict = field(default_factory=dict)
+    with_reversals: Response | None = None
     repeat_change: float = 0.0
     tolerance: float = 0.0
 
@@ -108,24 +108,24 @@ def start_arrays(modes: ModalBasis, drive, element, cycles: float, start=None) -
         float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)),
         2 * np.pi / drive.period,
     )
-    now = np.zeros(len(NOW))
+    scalars = np.zeros(len(SCALAR))
     counters = np.zeros(len(COUNT))
     work = np.zeros((26, size))
-    now[[NOW.step, NOW.first_step, NOW.fastest_rate, NOW.mass]] = (
+    scalars[[SCALAR.step, SCALAR.first_step, SCALAR.fastest_rate, SCALAR.mass]] = (
         FIRST_STEP_RATIO / pace,
         FIRST_STEP_RATIO / pace,
         pace,
         modes.mass,
     )
-    now[NOW.stiffness] = element.limit / element.length if element.length else 0.0
-    now[[NOW.period, NOW.base_moves]] = (drive.period, drive.moving)
+    scalars[SCALAR.stiffness] = element.limit / element.length if element.length else 0.0
+    scalars[[SCALAR.period, SCALAR.base_moves]] = (drive.period, drive.moving)
     counters[COUNT.period] = drive.period
     work[WORK.sizes, 2 * n : -3] = element.state_scales
     rows = np.stack(
         [modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output]
     )
     law = element.numbers[None], [element.memory] * 2, [1.0, np.inf, 1.0, *np.zeros(7)]
-    own = (rows, damping, drive_segments(drive), *law, state, work, now)
+    own = (rows, damping, drive_segments(drive), *law, state, work, scalars)
     moving = MotionArrays(*(np.array(part, float, order="C") for part in own))
     cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))
     cycles[0] = np.inf
@@ -134,7 +134,7 @@ def start_arrays(modes: ModalBasis, drive, element, cycles: float, start=None) -
     return moving, MotionRecord(
         cycles,
         np.zeros((0, width)),
-        np.zeros((TURNS_PER_CALL, width)),
+        np.zeros((REVERSALS_PER_CALL, width)),
         np.zeros((0, N_NODES, width)),
         counters,
         np.zeros(size),
@@ -244,20 +244,31 @@ class Motion:
     @property
     def time(self) -> float:
         """Time that is reached [s]."""
-        return float(self.arrays.now[NOW.time])
+        return float(self.arrays.scalars[SCALAR.time])
 
     def _segment_starts(self) -> np.ndarray:
         """Return the times (p,) [s] at which the segments of the drive begin."""
         return self.arrays.segments[:, [SEGMENT.cycle, SEGMENT.offset]] @ [self.drive.period, 1.0]
 
     def _enter_segment(self, piece: int) -> None:
-        self.arrays.now[NOW.segment] = piece
+        self.arrays.scalars[SCALAR.segment] = piece
 
     def run_to(self, time: float, times=(), whole: bool = False) -> np.ndarray:
-        """Run to a time [s]; returns the rows (s, 2 n + 7) of samples at `times` (s,) on the way.
+        """Run to a time, with samples at times on the way.
 
-        whole: whether all steps are kept in `parts`. There are fewer rows where the run ends
-        before.
+        Parameters
+        ----------
+        time : float
+            Time at which the run stops [s].
+        times : array_like, optional
+            (s,) times of samples [s].
+        whole : bool, optional
+            Whether all steps are kept in `parts`.
+
+        Returns
+        -------
+        ndarray
+            (s, 2 n + 7) samples; fewer where the run ends before.
         """
         times = np.asarray(times, float)
         width = self.record.turns.shape[1]
@@ -268,11 +279,11 @@ class Motion:
         self.record.counters[COUNT.next_sample] = 0
         ends = np.append(self._segment_starts()[1:], np.inf)
         while self.outcome is None:
-            end = float(ends[int(self.arrays.now[NOW.segment])])
+            end = float(ends[int(self.arrays.scalars[SCALAR.segment])])
             if self.time >= end:
-                self._enter_segment(int(self.arrays.now[NOW.segment]) + 1)
+                self._enter_segment(int(self.arrays.scalars[SCALAR.segment]) + 1)
                 continue
-            status = self.loops.advance(
+            status = self.loops.advance_motion(
                 self.arrays, self.record, float(time), end, self.tolerance, float(self.travel)
             )
             self._collect(status)
@@ -332,11 +343,11 @@ class Motion:
         Coordinates and rates count relative to their recent maximum, states of the law relative to
         their sizes.
         """
-        now = self.arrays.now
+        scalars = self.arrays.scalars
         n = self.modes.omega.size
         sizes = self.arrays.work[WORK.sizes]
         scale = np.concatenate(
-            [np.repeat(now[[NOW.max_coordinate, NOW.max_rate]], n), sizes[2 * n : -3]]
+            [np.repeat(scalars[[SCALAR.max_coordinate, SCALAR.max_rate]], n), sizes[2 * n : -3]]
         )
         return max(
             float(np.max(np.abs(self.arrays.state - last)[:-3] / np.maximum(scale, 1e-300))),
@@ -373,21 +384,23 @@ class Motion:
         at = round(self.time / period)
         turns = np.concatenate([self.record.turns[:0], *self.turns[-2:]])
         self.arrays.state[-3:] += count * sums[:3]
-        self.arrays.now[NOW.start_loss] += count * sums[2]
+        self.arrays.scalars[SCALAR.start_loss] += count * sums[2]
         self.record.counters[[COUNT.drive_power, COUNT.friction_loss]] += count * sums[3:]
         self.record.cycles[:, at : at + count] = self.record.cycles[:, at - 1 : at]
         turns = turns[turns[:, 0] > self.time - period * (1 - 1e-9)]
-        shown = min(count, max(0, MAX_KEPT_TURNS - sum(map(len, self.turns))) // max(1, len(turns)))
+        shown = min(
+            count, max(0, MAX_KEPT_REVERSALS - sum(map(len, self.turns))) // max(1, len(turns))
+        )
         later = np.zeros((shown, 1, turns.shape[1]))
         later[:, 0, 0] = period * np.arange(1, shown + 1)
         later[:, 0, -1] = sums[2] * np.arange(1, shown + 1)
         self.turns.append((turns + later).reshape(-1, turns.shape[1]))
-        self.arrays.now[NOW.time] = (at + count) * period
+        self.arrays.scalars[SCALAR.time] = (at + count) * period
 
     def _collect(self, status: int) -> None:
         """Collect what a call of the loop recorded, and set the outcome that its status means."""
         count = int(self.record.counters[COUNT.n_turns])
-        if count and sum(map(len, self.turns)) < MAX_KEPT_TURNS:
+        if count and sum(map(len, self.turns)) < MAX_KEPT_REVERSALS:
             self.turns.append(self.record.turns[:count].copy())
         if self.record.counters[COUNT.n_parts]:
             self.parts.append(self.record.parts[: int(self.record.counters[COUNT.n_parts])].copy())
@@ -422,7 +435,9 @@ class Motion:
     def read_state(self) -> tuple:
         """Return the present sample (2 n + 7,), counters, memory of the law, and stored energy [J]."""
         kept = self.record._replace(counters=self.record.counters.copy())
-        twin = self.arrays._replace(memory=self.arrays.memory.copy(), now=self.arrays.now.copy())
+        twin = self.arrays._replace(
+            memory=self.arrays.memory.copy(), scalars=self.arrays.scalars.copy()
+        )
         row = np.zeros(kept.turns.shape[1])
         stored = float(self.loops.read_state(twin, kept, row))
         return row, kept.counters, twin.memory[0], stored
@@ -475,7 +490,7 @@ class Motion:
         self.tolerance *= (
             LAST_TOLERANCE_RATIO  # the extension of a step errs more than the step does
         )
-        self.arrays.now[NOW.step] *= LAST_TOLERANCE_RATIO**0.125
+        self.arrays.scalars[SCALAR.step] *= LAST_TOLERANCE_RATIO**0.125
         count = max(MIN_SAMPLES, round((end - begin) / self.drive.period * SAMPLES_PER_CYCLE) + 1)
         times = np.linspace(begin, end, count)
         rows = []
@@ -543,7 +558,7 @@ def simulate(
     progress : callable, optional
         Is called with the fraction of the run that is done, whenever the loop returns.
     even : bool, optional
-        Whether equally spaced samples of all cycles are kept, as `wanted` of
+        Whether equidistant samples of all cycles are kept, as `needs_history` of
         `choose_samples_per_cycle`.
 
     Returns
@@ -555,30 +570,20 @@ def simulate(
     run = Motion(modes, drive, element, cycles, tolerance, travel, start)
     period = drive.period
     run.request_last_phasors(window)
-    end = cycles * period
-    kept = []
-    shots = []
     run.progress = progress
-    whole = min(2.0, cycles) * period
-    even = choose_samples_per_cycle(drive, cycles, needs_history=even)
-    if even:
-        begin = end - max(whole, window * period)
-        kept.append(run.run_to(begin, np.arange(0, begin, period / even)))
-    if window * period < whole:
-        run.run_ahead_to(end - whole)
-        count = max(2, round((whole - window * period) / period * SAMPLES_PER_CYCLE) + 1)
-        kept.append(
-            run.run_to(
-                end - window * period, np.linspace(end - whole, end - window * period, count)
-            )[:-1]
-        )
-    at = end - np.linspace(min(1.0, cycles), 0.0, frames + 1)[1:] * period if frames else []
-    rows, (fine, unsure) = run.run_last_cycles(
-        end, window * period, [float(min(t, end)) for t in at], shots
+    n_equidistant = choose_samples_per_cycle(drive, cycles, needs_history=even)
+    early_rows = _run_to_window(run, window * period, n_equidistant)
+    snapshots = []
+    shots = []
+    if frames:
+        times = cycles * period - np.linspace(min(1.0, cycles), 0.0, frames + 1)[1:] * period
+        shots = [float(min(time, cycles * period)) for time in times]
+    rows, (integrated, peak_errors) = run.run_last_cycles(
+        cycles * period, window * period, shots, snapshots
     )
     # the last cycles were not known in advance, so the run is repeated up to its end
     if run.outcome is not None and run.time > 0:
-        done = simulate(
+        result = simulate(
             modes,
             drive,
             element,
@@ -588,45 +593,61 @@ def simulate(
             np.inf,
             frames,
             start,
-            even=bool(even),
+            even=bool(n_equidistant),
         )
-        return replace(done, outcome=run.outcome, message=run.message)
-    last = run.response(rows)
-    turned = run.response(_merge_reversals(rows, run, rows[0, 0]))
-    rows = np.concatenate(
-        [*_early_rows(run, kept[0][0, 0] if kept and not even else rows[0, 0]), *kept, rows]
-    )
-    if even:
-        rows = rows[np.unique(rows[:, 0], return_index=True)[1]]
-    done = max(1, ceil(run.time / period - 1e-9))
-    phasors = np.array([1, 1j]) @ run.record.cycles[2:, :done]
-    book = run.energy_ledger() | _work_check(turned)
+        return replace(result, outcome=run.outcome, message=run.message)
+    with_reversals = run.response(_merge_reversals(rows, run, rows[0, 0]))
+    begin = early_rows[0][0, 0] if early_rows and not n_equidistant else rows[0, 0]
+    all_rows = np.concatenate([*_select_reversal_rows(run, begin), *early_rows, rows])
+    if n_equidistant:
+        all_rows = all_rows[np.unique(all_rows[:, 0], return_index=True)[1]]
+    n_cycles = max(1, ceil(run.time / period - 1e-9))
     return SmoothResult(
-        run.response(rows),
-        last,
-        np.zeros(0),
-        run.extremes(done),
-        phasors,
-        book,
-        run.outcome,
-        shots,
-        fine.loops[0].work,
-        run.time / period,
-        run.message,
-        (),
-        fine,
-        unsure,
-        turned,
-        run.repeat_change,
-        tolerance,
+        response=run.response(all_rows),
+        window=run.response(rows),
+        step_force=np.zeros(0),
+        amplitudes=run.extremes(n_cycles),
+        phasors=np.array([1, 1j]) @ run.record.cycles[2:, :n_cycles],
+        ledger=run.energy_ledger() | _work_check(with_reversals),
+        outcome=run.outcome,
+        snapshots=snapshots,
+        window_work=integrated.loops[0].work,
+        cycles_done=run.time / period,
+        message=run.message,
+        integrated=integrated,
+        peak_errors=peak_errors,
+        with_reversals=with_reversals,
+        repeat_change=run.repeat_change,
+        tolerance=tolerance,
     )
 
 
-def _work_check(turned) -> dict:
+def _run_to_window(run: Motion, window: float, n_equidistant: int) -> list:
+    """Run towards the window [s] at the end; return the sample rows from before it.
+
+    They are `n_equidistant` samples of every cycle where that is not 0, and those of the last two
+    cycles before the window.
+    """
+    period = run.drive.period
+    end = run.cycles * period
+    last_cycles = min(2.0, run.cycles) * period
+    rows = []
+    if n_equidistant:
+        begin = end - max(last_cycles, window)
+        rows.append(run.run_to(begin, np.arange(0, begin, period / n_equidistant)))
+    if window < last_cycles:
+        run.run_ahead_to(end - last_cycles)
+        count = max(2, round((last_cycles - window) / period * SAMPLES_PER_CYCLE) + 1)
+        times = np.linspace(end - last_cycles, end - window, count)
+        rows.append(run.run_to(end - window, times)[:-1])
+    return rows
+
+
+def _work_check(response) -> dict:
     """Return the friction work [J] by samples and by the ledger, and its magnitude."""
-    parts = np.diff(turned.extra["ledger"][0])
+    parts = np.diff(response.extra["ledger"][0])
     return {
-        "sampled": float(sampled_work(turned.slide, turned.force).sum()),
+        "sampled": float(sampled_work(response.slide, response.force).sum()),
         "booked": float(parts.sum()),
         "passed": float(np.abs(parts).sum()),
     }
@@ -640,7 +661,7 @@ def _merge_reversals(rows, run, begin: float) -> np.ndarray:
     return every[np.append(True, np.diff(every[:, 0]) > 1e-9 * run.drive.period)]
 
 
-def _early_rows(run, begin: float) -> list:
+def _select_reversal_rows(run, begin: float) -> list:
     """Return the sample rows at the start and at the reversals before a time [s]."""
     if run.first[0] >= begin:
         return []

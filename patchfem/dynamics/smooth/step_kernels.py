@@ -23,7 +23,7 @@ from ..tableau_kernels import (
     RUNGE_KUTTA_MATRIX,
     STAGE_NODES,
 )
-from .arrays import MODE, NOW, TURN, WORK
+from .arrays import MODE, SCALAR, TURN, WORK
 
 # smallest size of a number, by which the error of a state at rest is measured
 MIN_SIZE = 1e-30
@@ -38,7 +38,7 @@ def evaluate_drive(motion, t):
     The segment is continued beyond its ends.
     """
     return drive_value(
-        motion.segments[int(motion.now[NOW.segment])], 0.0, t, motion.now[NOW.period]
+        motion.segments[int(motion.scalars[SCALAR.segment])], 0.0, t, motion.scalars[SCALAR.period]
     )
 
 
@@ -55,12 +55,27 @@ def find_slide(motion, y):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def write_mode_slopes(motion, i, y, out, drive, pull):
-    """Write the slopes of a mode into out.
+def write_mode_slopes(motion, i, y, out, drive, friction_accel):
+    """Write the slopes of a mode.
 
-    Returns the power of the drive and the viscous power [m2 s-3].
+    Parameters
+    ----------
+    motion : MotionArrays
+    i : int
+        Number of the mode.
+    y : ndarray
+        (N,) state.
+    out : ndarray
+        (N,) slopes, which are written.
+    drive : float
+        Drive [m s-2].
+    friction_accel : float
+        Friction force over the modal mass [m s-2].
 
-    pull: friction force over the modal mass [m s-2].
+    Returns
+    -------
+    drive_power, viscous_power : float
+        Over the modal mass [m2 s-3].
     """
     n = motion.modes.shape[1]
     rate = y[motion.modes.shape[1] + i]
@@ -74,7 +89,7 @@ def write_mode_slopes(motion, i, y, out, drive, pull):
         -damped
         - (
             motion.modes[MODE.omega, i] * motion.modes[MODE.omega, i] * y[i]
-            + motion.modes[MODE.slide, i] * pull
+            + motion.modes[MODE.slide, i] * friction_accel
         )
         - motion.modes[MODE.base, i] * drive
     )
@@ -83,7 +98,18 @@ def write_mode_slopes(motion, i, y, out, drive, pull):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def write_free_motion(motion, q, y, drive):
-    """Write into motion.turn what a law that holds must know, see `TurnPositions`."""
+    """Write what a set-valued law must know into motion.turn, see `TurnPositions`.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    q : float
+        Relative displacement [m].
+    y : ndarray
+        (N,) state.
+    drive : float
+        Drive [m s-2].
+    """
     n = motion.modes.shape[1]
     free = 0.0
     ease = 0.0
@@ -98,7 +124,9 @@ def write_free_motion(motion, q, y, drive):
             + motion.modes[MODE.omega, i] * motion.modes[MODE.omega, i] * y[i]
             + motion.modes[MODE.base, i] * drive
         )
-        ease += motion.modes[MODE.slide, i] * motion.modes[MODE.slide, i] / motion.now[NOW.mass]
+        ease += (
+            motion.modes[MODE.slide, i] * motion.modes[MODE.slide, i] / motion.scalars[SCALAR.mass]
+        )
     motion.turn[TURN.free_acceleration] = free
     motion.turn[TURN.inverse_mass] = ease
     motion.turn[TURN.slide] = q
@@ -106,15 +134,25 @@ def write_free_motion(motion, q, y, drive):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def write_slopes(motion, t, y, out):
-    """Write the slopes of a state at a time t [s] into out: motion, law and energies.
+    """Write the slopes of a state: motion, law and energies.
 
     The first mode stands before the loop over the others, because the compiler vectorises that
     loop; with one mode this takes 16 ns instead of 53.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    t : float
+        Time [s].
+    y : ndarray
+        (N,) state.
+    out : ndarray
+        (N,) slopes, which are written.
     """
     n = motion.modes.shape[1]
     energies = y.size - 3
     drive = evaluate_drive(motion, t)
-    mass = motion.now[NOW.mass]
+    mass = motion.scalars[SCALAR.mass]
     q, v = find_slide(motion, y)
     if law.IS_SET_VALUED:
         write_free_motion(motion, q, y, drive)
@@ -122,7 +160,7 @@ def write_slopes(motion, t, y, out):
         motion.numbers[0],
         motion.memory[0],
         motion.turn,
-        q - motion.now[NOW.origin],
+        q - motion.scalars[SCALAR.origin],
         v,
         y[2 * n : energies],
         out[2 * n : energies],
@@ -139,13 +177,24 @@ def write_slopes(motion, t, y, out):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_INTERNAL)
 def write_stage(motion, stage, h, size):
-    """Write the state at a stage of a step of h [s] into work[WORK.trial]."""
+    """Write the state at a stage of a step into work[WORK.trial].
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    stage : int
+        Number of the stage.
+    h : float
+        Length of the step [s].
+    size : int
+        Numbers of the state that are written.
+    """
     first = RUNGE_KUTTA_MATRIX[stage, 0]
-    share = RUNGE_KUTTA_MATRIX[stage]
+    fraction = RUNGE_KUTTA_MATRIX[stage]
     for c in range(size):
         part = first * motion.work[0, c]
         for j in range(FIRST_COLUMNS[stage], stage):
-            part += share[j] * motion.work[j, c]
+            part += fraction[j] * motion.work[j, c]
         motion.work[WORK.trial, c] = motion.state[c] + h * part
 
 
@@ -155,7 +204,7 @@ def take_step(motion, h):
 
     work[0] holds the slopes at the start.
     """
-    t = motion.now[NOW.time]
+    t = motion.scalars[SCALAR.time]
     size = motion.state.size
     last = motion.work.shape[0] - 14
     for stage in range(1, last + 1):
@@ -167,27 +216,40 @@ def take_step(motion, h):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def estimate_error(motion, h, tolerance):
-    """Return the estimated error of a step of h [s] over the tolerance.
+    """Return the estimated error of a step over the tolerance.
 
-    Coordinates count relative to their recent maximum, rates likewise, and states of the law
-    relative to their sizes. A rate counts no less than what round-off of the forces makes of it in
-    the step: a rate that decays to round-off while the forces balance is no error.
+    Coordinates and rates count relative to their recent maxima, states of the law relative to their
+    sizes. The size of a rate is at least the round-off that the forces leave in it during the step:
+    a rate that decays to round-off while the forces balance is no error.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    h : float
+        Length of the step [s].
+    tolerance : float
+        Relative tolerance of a step.
+
+    Returns
+    -------
+    float
     """
     n = motion.modes.shape[1]
     size = motion.state.size - 3
     fifth = 0.0
     third = 0.0
-    pull = (
-        motion.now[NOW.stiffness] * abs(find_slide(motion, motion.state)[0]) / motion.now[NOW.mass]
+    friction_accel = (
+        motion.scalars[SCALAR.stiffness]
+        * abs(find_slide(motion, motion.state)[0])
+        / motion.scalars[SCALAR.mass]
     )
     for c in range(size):
-        scale = (
-            motion.now[NOW.max_coordinate]
-            if c < n
-            else motion.now[NOW.max_rate]
-            if c < 2 * n
-            else motion.work[WORK.sizes, c]
-        )
+        if c < n:
+            scale = motion.scalars[SCALAR.max_coordinate]
+        elif c < 2 * n:
+            scale = motion.scalars[SCALAR.max_rate]
+        else:
+            scale = motion.work[WORK.sizes, c]
         high = 0.0
         low = 0.0
         for j in range(12):
@@ -201,7 +263,7 @@ def estimate_error(motion, h, tolerance):
         if n <= c < 2 * n:
             force_size = (
                 abs(motion.state[c - n]) * motion.modes[MODE.omega, c - n] ** 2
-                + abs(motion.modes[MODE.slide, c - n]) * pull
+                + abs(motion.modes[MODE.slide, c - n]) * friction_accel
             )
             top = max(top, ROUND_OFF_RATIO * abs(h) * force_size / tolerance)
         scale = max(scale, top, MIN_SIZE)
@@ -217,7 +279,7 @@ def estimate_error(motion, h, tolerance):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_INTERNAL)
 def extend_step(motion, h):
     """Write the dense output of a step of h [s], after `take_step`, into work[WORK.extension]."""
-    t = motion.now[NOW.time]
+    t = motion.scalars[SCALAR.time]
     size = motion.state.size
     for c in range(size):  # the stages overwrite it
         motion.work[WORK.extension + 7, c] = motion.work[WORK.trial, c]
@@ -240,12 +302,23 @@ def extend_step(motion, h):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_INTERNAL)
-def evaluate_inside(motion, share, out, size):
-    """Write the state at a fraction of the step into out, by its dense output."""
+def evaluate_inside(motion, fraction, out, size):
+    """Write the state at a fraction of the step by its dense output.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    fraction : float
+        Of the step.
+    out : ndarray
+        (N,) state, which is written.
+    size : int
+        Numbers of the state that are written.
+    """
     for c in range(size):
-        value = motion.work[WORK.extension + 6, c] * share
+        value = motion.work[WORK.extension + 6, c] * fraction
         for k in range(5, -1, -1):
             value = (value + motion.work[WORK.extension + k, c]) * (
-                share if k % 2 == 0 else 1 - share
+                fraction if k % 2 == 0 else 1 - fraction
             )
         out[c] = motion.state[c] + value

@@ -11,18 +11,21 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INTERNAL
 from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps
-from .arrays import COUNT, MODE, NODE_PLACES, NOW, WORK
+from .arrays import COUNT, MODE, NODE_FRACTIONS, SCALAR, WORK
 
 # Gauss rule for the part of a step in a cycle, which the phasor of the cycle sums
 PHASOR_POINTS, PHASOR_WEIGHTS = np.polynomial.legendre.leggauss(4)
-# Chebyshev polynomial of the last but one degree at NODE_PLACES
+# Chebyshev polynomial of the last but one degree at NODE_FRACTIONS
 PENULTIMATE_TERM = np.cos(
-    np.pi * (NODE_PLACES.size - 2) / (NODE_PLACES.size - 1) * np.arange(NODE_PLACES.size)[::-1]
+    np.pi
+    * (NODE_FRACTIONS.size - 2)
+    / (NODE_FRACTIONS.size - 1)
+    * np.arange(NODE_FRACTIONS.size)[::-1]
 )
 # last terms of the force in a part over the largest force; a part with more is halved
-MAX_ROUGHNESS = 1e-9
+MAX_ROUGHNESS_RATIO = 1e-9
 # fraction of a step below which a part is not halved
-MIN_PART = 2.0**-14
+MIN_PART_FRACTION = 2.0**-14
 # parts of a step for which rows must be free
 MAX_PARTS = 64
 
@@ -38,7 +41,7 @@ def read_interface(motion, y):
         motion.numbers[0],
         motion.memory[1],
         motion.turn,
-        q - motion.now[NOW.origin],
+        q - motion.scalars[SCALAR.origin],
         v,
         y[2 * n : y.size - 3],
     )
@@ -48,7 +51,18 @@ def read_interface(motion, y):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def write_sample(motion, t, y, row):
-    """Write the sample of a state at a time [s] into a row, see `MotionRecord`."""
+    """Write the sample of a state, see `MotionRecord`.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    t : float
+        Time [s].
+    y : ndarray
+        (N,) state.
+    row : ndarray
+        (2 n + 7,) sample, which is written.
+    """
     n = motion.modes.shape[1]
     if law.IS_SET_VALUED:
         steps.write_slopes(motion, t, y, motion.work[13])
@@ -89,9 +103,20 @@ def can_output_turn(motion):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_output_extreme(motion, record, a, b, rate):
-    """Return the output [m] where its rate vanishes between two fractions of a step.
+    """Return the output [m] where its rate vanishes inside a step.
 
-    a, b: the fractions; rate: at a [m/s].
+    Parameters
+    ----------
+    motion : MotionArrays
+    record : MotionRecord
+    a, b : float
+        Fractions of the step between which the rate vanishes.
+    rate : float
+        Rate of the output at a [m/s].
+
+    Returns
+    -------
+    float
     """
     out = 0.0
     for _ in range(60):
@@ -109,9 +134,16 @@ def find_output_extreme(motion, record, a, b, rate):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def widen_by_step(motion, h, record, parts):
-    """Widen the extremes of the cycle by a step of h [s].
+    """Widen the extremes of the present cycle by a step.
 
-    parts: of the step, at whose ends the sign of the rate is looked at.
+    Parameters
+    ----------
+    motion : MotionArrays
+    h : float
+        Length of the step [s].
+    record : MotionRecord
+    parts : int
+        Number of parts of the step, at whose ends the sign of the rate is evaluated.
     """
     x, w = find_output(motion, motion.state)
     low = x
@@ -130,13 +162,29 @@ def widen_by_step(motion, h, record, parts):
             high = max(high, top)
         w = w1
     widen_extremes(
-        record.cycles, record.counters[COUNT.period], motion.now[NOW.time] + 0.5 * h, low, high
+        record.cycles,
+        record.counters[COUNT.period],
+        motion.scalars[SCALAR.time] + 0.5 * h,
+        low,
+        high,
     )
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def widen_extremes(cycles, period, time, x, y):
-    """Widen the extremes of the cycle of a time [s] by two outputs [m]."""
+    """Widen the extremes of the cycle of a time by two outputs.
+
+    Parameters
+    ----------
+    cycles : ndarray
+        (4, c) see `MotionRecord`.
+    period : float
+        Duration of a cycle [s].
+    time : float
+        [s].
+    x, y : float
+        Outputs [m].
+    """
     cycle = min(max(int(time / period), 0), cycles.shape[1] - 1)
     cycles[0, cycle] = min(cycles[0, cycle], x, y)
     cycles[1, cycle] = max(cycles[1, cycle], x, y)
@@ -186,7 +234,15 @@ def add_phasor(cycles, period, t, h, begin, end):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def add_step_to_phasors(motion, h, record):
-    """Add a step of h [s] to the phasors."""
+    """Add a step to the phasors.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    h : float
+        Length of the step [s].
+    record : MotionRecord
+    """
     n = motion.modes.shape[1]
     gain = 0.0
     after = 0.0
@@ -198,7 +254,7 @@ def add_step_to_phasors(motion, h, record):
     add_phasor(
         record.cycles,
         record.counters[COUNT.period],
-        motion.now[NOW.time],
+        motion.scalars[SCALAR.time],
         h,
         (x, w, gain),
         (y, v, after),
@@ -207,8 +263,16 @@ def add_step_to_phasors(motion, h, record):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def write_samples(motion, h, record):
-    """Write the samples inside a step of h [s], its end included."""
-    t = motion.now[NOW.time]
+    """Write the samples inside a step, its end included.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    h : float
+        Length of the step [s].
+    record : MotionRecord
+    """
+    t = motion.scalars[SCALAR.time]
     end = t + h
     while (
         record.counters[COUNT.next_sample] < record.samples.shape[0]
@@ -226,11 +290,11 @@ def write_samples(motion, h, record):
 def estimate_roughness(row, force):
     """Return the last two Chebyshev coefficients [N] of the force in a part.
 
-    row: samples at NODE_PLACES; force: column.
+    row: samples at NODE_FRACTIONS; force: column.
     """
     one = 0.0
     two = 0.0
-    last = NODE_PLACES.size - 1
+    last = NODE_FRACTIONS.size - 1
     for j in range(last + 1):
         weight = (0.5 if j == 0 or j == last else 1.0) * row[j, force]
         one += weight if j % 2 == 0 else -weight
@@ -240,25 +304,33 @@ def estimate_roughness(row, force):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def write_parts(motion, h, record):
-    """Write a step of h [s] into record.parts, in parts with a smooth force.
+    """Write a step into record.parts, in parts with a smooth force.
 
-    The force in each part is a polynomial to MAX_ROUGHNESS.
+    The force in each part is a polynomial to MAX_ROUGHNESS_RATIO.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    h : float
+        Length of the step [s].
+    record : MotionRecord
     """
     begin = 0.0
     size = 1.0
     force = 2 * motion.modes.shape[1] + 3
     while begin < 1 and record.counters[COUNT.n_parts] < record.parts.shape[0]:
         row = record.parts[int(record.counters[COUNT.n_parts])]
-        for j in range(NODE_PLACES.size):
-            at = min(begin + NODE_PLACES[j] * size, 1.0)
+        for j in range(NODE_FRACTIONS.size):
+            at = min(begin + NODE_FRACTIONS[j] * size, 1.0)
             steps.evaluate_inside(motion, at, record.workspace, motion.state.size)
-            write_sample(motion, motion.now[NOW.time] + at * h, record.workspace, row[j])
+            write_sample(motion, motion.scalars[SCALAR.time] + at * h, record.workspace, row[j])
             record.counters[COUNT.max_force] = max(
                 record.counters[COUNT.max_force], abs(row[j, force])
             )
         if (
-            size > MIN_PART
-            and estimate_roughness(row, force) > MAX_ROUGHNESS * record.counters[COUNT.max_force]
+            size > MIN_PART_FRACTION
+            and estimate_roughness(row, force)
+            > MAX_ROUGHNESS_RATIO * record.counters[COUNT.max_force]
         ):
             size *= 0.5
             continue
@@ -277,12 +349,20 @@ def stored_energy(motion, y):
             y[n + i] * y[n + i]
             + motion.modes[MODE.omega, i] * motion.modes[MODE.omega, i] * y[i] * y[i]
         )
-    return 0.5 * motion.now[NOW.mass] * out + read_interface(motion, y)[3]
+    return 0.5 * motion.scalars[SCALAR.mass] * out + read_interface(motion, y)[3]
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def record_step(motion, h, record):
-    """Record a step of h [s] before the state moves on."""
+    """Record a step before the state moves on.
+
+    Parameters
+    ----------
+    motion : MotionArrays
+    h : float
+        Length of the step [s].
+    record : MotionRecord
+    """
     work = motion.state.size - 3
     at = int(record.counters[COUNT.next_sample])
     record.counters[COUNT.drive_power] += abs(motion.work[WORK.trial, work] - motion.state[work])
@@ -291,7 +371,9 @@ def record_step(motion, h, record):
     )
     record.counters[COUNT.accepted] += 1
     add_step_to_phasors(motion, h, record)
-    sampled = at < record.samples.shape[0] and record.samples[at, 0] <= motion.now[NOW.time] + h
+    sampled = (
+        at < record.samples.shape[0] and record.samples[at, 0] <= motion.scalars[SCALAR.time] + h
+    )
     whole = record.parts.shape[0] > 0
     if not (whole or sampled or can_output_turn(motion)):
         widen_by_step(motion, h, record, 1)

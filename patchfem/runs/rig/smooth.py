@@ -85,7 +85,7 @@ class SmoothReader(Reader):
 
     def integrated(self, run, drive) -> IntegratedMeasures:
         """Return the measures from the polynomials of the steps."""
-        book, fine = run.ledger, run.fine
+        book, fine = run.ledger, run.integrated
         if not _clear(run):
             fine = replace(
                 fine, loops=(fine.loops[0]._replace(stuck_time=None),), slip_start_phases=None
@@ -94,11 +94,11 @@ class SmoothReader(Reader):
 
     def more(self, run, drive, stuck: bool) -> dict:
         """Return the samples including the reversals, and the equally spaced ones."""
-        return {"window": run.turned, "even": run.window, "by": "rate"}
+        return {"window": run.with_reversals, "even": run.window, "by": "rate"}
 
     def fewer(self, run):
         """Return the run with every second one of its samples."""
-        return replace(super().fewer(run), turned=thin_samples(run.turned))
+        return replace(super().fewer(run), with_reversals=thin_samples(run.with_reversals))
 
     def left_open(self, run, values: dict) -> dict:
         """Return the errors of measures by name that a SmoothResult states itself.
@@ -116,7 +116,7 @@ class SmoothReader(Reader):
             )
         return {
             name: found.get(name, 0.0)
-            + run.unsure.get(name, 0.0)
+            + run.peak_errors.get(name, 0.0)
             + run.repeat_change * (size if name == "drift_per_cycle" else abs(value))
             for name, value in values.items()
         }
@@ -124,4 +124,4 @@ class SmoothReader(Reader):
 
 def _clear(run) -> bool:
     """Return whether the slip of a SmoothResult exceeds round-off."""
-    return run.fine.loops[0].slip_range > CLEAR * slip_round_off(run.window)
+    return run.integrated.loops[0].slip_range > CLEAR * slip_round_off(run.window)

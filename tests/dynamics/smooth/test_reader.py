@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from test_smooth import MASS
 
 from patchfem.core import InitialState, Response, SineDrive
-from patchfem.dynamics.smooth.arrays import NODE_PLACES
+from patchfem.dynamics.smooth.arrays import NODE_FRACTIONS
 from patchfem.dynamics.smooth.reader import StepParts
 from patchfem.dynamics.smooth.run import Motion
 from patchfem.friction.bonds.parameters import Bonds
@@ -22,7 +22,7 @@ PERIOD, CYCLES = 0.7, 3
 def parts(slide, slip=None, count: int = 61):
     """StepParts of functions of time [s], in `count` steps of uneven length."""
     edges = PERIOD * CYCLES * np.linspace(0, 1, count + 1) ** 1.2
-    time = (edges[:-1, None] + np.diff(edges)[:, None] * NODE_PLACES).ravel()
+    time = (edges[:-1, None] + np.diff(edges)[:, None] * NODE_FRACTIONS).ravel()
     none, one = np.zeros((time.size, 1)), slide(time)
     return StepParts(
         Response(
@@ -127,6 +127,6 @@ def test_exact_peaks_are_those_of_the_motion_seen_closely(name):
 def test_exact_a_step_of_no_length_adds_nothing_to_a_mean(recwarn):
     """As an event at the end of a step leaves one: the mean of x = t over [0.5, 1.5] is 1, and nothing is warned of."""
     edges = [(0.0, 1.0), (1.0, 1.0), (1.0, 2.0)]
-    time = np.concatenate([begin + (end - begin) * NODE_PLACES for begin, end in edges])
+    time = np.concatenate([begin + (end - begin) * NODE_FRACTIONS for begin, end in edges])
     found = StepParts(SimpleNamespace(time=time, slide=time), 1.0)
     assert found.mean("slide", 0.5, 1.5) == pytest.approx(1.0, rel=1e-14) and not recwarn.list
