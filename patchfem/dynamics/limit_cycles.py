@@ -18,10 +18,10 @@ from scipy.optimize import brentq
 
 from ..core import ModalBasis, NotConverged
 from . import propagator
-from .harmonic.backbone import FreeBalance, FreeMotion, trace
-from .harmonic.forces import Group
-from .harmonic.harmonic import pack
-from .harmonic.point import balance_of
+from .harmonic.backbone import FreeBalance, FreeMotion, trace_free_motions
+from .harmonic.forces import LawGroup
+from .harmonic.harmonic import pack_harmonics
+from .harmonic.point import make_balance
 
 N_SAMPLES = 4096  # samples of a cycle from which its largest motion is found
 N_AMPLITUDES = 48  # number of amplitudes at which the damping of a free motion is evaluated
@@ -282,8 +282,8 @@ def _find_maximum(samples) -> float:
     return float(b - (c - a) ** 2 / (8 * bend)) if bend < 0 else float(samples.max())
 
 
-def find_balance_cycles(modes: ModalBasis, group: Group, row, limit: float) -> tuple:
-    """Find the limit cycles of the laws of a Group on one interface, by harmonic balance.
+def find_balance_cycles(modes: ModalBasis, group: LawGroup, row, limit: float) -> tuple:
+    """Find the limit cycles of the laws of a LawGroup on one interface, by harmonic balance.
 
     Each is found with harmonics and samples twice as many. A law that weakens may have no free
     motion in micro-slip; the path then starts where the interface slides, at the mode without
@@ -292,7 +292,7 @@ def find_balance_cycles(modes: ModalBasis, group: Group, row, limit: float) -> t
     Parameters
     ----------
     modes : ModalBasis
-    group : Group
+    group : LawGroup
     row : ndarray
         (n,) slide per coordinate.
     limit : float
@@ -320,7 +320,7 @@ def find_balance_cycles(modes: ModalBasis, group: Group, row, limit: float) -> t
     return sorted(out), least
 
 
-def _find_mode_cycles(modes: ModalBasis, group: Group, mode: int, size: float) -> tuple:
+def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float) -> tuple:
     """Return the limit cycles of one mode and the smallest amplitude [m] that was examined."""
     shape = np.eye(modes.omega.size)[mode]
     paths = (
@@ -358,7 +358,7 @@ def _find_mode_cycles(modes: ModalBasis, group: Group, mode: int, size: float) -
 
 
 def _find_undamped_motions(
-    modes: ModalBasis, group: Group, mode: int, path: tuple, harmonics: int
+    modes: ModalBasis, group: LawGroup, mode: int, path: tuple, harmonics: int
 ) -> list:
     """Return the cycles along the free motions of a mode, where their damping changes sign.
 
@@ -366,9 +366,9 @@ def _find_undamped_motions(
     """
     amplitudes, (omega, shape) = path
     slides = np.abs(group.rows @ shape) * amplitudes[-1]
-    balance = balance_of(modes, group, group.samples_for(harmonics, slides))
+    balance = make_balance(modes, group, group.samples_for(harmonics, slides))
     equations = FreeBalance(balance, mode, harmonics, omega)
-    path = trace(equations, amplitudes, omega, shape)
+    path = trace_free_motions(equations, amplitudes, omega, shape)
     zeta = np.array([one.zeta for one in path])
     out = []
     for k in np.flatnonzero(np.sign(zeta[:-1]) * np.sign(zeta[1:]) < 0):
@@ -385,7 +385,7 @@ def _find_undamped_motions(
 def _pack_unknowns(equations: FreeBalance, one: FreeMotion) -> np.ndarray:
     """Return the unknowns of `FreeBalance.solve` at a free motion."""
     y = equations.balance.lift.T @ one.slides[:, : equations.h + 1]
-    return np.append(pack(y) / one.amplitude, [one.omega / equations.scale, one.zeta])
+    return np.append(pack_harmonics(y) / one.amplitude, [one.omega / equations.scale, one.zeta])
 
 
 def _solve_undamped_between(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from patchfem.core import ModalBasis, SineDrive, frozen_array
-from patchfem.dynamics.events.elements import coulomb
+from patchfem.dynamics.events.elements import make_coulomb_elements
 from patchfem.dynamics.events.histories import evaluate_motion
 
 
@@ -36,7 +36,9 @@ TWO_LIMIT = 3.0  # friction [N]
 
 def sampled(modes, drive, limit, cycles: float, times, start=None):
     """Response at `times` (k,) of `cycles` by the event engine of any modes."""
-    return evaluate_motion(modes, drive, [coulomb(limit, limit)], cycles, times, start)
+    return evaluate_motion(
+        modes, drive, [make_coulomb_elements(limit, limit)], cycles, times, start
+    )
 
 
 def exact(name: str, times):

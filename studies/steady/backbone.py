@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import steady_pictures
 from rig_texts import ONE_MODE, TEXTS
 
-from patchfem.dynamics.harmonic import balance as harmonic_balance
+from patchfem.dynamics.harmonic.branch import find_backbone
 from patchfem.model.model import build
 from patchfem.runs import run as runner
 from patchfem.runs.patch.ladder import solve_all
@@ -81,7 +81,7 @@ def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
         else None
     )
     contact, amplitude = contact_model(model, choose(model), patch), size * np.asarray(shares)
-    free = [harmonic_balance.backbone(modes, contact, amplitude, harmonics=h) for h in (1, 9)]
+    free = [find_backbone(modes, contact, amplitude, harmonics=h) for h in (1, 9)]
     w, zeta = modes.omega[0], modes.zeta[0]
     stiffness, area = np.array([loop(text, float(a), steps) for a in amplitude]).T
     omega = np.sqrt(w**2 + stiffness / modes.mass)

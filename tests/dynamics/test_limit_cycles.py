@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from patchfem.core import ModalBasis
 from patchfem.dynamics import limit_cycles
-from patchfem.dynamics.harmonic.forces import Group
+from patchfem.dynamics.harmonic.forces import LawGroup
 from patchfem.dynamics.harmonic.laws import Jenkins
 
 
@@ -108,7 +108,7 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
     stiffness, yields = np.array([2e4, 1e4, 3e4]), np.array([1e-4, 2e-4, 4e-4])
     modes, limit = modes_of([750.0], [-0.01], [1.0], [1.0]), float(stiffness @ yields)
     (low, high), least = limit_cycles.find_balance_cycles(
-        modes, Group(modes, Jenkins(stiffness, yields)), modes.slide, limit
+        modes, LawGroup(modes, Jenkins(stiffness, yields)), modes.slide, limit
     )
     assert least == 0.0
     assert low.lasts and not high.lasts and low.amplitude < high.amplitude

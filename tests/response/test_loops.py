@@ -182,7 +182,7 @@ def test_exact_drift(count, samples):
 
 def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
     """Slide (k,) [m] at the middles of equal parts of the cycle that begins at `begin` cycles, by the event engine."""
-    from patchfem.dynamics.events.elements import coulomb
+    from patchfem.dynamics.events.elements import make_coulomb_elements
     from patchfem.dynamics.events.histories import evaluate_motion
 
     model, rig = done.plan.model, done.plan.model.rig
@@ -190,7 +190,7 @@ def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
     return evaluate_motion(
         rig.modes,
         rig.drive.signal,
-        [coulomb(*model.friction_limits(model.point.load))],
+        [make_coulomb_elements(*model.friction_limits(model.point.load))],
         rig.drive.cycles,
         times,
     ).slide

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from patchfem.dynamics.events import histories, stick_steady
-from patchfem.dynamics.events.elements import coulomb
+from patchfem.dynamics.events.elements import make_coulomb_elements
 from patchfem.dynamics.events.positions_kernels import BEGIN, COLUMN
 
 
@@ -13,7 +13,7 @@ def groups_of(modes, static, kinetic) -> list:
     """A rigid element per interface, from limits [N] that are one for all or (i,)."""
     count = len(modes.interfaces)
     pairs = zip(np.broadcast_to(static, count), np.broadcast_to(kinetic, count))
-    return [coulomb(float(one), float(other)) for one, other in pairs]
+    return [make_coulomb_elements(float(one), float(other)) for one, other in pairs]
 
 
 def simulate(
@@ -110,7 +110,7 @@ class Phase:
 def rows_of(modes, drive, static, kinetic, cycles, start=None, begin=0) -> tuple:
     """(run, rows of all its pieces) from rest or `start`, the clock put to the cycle `begin` at first."""
     groups = groups_of(modes, static, kinetic)
-    one = histories.start_run(modes, drive, groups, cycles, int(cycles) + 2, start=start)
+    one = histories.start_event_run(modes, drive, groups, cycles, int(cycles) + 2, start=start)
     one.time_state.now[0], rows = begin, []
     one.run_to(cycles, one._collect_into(rows))
     return one, np.concatenate(rows)

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from patchfem.core import ModalBasis
-from patchfem.dynamics.harmonic.laws import Flow, SpeedLaw
+from patchfem.dynamics.harmonic.laws import FlowLaw, SpeedLaw
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.stretch import points_element
 from patchfem.friction.laws.tanh import TanhLaw
@@ -17,7 +17,7 @@ def of_speed(limit, speed):
 
 def bonds(limit, length):
     """The bond recursion u' = sgn - u per length, F = limit u."""
-    return Flow(points_element(Bonds(limit, length), np.ones(1), np.ones(1)))
+    return FlowLaw(points_element(Bonds(limit, length), np.ones(1), np.ones(1)))
 
 
 def sdof(xi=0.003, omega=1.0, mass=1.0):

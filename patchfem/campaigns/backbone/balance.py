@@ -10,10 +10,10 @@ import numpy as np
 from ...core import NotConverged, PatchfemError
 from ...dynamics import limit_cycles
 from ...dynamics.harmonic.backbone import FreeBalance
-from ...dynamics.harmonic.forces import Group
-from ...dynamics.harmonic.harmonic import pack
-from ...dynamics.harmonic.laws import synthesis
-from ...dynamics.harmonic.point import balance_of, find_peak
+from ...dynamics.harmonic.forces import LawGroup
+from ...dynamics.harmonic.harmonic import pack_harmonics
+from ...dynamics.harmonic.laws import evaluate_series
+from ...dynamics.harmonic.point import find_peak, make_balance
 from ...formatting import format_length
 from ...response.errors import error_of_change
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
@@ -84,14 +84,16 @@ def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
     return curve.at(oscillates)
 
 
-def _read_motions(group: Group, joint: Joint, amplitudes, harmonics: int, count=None) -> np.ndarray:
+def _read_motions(
+    group: LawGroup, joint: Joint, amplitudes, harmonics: int, count=None
+) -> np.ndarray:
     """Return frequency [Hz], damping ratio and loss [J] (3, k) of the free motions.
 
     They are NaN if no motion is found, and for all amplitudes after the first `count`.
 
     Parameters
     ----------
-    group : Group
+    group : LawGroup
     joint : Joint
     amplitudes : (k,) array
         At the output [m].
@@ -110,7 +112,7 @@ def _read_motions(group: Group, joint: Joint, amplitudes, harmonics: int, count=
     return out
 
 
-def find_free_motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
+def find_free_motions(group: LawGroup, joint: Joint, amplitudes, harmonics: int) -> list:
     """Find the free motions at amplitudes (k,) [m] of the output.
 
     The search starts from the motion at the amplitude before. If there is none, for example after a
@@ -120,7 +122,7 @@ def find_free_motions(group: Group, joint: Joint, amplitudes, harmonics: int) ->
 
     Parameters
     ----------
-    group : Group
+    group : LawGroup
         Steady loops of the laws.
     joint : Joint
     amplitudes : (k,) array
@@ -148,7 +150,7 @@ class _FreeMotionSearch:
 
     Parameters
     ----------
-    group : Group
+    group : LawGroup
         Steady loops of the laws.
     joint : Joint
     amplitudes : (k,) array
@@ -156,7 +158,7 @@ class _FreeMotionSearch:
     harmonics : int
     """
 
-    def __init__(self, group: Group, joint: Joint, amplitudes, harmonics: int):
+    def __init__(self, group: LawGroup, joint: Joint, amplitudes, harmonics: int):
         modes = joint.modes
         omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), joint.mode)
         self.joint = joint
@@ -164,12 +166,12 @@ class _FreeMotionSearch:
         widest = np.abs(group.rows @ shape) * amplitudes[-1] / self.reach
         samples = group.samples or group.samples_for(harmonics, widest)
         samples = min(samples * (harmonics // HARMONICS[0]) ** 2, MAX_SAMPLES)
-        balance = balance_of(modes, group, samples)
+        balance = make_balance(modes, group, samples)
         self.equations = FreeBalance(balance, joint.mode, harmonics, omega)
         balance = self.equations.balance
         faces = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
         faces[:, 1] = balance.faces @ shape
-        self.first = np.append(pack(faces), [1.0, 0.0])
+        self.first = np.append(pack_harmonics(faces), [1.0, 0.0])
         self.small = MIN_AMPLITUDE_FACTOR * float(joint.slip_amplitude) / self.reach
 
     def continue_from(self, near: FreeMotion | None, amplitude: float) -> FreeMotion | None:
@@ -270,7 +272,7 @@ def _solve_from_stuck(equations: FreeBalance, first, small: float, here: float) 
 
 def half_range(harmonics) -> float:
     """Return (maximum - minimum)/2 of a motion with harmonics (H + 1,)."""
-    motion = synthesis(harmonics, N_SAMPLES)
+    motion = evaluate_series(harmonics, N_SAMPLES)
     return (find_peak(motion) + find_peak(-motion)) / 2
 
 

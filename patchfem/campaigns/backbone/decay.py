@@ -8,8 +8,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import CubicHermiteSpline
 
 from ...core import InitialState, NotConverged, PatchfemError
-from ...dynamics.harmonic.forces import Group
-from ...dynamics.harmonic.laws import synthesis
+from ...dynamics.harmonic.forces import LawGroup
+from ...dynamics.harmonic.laws import evaluate_series
 from ...effects import NO_WAVEFORM
 from ...formatting import format_length
 from ...model.model import Model
@@ -286,8 +286,8 @@ def _distance_to_free_motion(free, shape, place, rate) -> float:
     Both are divided by their component along the shape (n,) of the sticking mode.
     """
     order = np.arange(free.modal.shape[0])[:, None]
-    free_place = np.apply_along_axis(synthesis, 0, free.modal, N_SAMPLES)
-    free_rate = np.apply_along_axis(synthesis, 0, 1j * order * free.modal, N_SAMPLES)
+    free_place = np.apply_along_axis(evaluate_series, 0, free.modal, N_SAMPLES)
+    free_rate = np.apply_along_axis(evaluate_series, 0, 1j * order * free.modal, N_SAMPLES)
     own = place @ shape
     side = np.sign(own)
     reversal = int(np.argmax(side * (free_place @ shape)))
@@ -298,7 +298,7 @@ def _distance_to_free_motion(free, shape, place, rate) -> float:
     )
 
 
-def _sticks(group: Group, free) -> np.ndarray:
+def _sticks(group: LawGroup, free) -> np.ndarray:
     """Return whether each interface (i,) of a free motion has its stiffness without slip."""
     force, slide = free.forces[:, 1], free.slides[:, 1]
     stiffness = STUCK_FRACTION * group.stiffness()

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...dynamics.events.elements import CELL_MERGES, join_cells
-from ...dynamics.harmonic.forces import Group
+from ...dynamics.harmonic.forces import LawGroup
 from ...effects import describe_unsupported, law_has_trait
 from ...model.model import Model
 from ...response.errors import error_of_change
@@ -198,7 +198,7 @@ class Joint(NamedTuple):
         own = np.sqrt(self.spring / abs(rig.springs.cubic)) / output
         return min(travel, own * (SOFTENING_END if rig.springs.cubic < 0 else HARDENING_END))
 
-    def steady_laws(self) -> Group:
+    def steady_laws(self) -> LawGroup:
         """Return the steady loops of all laws.
 
         PatchfemError if a law has no steady loop in closed form.
@@ -229,7 +229,7 @@ class Joint(NamedTuple):
             raise PatchfemError(f"{method} cannot be computed {reason}")
 
     def space_errors(self, read: Callable) -> np.ndarray | float:
-        """Return the errors of read(Group) by the mesh and by the discrete sliders of a law."""
+        """Return the errors of read(LawGroup) by the mesh and by the discrete sliders of a law."""
         model = self.model
         has_cells = any(
             law_has_trait(one.numbers.law, "cells") for one in model.rig.friction.interfaces

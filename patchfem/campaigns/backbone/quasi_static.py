@@ -41,7 +41,7 @@ def compute_static_curve(joint: Joint, amplitudes) -> Curve:
         return _by_bench_loops(joint, amplitudes)
 
     def read(group, samples: int) -> np.ndarray:
-        """Return amplitude, frequency, damping and loss (4, k) by the loops of a Group."""
+        """Return amplitude, frequency, damping and loss (4, k) by the loops of a LawGroup."""
         return decays.static_rows(joint.modes, group, joint.mode, amplitudes, samples)
 
     best = read(laws, N_SAMPLES)
@@ -95,7 +95,7 @@ def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
         loops = [steady_loop(model.friction, load, float(slide)) for slide in slides]
         if None in loops:
             return None
-        best = _read_loops(joint, slides, [quasi_static.Loops(*loop) for loop in loops])
+        best = _read_loops(joint, slides, [quasi_static.StaticLoops(*loop) for loop in loops])
         is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
         if is_wanted.all():
             break
@@ -111,7 +111,7 @@ def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
 def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
     """Return amplitude, frequency, damping and loss (4, k) by loops at displacements (k,) [m]."""
     modes = joint.modes
-    statics = quasi_static.static_motions_from_loops(
+    statics = quasi_static.find_static_motions_from_loops(
         modes, modes.interfaces[0], joint.held, slides, loops
     )
     return decays.decay_rows(modes, statics)
@@ -134,8 +134,8 @@ def _by_bench_loops(joint: Joint, amplitudes) -> Curve:
         stiffness_error, area_error = (
             measures[name].error + change for name, change in zip(LOOP_MEASURES, settled.change)
         )
-        loops.append(quasi_static.Loops(stiffness * slide, area))
-        errors.append(quasi_static.Loops(stiffness_error * slide, area_error))
+        loops.append(quasi_static.StaticLoops(stiffness * slide, area))
+        errors.append(quasi_static.StaticLoops(stiffness_error * slide, area_error))
     best = _read_loops(joint, slides, loops)
     error = ROUND * np.abs(best)
     pairs = list(zip(loops, errors))

@@ -81,7 +81,7 @@ def make_elements(stiffness, yield_displacement) -> Elements:
     )
 
 
-def coulomb(static: float, kinetic: float | None = None) -> Elements:
+def make_coulomb_elements(static: float, kinetic: float | None = None) -> Elements:
     """Return the rigid element of Coulomb friction.
 
     Parameters
@@ -177,7 +177,7 @@ class ElementTable(NamedTuple):
     kinetic_limit: np.ndarray
 
 
-def make_table(groups) -> ElementTable:
+def make_element_table(groups) -> ElementTable:
     """Return the table of the Elements of every interface."""
     longest = max((group.stiffness.size for group in groups), default=0)
     yield_slide = np.full((len(groups), longest + 1), np.inf)

@@ -18,7 +18,12 @@ from ...core import (
 from ...cost_model import PYTHON_READ_TIME_RATIO
 from ...structure.drive_sizes import choose_samples_per_cycle
 from .cost import python_seconds, sample_seconds
-from .elements import coulomb, element_stretches, make_table, unstretched_memory
+from .elements import (
+    element_stretches,
+    make_coulomb_elements,
+    make_element_table,
+    unstretched_memory,
+)
 from .event_list import BORDER, MAX_EVENTS, RELEASE, REVERSAL, STOP, EventLog
 from .modal_system import (
     clear_workspace,
@@ -45,7 +50,7 @@ from .positions_kernels import (
 )
 from .reading import Reading, find_sticking_ring
 
-HERE = "dynamics.events"
+FOLDER = "dynamics.events"
 # samples of a cycle in the window
 SAMPLES_PER_CYCLE = 400
 # samples of the window of a run that is shorter than a cycle
@@ -123,13 +128,13 @@ class PieceRun:
         return float(self.reading.acceleration)
 
 
-def load_kernels(say=None) -> tuple:
+def load_event_kernels(say=None) -> tuple:
     """Return the kernels that march, evaluate rows and read measures.
 
     say: is called before they are compiled.
     """
     set_compile_callback(say)
-    return tuple(load(f"{HERE}.{name}_kernels") for name in ("march", "dense", "read"))
+    return tuple(load(f"{FOLDER}.{name}_kernels") for name in ("march", "dense", "read"))
 
 
 def announce_runs(
@@ -150,7 +155,7 @@ def announce_runs(
     runs : int, optional
         Number of runs.
     """
-    march, dense, read = load_kernels()
+    march, dense, read = load_event_kernels()
     stiff = max((float(one.stiffness.sum()) for one in groups), default=0.0)
     shown = min(cycles, window)
     each = python_seconds(modes, drive, stiff, sum(one.stiffness.size for one in groups))
@@ -167,11 +172,11 @@ def is_loop_kept(modes: ModalBasis, drive) -> bool:
     separately.
     """
     modal_system = make_modal_system(modes)
-    table = make_table([coulomb(1.0)] * len(modal_system.interfaces))
+    table = make_element_table([make_coulomb_elements(1.0)] * len(modal_system.interfaces))
     motion = np.zeros((2, modes.omega.size))
     rows = np.zeros((1, 1))
     memory = unstretched_memory(table, np.zeros(len(modal_system.interfaces)))
-    march = get_kernel_module(f"{HERE}.march_kernels").march
+    march = get_kernel_module(f"{FOLDER}.march_kernels").march
     return march.is_stored(
         (0.0, 0.0),
         motion,
@@ -186,7 +191,7 @@ def is_loop_kept(modes: ModalBasis, drive) -> bool:
     )
 
 
-def start_run(
+def start_event_run(
     modes: ModalBasis,
     drive,
     groups,
@@ -264,12 +269,12 @@ def simulate(
             "structure.travel: the displacement at the start is larger than this travel; raise the "
             "travel, or start nearer to the middle"
         )
-    run = start_run(modes, drive, groups, cycles, window, travel, start, memory)
+    run = start_event_run(modes, drive, groups, cycles, window, travel, start, memory)
     done = run.run(frames, progress, even=even)
     # the output exceeded the travel: the run is repeated up to that time, because only a run whose end is known
     # keeps the samples of its last cycles
     if done is None:
-        again = start_run(
+        again = start_event_run(
             modes, drive, groups, run.now / drive.period, window, np.inf, start, memory
         )
         again.outcome = Outcome.EXCEEDS_TRAVEL
@@ -322,7 +327,7 @@ def evaluate_motion(
     """
     times = np.asarray(times, float)
     rows = []
-    run = start_run(modes, drive, groups, cycles, start=start)
+    run = start_event_run(modes, drive, groups, cycles, start=start)
     run.run_to(cycles, run._collect_into(rows))
     rows = np.concatenate(rows)
     owner = np.clip(np.searchsorted(rows[:, ROW.time], times, side="right") - 1, 0, len(rows) - 1)
@@ -342,12 +347,12 @@ class _Run:
         self.drive = drive
         self.groups = tuple(groups)
         self.n_window = window
-        self.kernels, self.dense, self.reader = load_kernels()
+        self.kernels, self.dense, self.reader = load_event_kernels()
         self.modal_system = make_modal_system(modes)
         old = like.arrays if like is not None else (None,) * 5
         n = modes.omega.size
         count = max(1, ceil(cycles - WHOLE_CYCLES_TOL))
-        table = make_table(self.groups)
+        table = make_element_table(self.groups)
         if np.any(~self.modal_system.interfaces.any(axis=1) & (table.static_limit > 0)):
             raise PatchfemError(
                 "structure.mode.slide: no mode moves the interface, so friction cannot act"

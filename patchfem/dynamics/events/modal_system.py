@@ -16,7 +16,7 @@ WHOLE_TOL = 4e-15
 # positions of the first part of the revolutions per cycle, so that its product with a number of cycles is exact [bits]
 TURN_BITS = 24
 
-series = get_kernel_module("dynamics.events.series_kernels")
+series_kernels = get_kernel_module("dynamics.events.series_kernels")
 
 
 class ModalSystem(NamedTuple):
@@ -355,7 +355,7 @@ class Workspace(NamedTuple):
 def make_workspace(modal_system: ModalSystem) -> Workspace:
     """Return a cleared workspace for a modal system."""
     i, n = modal_system.interfaces.shape
-    n_terms = series.MAX_POWER + 5
+    n_terms = series_kernels.MAX_POWER + 5
     constraint = Constraint(
         is_sticking=np.empty(i),
         status=np.empty(len(CONSTRAINT)),
@@ -381,7 +381,7 @@ def make_workspace(modal_system: ModalSystem) -> Workspace:
         friction_accel=np.empty(i),
         stiffness=np.empty(i),
         rates=np.empty((n, 4)),
-        hulls=np.empty((series.MAX_HALVINGS + 2, series.HULL_WIDTH)),
+        hulls=np.empty((series_kernels.MAX_HALVINGS + 2, series_kernels.HULL_WIDTH)),
         constraint=constraint,
         choice=choice,
     )

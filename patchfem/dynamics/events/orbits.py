@@ -34,7 +34,7 @@ class PeriodicMotion(NamedTuple):
     displacement: float
 
 
-class Orbits:
+class PeriodicMotionFinder:
     """Periodic motions of modes behind elements that change sign after half a period.
 
     A call with a drive (core.SineDrive) and a Point near its motion, or None for rest, returns a

@@ -11,7 +11,7 @@ import numpy as np
 from ...compiled import load
 from ...core import ModalBasis, NotConverged, PatchfemError
 from .cost import python_seconds
-from .elements import Memory, make_table, sorted_stretches, unstretched_memory
+from .elements import Memory, make_element_table, sorted_stretches, unstretched_memory
 from .modal_system import (
     TimeState,
     make_modal_system,
@@ -130,7 +130,7 @@ class PeriodMap:
         self.modes = modes
         self.groups = tuple(groups)
         self.modal_system = make_modal_system(modes)
-        self.table = make_table(groups)
+        self.table = make_element_table(groups)
         self.faces = self.modal_system.interfaces
         self.held = {}
         self.still = unstretched_memory(self.table, np.zeros(len(self.groups)))

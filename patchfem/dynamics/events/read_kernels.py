@@ -39,7 +39,7 @@ def force_column(interface, modal_system):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def row_slide(row, interface, modal_system):
+def read_slide(row, interface, modal_system):
     """Return the relative displacement [m] of an interface where a row begins.
 
     Parameters
@@ -57,7 +57,7 @@ def row_slide(row, interface, modal_system):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def row_rate(row, interface, modal_system):
+def read_rate(row, interface, modal_system):
     """Return the relative velocity [m/s] of an interface where a row begins.
 
     Parameters
@@ -79,7 +79,7 @@ def row_rate(row, interface, modal_system):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def end_force(rows, j, interface, modal_system):
+def find_end_force(rows, j, interface, modal_system):
     """Return the force [N] of a free interface at the end of row j.
 
     Parameters
@@ -96,14 +96,14 @@ def end_force(rows, j, interface, modal_system):
     float
     """
     at = force_column(interface, modal_system)
-    step = row_slide(rows[j + 1], interface, modal_system) - row_slide(
+    step = read_slide(rows[j + 1], interface, modal_system) - read_slide(
         rows[j], interface, modal_system
     )
     return rows[j, at + COLUMN.force] + rows[j, at + COLUMN.stiffness] * step
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def peak_acceleration(top, h, modal_system, base_moves, workspace, largest):
+def find_peak_acceleration(top, h, modal_system, base_moves, workspace, largest):
     """Return the larger of a bound and the peak acceleration of the output in a piece [m s-2].
 
     The series of the acceleration is left in the last but one of workspace.polynomials.
@@ -187,7 +187,7 @@ def add_integrals(
         for f in range(n_interfaces):
             at = force_column(f, modal_system)
             values = interface_values[f]
-            slide = w * row_slide(row, f, modal_system)
+            slide = w * read_slide(row, f, modal_system)
             force = 0.0
             if workspace.stiffness[f] == RIGID_STIFFNESS:
                 force = w * evaluate_polynomial(workspace.constraint.reactions[f], 0, top - 2, u)
@@ -235,7 +235,7 @@ def add_row_state(row, modal_system, run_values, interface_values):
     for f in range(len(modal_system.inverse_mass)):
         values = interface_values[f]
         at = force_column(f, modal_system)
-        slide = row_slide(row, f, modal_system)
+        slide = read_slide(row, f, modal_system)
         values[INTERFACE.min_slide] = min(values[INTERFACE.min_slide], slide)
         values[INTERFACE.max_slide] = max(values[INTERFACE.max_slide], slide)
         values[INTERFACE.min_slip] = min(values[INTERFACE.min_slip], row[at + COLUMN.slip])
@@ -273,17 +273,17 @@ def add_forces(rows, j, top, modal_system, workspace, interface_values):
             )
             continue
         force = rows[j, at + COLUMN.force]
-        last = end_force(rows, j, f, modal_system)
+        last = find_end_force(rows, j, f, modal_system)
         values[INTERFACE.max_force] = max(values[INTERFACE.max_force], abs(force), abs(last))
         values[INTERFACE.end_work] += (
             0.5
             * (force + last)
-            * (row_slide(rows[j + 1], f, modal_system) - row_slide(rows[j], f, modal_system))
+            * (read_slide(rows[j + 1], f, modal_system) - read_slide(rows[j], f, modal_system))
         )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def turning_force(rows, j, n_rows, interface, modal_system, min_motion):
+def find_turning_force(rows, j, n_rows, interface, modal_system, min_motion):
     """Return the force of an interface at a reversal where a row begins [N].
 
     It is the mean of the forces before and after the rest there.
@@ -311,8 +311,8 @@ def turning_force(rows, j, n_rows, interface, modal_system, min_motion):
     while (
         back >= 0
         and abs(
-            row_slide(rows[back + 1], interface, modal_system)
-            - row_slide(rows[back], interface, modal_system)
+            read_slide(rows[back + 1], interface, modal_system)
+            - read_slide(rows[back], interface, modal_system)
         )
         <= min_motion
     ):
@@ -320,15 +320,17 @@ def turning_force(rows, j, n_rows, interface, modal_system, min_motion):
     while (
         on < n_rows
         and abs(
-            row_slide(rows[on + 1], interface, modal_system)
-            - row_slide(rows[on], interface, modal_system)
+            read_slide(rows[on + 1], interface, modal_system)
+            - read_slide(rows[on], interface, modal_system)
         )
         <= min_motion
     ):
         on += 1
     at = force_column(interface, modal_system)
     if back >= 0 and on < n_rows:
-        return 0.5 * (end_force(rows, back, interface, modal_system) + rows[on, at + COLUMN.force])
+        return 0.5 * (
+            find_end_force(rows, back, interface, modal_system) + rows[on, at + COLUMN.force]
+        )
     near = j
     if on < n_rows:
         near = on
@@ -339,7 +341,7 @@ def turning_force(rows, j, n_rows, interface, modal_system, min_motion):
         return nan
     if on < n_rows:
         return rows[on, at + COLUMN.force]
-    return end_force(rows, back, interface, modal_system)
+    return find_end_force(rows, back, interface, modal_system)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -372,7 +374,7 @@ def find_turn_near_border(rows, j, n_rows, forward, interface, modal_system, per
     while (
         0 <= k <= n_rows and abs(rows[k, ROW.time] - rows[j, ROW.time]) <= MAX_TURN_DELAY * period
     ):
-        if abs(row_rate(rows[k], interface, modal_system)) <= rest_rate:
+        if abs(read_rate(rows[k], interface, modal_system)) <= rest_rate:
             return k
         k += 1 if forward else -1
     return -1
@@ -402,7 +404,7 @@ def measure_cycles(rows, n_rows, cycles, interface, modal_system, period, values
     low = 0
     begun = rows[0, ROW.time]
     for j in range(n_rows + 1):
-        fast = max(fast, abs(row_rate(rows[j], interface, modal_system)))
+        fast = max(fast, abs(read_rate(rows[j], interface, modal_system)))
     min_motion = MIN_MOTION_RATIO * (values[INTERFACE.max_slide] - values[INTERFACE.min_slide])
     for k in range(cycles):
         top = low
@@ -413,10 +415,10 @@ def measure_cycles(rows, n_rows, cycles, interface, modal_system, period, values
             and rows[high, ROW.time] + 0.5 * rows[high, ROW.duration] < begun + (k + 1) * period
         ):
             high += 1
-            slide = row_slide(rows[high], interface, modal_system)
-            top = high if slide > row_slide(rows[top], interface, modal_system) else top
-            bottom = high if slide < row_slide(rows[bottom], interface, modal_system) else bottom
-        size = row_slide(rows[top], interface, modal_system) - row_slide(
+            slide = read_slide(rows[high], interface, modal_system)
+            top = high if slide > read_slide(rows[top], interface, modal_system) else top
+            bottom = high if slide < read_slide(rows[bottom], interface, modal_system) else bottom
+        size = read_slide(rows[top], interface, modal_system) - read_slide(
             rows[bottom], interface, modal_system
         )
         values[INTERFACE.mean_range] += size / cycles
@@ -444,8 +446,8 @@ def measure_cycles(rows, n_rows, cycles, interface, modal_system, period, values
             )
         if size > 0.0 and top >= 0 and bottom >= 0:
             secant = (
-                turning_force(rows, top, n_rows, interface, modal_system, min_motion)
-                - turning_force(rows, bottom, n_rows, interface, modal_system, min_motion)
+                find_turning_force(rows, top, n_rows, interface, modal_system, min_motion)
+                - find_turning_force(rows, bottom, n_rows, interface, modal_system, min_motion)
             ) / size
             if secant == secant:
                 n_secants += 1
@@ -610,8 +612,8 @@ def read_rows(
         values[INTERFACE.max_slide] = -inf
         values[INTERFACE.min_slip] = inf
         values[INTERFACE.max_slip] = -inf
-        values[INTERFACE.start_slide] = row_slide(rows[0], f, modal_system)
-        values[INTERFACE.end_slide] = row_slide(rows[n_rows], f, modal_system)
+        values[INTERFACE.start_slide] = read_slide(rows[0], f, modal_system)
+        values[INTERFACE.end_slide] = read_slide(rows[n_rows], f, modal_system)
         values[INTERFACE.work] = rows[n_rows, at + COLUMN.work] - rows[0, at + COLUMN.work]
     for j in range(n_rows + 1):
         add_row_state(rows[j], modal_system, run_values, interface_values)
@@ -619,7 +621,7 @@ def read_rows(
         if j == n_rows or h <= 0.0:
             continue
         top = expand_row(rows[j], h, modal_system, time_state, workspace)
-        run_values[RUN.max_acceleration] = peak_acceleration(
+        run_values[RUN.max_acceleration] = find_peak_acceleration(
             top, h, modal_system, base_moves, workspace, run_values[RUN.max_acceleration]
         )
         add_forces(rows, j, top, modal_system, workspace, interface_values)

@@ -25,7 +25,7 @@ MAX_APPROACH_PERIODS = 400
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class SteadyState:
+class CoulombSteadyState:
     """A periodic motion under Coulomb friction.
 
     - start: state at phase 0 of the drive
@@ -51,7 +51,7 @@ class SteadyState:
     iterations: int
 
 
-class PeriodMapping(NamedTuple):
+class CoulombPeriodMapping(NamedTuple):
     """Image of a state (2n,) under the map over some periods.
 
     - end: the state at the end
@@ -112,7 +112,7 @@ class LinearPhase:
         n = len(self.square)
         p = self.project
         left = np.block([[np.zeros((n, n)), p], [-p @ self.square, -p @ self.dampers]])
-        return matrix_exponential(left * self.span) @ self.taken_out()
+        return exponentiate_modal_matrix(left * self.span) @ self.taken_out()
 
     def taken_out(self) -> np.ndarray:
         """Return the derivative (2n, 2n) of a state whose sticking interfaces come to rest."""
@@ -180,7 +180,7 @@ class LinearPhase:
         return out, not any(others)
 
 
-def matrix_exponential(left) -> np.ndarray:
+def exponentiate_modal_matrix(left) -> np.ndarray:
     """Return the exponential of a small matrix (2n, 2n) of coordinates and rates.
 
     Taylor's series of 2^-s of the matrix, squared s times. SciPy's function starts the threads of
@@ -216,7 +216,7 @@ def _identify_event(one: LinearPhase, later: LinearPhase, changed, reactions) ->
     return int(np.flatnonzero(one.held)[int(np.argmin(near))]), False
 
 
-def map_period(modes: ModalBasis, drive, groups, state, periods: int = 1) -> PeriodMapping:
+def map_period(modes: ModalBasis, drive, groups, state, periods: int = 1) -> CoulombPeriodMapping:
     """Map a state over whole periods of the drive, with the derivative.
 
     Parameters
@@ -236,7 +236,7 @@ def map_period(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Per
         events.
     """
     n = modes.omega.size
-    run = histories.start_run(
+    run = histories.start_event_run(
         modes, drive, groups, periods, periods, start=InitialState(state[:n], state[n:])
     )
     kept = []
@@ -262,7 +262,7 @@ def map_period(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Per
     sizes = [max(float(np.abs(part).max()), 1e-300) for part in (dense[:, :n], dense[:, n : 2 * n])]
     low = run.run_sums.extremes[:, 0].min()
     high = run.run_sums.extremes[:, 1].max()
-    return PeriodMapping(
+    return CoulombPeriodMapping(
         run.motion.ravel().copy(),
         slope,
         np.array([part.signs for part in parts]),
@@ -281,7 +281,7 @@ def solve_steady(
     start: InitialState | None = None,
     cycles: int = 30,
     periods: int = 1,
-) -> SteadyState:
+) -> CoulombSteadyState:
     """Find the periodic response to a sine under Coulomb friction.
 
     Parameters
@@ -365,14 +365,14 @@ class CoulombShooting(Shooting):
     def run(self, state, n_periods: int):
         """Return the state after some periods."""
         n = self.modes.omega.size
-        run = histories.start_run(
+        run = histories.start_event_run(
             self.modes, self.drive, self.groups, n_periods, start=InitialState(state[:n], state[n:])
         )
         run.run_to(n_periods)
         return run.motion.ravel().copy()
 
 
-def _make_steady(mapped_point: MappedPoint, n: int, regime, used: int) -> SteadyState:
+def _make_steady(mapped_point: MappedPoint, n: int, regime, used: int) -> CoulombSteadyState:
     one = mapped_point.image
     state = mapped_point.point
     stops = tuple(
@@ -389,7 +389,7 @@ def _make_steady(mapped_point: MappedPoint, n: int, regime, used: int) -> Steady
             regime = "sliding"
         else:
             regime = f"{most} stop{'s' if most != 1 else ''}"
-    return SteadyState(
+    return CoulombSteadyState(
         InitialState(frozen_array(state[:n]), frozen_array(state[n:])),
         mapped_point.max_residual,
         frozen_array(mapped_point.multipliers(), complex),

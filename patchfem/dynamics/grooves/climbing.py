@@ -15,7 +15,7 @@ from ..march.march import Run
 from ..march.varying_load import PLASTIC, Rubbing, plastic, rub_of
 from .arrays import CLIMB
 
-HERE = "dynamics.grooves.contact_kernels"
+CONTACT_MODULE = "dynamics.grooves.contact_kernels"
 # bond length of points of Coulomb's law over the tolerance times the slide at which pieces slip as a whole; the force is
 # then wrong by at most 0.17 of the tolerance
 COULOMB_LENGTH_RATIO = 0.1
@@ -179,7 +179,7 @@ class ClimbingModel(FlankModel):
     @property
     def kind(self) -> tuple:
         """Contact and law of which `march.instances` makes a loop."""
-        return HERE, ""
+        return CONTACT_MODULE, ""
 
     @property
     def static(self) -> float:

@@ -84,7 +84,7 @@ def start_motion(numbers, memory, way, y):
     numbers : ndarray
         (9,) see `LawNumbers`.
     memory : ndarray
-        Memory of the law, which it does not need.
+        (1,) the last force [N].
     way : float
         Direction of the motion.
     y : ndarray
@@ -111,7 +111,7 @@ def state_rates(numbers, memory, turn, dq, v, y, out):
     numbers : ndarray
         (9,) see `LawNumbers`.
     memory : ndarray
-        Memory of the law, which it does not need.
+        (1,) the last force [N].
     turn : ndarray
         (10,) see `smooth.arrays.TurnPositions`.
     dq : float
@@ -168,7 +168,7 @@ def read_memory(numbers, memory, q, v):
     numbers : ndarray
         (9,) see `LawNumbers`.
     memory : ndarray
-        Memory of the law, which it does not need.
+        (1,) the last force [N].
     q : float
         Relative displacement [m].
     v : float
@@ -193,7 +193,7 @@ def end_motion(numbers, memory, turn, dq, v, y):
     numbers : ndarray
         (9,) see `LawNumbers`.
     memory : ndarray
-        Memory of the law, which it does not need.
+        (1,) the last force [N].
     turn : ndarray
         (10,) see `smooth.arrays.TurnPositions`.
     dq : float

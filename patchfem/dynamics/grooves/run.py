@@ -20,10 +20,10 @@ from ..smooth.arrays import COUNT, SCALAR, WORK
 from .climbing import FlankModel, GroovesRun, check_lifted_mass
 
 # relative tolerance of a step
-TOLERANCE = 1e-11
+STEP_TOLERANCE = 1e-11
 # motion over wavelength/(2 pi), below which the choice of the step takes it for rest
 REST_RATIO = 1e-6
-HERE = "dynamics.grooves.flank_kernels"
+LAW_MODULE = "dynamics.grooves.flank_kernels"
 # positions in the ledger of a march of the sums that `SampledRun._read_sums` returns
 LEDGER_SUMS = [
     LEDGER.drive_work,
@@ -126,10 +126,10 @@ class SampledRun(GroovesRun):
             model.speed or 0.0,
         ]
         element = Element(
-            HERE, np.array(numbers), np.zeros(1), model.limit, state_scales=(np.inf,) * 3
+            LAW_MODULE, np.array(numbers), np.zeros(1), model.limit, state_scales=(np.inf,) * 3
         )
         self.smooth_motion = smooth.Motion(
-            self.modes, self.drive, element, 1.0, TOLERANCE, start=InitialState(*self.state)
+            self.modes, self.drive, element, 1.0, STEP_TOLERANCE, start=InitialState(*self.state)
         )
         self.smooth_motion.request_last_phasors(1)
         n = self.modes.omega.size

@@ -13,7 +13,7 @@ that of the continuous motion. Floquet multipliers come from the slopes of the l
 Where a balance is not possible, a march is brought to its periodic motion by extrapolation
 (`orbits`).
 
-In: `core.ModalBasis`, a sine, laws on rows (`forces.Group`). Out: `point.Periodic`, branches of
+In: `core.ModalBasis`, a sine, laws on rows (`forces.LawGroup`). Out: `point.SteadyMotion`, branches of
 them, backbones. It refuses rigid friction, and bonds whose memory is more than one number per row.
 Cost: 1 to 10 ms per motion with 15 harmonics and one row.
 
@@ -25,5 +25,5 @@ Cost: 1 to 10 ms per motion with 15 harmonics and one row.
 | curves through folds | `continuation`, `branch` |
 | multipliers | `stability`, `floquet` |
 | free motions | `backbone`, `quasi_static` |
-| what the rest of the package calls | `balance` |
+| a motion as histories and energies | `balance` |
 """

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...core import NotConverged
 from ...formatting import format_length
-from .harmonic import Balance, LinearPart, System, pack, solve_damped, unpack
+from .harmonic import Balance, LinearPart, System, pack_harmonics, solve_damped, unpack_harmonics
 
 # amplitudes that are tried between two given ones where the motion is not found
 MAX_HALVINGS = 6
@@ -96,7 +96,7 @@ class FreeBalance:
         last = here.free[0][2] @ by_zeta[1] / omega**2
         jacobian = one.jacobian.copy()
         jacobian[:, -2] = one.by_omega * self.scale / amplitude
-        jacobian[:, -1] = np.append(pack(turned), [last.real, last.imag]) / amplitude
+        jacobian[:, -1] = np.append(pack_harmonics(turned), [last.real, last.imag]) / amplitude
         return one._replace(residual=one.residual / amplitude, jacobian=jacobian)
 
     def solve(self, x, amplitude: float) -> tuple:
@@ -124,7 +124,9 @@ class FreeBalance:
             )
         x = found[0]
         one = self.system(found[0], amplitude)
-        slides = self.balance.lift @ unpack(x[:-2] * amplitude, self.balance.lift.shape[1])
+        slides = self.balance.lift @ unpack_harmonics(
+            x[:-2] * amplitude, self.balance.lift.shape[1]
+        )
         return x, FreeMotion(
             amplitude, x[-2] * self.scale, x[-1], slides, one.fold.force, one.modal
         )
@@ -160,7 +162,7 @@ def _invert(p) -> np.ndarray:
     return np.linalg.pinv(p, rcond=1e-13)
 
 
-def trace(equations: FreeBalance, amplitudes, omega: float, shape) -> list:
+def trace_free_motions(equations: FreeBalance, amplitudes, omega: float, shape) -> list:
     """Return the free motions at increasing amplitudes (k,) [m], from a linear mode.
 
     Parameters
@@ -180,7 +182,7 @@ def trace(equations: FreeBalance, amplitudes, omega: float, shape) -> list:
     h = equations.h
     y = np.zeros((balance.lift.shape[1], h + 1), complex)
     y[:, 1] = balance.faces @ shape
-    x = np.append(pack(y), [omega / equations.scale, 0.0])
+    x = np.append(pack_harmonics(y), [omega / equations.scale, 0.0])
     done = None
     out = []
     for target in amplitudes:

@@ -6,21 +6,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core import NotConverged, PatchfemError, SineDrive
-from .backbone import FreeBalance, trace
-from .continuation import NEWTON_TOL, correct_point, follow
-from .laws import synthesis
+from .backbone import FreeBalance, trace_free_motions
+from .continuation import NEWTON_TOL, PathSettings, Scales, correct_point, follow_curve
+from .laws import evaluate_series
 from .point import (
     HARMONIC_COUNTS,
-    Periodic,
-    balance_of,
-    by_level,
-    by_omega,
-    group_of,
+    SteadyMotion,
+    evaluate_by_level,
+    evaluate_by_omega,
+    find_point,
+    make_balance,
+    make_group,
     make_point,
-    point,
     with_harmonics,
 )
-from .stability import with_stability
+from .stability import add_stability
 from .starts import find_one_harmonic_roots
 
 
@@ -28,10 +28,10 @@ from .starts import find_one_harmonic_roots
 class Branch:
     """Points of a curve in order.
 
-    - points: tuple of Periodic
+    - points: tuple of SteadyMotion
     - parameter: "frequency" [Hz] or "level" [m s-2]
     - folds, crossings: values of the parameter there; at a crossing another branch meets
-    - ended: as of `continuation.Path`, or "listed" for given values
+    - ended: as of `continuation.CurvePath`, or "listed" for given values
     """
 
     points: tuple
@@ -55,21 +55,23 @@ class Branch:
         return np.array([p.amplitude(row) for p in self.points])
 
 
-def response(modes, drive: SineDrive, group, frequencies, stability: bool = False, **how) -> Branch:
+def trace_over_frequency(
+    modes, drive: SineDrive, group, frequencies, stability: bool = False, **how
+) -> Branch:
     """Find steady motions over frequency at the amplitude of the drive.
 
     Parameters
     ----------
     modes : ModalBasis
     drive : SineDrive
-    group : Group, or what `point.group_of` takes
+    group : LawGroup, or what `point.make_group` takes
     frequencies : sequence of float
         First and last [Hz], between which the curve is followed through folds; or more than two,
         at each of which a point is solved from the one before.
     stability : bool, optional
         Whether multipliers are computed.
     **how
-        Fields of `Numerics`.
+        Fields of `CurveNumerics`.
 
     Returns
     -------
@@ -79,10 +81,12 @@ def response(modes, drive: SineDrive, group, frequencies, stability: bool = Fals
         replace(drive, omega=2 * np.pi * f)
         for f in _check_values(frequencies, "drive.frequency: a frequency response", "frequencies")
     ]
-    return _follow("frequency", modes, drives, group, Numerics(**how), stability)
+    return _trace("frequency", modes, drives, group, CurveNumerics(**how), stability)
 
 
-def levels(modes, drive: SineDrive, group, accelerations, stability: bool = False, **how) -> Branch:
+def trace_over_level(
+    modes, drive: SineDrive, group, accelerations, stability: bool = False, **how
+) -> Branch:
     """Find steady motions over the amplitude of the drive [m s-2] at its frequency.
 
     Parameters
@@ -102,10 +106,10 @@ def levels(modes, drive: SineDrive, group, accelerations, stability: bool = Fals
             accelerations, "drive.acceleration: a sweep of the drive level", "amplitudes"
         )
     ]
-    return _follow("level", modes, drives, group, Numerics(**how), stability)
+    return _trace("level", modes, drives, group, CurveNumerics(**how), stability)
 
 
-class Numerics(NamedTuple):
+class CurveNumerics(NamedTuple):
     """Numerical settings of a curve.
 
     - harmonics: exactly so many; None for as many as the tolerance needs
@@ -127,33 +131,33 @@ def _check_values(given, what: str, noun: str) -> np.ndarray:
     return values
 
 
-def _follow(parameter: str, modes, drives, group, how: Numerics, stability: bool) -> Branch:
+def _trace(parameter: str, modes, drives, group, how: CurveNumerics, stability: bool) -> Branch:
     found = (_solve_curve if len(drives) == 2 else _solve_each)(
-        modes, drives, group_of(modes, group), parameter, how
+        modes, drives, make_group(modes, group), parameter, how
     )
     return (
-        replace(found, points=tuple(with_stability(p, modes) for p in found.points))
+        replace(found, points=tuple(add_stability(p, modes) for p in found.points))
         if stability
         else found
     )
 
 
-def _solve_each(modes, drives, group, parameter, how: Numerics) -> Branch:
+def _solve_each(modes, drives, group, parameter, how: CurveNumerics) -> Branch:
     points = []
     last = how.start
     for drive in drives:
-        last = point(modes, drive, group, how.harmonics, how.tolerance, last)
+        last = find_point(modes, drive, group, how.harmonics, how.tolerance, last)
         points.append(last)
     return Branch(tuple(points), parameter)
 
 
-def _solve_curve(modes, drives, group, parameter, how: Numerics) -> Branch:
+def _solve_curve(modes, drives, group, parameter, how: CurveNumerics) -> Branch:
     """Follow a curve by arc length with the same number of harmonics everywhere.
 
     It is raised where the harmonics above are not small.
     """
     harmonics, tolerance, start, longest = how
-    first = point(modes, drives[0], group, harmonics, tolerance, start)
+    first = find_point(modes, drives[0], group, harmonics, tolerance, start)
     for h in [harmonics] if harmonics else [h for h in HARMONIC_COUNTS if h >= first.harmonics]:
         points, above, path, scale = _follow_harmonics(
             modes, drives, group, parameter, h, first, longest
@@ -175,24 +179,23 @@ def _solve_curve(modes, drives, group, parameter, how: Numerics) -> Branch:
 def _follow_harmonics(modes, drives, group, parameter, h, first, longest) -> tuple:
     """Follow a curve with h harmonics and enough samples for the widest slide.
 
-    Returns the points, the largest part of a motion above h, the Path and the unit of its
+    Returns the points, the largest part of a motion above h, the CurvePath and the unit of its
     parameter.
     """
     samples = max(first.samples // 2, group.samples or group.samples_for(h))
     frequency = parameter == "frequency"
     ends = [d.omega if frequency else d.acceleration for d in drives]
     for _ in range(3):
-        balance = balance_of(modes, group, samples)
+        balance = make_balance(modes, group, samples)
         x = with_harmonics(balance, first.coefficients, first.unknowns, first.harmonics, h)
 
         def system(v, p, balance=balance):
             if frequency:
-                return by_omega(balance, v, p, drives[0].acceleration, h)
-            return by_level(balance, v, drives[0].omega, p, h)
+                return evaluate_by_omega(balance, v, p, drives[0].acceleration, h)
+            return evaluate_by_level(balance, v, drives[0].omega, p, h)
 
-        path = follow(
-            system, x, ends[0], (min(ends), max(ends)), ends[1] > ends[0], longest / 4, longest
-        )
+        settings = PathSettings(first_step=longest / 4, max_step=longest)
+        path = follow_curve(system, x, ends[0], (min(ends), max(ends)), ends[1] > ends[0], settings)
         made = [
             make_point(
                 balance,
@@ -204,7 +207,7 @@ def _follow_harmonics(modes, drives, group, parameter, h, first, longest) -> tup
         ]
         widest = np.max(
             [
-                np.ptp(synthesis(p.coefficients, 2 ** (h + 64).bit_length()), axis=1) / 2
+                np.ptp(evaluate_series(p.coefficients, 2 ** (h + 64).bit_length()), axis=1) / 2
                 for p, _ in made
             ],
             axis=0,
@@ -216,22 +219,22 @@ def _follow_harmonics(modes, drives, group, parameter, h, first, longest) -> tup
     return tuple(p for p, _ in made), max(a for _, a in made), path, 2 * np.pi if frequency else 1.0
 
 
-def distance(one: Periodic, other: Periodic, width: float) -> float:
+def measure_distance(one: SteadyMotion, other: SteadyMotion, width: float) -> float:
     """Return the distance between two points of a branch over the size of the motion.
 
     Parameters
     ----------
-    one, other : Periodic
+    one, other : SteadyMotion
     width : float
 
     Returns
     -------
     float
     """
-    return float(np.linalg.norm(_step(one, other, width)[0]))
+    return float(np.linalg.norm(_find_scaled_step(one, other, width)[0]))
 
 
-def _step(one: Periodic, other: Periodic, width: float) -> tuple:
+def _find_scaled_step(one: SteadyMotion, other: SteadyMotion, width: float) -> tuple:
     """Return the scaled step (N + 1,) between two points, and the size of the motion."""
     size = max(float(np.linalg.norm(one.unknowns)), float(np.linalg.norm(other.unknowns))) or 1.0
     return np.append(
@@ -239,9 +242,9 @@ def _step(one: Periodic, other: Periodic, width: float) -> tuple:
     ), size
 
 
-def point_between(
-    modes, drive, one: Periodic, other: Periodic, share: float, width: float
-) -> Periodic:
+def find_point_between(
+    modes, drive, one: SteadyMotion, other: SteadyMotion, share: float, width: float
+) -> SteadyMotion:
     """Find the point of a frequency branch at a fraction of the way between two of its points.
 
     Newton's method goes across the straight line that joins them, so folds are no obstacle.
@@ -249,7 +252,7 @@ def point_between(
     Parameters
     ----------
     modes, drive
-    one, other : Periodic
+    one, other : SteadyMotion
     share : float
         Fraction of the way.
     width : float
@@ -257,35 +260,32 @@ def point_between(
 
     Returns
     -------
-    Periodic
+    SteadyMotion
 
     Raises
     ------
     NotConverged
         If it leads elsewhere.
     """
-    balance = balance_of(modes, one.group, one.base_samples)
-    step, size = _step(one, other, width)
+    balance = make_balance(modes, one.group, one.base_samples)
+    step, size = _find_scaled_step(one, other, width)
     h = one.harmonics
     length = float(np.linalg.norm(step))
     found = correct_point(
-        lambda x, p: by_omega(balance, x, p, drive.acceleration, h),
-        one.unknowns + share * size * step[:-1],
-        one.omega + share * width * step[-1],
-        step[:-1] / length,
-        step[-1] / length,
-        size,
-        width,
+        lambda x, p: evaluate_by_omega(balance, x, p, drive.acceleration, h),
+        (one.unknowns + share * size * step[:-1], one.omega + share * width * step[-1]),
+        step / length,
+        Scales(size, width),
         NEWTON_TOL,
     )
     if found is None:
         raise NotConverged(
             "accuracy.method: no steady motion was found between two neighbouring points of the curve"
         )
-    return make_point(balance, found[0], replace(drive, omega=float(found[1])), h)[0]
+    return make_point(balance, found.x, replace(drive, omega=float(found.p)), h)[0]
 
 
-def branches(
+def find_branches(
     modes, drive: SineDrive, group, tolerance: float = 1e-3, stability: bool = True
 ) -> list:
     """Find all steady motions at a drive that the roots of the one-harmonic balance lead to.
@@ -294,39 +294,39 @@ def branches(
     ----------
     modes : ModalBasis
     drive : SineDrive
-    group : Group, or what `point.group_of` takes
+    group : LawGroup, or what `point.make_group` takes
     tolerance : float, optional
     stability : bool, optional
         Whether multipliers are computed.
 
     Returns
     -------
-    list of Periodic
+    list of SteadyMotion
         In increasing size. A motion that no such root leads to (an isola of a higher harmonic) is
         not found.
     """
-    group = group_of(modes, group)
+    group = make_group(modes, group)
     found = []
     for start in [
         None,
-        *find_one_harmonic_roots(balance_of(modes, group, 512), drive.omega, drive.acceleration),
+        *find_one_harmonic_roots(make_balance(modes, group, 512), drive.omega, drive.acceleration),
     ]:
         try:
-            new = point(modes, drive, group, None, tolerance, start)
+            new = find_point(modes, drive, group, None, tolerance, start)
         except NotConverged:
             continue
         size = max(np.abs(new.coefficients).max(), 1e-300)
-        if not any(_difference(new, old) < 10 * tolerance * size for old in found):
+        if not any(_subtract_padded(new, old) < 10 * tolerance * size for old in found):
             found.append(new)
     if not found:
         raise NotConverged(
             f"accuracy.method: no steady motion was found at {drive.omega / (2 * np.pi):.6g} Hz"
         )
     found.sort(key=lambda p: float(np.linalg.norm(p.coefficients)))
-    return [with_stability(p, modes) for p in found] if stability else found
+    return [add_stability(p, modes) for p in found] if stability else found
 
 
-def _difference(a: Periodic, b: Periodic) -> float:
+def _subtract_padded(a: SteadyMotion, b: SteadyMotion) -> float:
     k = min(a.coefficients.shape[1], b.coefficients.shape[1])
     return float(np.abs(a.coefficients[:, :k] - b.coefficients[:, :k]).max())
 
@@ -348,13 +348,13 @@ class Backbone:
     loss: np.ndarray
 
 
-def backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Backbone:
+def find_backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Backbone:
     """Find frequency and damping of a mode over its amplitude, see `harmonic.backbone`.
 
     Parameters
     ----------
     modes : ModalBasis
-    group : Group, or what `point.group_of` takes
+    group : LawGroup, or what `point.make_group` takes
     amplitudes : array_like
         (k,) of the coordinate of the mode, increasing [m].
     mode : int, optional
@@ -370,7 +370,7 @@ def backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Bac
     PatchfemError
         If the amplitudes do not increase.
     """
-    group = group_of(modes, group)
+    group = make_group(modes, group)
     wanted = np.asarray(amplitudes, float)
     if (
         wanted.size == 0
@@ -384,12 +384,14 @@ def backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Bac
             f"backbone: there is no mode {mode}; the rig has {modes.omega.size} modes, counted from 0"
         )
     samples = group.samples or group.samples_for(harmonics, np.full(len(group.rows), wanted[-1]))
-    balance = balance_of(modes, group, samples)
+    balance = make_balance(modes, group, samples)
     omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
-    found = trace(FreeBalance(balance, mode, harmonics, omega), wanted, omega, shape)
+    found = trace_free_motions(FreeBalance(balance, mode, harmonics, omega), wanted, omega, shape)
     k = np.arange(harmonics + 1)
     loss = [np.pi * float(np.sum(k * (np.conj(f.slides) * f.forces).imag)) for f in found]
-    slide = [np.ptp(synthesis(f.slides[0], 2 ** (harmonics + 128).bit_length())) / 2 for f in found]
+    slide = [
+        np.ptp(evaluate_series(f.slides[0], 2 ** (harmonics + 128).bit_length())) / 2 for f in found
+    ]
     return Backbone(
         wanted,
         np.array([f.omega for f in found]) / (2 * np.pi),

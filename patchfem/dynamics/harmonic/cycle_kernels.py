@@ -114,9 +114,7 @@ def find_turning_points(re, im, rate, angle, place, cell):
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def sample_jenkins(
-    q, start, cells, turns, limit, stiff, full, square, workspace, force, slope, hold, stretch
-):
+def sample_jenkins(q, turning_points, yield_slides, sums, groups, samples):
     """Follow parallel Jenkins elements along the samples of a cycle.
 
     They start from the virgin state; the second of two cycles is periodic.
@@ -125,86 +123,97 @@ def sample_jenkins(
     ----------
     q : ndarray
         (N,) slide [m].
-    start : float
-        Direction at the first sample.
-    cells, turns : ndarray
-        (R,) sample before each turning point, and its slide [m].
-    limit, stiff, full, square : ndarray
-        (t,) yield slides in increasing order [m], (t + 1,) running sums of k, k limit and k
-        limit^2.
-    workspace : tuple
-        (2, 2 R + 3) integers and (2, 2 R + 3) numbers.
-    force, slope, hold, stretch : ndarray
-        Become force (N,) [N], slope (N,) of the elements that stick [N/m], minus the stiffness
-        that belongs to each turning point (R, N), and the sum of k limit stretch (N,).
+    turning_points : laws.TurningPoints
+    yield_slides : ndarray
+        (t,) in increasing order [m].
+    sums : laws.JenkinsSums
+    groups : laws.JenkinsGroups
+        Workspace for 2 R + 3 groups.
+    samples : laws.JenkinsSamples
+        They are written; samples.hold must be 0.
     """
-    t = limit.size
-    n = q.size
-    r = turns.size
-    depth = 1
-    end = workspace[0][0]
-    mark = workspace[0][1]
-    sign = workspace[1][0]
-    base = workspace[1][1]
-    end[0] = t
-    mark[0] = -1
-    sign[0] = 0.0
-    base[0] = 0.0
-    p = 0
-    g = 1.0 if q[0] > 0 else -1.0
-    depth, p = _slip_elements(q[0], g, p, depth, end, sign, base, limit)
-    if g != start:
-        depth, p = _store_turning_point(q[0], g, p, depth, end, sign, base, mark, -1)
-    g = start
-    for turn in range(2):
-        at = 0
-        for i in range(n):
-            depth, p = _slip_elements(q[i], g, p, depth, end, sign, base, limit)
-            if turn:
-                f = g * full[p]
-                s = g * square[p]
-                low = p
-                for d in range(depth - 1, -1, -1):
-                    k = stiff[end[d]] - stiff[low]
-                    w = full[end[d]] - full[low]
-                    f += sign[d] * w + k * (q[i] - base[d])
-                    s += sign[d] * (square[end[d]] - square[low]) + w * (q[i] - base[d])
-                    if mark[d] >= 0:
-                        hold[mark[d], i] -= k
-                    low = end[d]
-                force[i] = f
-                stretch[i] = s
-                slope[i] = stiff[t] - stiff[p]
-            while at < r and cells[at] == i:
-                depth, p = _slip_elements(turns[at], g, p, depth, end, sign, base, limit)
-                depth, p = _store_turning_point(turns[at], g, p, depth, end, sign, base, mark, at)
-                g = -g
-                at += 1
+    t = yield_slides.size
+    n_turning_points = turning_points.slides.size
+    n_groups = 1
+    groups.end[0] = t
+    groups.mark[0] = -1
+    groups.sign[0] = 0.0
+    groups.base[0] = 0.0
+    n_slipping = 0
+    direction = 1.0 if q[0] > 0 else -1.0
+    n_groups, n_slipping = _slip_elements(
+        q[0], direction, n_slipping, n_groups, groups, yield_slides
+    )
+    if direction != turning_points.start:
+        n_groups = _store_turning_point(q[0], direction, n_slipping, n_groups, groups, -1)
+        n_slipping = 0
+    direction = turning_points.start
+    for cycle in range(2):
+        k = 0
+        for i in range(q.size):
+            n_groups, n_slipping = _slip_elements(
+                q[i], direction, n_slipping, n_groups, groups, yield_slides
+            )
+            if cycle == 1:
+                _write_sample(i, q[i], direction, n_slipping, n_groups, groups, sums, samples)
+            while k < n_turning_points and turning_points.cells[k] == i:
+                slide = turning_points.slides[k]
+                n_groups, n_slipping = _slip_elements(
+                    slide, direction, n_slipping, n_groups, groups, yield_slides
+                )
+                n_groups = _store_turning_point(slide, direction, n_slipping, n_groups, groups, k)
+                n_slipping = 0
+                direction = -direction
+                k += 1
+
+
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
+def _write_sample(i, slide, direction, n_slipping, n_groups, groups, sums, samples):
+    """Write force, slopes and stretch of the elements at sample i."""
+    force = direction * sums.limit[n_slipping]
+    stretch = direction * sums.square[n_slipping]
+    low = n_slipping
+    for group in range(n_groups - 1, -1, -1):
+        end = groups.end[group]
+        sign = groups.sign[group]
+        distance = slide - groups.base[group]
+        stiffness = sums.stiffness[end] - sums.stiffness[low]
+        limit = sums.limit[end] - sums.limit[low]
+        force += sign * limit + stiffness * distance
+        stretch += sign * (sums.square[end] - sums.square[low]) + limit * distance
+        if groups.mark[group] >= 0:
+            samples.hold[groups.mark[group], i] -= stiffness
+        low = end
+    samples.force[i] = force
+    samples.stretch[i] = stretch
+    samples.slope[i] = sums.stiffness[sums.stiffness.size - 1] - sums.stiffness[n_slipping]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _slip_elements(q, g, p, depth, end, sign, base, limit):
-    """Let the elements slip that must at slide q in direction g.
-
-    Returns groups and slipping elements.
-    """
-    while depth > 0:
-        d = depth - 1
-        while p < end[d] and g * (sign[d] * limit[p] + q - base[d]) >= limit[p]:
-            p += 1
-        if p < end[d]:
+def _slip_elements(slide, direction, n_slipping, n_groups, groups, yield_slides):
+    """Let the elements slip that must at a slide; return the numbers of groups and of slipping ones."""
+    while n_groups > 0:
+        group = n_groups - 1
+        sign = groups.sign[group]
+        base = groups.base[group]
+        while n_slipping < groups.end[group]:
+            limit = yield_slides[n_slipping]
+            if direction * (sign * limit + slide - base) < limit:
+                break
+            n_slipping += 1
+        if n_slipping < groups.end[group]:
             break
-        depth -= 1
-    return depth, p
+        n_groups -= 1
+    return n_groups, n_slipping
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _store_turning_point(q, g, p, depth, end, sign, base, mark, number):
-    """Store the slipping elements as a group at a turning point."""
-    if p > 0:
-        end[depth] = p
-        sign[depth] = g
-        base[depth] = q
-        mark[depth] = number
-        depth += 1
-    return depth, 0
+def _store_turning_point(slide, direction, n_slipping, n_groups, groups, mark):
+    """Store the slipping elements as a group at a turning point; return the number of groups."""
+    if n_slipping == 0:
+        return n_groups
+    groups.end[n_groups] = n_slipping
+    groups.sign[n_groups] = direction
+    groups.base[n_groups] = slide
+    groups.mark[n_groups] = mark
+    return n_groups + 1

@@ -36,7 +36,7 @@ class TurningPoint:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Fading:
+class FadingMemory:
     """Memory u of bonds or of a flow: u' = gain q' - loss u, with the force limit u.
 
     - row
@@ -50,7 +50,7 @@ class Fading:
     limit: float | np.ndarray
 
 
-def monodromy(
+def find_monodromy(
     modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), fading=()
 ) -> np.ndarray:
     """Return the map over one cycle of (z, dz/dtheta, memories), theta = omega t from 0.
@@ -64,7 +64,7 @@ def monodromy(
     slope, by_rate : ndarray
         (i, N) means per cell of the local stiffness [N/m] and damping [N s/m].
     marks, fading : sequence, optional
-        TurningPoints and Fading memories.
+        TurningPoints and FadingMemories.
 
     Returns
     -------

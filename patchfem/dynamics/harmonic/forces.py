@@ -6,14 +6,14 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from .harmonic import ContactResponse
-from .laws import Jenkins, Track, analysis, make_law, synthesis
+from .laws import Jenkins, SampledSlide, evaluate_series, find_harmonics, make_law
 
 # bounds of the samples of a cycle
 MIN_SAMPLES = 256
 MAX_SAMPLES = 65536
 
 
-class Group:
+class LawGroup:
     """Laws on rows: a law, a pair (row, law) or a list of them.
 
     A row is the number of an interface of `modes` or participations (n,); a law alone sits on
@@ -43,15 +43,15 @@ class Group:
         self.laws = [tuple(v) for v in laws.values()]
         self.samples = samples
 
-    def with_samples(self, samples: int) -> "Group":
+    def with_samples(self, samples: int) -> "LawGroup":
         """Return the same laws on the same rows with `samples` per cycle."""
-        other = object.__new__(Group)
+        other = object.__new__(LawGroup)
         other.rows = self.rows
         other.laws = self.laws
         other.samples = samples
         return other
 
-    def with_elements(self, change) -> "Group":
+    def with_elements(self, change) -> "LawGroup":
         """Return the same laws with other elements.
 
         change: (stiffness (t,) [N/m], yield slide (t,) [m]) -> the same of other elements.
@@ -79,7 +79,7 @@ class Group:
         want = max(MIN_SAMPLES, 12 * harmonics)
         if amplitudes is not None:
             found = [
-                (law.total * a, law.sharpness(a))
+                (law.total * a, law.count_samples(a))
                 for a, laws in zip(amplitudes, self.laws)
                 for law in laws
             ]
@@ -101,7 +101,7 @@ class Group:
         return np.array([sum(law.total for law in laws) for laws in self.laws])
 
     def tracks(self, q, omega: float, samples: int = 0) -> list:
-        """Return the Track of every row.
+        """Return the SampledSlide of every row.
 
         Parameters
         ----------
@@ -114,12 +114,12 @@ class Group:
 
         Returns
         -------
-        list of Track
+        list of SampledSlide
         """
         n = samples or self.samples or self.samples_for(q.shape[1] - 1)
-        values = synthesis(q, n)
-        rates = synthesis(1j * np.arange(q.shape[1]) * q, n)
-        return [Track(x, omega, n, v, r) for x, v, r in zip(q, values, rates)]
+        values = evaluate_series(q, n)
+        rates = evaluate_series(1j * np.arange(q.shape[1]) * q, n)
+        return [SampledSlide(x, omega, n, v, r) for x, v, r in zip(q, values, rates)]
 
     def forces(self, q, omega: float, samples: int = 0) -> np.ndarray:
         """Return the forces (i, N) [N] at the samples of a cycle.
@@ -155,7 +155,7 @@ class Group:
         -------
         ndarray
         """
-        return analysis(self.forces(q, omega, samples), harmonics)
+        return find_harmonics(self.forces(q, omega, samples), harmonics)
 
     def __call__(self, q, omega: float) -> ContactResponse:
         tracks = self.tracks(q, omega)
@@ -194,10 +194,10 @@ def find_response(tracks: list, sampled: list) -> ContactResponse:
     moving = any(one is not None for one in rates)
     lines = [*added("force"), *added("slope"), *(rates if moving else ())]
     lines = [np.zeros(samples) if line is None else line for line in lines]
-    found = analysis(
+    found = find_harmonics(
         np.concatenate([np.array(lines), *(hold for hold in holds if hold is not None)]), 2 * h
     )
-    slope = local_jacobians(found[rows : 2 * rows])
+    slope = find_local_jacobians(found[rows : 2 * rows])
     rate = np.zeros((rows, h + 1), complex)
     turns = moving or any(s.tangent is not None for laws in sampled for s in laws)
     at = 2 * rows
@@ -208,14 +208,14 @@ def find_response(tracks: list, sampled: list) -> ContactResponse:
         return np.einsum("ikl,il->ik", turned, parts)
 
     if moving:
-        turned = local_jacobians(found[at : at + rows])
+        turned = find_local_jacobians(found[at : at + rows])
         at = at + rows
         slope[..., 1 : h + 1] += turned[..., h + 1 :] * (k * omega)
         slope[..., h + 1 :] -= turned[..., 1 : h + 1] * (k * omega)
         rate += by_omega(turned, 1j * k * x[:, 1:])
     for i, (track, hold) in enumerate(zip(tracks, holds)):
         if hold is not None and len(hold):
-            phase = np.arange(h + 1) * track.turning[0][:, None]
+            phase = np.arange(h + 1) * track.turning_points.angles[:, None]
             basis = np.concatenate([np.cos(phase), -np.sin(phase[:, 1:])], axis=1)
             slope[i] += found[at : at + len(hold), : h + 1].T @ basis
             at += len(hold)
@@ -223,8 +223,8 @@ def find_response(tracks: list, sampled: list) -> ContactResponse:
         for one in laws:
             if one.tangent is not None:
                 to_slide, to_omega = one.tangent()
-                slope[i] += analysis(to_slide.T, h).T
-                rate[i] += analysis(to_omega, h)
+                slope[i] += find_harmonics(to_slide.T, h).T
+                rate[i] += find_harmonics(to_omega, h)
     return ContactResponse(found[:rows, : h + 1], slope, rate if turns else None)
 
 
@@ -239,7 +239,7 @@ def _coefficient_positions(h: int) -> tuple:
     return row - column + 2 * h, row + column + 2 * h
 
 
-def local_jacobians(k) -> np.ndarray:
+def find_local_jacobians(k) -> np.ndarray:
     """Return the Jacobians (i, H + 1, 2 H + 1) of the harmonics of K(theta) q(theta).
 
     k: (i, 2 H + 1) harmonics of K.

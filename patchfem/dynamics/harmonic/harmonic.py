@@ -39,7 +39,7 @@ class ContactResponse(NamedTuple):
     rate: np.ndarray | None = None
 
 
-def pack(x) -> np.ndarray:
+def pack_harmonics(x) -> np.ndarray:
     """Return complex harmonics (r, H + 1) as real numbers (r (2 H + 1),).
 
     Each row has the real parts of k = 0 to H, then the imaginary ones of k = 1 to H.
@@ -47,8 +47,8 @@ def pack(x) -> np.ndarray:
     return np.concatenate([x.real, x.imag[:, 1:]], axis=1).ravel()
 
 
-def unpack(v, rows: int) -> np.ndarray:
-    """Return complex harmonics (rows, H + 1) from the real numbers of `pack`."""
+def unpack_harmonics(v, rows: int) -> np.ndarray:
+    """Return complex harmonics (rows, H + 1) from the real numbers of `pack_harmonics`."""
     v = v.reshape(rows, -1)
     h = v.shape[1] // 2
     x = v[:, : h + 1].astype(complex)
@@ -56,7 +56,7 @@ def unpack(v, rows: int) -> np.ndarray:
     return x
 
 
-def _real(c) -> np.ndarray:
+def _to_real_equations(c) -> np.ndarray:
     """Return complex equations (H + 1, ...) as real ones (2 H + 1, ...)."""
     return np.concatenate([c.real, c.imag[1:]], axis=0)
 
@@ -74,7 +74,7 @@ class LinearPart:
     free: tuple
 
 
-def linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearPart:
+def make_linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearPart:
     """Return the linear part (Omega^2 - k^2 omega^2 + i k omega D)^-1 for k = 0 to `harmonics`.
 
     Parameters
@@ -177,12 +177,12 @@ class Balance:
         return other
 
     def linear(self, omega: float, harmonics: int) -> LinearPart:
-        """Return `linear_part` at omega [rad/s]; up to nine frequencies are kept."""
+        """Return `make_linear_part` at omega [rad/s]; up to nine frequencies are kept."""
         key = (omega, harmonics)
         if key not in self._linear:
             if len(self._linear) > 8:
                 self._linear.clear()
-            self._linear[key] = linear_part(self.modes, omega, harmonics)
+            self._linear[key] = make_linear_part(self.modes, omega, harmonics)
         return self._linear[key]
 
     def size(self, omega: float, harmonics: int) -> int:
@@ -204,7 +204,7 @@ class Balance:
         ndarray
         """
         r = self.lift.shape[1]
-        return self.lift @ unpack(x[: r * (2 * harmonics + 1)], r)
+        return self.lift @ unpack_harmonics(x[: r * (2 * harmonics + 1)], r)
 
     def motion(self, x, omega: float, level: float, harmonics: int, force) -> np.ndarray:
         """Return the modal harmonics (K + 1, n) [m] under a force (i, K + 1) [N] and a drive.
@@ -272,7 +272,7 @@ class Balance:
         mass = self.modes.mass
         here = here or self.linear(omega, h)
         coordinates = self._coordinates(x, here, h)
-        y = unpack(x[: r * (2 * h + 1)], r)
+        y = unpack_harmonics(x[: r * (2 * h + 1)], r)
         fold = self.contact(self.lift @ y, omega)
         z = self._motion(here, coordinates, level, fold.force[:, : h + 1])
         through = -np.einsum("ra,kab->krb", self.faces, here.inverse)  # -faces R_k
@@ -282,7 +282,7 @@ class Balance:
         block = (receptance @ linked).reshape(h + 1, r, r, 2 * h + 1)
         size = r * (2 * h + 1)
         jacobian = np.eye(x.size)
-        block = _real(block).transpose(1, 0, 2, 3).reshape(size, size)
+        block = _to_real_equations(block).transpose(1, 0, 2, 3).reshape(size, size)
         jacobian[:size, :size] += block
         turned = -np.einsum("krb,kbc,kc->rk", through, here.slope, z)
         if fold.rate is not None:
@@ -290,7 +290,7 @@ class Balance:
         lifted = np.zeros((r, h + 1), complex)
         if h:
             lifted[:, 1] = 1j * through[1] @ self.modes.base
-        parts = [[pack(miss)], [pack(turned)], [pack(lifted)]]
+        parts = [[pack_harmonics(miss)], [pack_harmonics(turned)], [pack_harmonics(lifted)]]
         self._free(here, coordinates, jacobian, parts, fold, z, level, linked, omega, size)
         return System(
             *[np.concatenate(parts[0])],
@@ -399,7 +399,7 @@ class Balance:
                 own = stiffness / omega**2 * unit
                 column = np.zeros((r, h + 1), complex)
                 column[:, k] = -across * unit
-                jacobian[:size, at + j] = pack(column)
+                jacobian[:size, at + j] = pack_harmonics(column)
                 jacobian[at : at + count, at + j] = [own.real, own.imag][:count]
             for part, value in zip(parts, (miss, by_omega, -1j * drive)):
                 part.append(np.array([value.real, value.imag][:count]))

@@ -59,7 +59,58 @@ class SampledForce(NamedTuple):
     tangent: Callable | None = None
 
 
-class Track:
+class TurningPoints(NamedTuple):
+    """Turning points of a periodic slide.
+
+    - angles, slides: (R,) [rad], [m]
+    - cells: (R,) numbers of the samples before them
+    - start: direction of the slide at the first sample
+    """
+
+    angles: np.ndarray
+    slides: np.ndarray
+    cells: np.ndarray
+    start: float
+
+
+class JenkinsSums(NamedTuple):
+    """Sums (t + 1,) over the first elements: k [N/m], k limit [N] and k limit^2 [N m]."""
+
+    stiffness: np.ndarray
+    limit: np.ndarray
+    square: np.ndarray
+
+
+class JenkinsGroups(NamedTuple):
+    """Groups of elements between turning points, innermost last; workspace of a kernel.
+
+    - end: number of the elements up to the end of a group
+    - mark: number of the turning point, -1 before the first one
+    - sign, base: direction of the slip and slide [m] at the turning point
+    """
+
+    end: np.ndarray
+    mark: np.ndarray
+    sign: np.ndarray
+    base: np.ndarray
+
+
+class JenkinsSamples(NamedTuple):
+    """What a kernel writes of Jenkins elements along N samples.
+
+    - force: (N,) [N]
+    - slope: (N,) stiffness of the elements that stick [N/m]
+    - hold: (R, N) minus the stiffness that belongs to each turning point [N/m]
+    - stretch: (N,) sum of k limit stretch [N m]
+    """
+
+    force: np.ndarray
+    slope: np.ndarray
+    hold: np.ndarray
+    stretch: np.ndarray
+
+
+class SampledSlide:
     """A periodic slide on equal samples of the cycle.
 
     - x: (H + 1,) harmonics [m]; omega [rad/s]; samples: N
@@ -70,12 +121,12 @@ class Track:
         self.x = x
         self.omega = omega
         self.samples = samples
-        self.q = synthesis(x, samples) if q is None else q
-        self.rate = synthesis(1j * np.arange(x.size) * x, samples) if rate is None else rate
+        self.q = evaluate_series(x, samples) if q is None else q
+        self.rate = evaluate_series(1j * np.arange(x.size) * x, samples) if rate is None else rate
 
     @cached_property
-    def turning(self) -> tuple:
-        """Angles, slides and cells of the turning points, and the first direction."""
+    def turning_points(self) -> "TurningPoints":
+        """Turning points of the slide."""
         n = self.samples
         angle = np.empty(n)
         place = np.empty(n)
@@ -85,21 +136,21 @@ class Track:
         count, start = load_cycle_kernels().find_turning_points(
             re, im, self.rate, angle, place, cell
         )
-        return angle[:count], place[:count], cell[:count], start
+        return TurningPoints(angle[:count], place[:count], cell[:count], start)
 
 
-def synthesis(x, samples: int) -> np.ndarray:
+def evaluate_series(x, samples: int) -> np.ndarray:
     """Return samples (..., N) of a cycle of Re sum X_k exp(i k theta)."""
     if 2 * x.shape[-1] > samples:
         every = -(-2 * x.shape[-1] // samples)
-        return synthesis(x, samples * every)[..., ::every]
+        return evaluate_series(x, samples * every)[..., ::every]
     spectrum = np.zeros((*x.shape[:-1], samples // 2 + 1), complex)
     spectrum[..., : x.shape[-1]] = x * (samples / 2)
     spectrum[..., 0] *= 2
     return np.fft.irfft(spectrum, samples, axis=-1)
 
 
-def analysis(values, harmonics: int) -> np.ndarray:
+def find_harmonics(values, harmonics: int) -> np.ndarray:
     """Return harmonics (..., H + 1) of samples (..., N) of a cycle, H <= N/2."""
     n = values.shape[-1]
     out = np.fft.rfft(values, axis=-1)[..., : harmonics + 1] * (2 / n)
@@ -116,11 +167,11 @@ class Law:
     __slots__ = ()
     total = 0.0
 
-    def sharpness(self, amplitude: float) -> int:
+    def count_samples(self, amplitude: float) -> int:
         """Return the samples of a cycle that resolve the corners at an amplitude [m], or 0."""
         return 0
 
-    def sample(self, track: "Track") -> "SampledForce":
+    def sample(self, track: "SampledSlide") -> "SampledForce":
         """Return its periodic state along a slide, that of a virgin contact where there are several."""
         raise NotImplementedError
 
@@ -155,45 +206,46 @@ class Jenkins(Law):
         object.__setattr__(
             self,
             "sums",
-            tuple(frozen_array(np.append(0.0, np.cumsum(v))) for v in (k, k * w, k * w * w)),
+            JenkinsSums(
+                *(frozen_array(np.append(0.0, np.cumsum(v))) for v in (k, k * w, k * w * w))
+            ),
         )
 
     @property
     def total(self) -> float:
         """Tangent stiffness at rest [N/m]."""
-        return float(self.sums[0][-1])
+        return float(self.sums.stiffness[-1])
 
-    def sharpness(self, amplitude: float) -> int:
+    def count_samples(self, amplitude: float) -> int:
         """Return the samples of a cycle that resolve a stick at an amplitude [m]."""
-        share = float(self.sums[1][-1]) / self.total / max(amplitude, 1e-300)
-        return _count_samples(share)
+        stick_fraction = float(self.sums.limit[-1]) / self.total / max(amplitude, 1e-300)
+        return _count_samples(stick_fraction)
 
-    def sample(self, track: Track) -> SampledForce:
+    def sample(self, track: SampledSlide) -> SampledForce:
         """Return the periodic state that a virgin contact reaches."""
-        _, places, cells, start = track.turning
         n = track.samples
-        stiff, full, square = self.sums
-        force = np.empty(n)
-        slope = np.empty(n)
-        stretch = np.empty(n)
-        hold = np.zeros((places.size, n))
-        workspace = np.empty((2, 2 * places.size + 3), np.int64), np.empty((2, 2 * places.size + 3))
-        load_cycle_kernels().sample_jenkins(
-            track.q,
-            start,
-            cells,
-            places,
-            self.limit_slide,
-            stiff,
-            full,
-            square,
-            workspace,
-            force,
-            slope,
-            hold,
-            stretch,
+        n_turning_points = track.turning_points.slides.size
+        max_groups = 2 * n_turning_points + 3
+        groups = JenkinsGroups(
+            np.empty(max_groups, np.int64),
+            np.empty(max_groups, np.int64),
+            np.empty(max_groups),
+            np.empty(max_groups),
         )
-        return SampledForce(force, slope, None, hold, float(full[-1]), stretch)
+        samples = JenkinsSamples(
+            np.empty(n), np.empty(n), np.zeros((n_turning_points, n)), np.empty(n)
+        )
+        load_cycle_kernels().sample_jenkins(
+            track.q, track.turning_points, self.limit_slide, self.sums, groups, samples
+        )
+        return SampledForce(
+            samples.force,
+            samples.slope,
+            None,
+            samples.hold,
+            float(self.sums.limit[-1]),
+            samples.stretch,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +260,7 @@ class Spring(Law):
         """Tangent stiffness at rest [N/m]."""
         return self.stiffness
 
-    def sample(self, track: Track) -> SampledForce:
+    def sample(self, track: SampledSlide) -> SampledForce:
         """Force and slope at the samples."""
         q = track.q
         return SampledForce(
@@ -228,11 +280,11 @@ class Interlock(Law):
         """Tangent stiffness at rest [N/m]."""
         return self.stiffness
 
-    def sharpness(self, amplitude: float) -> int:
+    def count_samples(self, amplitude: float) -> int:
         """Return the samples for the wavelengths that a cycle passes."""
         return int(16 * min(2 * np.pi * amplitude / self.wavelength, 1000.0))
 
-    def sample(self, track: Track) -> SampledForce:
+    def sample(self, track: SampledSlide) -> SampledForce:
         """Force and slope at the samples."""
         angle = 2 * np.pi / self.wavelength * track.q
         return SampledForce(
@@ -247,7 +299,7 @@ class SpeedLaw(Law):
 
     element: Element
 
-    def sample(self, track: Track) -> SampledForce:
+    def sample(self, track: SampledSlide) -> SampledForce:
         """Force and slope at the samples."""
         force = np.empty(track.samples)
         slope = np.empty(track.samples)
@@ -258,7 +310,7 @@ class SpeedLaw(Law):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Flow(Law):
+class FlowLaw(Law):
     """A law whose memory is its stretch alone: its Element of form "flow"."""
 
     element: Element
@@ -273,13 +325,13 @@ class Flow(Law):
         """Tangent stiffness at rest [N/m]."""
         return self.element.limit / self.element.length
 
-    def sharpness(self, amplitude: float) -> int:
+    def count_samples(self, amplitude: float) -> int:
         """Samples of a cycle that resolve a reversal at a slide amplitude [m]."""
         return _count_samples(self.length / max(amplitude, 1e-300))
 
-    def along(self, track: Track) -> "Nodes":
+    def find_periodic_state(self, track: SampledSlide) -> "FlowNodes":
         """Return the periodic state at samples and turning points."""
-        angles, places, cells, _ = track.turning
+        angles, slides, cells, _ = track.turning_points
         n = track.samples
         own = np.ones(track.samples + len(cells), bool)
         own[cells + 1 + np.arange(len(cells))] = False
@@ -288,7 +340,7 @@ class Flow(Law):
         q[own] = track.q
         speed[own] = track.omega * track.rate
         angle[~own] = angles
-        q[~own] = places
+        q[~own] = slides
         dt = np.maximum(np.diff(angle, append=2 * np.pi) / track.omega, 1e-300)
         z = np.empty(q.size)
         steps = np.empty((3, q.size))
@@ -297,15 +349,15 @@ class Flow(Law):
         load_flow_kernels(self.element.kernels).solve_cycle(
             self.element.numbers[None], q, speed, dt, z, steps, force, slopes
         )
-        return Nodes(angle, own, dt, z, steps, force, slopes)
+        return FlowNodes(angle, own, dt, z, steps, force, slopes)
 
-    def sample(self, track: Track) -> SampledForce:
+    def sample(self, track: SampledSlide) -> SampledForce:
         """Return the force at the samples of the periodic state.
 
         Where the law does not depend on time, the slopes are those over the slide and the turning
         points, else those over the harmonics.
         """
-        one = self.along(track)
+        one = self.find_periodic_state(track)
         own = one.own
         force = one.force[one.own]
         stretch = self.element.limit * one.z[one.own]
@@ -320,7 +372,7 @@ class Flow(Law):
         # fraction of z that the step keeps
         before = np.roll(one.steps[1], 1)
         after = one.steps[1] / np.maximum(one.steps[0], 1e-300)
-        hold = one.kept_from(np.flatnonzero(~own)) * (before - after)[~own, None]
+        hold = one.find_remainders(np.flatnonzero(~own)) * (before - after)[~own, None]
         return SampledForce(
             force,
             (one.slopes[0] * before)[own],
@@ -330,7 +382,7 @@ class Flow(Law):
             stretch,
         )
 
-    def _tangent(self, track: Track, one: "Nodes") -> tuple:
+    def _tangent(self, track: SampledSlide, one: "FlowNodes") -> tuple:
         """Return the derivatives of the force at the samples, as `SampledForce.tangent`."""
         k = np.arange(track.x.size)
         own = one.own
@@ -348,8 +400,8 @@ class Flow(Law):
         return out[:, :-1], out[:, -1]
 
 
-class Nodes(NamedTuple):
-    """A Flow at the M samples and turning points of a cycle.
+class FlowNodes(NamedTuple):
+    """A FlowLaw at the M samples and turning points of a cycle.
 
     - angle: (M,); own: (M,) which are samples; dt: (M,) time to the next [s]
     - z: (M,) stretch [m]
@@ -365,21 +417,21 @@ class Nodes(NamedTuple):
     force: np.ndarray
     slopes: np.ndarray
 
-    def kept_from(self, places) -> np.ndarray:
-        """Return the remainder (r, M) at every node of a disturbance of z at the nodes `places`.
+    def find_remainders(self, nodes) -> np.ndarray:
+        """Return the remainder (r, M) at every node of a disturbance of z at some nodes.
 
         It is 0 for a law that forgets nothing.
         """
         fall = np.append(0.0, np.cumsum(np.log(np.maximum(self.steps[0], 1e-300))))
         since = (
             fall[:-1]
-            - fall[places, None]
-            + np.where(np.arange(self.z.size) < places[:, None], fall[-1], 0.0)
+            - fall[nodes, None]
+            + np.where(np.arange(self.z.size) < nodes[:, None], fall[-1], 0.0)
         )
         forgets = -np.expm1(fall[-1])
         return np.exp(since) / forgets if forgets > 1e-12 else np.zeros_like(since)
 
-    def by_cell(self) -> tuple:
+    def find_cell_factors(self) -> tuple:
         """Return the fraction of the stretch kept by every cell, and its slope over the slide (N,)."""
         kept, by_slide, _ = self.steps
         first = np.flatnonzero(self.own)
@@ -392,12 +444,12 @@ class Nodes(NamedTuple):
         return np.multiply.reduceat(kept, first), np.add.reduceat(by_slide * share * later, first)
 
 
-def _count_samples(share: float) -> int:
+def _count_samples(stick_fraction: float) -> int:
     """Return the samples of a cycle for a stick over a fraction of the amplitude.
 
-    The stick takes the angle acos(1 - 2 share).
+    The stick takes the angle acos(1 - 2 stick_fraction).
     """
-    angle = np.arccos(max(1 - 2 * share, -1.0))
+    angle = np.arccos(max(1 - 2 * stick_fraction, -1.0))
     return int(min(SAMPLES_PER_STICK * 2 * np.pi / max(angle, 1e-9), 65536))
 
 
@@ -418,7 +470,7 @@ def make_law(model):
         return SpeedLaw(one)
     # points of bonds that do not grow and break at once remember one stretch
     if form == "flow" or (form == "points" and one.numbers[3] < 0 and not one.numbers[8]):
-        return Flow(one)
+        return FlowLaw(one)
     if model.set_valued:
         raise PatchfemError(
             'accuracy.method: "harmonic" '

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import NotConverged
-from .continuation import follow
-from .forces import Group
-from .harmonic import Balance, System, pack, solve_linear, solve_newton, unpack
-from .laws import Interlock, Track, synthesis
+from .continuation import PathSettings, follow_curve
+from .forces import LawGroup
+from .harmonic import Balance, System, pack_harmonics, solve_linear, solve_newton, unpack_harmonics
+from .laws import Interlock, SampledSlide, evaluate_series
 from .starts import find_one_harmonic_roots
 
 # numbers of harmonics that are tried
@@ -37,7 +37,7 @@ class _Unbounded(NotConverged):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Periodic:
+class SteadyMotion:
     """A steady motion.
 
     - omega, level: frequency [rad/s] and amplitude [m s-2] of the drive
@@ -65,7 +65,7 @@ class Periodic:
     error: float
     iterations: int
     unknowns: np.ndarray
-    group: Group
+    group: LawGroup
     left: float = 0.0
     stable: bool | None = None
     multipliers: np.ndarray | None = None
@@ -79,7 +79,7 @@ class Periodic:
 
     def amplitude(self, row, samples: int = 4096) -> float:
         """Return half the range [m] of row @ coordinates, row (n,), between samples by parabolas."""
-        y = synthesis(self.modal @ np.asarray(row, float), samples)
+        y = evaluate_series(self.modal @ np.asarray(row, float), samples)
         return (find_peak(y) + find_peak(-y)) / 2
 
     def turns(self) -> tuple:
@@ -87,7 +87,9 @@ class Periodic:
 
         It is () for a row at rest.
         """
-        angles, places, _, _ = Track(self.coefficients[0], self.omega, self.samples).turning
+        angles, places, _, _ = SampledSlide(
+            self.coefficients[0], self.omega, self.samples
+        ).turning_points
         if not angles.size:
             return ()
         k = np.arange(self.coefficients.shape[1])
@@ -96,7 +98,7 @@ class Periodic:
             np.argmin(places),
             np.argmax(places),
         ):  # the cycle begins at the reversal, so its first sample is the reversal
-            track = Track(
+            track = SampledSlide(
                 self.coefficients[0] * np.exp(1j * k * angles[at]), self.omega, self.samples
             )
             found = [law.sample(track) for law in self.group.laws[0]]
@@ -120,7 +122,7 @@ def friction_force(laws: tuple, sampled: list) -> np.ndarray:
     return sum(friction or [one.force for one in sampled])
 
 
-def find_slip(track: Track, found: list) -> np.ndarray:
+def find_slip(track: SampledSlide, found: list) -> np.ndarray:
     """Return the slip (N,) [m] of a row from the laws sampled along it; 0 where nothing rubs."""
     limit = sum(one.limit for one in found)
     stretch = sum(one.stretch for one in found if one.stretch is not None)
@@ -140,18 +142,18 @@ def find_peak(y) -> float:
     return float(b - (a - c) ** 2 / (8 * bend)) if bend < 0 else float(b)
 
 
-def group_of(modes, group) -> Group:
-    """Return a Group from a Group, a law, a model or (row, law) pairs."""
-    return group if isinstance(group, Group) else Group(modes, group)
+def make_group(modes, group) -> LawGroup:
+    """Return a LawGroup from a LawGroup, a law, a model or (row, law) pairs."""
+    return group if isinstance(group, LawGroup) else LawGroup(modes, group)
 
 
-def balance_of(modes, group: Group, samples: int) -> Balance:
+def make_balance(modes, group: LawGroup, samples: int) -> Balance:
     """Return the balance of the rows of `group` on `samples` of a cycle.
 
     Parameters
     ----------
     modes : ModalBasis
-    group : Group
+    group : LawGroup
     samples : int
 
     Returns
@@ -162,38 +164,42 @@ def balance_of(modes, group: Group, samples: int) -> Balance:
     return Balance(modes, gridded.rows, gridded)
 
 
-def point(
+def find_point(
     modes, drive, group, harmonics: int | None = None, tolerance: float = 1e-3, start=None
-) -> Periodic:
+) -> SteadyMotion:
     """Find a steady motion under a sine.
 
     Parameters
     ----------
     modes : ModalBasis
     drive : core.SineDrive
-    group : Group, or what `group_of` takes
+    group : LawGroup, or what `make_group` takes
     harmonics : int, optional
         Exactly so many; as many as the tolerance needs by default.
     tolerance : float, optional
-    start : Periodic or ndarray, optional
+    start : SteadyMotion or ndarray, optional
         A motion nearby; else the stuck contact, the motions of one harmonic, and weaker drives are
         tried.
 
     Returns
     -------
-    Periodic
+    SteadyMotion
 
     Raises
     ------
     NotConverged
         If no balance is found, or no number of harmonics meets the tolerance.
     """
-    group = group_of(modes, group)
-    x, near = (start.unknowns, start.base_samples) if isinstance(start, Periodic) else (start, 0)
+    group = make_group(modes, group)
+    x, near = (
+        (start.unknowns, start.base_samples) if isinstance(start, SteadyMotion) else (start, 0)
+    )
     if harmonics is not None:
         return _solve_harmonics(modes, drive, group, harmonics, x, 1, near=near)
     found = None
-    least = start.harmonics if isinstance(start, Periodic) else _min_harmonics(modes, drive, group)
+    least = (
+        start.harmonics if isinstance(start, SteadyMotion) else _min_harmonics(modes, drive, group)
+    )
     for h in [h for h in HARMONIC_COUNTS if h >= least] or HARMONIC_COUNTS[-1:]:
         try:
             found = _solve_harmonics(modes, drive, group, h, x, FOLLOWING_RATIO, tolerance, near)
@@ -206,7 +212,7 @@ def point(
         if found.error <= tolerance:
             return found
         x = with_harmonics(
-            balance_of(modes, group, 0), found.coefficients, found.unknowns, h, _next_harmonics(h)
+            make_balance(modes, group, 0), found.coefficients, found.unknowns, h, _next_harmonics(h)
         )
     if found is None or found.error > tolerance:
         raise NotConverged(
@@ -250,10 +256,10 @@ def with_harmonics(balance, slides, unknowns, h: int, harmonics: int) -> np.ndar
     y = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
     keep = min(harmonics, slides.shape[1] - 1) + 1
     y[:, :keep] = balance.lift.T @ slides[:, :keep]
-    return np.concatenate([pack(y), unknowns[y.shape[0] * (2 * h + 1) :]])
+    return np.concatenate([pack_harmonics(y), unknowns[y.shape[0] * (2 * h + 1) :]])
 
 
-def refine_point(found: Periodic, modes, drive) -> Periodic:
+def refine_point(found: SteadyMotion, modes, drive) -> SteadyMotion:
     """Return the same motion with twice its harmonics and samples.
 
     From one harmonic they become three, as a symmetric law has no even ones. NotConverged where it
@@ -261,18 +267,18 @@ def refine_point(found: Periodic, modes, drive) -> Periodic:
 
     Parameters
     ----------
-    found : Periodic
+    found : SteadyMotion
     modes : ModalBasis
     drive
 
     Returns
     -------
-    Periodic
+    SteadyMotion
     """
     h = found.harmonics
     x = found.unknowns
     top = max(2 * (found.coefficients.shape[1] - 1), 3)
-    balance = balance_of(modes, found.group, 2 * found.base_samples)
+    balance = make_balance(modes, found.group, 2 * found.base_samples)
     here = balance.system(x, drive.omega, drive.acceleration, h)
     one = _add_harmonics(
         balance, SweepStart(x, here, 0, found.coefficients), drive, h, top // h, DEFAULT_TOLERANCE
@@ -286,7 +292,7 @@ def refine_point(found: Periodic, modes, drive) -> Periodic:
 
 def _solve_harmonics(
     modes, drive, group, h, x, wider, tolerance=DEFAULT_TOLERANCE, near=0
-) -> Periodic:
+) -> SteadyMotion:
     """Solve the balance with h harmonics; those up to wider h follow.
 
     The samples resolve the shortest stick.
@@ -294,11 +300,14 @@ def _solve_harmonics(
     near: samples that a neighbour took.
     """
     samples = group.samples or max(group.samples_for(h * wider), near)
-    balance = balance_of(modes, group, samples)
+    balance = make_balance(modes, group, samples)
     for _ in range(3):
         x, here, count = _solve_balance(balance, x, drive, h)
         swing = (
-            np.ptp(synthesis(balance.slides(x, drive.omega, h), 2 ** (h + 64).bit_length()), axis=1)
+            np.ptp(
+                evaluate_series(balance.slides(x, drive.omega, h), 2 ** (h + 64).bit_length()),
+                axis=1,
+            )
             / 2
         )
         want = group.samples or group.samples_for(h * wider, swing)
@@ -312,7 +321,7 @@ def _solve_balance(balance, x, drive, h: int):
     """Solve by `solve_newton` from each start in turn, and last along weaker drives."""
     omega = drive.omega
     level = drive.acceleration
-    for start in _starts(balance, x, omega, level, h):
+    for start in _iterate_starts(balance, x, omega, level, h):
         try:
             return solve_newton(balance, start, omega, level, h)
         except NotConverged:
@@ -320,7 +329,7 @@ def _solve_balance(balance, x, drive, h: int):
     return solve_newton(balance, _climb_harmonics(balance, omega, level, h), omega, level, h)
 
 
-def _starts(balance, x, omega, level, h: int):
+def _iterate_starts(balance, x, omega, level, h: int):
     """Yield unknowns from which Newton's method may lead to a motion, the likeliest first."""
     r = balance.lift.shape[1]
     if x is not None:
@@ -328,7 +337,7 @@ def _starts(balance, x, omega, level, h: int):
         have, rest = divmod(x.size - free - r, 2 * r)
         if have >= 0 and not rest:
             yield with_harmonics(
-                balance, balance.lift @ unpack(x[: r * (2 * have + 1)], r), x, have, h
+                balance, balance.lift @ unpack_harmonics(x[: r * (2 * have + 1)], r), x, have, h
             )
     yield _solve_stuck(balance, omega, level, h)
     for one in find_one_harmonic_roots(balance, omega, level):
@@ -351,16 +360,12 @@ def _climb_harmonics(balance, omega, level, h: int) -> np.ndarray:
 
 def _follow_levels(balance, omega, level, h: int) -> np.ndarray:
     """Return unknowns by following the motion from a thousandth of the amplitude of the drive."""
-    path = follow(
-        lambda v, p: by_level(balance, v, omega, p, h),
+    path = follow_curve(
+        lambda v, p: evaluate_by_level(balance, v, omega, p, h),
         _solve_stuck(balance, omega, level, h) * 1e-3,
         1e-3 * level,
         (0.0, level),
-        True,
-        0.05,
-        0.5,
-        1000,
-        1e-6,
+        settings=PathSettings(0.05, 0.5, 1000, 1e-6),
     )
     if path.ended != "end":
         bare = any(k for k, *_ in balance.linear(omega, h).free)
@@ -379,7 +384,7 @@ def _follow_levels(balance, omega, level, h: int) -> np.ndarray:
     return path.x[-1]
 
 
-def by_level(balance, x, omega, level, h) -> tuple:
+def evaluate_by_level(balance, x, omega, level, h) -> tuple:
     """Return residual, Jacobian and derivative over the drive level, for `continuation`.
 
     Parameters
@@ -395,7 +400,7 @@ def by_level(balance, x, omega, level, h) -> tuple:
     return s.residual, s.jacobian, s.by_level
 
 
-def by_omega(balance, x, omega, level, h) -> tuple:
+def evaluate_by_omega(balance, x, omega, level, h) -> tuple:
     """Return residual, Jacobian and derivative over omega, for `continuation`.
 
     Parameters
@@ -412,7 +417,7 @@ def by_omega(balance, x, omega, level, h) -> tuple:
 
 
 def make_point(balance, x, drive, h: int) -> tuple:
-    """Return the Periodic of solved unknowns, and what h more harmonics would add.
+    """Return the SteadyMotion of solved unknowns, and what h more harmonics would add.
 
     Parameters
     ----------
@@ -423,7 +428,7 @@ def make_point(balance, x, drive, h: int) -> tuple:
 
     Returns
     -------
-    Periodic, float
+    SteadyMotion, float
     """
     here = balance.system(x, drive.omega, drive.acceleration, h)
     found = _add_harmonics(balance, SweepStart(x, here), drive, h, 1, 1.0)
@@ -453,7 +458,7 @@ class SweepStart(NamedTuple):
     slides: np.ndarray | None = None
 
 
-def _add_harmonics(balance, start: SweepStart, drive, h, wider, tolerance) -> Periodic:
+def _add_harmonics(balance, start: SweepStart, drive, h, wider, tolerance) -> SteadyMotion:
     """Add harmonics above h by sweeps with the Jacobian of those below, and estimate the error.
 
     The last sweep takes twice the samples.
@@ -492,12 +497,12 @@ def _add_harmonics(balance, start: SweepStart, drive, h, wider, tolerance) -> Pe
     return _make_periodic(balance, x, drive, h, top, fine, changes, size, count, q)
 
 
-def _make_diverged(balance, start: SweepStart, drive, h, samples) -> Periodic:
+def _make_diverged(balance, start: SweepStart, drive, h, samples) -> SteadyMotion:
     """Return the balance alone where the harmonics above h do not follow; its error is unknown."""
     x, here, count, _ = start
     q = balance.slides(x, drive.omega, h)
     z = balance.motion(x, drive.omega, drive.acceleration, h, here.fold.force)
-    return Periodic(
+    return SteadyMotion(
         drive.omega,
         drive.acceleration,
         q,
@@ -517,8 +522,8 @@ def _find_residual(balance, x, omega, level, h, force, z) -> np.ndarray:
     """Return the residual (N,) under forces with more harmonics than the unknowns."""
     low = balance.lift.shape[1] * (2 * h + 1)
     at = 0
-    y = unpack(x[:low], balance.lift.shape[1])
-    out = [pack(y - (z[: h + 1] @ balance.faces.T).T)]
+    y = unpack_harmonics(x[:low], balance.lift.shape[1])
+    out = [pack_harmonics(y - (z[: h + 1] @ balance.faces.T).T)]
     for k, _, left, stiffness in balance.linear(omega, h).free:
         parts = x[low + at : low + at + (2 if k else 1)]
         miss = balance.free_residual((k, left, stiffness), complex(*parts), omega, level, force)
@@ -527,14 +532,14 @@ def _find_residual(balance, x, omega, level, h, force, z) -> np.ndarray:
     return np.concatenate(out)
 
 
-def _make_periodic(balance, x, drive, h, top, samples, changes, size, count, q) -> Periodic:
+def _make_periodic(balance, x, drive, h, top, samples, changes, size, count, q) -> SteadyMotion:
     omega = drive.omega
     level = drive.acceleration
     group = balance.contact
     q = q[:, : top + 1]
     fine = group.forces(q, omega, 2 * samples)
     used = group.force(q, omega, top, samples)
-    left = fine - synthesis(used, 2 * samples)
+    left = fine - evaluate_series(used, 2 * samples)
     scale = float(np.sqrt(np.mean(fine**2)))
     residual = float(np.sqrt(np.mean(left**2))) / scale if scale > 0 else 0.0
     z = balance.motion(x, omega, level, h, used)
@@ -550,6 +555,6 @@ def _make_periodic(balance, x, drive, h, top, samples, changes, size, count, q) 
         left = changes[-2] * ratio / (1 - ratio)
         error = 2 * (changes[-1] + left + max(changes) * (h / top) ** 2.5)
     size = max(size, 1e-300)
-    return Periodic(
+    return SteadyMotion(
         omega, level, q, used, z, h, samples, residual, error / size, count, x, group, left / size
     )

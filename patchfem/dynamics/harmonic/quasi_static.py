@@ -16,8 +16,8 @@ from scipy.optimize import root
 from ...core import ModalBasis, NotConverged, PatchfemError
 from ...formatting import format_length
 from ...friction.laws.elastic_plastic import masing_loop
-from .forces import Group
-from .laws import Jenkins, Track
+from .forces import LawGroup
+from .laws import Jenkins, SampledSlide
 
 # step over a slide, for the finite difference of the force at the tip of a loop
 SLOPE_STEP = 1e-6
@@ -28,7 +28,7 @@ FORCE_TOL = 1e-9
 SPEED_MESSAGE = "a friction force that depends on the sliding speed has no static loop"
 
 
-class Loops(NamedTuple):
+class StaticLoops(NamedTuple):
     """Loops of the laws of a row at an amplitude of its slide: tip [N] and area [J]."""
 
     tip: float
@@ -51,7 +51,7 @@ class StaticMotion(NamedTuple):
     loss: float
 
 
-def find_loops(laws, u: float, samples: int) -> Loops:
+def find_loops(laws, u: float, samples: int) -> StaticLoops:
     """Return the loops of the laws on one row at an amplitude of its slide.
 
     Parameters
@@ -65,33 +65,33 @@ def find_loops(laws, u: float, samples: int) -> Loops:
 
     Returns
     -------
-    Loops
+    StaticLoops
     """
     found = [
-        Loops(*map(float, masing_loop(law.stiffness, law.limit_slide, u)))
+        StaticLoops(*map(float, masing_loop(law.stiffness, law.limit_slide, u)))
         if isinstance(law, Jenkins)
         else _sample_loops(law, u, samples)
         for law in laws
     ]
-    return Loops(sum(one.tip for one in found), sum(one.area for one in found))
+    return StaticLoops(sum(one.tip for one in found), sum(one.area for one in found))
 
 
-def _sample_loops(law, u: float, samples: int) -> Loops:
+def _sample_loops(law, u: float, samples: int) -> StaticLoops:
     """Return tip and area of the loop of a law that does not depend on time, by samples."""
     if u == 0:
-        return Loops(0.0, 0.0)
-    track = Track(np.array([0.0, u], complex), 1.0, samples)
+        return StaticLoops(0.0, 0.0)
+    track = SampledSlide(np.array([0.0, u], complex), 1.0, samples)
     force = law.sample(track).force
-    return Loops(
+    return StaticLoops(
         float(force[0] - force[samples // 2]) / 2, float(force @ track.rate) * 2 * np.pi / samples
     )
 
 
-def depends_on_speed(group: Group, u: float) -> bool:
+def depends_on_speed(group: LawGroup, u: float) -> bool:
     """Return whether a force changes with the rate of a cycle of amplitude u [m]."""
     for law in (one for laws in group.laws for one in laws if not isinstance(one, Jenkins)):
         slow, fast = (
-            law.sample(Track(np.array([0.0, u], complex), rate, 512)).force
+            law.sample(SampledSlide(np.array([0.0, u], complex), rate, 512)).force
             for rate in (1.0, RATE_RATIO)
         )
         if np.abs(fast - slow).max() > FORCE_TOL * np.abs(slow).max(initial=1e-300):
@@ -99,8 +99,8 @@ def depends_on_speed(group: Group, u: float) -> bool:
     return False
 
 
-def static_motions(
-    modes: ModalBasis, group: Group, shares, held: tuple, samples: int = 4096, of=None
+def find_static_motions(
+    modes: ModalBasis, group: LawGroup, shares, held: tuple, samples: int = 4096, of=None
 ) -> list:
     """Return the static motions (k,) of a mode at amplitudes (k,) [m].
 
@@ -108,7 +108,7 @@ def static_motions(
     ----------
     modes : ModalBasis
         Without the contact.
-    group : Group
+    group : LawGroup
         Laws on the rows.
     shares : array_like
         (k,) parts of the motion along the shape, or of what `of` names [m].
@@ -156,7 +156,7 @@ def static_motions(
     return out
 
 
-def static_motions_from_loops(modes: ModalBasis, row, held: tuple, slides, found) -> list:
+def find_static_motions_from_loops(modes: ModalBasis, row, held: tuple, slides, found) -> list:
     """Return the static motions of a mode whose one interface runs through known loops.
 
     Parameters
@@ -165,10 +165,10 @@ def static_motions_from_loops(modes: ModalBasis, row, held: tuple, slides, found
     row : ndarray
         (n,) slide per coordinate.
     held : tuple
-        As of `static_motions`.
+        As of `find_static_motions`.
     slides : array_like
         (k,) [m].
-    found : sequence of Loops
+    found : sequence of StaticLoops
         (k,).
 
     Returns
@@ -213,7 +213,7 @@ def _solve_equilibrium(modes, group, held: tuple, share: float, near, samples: i
 
     def slopes(x):
         u = np.abs(group.rows @ x[:n] * share)
-        rise = [_slope(laws, one, samples) for one, laws in zip(u, group.laws)]
+        rise = [_find_tip_slope(laws, one, samples) for one, laws in zip(u, group.laws)]
         top = stiff + group.rows.T * rise @ group.rows / (m * omega**2)
         return np.block([[top, -shape[:, None]], [of[None], np.zeros((1, 1))]])
 
@@ -226,7 +226,7 @@ def _solve_equilibrium(modes, group, held: tuple, share: float, near, samples: i
     )
 
 
-def _slope(laws, u: float, samples: int) -> float:
+def _find_tip_slope(laws, u: float, samples: int) -> float:
     """Return the slope [N/m] of the tips of loops over the amplitude."""
     step = max(SLOPE_STEP * u, 1e-30)
     return (find_loops(laws, u + step, samples).tip - find_loops(laws, u, samples).tip) / step

@@ -5,35 +5,35 @@ from dataclasses import replace
 import numpy as np
 
 from ..periodic import find_multipliers, is_stable
-from .floquet import Fading, TurningPoint, monodromy
-from .laws import Flow, Nodes
+from .floquet import FadingMemory, TurningPoint, find_monodromy
+from .laws import FlowLaw, FlowNodes
 
 
-def with_stability(periodic, modes, cells: int = 0):
-    """Return the Periodic with its Floquet multipliers and whether it is stable.
+def add_stability(periodic, modes, cells: int = 0):
+    """Return the SteadyMotion with its Floquet multipliers and whether it is stable.
 
     Parameters
     ----------
-    periodic : Periodic
+    periodic : SteadyMotion
     modes : ModalBasis
     cells : int, optional
         Of the cycle; 0 for 1024, or as many as it was sampled in.
 
     Returns
     -------
-    Periodic
+    SteadyMotion
     """
-    found = find_multipliers(monodromy_of(periodic, modes, cells))
+    found = find_multipliers(find_motion_monodromy(periodic, modes, cells))
     return replace(periodic, multipliers=found, stable=is_stable(found))
 
 
-def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
-    """Return the map of a small change of a Periodic over one period of the drive.
+def find_motion_monodromy(periodic, modes, cells: int = 0) -> np.ndarray:
+    """Return the map of a small change of a SteadyMotion over one period of the drive.
 
     Parameters
     ----------
     periodic, modes, cells
-        As of `with_stability`; the slopes of the laws are constant in a cell.
+        As of `add_stability`; the slopes of the laws are constant in a cell.
 
     Returns
     -------
@@ -49,8 +49,8 @@ def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
         zip(group.tracks(periodic.coefficients, periodic.omega, n), group.laws)
     ):
         for law in laws:
-            if isinstance(law, Flow):
-                one = law.along(track)
+            if isinstance(law, FlowLaw):
+                one = law.find_periodic_state(track)
                 fading.append(_make_fading(i, one))
                 by_rate[i] += _average_cells(one.slopes[1, one.own], 0.5)
                 continue
@@ -60,7 +60,7 @@ def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
             by_rate[i] += _average_cells(found.by_rate, 0.5) if found.by_rate is not None else 0.0
             if found.hold is not None:
                 marks += _make_turning_points(i, track, found.hold, share, slope[i])
-    return monodromy(modes, group.rows, periodic.omega, slope, by_rate, marks, fading)
+    return find_monodromy(modes, group.rows, periodic.omega, slope, by_rate, marks, fading)
 
 
 def _average_cells(values, share) -> np.ndarray:
@@ -93,14 +93,14 @@ def _weigh_samples(track, found):
 
 def _set_turning_cells(track, share):
     """Return the weights (N,) with those of the cells of the turning points set from their positions."""
-    cells = track.turning[2]
+    cells = track.turning_points.cells
     share[cells] = 1 - _place_in_cell(track)
     return share
 
 
 def _place_in_cell(track) -> np.ndarray:
     """Return the position [0, 1] of every turning point in its cell."""
-    return track.turning[0] * (track.samples / (2 * np.pi)) - track.turning[2]
+    return track.turning_points.angles * (track.samples / (2 * np.pi)) - track.turning_points.cells
 
 
 def _make_turning_points(row: int, track, hold, share, slope) -> list:
@@ -110,7 +110,7 @@ def _make_turning_points(row: int, track, hold, share, slope) -> list:
     square of the cell.
     """
     out = []
-    for cell, x, line in zip(track.turning[2], _place_in_cell(track), hold):
+    for cell, x, line in zip(track.turning_points.cells, _place_in_cell(track), hold):
         if line.min() < line.max():
             line = line - line.max()
             mean = _average_cells(line, share)
@@ -120,10 +120,10 @@ def _make_turning_points(row: int, track, hold, share, slope) -> list:
     return out
 
 
-def _make_fading(row: int, one: Nodes) -> Fading:
-    kept, by_slide = one.by_cell()
+def _make_fading(row: int, one: FlowNodes) -> FadingMemory:
+    kept, by_slide = one.find_cell_factors()
     loss = -np.log(np.maximum(kept, 1e-300))
     gain = by_slide * np.divide(loss, 1 - kept, out=np.ones_like(loss), where=loss > 1e-9)
-    return Fading(
+    return FadingMemory(
         row, gain, loss * (kept.size / (2 * np.pi)), _average_cells(one.slopes[0, one.own], 0.5)
     )

@@ -45,7 +45,7 @@ def make_interpolation_matrix(fractions) -> np.ndarray:
     return chebyshev.chebvander(2 * np.asarray(fractions) - 1, N_NODES - 1) @ TO_CHEBYSHEV
 
 
-def evaluate_powers(terms, fraction):
+def evaluate_power_series(terms, fraction):
     """Evaluate k polynomials in powers of 2 fraction - 1 at fractions (k,).
 
     terms: (k, N_NODES) coefficients.
@@ -57,7 +57,7 @@ def evaluate_powers(terms, fraction):
     return out
 
 
-def apply_matrix(values, matrix) -> np.ndarray:
+def transform_parts(values, matrix) -> np.ndarray:
     """Return values (k, p) of k polynomials by a matrix (p, N_NODES).
 
     With so many rows a matrix product would be slower by the threads that it starts.
@@ -105,9 +105,9 @@ class StepParts:
         steps = np.flatnonzero(top + MAX_RISE_RATIO * (top - least) >= top.max())
         if steps.size > MAX_CANDIDATES:
             steps = steps[
-                np.argsort(apply_matrix(values[steps], TO_FINE).max(axis=1))[-MAX_CANDIDATES:]
+                np.argsort(transform_parts(values[steps], TO_FINE).max(axis=1))[-MAX_CANDIDATES:]
             ]
-        seen = apply_matrix(values[steps], TO_FINEST)
+        seen = transform_parts(values[steps], TO_FINEST)
         every = np.arange(len(steps))
         at = np.clip(np.argmax(seen, axis=1), 1, FINEST_FRACTIONS.size - 2)
         left, mid, right = (seen[every, at + side] for side in (-1, 0, 1))
@@ -135,7 +135,7 @@ class StepParts:
 
     def harmonic(self, name: str, number: int = 1) -> complex:
         """Return the Fourier coefficient 2/T int x exp(-i n omega t) dt of a number of the response."""
-        values = self.weights * apply_matrix(self.values(name), TO_GAUSS)
+        values = self.weights * transform_parts(self.values(name), TO_GAUSS)
         return complex(2 / self.length.sum() * np.sum(values * self.carrier**number))
 
     def mean(self, name: str, begin: float, end: float) -> float:
@@ -161,7 +161,7 @@ class StepParts:
         cut = part[(low[part] > 0) | (high[part] < 1)]
         whole = np.setdiff1d(part, cut)
         total = float(
-            (self.weights[whole] * apply_matrix(self.values(name)[whole], TO_GAUSS)).sum()
+            (self.weights[whole] * transform_parts(self.values(name)[whole], TO_GAUSS)).sum()
         )
         for k in cut:
             size = high[k] - low[k]
@@ -200,8 +200,8 @@ class StepParts:
         place beside it in the part decides. A part that lies in such a place as a whole shows
         nothing.
         """
-        slip, slide = (apply_matrix(self.values(name), TO_SLOPES) for name in ("slip", "slide"))
-        moves, slides = (np.abs(apply_matrix(rates, TO_FINE)) for rates in (slip, slide))
+        slip, slide = (transform_parts(self.values(name), TO_SLOPES) for name in ("slip", "slide"))
+        moves, slides = (np.abs(transform_parts(rates, TO_FINE)) for rates in (slip, slide))
         rest = REST_SPEED_RATIO * slides.max(axis=1, keepdims=True) + SLIDE_TOL * np.abs(
             self.response.slide
         ).max(initial=0.0)
@@ -222,12 +222,12 @@ class StepParts:
         low = FINE_FRACTIONS[at]
         high = FINE_FRACTIONS[at + 1]
         below = before[steps, at] < 0
-        one, other = (apply_matrix(rates[steps], TO_POWERS) for rates in (slip, slide))
+        one, other = (transform_parts(rates[steps], TO_POWERS) for rates in (slip, slide))
         for _ in range(N_BISECTIONS):
             middle = 0.5 * (low + high)
             same = (
-                np.abs(evaluate_powers(one, middle))
-                < SLIP_FRACTION * np.abs(evaluate_powers(other, middle))
+                np.abs(evaluate_power_series(one, middle))
+                < SLIP_FRACTION * np.abs(evaluate_power_series(other, middle))
             ) == below
             low = np.where(same, middle, low)
             high = np.where(same, high, middle)

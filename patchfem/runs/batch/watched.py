@@ -119,7 +119,7 @@ class MotionObserver:
     def _line(self, drive, near) -> ObservedMotion | None:
         """Return the motion without friction: z = (Omega^2 - omega^2 + i omega D)^-1 (i a base)."""
         modes, omega = self.model.rig.modes, drive.omega
-        found = harmonic.linear_part(modes, omega, 1)
+        found = harmonic.make_linear_part(modes, omega, 1)
         if any(k == 1 for k, *_ in found.free):
             return None
         z = found.inverse[1] @ (1j * drive.acceleration * modes.base)
@@ -171,7 +171,7 @@ class MotionObserver:
         return (
             found
             if found is not None and found.replace_system(modes, groups)
-            else event_orbits.Orbits(modes, groups)
+            else event_orbits.PeriodicMotionFinder(modes, groups)
         )
 
     def _balance(self, drive, near) -> ObservedMotion:
@@ -180,8 +180,10 @@ class MotionObserver:
             "balance",
             lambda: rig_balance.BalanceFinder(self.model, self.numerics, self.patch, 0, self.say),
         )
-        found = point.point(one.modes, drive, one.group, one.harmonics, one.tolerance, start=near)
-        window = point_balance.periodic_response(found, one.modes, drive, rig_balance.SAMPLES)
+        found = point.find_point(
+            one.modes, drive, one.group, one.harmonics, one.tolerance, start=near
+        )
+        window = point_balance.make_cycle_response(found, one.modes, drive, rig_balance.SAMPLES)
         return ObservedMotion(
             window,
             measures.compute_acceleration_peak(window),

@@ -91,7 +91,7 @@ def _read(run: Solution) -> DecayCurve:
 
 
 def laws_on(model, patch, meshed: tuple = ()):
-    """Return the `harmonic.forces.Group` of a rig on one of its meshes.
+    """Return the `harmonic.forces.LawGroup` of a rig on one of its meshes.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def laws_on(model, patch, meshed: tuple = ()):
             model, replace(numerics.choose(with_automatic_method(model)), meshed=meshed), patch
         ).group
     load("dynamics.harmonic.cycle_kernels", None)
-    return forces.Group(
+    return forces.LawGroup(
         rig.modes, list(enumerate(map(models.element_model, interface.own_elements(model, meshed))))
     )
 
@@ -140,7 +140,7 @@ def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarra
     ----------
     modes
         Modal basis.
-    laws : Group
+    laws : LawGroup
     number : int
         Index of the mode, along which the static force acts.
     amplitudes : (k,)
@@ -157,7 +157,7 @@ def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarra
     moved = float(modes.output @ held[1])
     return decay_rows(
         modes,
-        quasi_static.static_motions(
+        quasi_static.find_static_motions(
             modes, laws, amplitudes / abs(moved), held, samples, modes.output / moved
         ),
     )
@@ -174,7 +174,7 @@ def decay_rows(modes, found: list) -> np.ndarray:
 
 
 def mesh_error(fine, rough, read) -> np.ndarray:
-    """Return the error by the mesh of the values that read(Group) returns, for partial slip.
+    """Return the error by the mesh of the values that read(LawGroup) returns, for partial slip.
 
     It is the change by a coarser mesh at second order, but not less than the change if the elements
     are spread over the yield slides between the nodes (`slip.mesh_correction`): at a slide at which
@@ -182,12 +182,12 @@ def mesh_error(fine, rough, read) -> np.ndarray:
 
     Parameters
     ----------
-    fine : Group
+    fine : LawGroup
         Laws on the mesh of the run.
-    rough : list of Group
+    rough : list of LawGroup
         Laws with a coarser mesh of one patch after the other.
     read : callable
-        Function of a Group that returns an array.
+        Function of a LawGroup that returns an array.
     """
     best = read(fine)
     changes = (read(other) - best for other in rough)
@@ -213,7 +213,7 @@ def mesh_errors_of_decay(model, patch, coarse, amplitudes, mode) -> tuple:
         Increasing amplitudes of the output [m]. The errors are interpolated between those that have
         a static motion.
     mode : callable
-        Function of a Group that returns the index of the mode.
+        Function of a LawGroup that returns the index of the mode.
 
     Returns
     -------

@@ -101,7 +101,7 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
 def _run(reader, frames: int, say, progress) -> Solution:
     """Run the drive of a rig, level by level if it has levels, and return the Solution."""
     rig, numerics, begin, more = reader.model.rig, reader.numerics, perf_counter(), {}
-    histories.load_kernels(say)
+    histories.load_event_kernels(say)
     prepare = {"reduce": reader.reduced, "compiled_code": perf_counter() - begin}
     begin = perf_counter()
 
@@ -425,7 +425,9 @@ class RigidElements:
     rigid, contact, held, seconds = True, None, 0.0, 0.0
 
     def __init__(self, model, numerics, patch):
-        self.groups = tuple(elements.coulomb(*pair) for pair in coulomb_limits(model, patch))
+        self.groups = tuple(
+            elements.make_coulomb_elements(*pair) for pair in coulomb_limits(model, patch)
+        )
 
 
 def coulomb_limits(model, patch) -> list:

@@ -12,7 +12,7 @@ from event_reference import random_basis
 
 from patchfem.core import SineDrive
 from patchfem.dynamics.events import cost, histories
-from patchfem.dynamics.events.elements import coulomb, make_elements
+from patchfem.dynamics.events.elements import make_coulomb_elements, make_elements
 from patchfem.structure import drives
 
 SINE = SineDrive(1.0, 1.2)
@@ -42,10 +42,10 @@ with open({file!r}, "wb") as file:
 def interface_of(rng, kind: str):
     """Return the elements of an interface."""
     if kind == "none":
-        return coulomb(0.0)
+        return make_coulomb_elements(0.0)
     if kind == "springs":
         return make_elements(rng.uniform(0.2, 1.0, 5), rng.uniform(0.05, 1.0, 5))
-    return coulomb(*sorted(rng.uniform(0.2, 0.6, 2), reverse=True))
+    return make_coulomb_elements(*sorted(rng.uniform(0.2, 0.6, 2), reverse=True))
 
 
 def motion_of(seed: int, n_modes: int, n_interfaces: int, kind: str, drive) -> dict:

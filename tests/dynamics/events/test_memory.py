@@ -7,8 +7,8 @@ from patchfem.core import PatchfemError
 from patchfem.dynamics.events import memory_kernels as kernels
 from patchfem.dynamics.events.elements import (
     element_stretches,
+    make_element_table,
     make_elements,
-    make_table,
     unstretched_memory,
 )
 
@@ -19,7 +19,7 @@ class Follower:
     def __init__(self, stiffness, yield_displacement):
         self.k, self.y = np.asarray(stiffness, float), np.asarray(yield_displacement, float)
         self.group = make_elements(self.k, self.y)
-        self.table = make_table([self.group])
+        self.table = make_element_table([self.group])
         self.memory = unstretched_memory(self.table, [0.0])
         self.stretch, self.lost, self.depth = np.zeros(self.k.size), 0.0, 0
 

@@ -9,7 +9,7 @@ from test_elastic_plastic import basis, random_rig
 from patchfem.core import NotConverged, SineDrive
 from patchfem.dynamics.events.elements import make_elements
 from patchfem.dynamics.events.histories import simulate
-from patchfem.dynamics.events.orbits import Orbits
+from patchfem.dynamics.events.orbits import PeriodicMotionFinder
 from patchfem.dynamics.events.steady import solve_steady as steady
 from patchfem.dynamics.periodic import solve_linear
 
@@ -30,7 +30,7 @@ def first_harmonic(window, omega):
 def test_exact_readings_are_those_of_a_marched_period(seed):
     modes, drive, k, y = random_rig(seed, 12)
     modes, group = replace(modes, gauge=modes.output[::-1].copy()), [make_elements(k, y)]
-    seen, one = Orbits(modes, group)(drive), steady(modes, drive, group)
+    seen, one = PeriodicMotionFinder(modes, group)(drive), steady(modes, drive, group)
     done = simulate(modes, drive, group, 1.0, 1, start=one.start, memory=one.memory)
     gauged = simulate(
         replace(modes, output=modes.gauge), drive, group, 1.0, 1, start=one.start, memory=one.memory
@@ -47,36 +47,38 @@ def test_exact_a_start_of_other_elements_counts_as_none():
     drive, four = SineDrive(1.0, 1.0), [make_elements([2.0, 1.0, 0.5, 0.2], [0.1, 0.3, 0.4, 0.6])]
     for mine, other in ((GROUP, four), (four, GROUP)):
         assert (
-            Orbits(MODES, mine)(drive, Orbits(MODES, other)(drive).point)[1:]
-            == Orbits(MODES, mine)(drive)[1:]
+            PeriodicMotionFinder(MODES, mine)(
+                drive, PeriodicMotionFinder(MODES, other)(drive).point
+            )[1:]
+            == PeriodicMotionFinder(MODES, mine)(drive)[1:]
         )
 
 
 def test_exact_other_modes_and_elements_take_the_same_room():
     """One after the other in the room of the first, every digit is that of fresh room; other numbers ask for their own
     and leave what is there as it was."""
-    orbits, drives = Orbits(MODES, GROUP), [SineDrive(1.0, 1.0), SineDrive(2.0, 1.05)]
+    orbits, drives = PeriodicMotionFinder(MODES, GROUP), [SineDrive(1.0, 1.0), SineDrive(2.0, 1.05)]
     stiff = basis([1.3, 2.0], [0.05, 0.02], [0.7, 1.0], [1.0, 0.5], [0.4, 0.2])
     gauged = replace(MODES, gauge=np.array([0.3, 1.0]))
     others = (stiff, GROUP), (gauged, [make_elements([3.0, 0.4], [0.2, 0.25])]), (MODES, GROUP)
     for modes, group in others:
         assert orbits.replace_system(modes, group)
         for drive in drives:
-            assert orbits(drive)[1:] == Orbits(modes, group)(drive)[1:]
+            assert orbits(drive)[1:] == PeriodicMotionFinder(modes, group)(drive)[1:]
     for modes, group in (
         (basis([1.0], [0.1], [1.0], [1.0], [1.0]), GROUP),
         (MODES, [make_elements([1.0], [0.1])]),
         (MODES, 2 * GROUP),
     ):
         assert not orbits.replace_system(modes, group)
-    assert orbits(drives[0])[1:] == Orbits(MODES, GROUP)(drives[0])[1:]
+    assert orbits(drives[0])[1:] == PeriodicMotionFinder(MODES, GROUP)(drives[0])[1:]
 
 
 def test_refuses_a_motion_that_nothing_bounds():
     with pytest.raises(NotConverged):
-        Orbits(basis([1.0], [0.0], [1.0], [1.0], [1.0]), [make_elements([1.0], [0.01])])(
-            SineDrive(1.0, 1.0)
-        )
+        PeriodicMotionFinder(
+            basis([1.0], [0.0], [1.0], [1.0], [1.0]), [make_elements([1.0], [0.01])]
+        )(SineDrive(1.0, 1.0))
 
 
 def test_exact_a_step_that_is_not_determined_is_the_shortest():

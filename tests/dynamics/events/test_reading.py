@@ -39,7 +39,7 @@ def several() -> tuple:
 
 def run_of(modes, drive, groups, cycles=24, window=5) -> tuple:
     """(the run, its rows in the window, what it shows)."""
-    run, kept = histories.start_run(modes, drive, groups, cycles, window), []
+    run, kept = histories.start_event_run(modes, drive, groups, cycles, window), []
     ended = run._close_rows
     run._close_rows = lambda late: kept.append(ended(late)) or kept[-1]
     done = run.run(0, None)

@@ -7,11 +7,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patchfem.core import ModalBasis, NotConverged, PatchfemError, SineDrive
-from patchfem.dynamics.harmonic.balance import cycle_energy, periodic_response
-from patchfem.dynamics.harmonic.forces import Group
-from patchfem.dynamics.harmonic.harmonic import Balance, pack, solve_newton, unpack
-from patchfem.dynamics.harmonic.laws import Interlock, Jenkins, Spring, Track, synthesis
-from patchfem.dynamics.harmonic.point import balance_of, group_of, point
+from patchfem.dynamics.harmonic.balance import find_cycle_energies, make_cycle_response
+from patchfem.dynamics.harmonic.forces import LawGroup
+from patchfem.dynamics.harmonic.harmonic import (
+    Balance,
+    pack_harmonics,
+    solve_newton,
+    unpack_harmonics,
+)
+from patchfem.dynamics.harmonic.laws import (
+    Interlock,
+    Jenkins,
+    SampledSlide,
+    Spring,
+    evaluate_series,
+)
+from patchfem.dynamics.harmonic.point import find_point, make_balance, make_group
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import advance_bonds
@@ -41,8 +52,8 @@ def harmonics(seed, count, size=1.0):
 def test_always_elements_follow_the_plain_loop(seed, count, size):
     """Samples and true turning points in order, two turns, one element at a time."""
     k, w = many(17, 3.0, 1.0)
-    track = Track(harmonics(seed, count, size), 1.0, 64)
-    angles, places, cells, _ = track.turning
+    track = SampledSlide(harmonics(seed, count, size), 1.0, 64)
+    angles, places, cells, _ = track.turning_points
     order = np.argsort(
         np.concatenate([np.arange(64), cells + 0.5 + 1e-9 * np.arange(cells.size)]), kind="stable"
     )
@@ -50,7 +61,7 @@ def test_always_elements_follow_the_plain_loop(seed, count, size):
     forces = plain_jenkins(np.tile(cycle, 2), k, w)[0][cycle.size :]
     found = Jenkins(k, w).sample(track)
     assert found.force == pytest.approx(forces[order < 64], abs=1e-12)
-    fine = synthesis(track.x, 65536)
+    fine = evaluate_series(track.x, 65536)
     assert angles.size >= 2 and places.max() == pytest.approx(fine.max(), abs=1e-6 * np.ptp(fine))
 
 
@@ -58,8 +69,8 @@ def test_always_elements_follow_the_plain_loop(seed, count, size):
 @given(st.integers(0, 10**6), st.integers(1, 5), st.floats(0.05, 3.0))
 def test_always_bonds_follow_the_recursion(seed, count, size):
     """Turn after turn of friction.recursion.advance until the stretch repeats."""
-    track = Track(harmonics(seed, count, size), 1.0, 32)
-    _, places, cells, _ = track.turning
+    track = SampledSlide(harmonics(seed, count, size), 1.0, 32)
+    _, places, cells, _ = track.turning_points
     order = np.argsort(
         np.concatenate([np.arange(32), cells + 0.5 + 1e-9 * np.arange(cells.size)]), kind="stable"
     )
@@ -88,11 +99,11 @@ def test_always_bonds_follow_the_recursion(seed, count, size):
     ids=lambda law: type(law).__name__,
 )
 def test_exact_slopes_are_the_derivative_of_the_forces(law):
-    group, q = Group(sdof(), law, 4096), harmonics(3, 5)[None]
-    fold, v, eps = group(q, 1.3), pack(harmonics(3, 5)[None]), 1e-6
+    group, q = LawGroup(sdof(), law, 4096), harmonics(3, 5)[None]
+    fold, v, eps = group(q, 1.3), pack_harmonics(harmonics(3, 5)[None]), 1e-6
 
     def force(x, omega=1.3):
-        return group(unpack(x, 1), omega).force[0]
+        return group(unpack_harmonics(x, 1), omega).force[0]
 
     found = np.stack(
         [(force(v + d) - force(v - d)) / (2 * eps) for d in eps * np.eye(v.size)], axis=1
@@ -124,10 +135,12 @@ def test_exact_linear_limits(omega):
     c = np.diag(0.04 * np.arange(1, 6)) + 0.02
     for damping in (None, c):
         modes = five(damping)
-        found = point(modes, SineDrive(2.0, omega), Jenkins([1.0, 2.5], [1e6, 2e6]), harmonics=3)
+        found = find_point(
+            modes, SineDrive(2.0, omega), Jenkins([1.0, 2.5], [1e6, 2e6]), harmonics=3
+        )
         assert found.modal[1] == pytest.approx(dense(modes, omega, 2.0, 3.5), rel=1e-10)
         assert np.abs(found.modal[[0, 2, 3]]).max() < 1e-12
-        free = point(modes, SineDrive(2.0, omega), Jenkins([1e-9], [1.0]), harmonics=3)
+        free = find_point(modes, SineDrive(2.0, omega), Jenkins([1e-9], [1.0]), harmonics=3)
         assert free.modal[1] == pytest.approx(dense(modes, omega, 2.0, 0.0), rel=1e-7)
 
 
@@ -138,10 +151,12 @@ def test_exact_a_mode_without_stiffness_or_damping():
         ("r", "a"), np.array([0.0, 1.0]), np.zeros(2), np.array([1.0, 0.6]), one, one, 1.5
     )
     for omega in (0.8, 1.0):
-        found = point(modes, SineDrive(1.0, omega), Spring(2.0), harmonics=3)
+        found = find_point(modes, SineDrive(1.0, omega), Spring(2.0), harmonics=3)
         assert found.modal[1] == pytest.approx(dense(modes, omega, 1.0, 2.0), rel=1e-10)
         assert np.abs(found.modal[0]).max() < 1e-12
-    shaken = point(modes, SineDrive(1.0, 1.0), [Spring(0.5), Jenkins([3.0], [0.4])], tolerance=1e-4)
+    shaken = find_point(
+        modes, SineDrive(1.0, 1.0), [Spring(0.5), Jenkins([3.0], [0.4])], tolerance=1e-4
+    )
     check_cycle(
         modes, SineDrive(1.0, 1.0), shaken, np.array([0.5, 3.0]), np.array([1e9, 0.4]), 5e-4
     )
@@ -164,7 +179,7 @@ def test_exact_the_jacobian_of_the_balance():
             damping,
             faces,
         )
-        group = Group(
+        group = LawGroup(
             modes, [(0, of_speed(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, bonds(0.5, 0.4))], 1024
         )
         balance = Balance(modes, group.rows, group)
@@ -192,7 +207,7 @@ def test_exact_the_jacobian_of_the_balance():
 
 def check_cycle(modes, drive, found, k, w, near, steps=4000):
     """March one cycle from the state the balance gives: it must follow it and come back."""
-    response = periodic_response(found, modes, drive, steps)
+    response = make_cycle_response(found, modes, drive, steps)
     path = np.tile(response.slide[:-1], 2)
     stretch = plain_jenkins(np.append(path, path[0]), k, w)[1]
     start = np.concatenate([response.modal[0], response.modal_rate[0]])
@@ -211,8 +226,8 @@ def check_cycle(modes, drive, found, k, w, near, steps=4000):
 @pytest.mark.parametrize("omega", [0.7, 1.2, 2.45])
 def test_exact_a_hundred_elements_and_five_modes_march(omega):
     modes, (k, w), drive = five(), many(), SineDrive(1.5, omega)
-    found = point(modes, drive, jenkins_model(k, w), tolerance=1e-4)
-    assert found.error < 1e-4 and np.ptp(synthesis(found.coefficients, 512)) > 4 * w.min()
+    found = find_point(modes, drive, jenkins_model(k, w), tolerance=1e-4)
+    assert found.error < 1e-4 and np.ptp(evaluate_series(found.coefficients, 512)) > 4 * w.min()
     check_cycle(modes, drive, found, k, w, 2e-4)
 
 
@@ -222,7 +237,7 @@ def test_exact_a_hundred_elements_and_five_modes_march(omega):
     [(10, 1e-3, 1e-3), (100, 1e-3, 1e-3), (10, 1e-5, 1e-5), (100, 1e-5, 1e-5), (1000, 1e-4, 1e-4)],
 )
 def test_exact_peaks_at_resonance(stiffness, tolerance, near):
-    found = point(sdof(), DRIVE, Jenkins([stiffness], [0.8 / stiffness]), tolerance=tolerance)
+    found = find_point(sdof(), DRIVE, Jenkins([stiffness], [0.8 / stiffness]), tolerance=tolerance)
     miss = abs(found.amplitude([1.0]) / PEAKS[stiffness] - 1)
     assert miss < near and miss < found.error < tolerance
 
@@ -231,8 +246,8 @@ def test_exact_peaks_at_resonance(stiffness, tolerance, near):
 def test_always_work_in_is_what_is_lost(omega):
     """Parseval: base work = viscous loss + the loop's area, per cycle, from three independent sums."""
     modes, (k, w), drive = five(), many(), SineDrive(1.5, omega)
-    found = point(modes, drive, Jenkins(k, w), harmonics=15)
-    r = periodic_response(found, modes, drive, 2000)
+    found = find_point(modes, drive, Jenkins(k, w), harmonics=15)
+    r = make_cycle_response(found, modes, drive, 2000)
     dt = drive.period / 2000
     base = -modes.mass * dt * np.sum((r.modal_rate @ modes.base * drive.values(r.time))[:-1])
     viscous = (
@@ -242,7 +257,7 @@ def test_always_work_in_is_what_is_lost(omega):
     )
     slip = np.sum((r.force * r.slide_rate)[:-1]) * dt
     assert slip > 0.05 * base and base == pytest.approx(viscous + slip, rel=2e-4)
-    book = cycle_energy(found, modes)
+    book = find_cycle_energies(found, modes)
     assert [book[n] for n in ("work_in", "viscous", "friction")] == pytest.approx(
         [base, viscous, slip], rel=2e-4
     )
@@ -252,19 +267,19 @@ def test_always_work_in_is_what_is_lost(omega):
 def test_order_of_what_is_cut_off():
     """Smooth: spectral. Elements: the slide's harmonics fall like k^-4, so the error like H^-3 or better."""
     modes, drive = sdof(0.05), SineDrive(1.0, 0.5)
-    best = point(modes, drive, Spring(0.5, 3.0), harmonics=41).amplitude([1.0])
+    best = find_point(modes, drive, Spring(0.5, 3.0), harmonics=41).amplitude([1.0])
     errors = [
-        abs(point(modes, drive, Spring(0.5, 3.0), harmonics=h).amplitude([1.0]) / best - 1)
+        abs(find_point(modes, drive, Spring(0.5, 3.0), harmonics=h).amplitude([1.0]) / best - 1)
         for h in (3, 9, 15)
     ]
     assert errors[0] > 1e-4 and errors[1] < 1e-2 * errors[0] and errors[2] < 1e-2 * errors[1]
-    group = Group(modes, Jenkins([2.0], [0.3]), 8192)
-    best = point(modes, drive, group, harmonics=255)
-    y = synthesis(best.coefficients[0], 1024)
+    group = LawGroup(modes, Jenkins([2.0], [0.3]), 8192)
+    best = find_point(modes, drive, group, harmonics=255)
+    y = evaluate_series(best.coefficients[0], 1024)
     errors = []
     for h in (9, 19, 39, 79):
-        here = point(modes, drive, group, harmonics=h)
-        errors.append(np.abs(synthesis(here.coefficients[0], 1024) - y).max())
+        here = find_point(modes, drive, group, harmonics=h)
+        errors.append(np.abs(evaluate_series(here.coefficients[0], 1024) - y).max())
     order = -np.polyfit(np.log([9, 19, 39, 79]), np.log(errors), 1)[0]
     assert 2.7 < order < 4.5
 
@@ -273,12 +288,12 @@ def test_exact_both_rows_of_a_group():
     """Slide and output with their own laws; the two forces act where they should: reciprocal linear check."""
     modes = five()
     laws = [(0, Spring(1.5)), (modes.output, Spring(0.7))]
-    found = point(modes, SineDrive(1.0, 1.9), laws, harmonics=1)
+    found = find_point(modes, SineDrive(1.0, 1.9), laws, harmonics=1)
     a = np.diag(modes.omega**2) - 1.9**2 * np.eye(5) + 1.9j * modes.damping_matrix
     for row, k in ((modes.slide, 1.5), (modes.output, 0.7)):
         a = a + np.outer(row, row) * k / modes.mass
     assert found.modal[1] == pytest.approx(np.linalg.solve(a, 1j * modes.base), rel=1e-10)
-    balance = balance_of(modes, group_of(modes, laws), 64)
+    balance = make_balance(modes, make_group(modes, laws), 64)
     receptance = balance.faces @ balance.linear(1.9, 3).inverse @ balance.faces.T
     assert receptance == pytest.approx(receptance.transpose(0, 2, 1), abs=1e-14)
 
@@ -291,10 +306,10 @@ def test_exact_both_rows_of_a_group():
 def test_exact_other_laws_obey_the_equation_of_motion(law):
     """The accelerations of the harmonics against those the law's own force gives."""
     modes, drive = sdof(0.05), SineDrive(1.0, 1.2)
-    found = point(modes, drive, law, tolerance=1e-7 if isinstance(law, Interlock) else 1e-5)
-    r = periodic_response(found, modes, drive, 512)
+    found = find_point(modes, drive, law, tolerance=1e-7 if isinstance(law, Interlock) else 1e-5)
+    r = make_cycle_response(found, modes, drive, 512)
     k = np.arange(found.modal.shape[0])[:, None]
-    accel = synthesis((-((1.2 * k) ** 2) * found.modal).T, 512)
+    accel = evaluate_series((-((1.2 * k) ** 2) * found.modal).T, 512)
     assert r.acceleration[:-1] - drive.values(r.time[:-1]) == pytest.approx(accel[0], abs=2e-3)
 
 
@@ -304,13 +319,13 @@ def test_exact_other_laws_obey_the_equation_of_motion(law):
 def test_refuses_what_cannot_be_balanced():
     modes = sdof()
     with pytest.raises(PatchfemError, match="rigid friction"):
-        point(modes, DRIVE, coulomb_model(1.0, 1.0))
+        find_point(modes, DRIVE, coulomb_model(1.0, 1.0))
     with pytest.raises(PatchfemError, match="breakaway"):
-        point(modes, DRIVE, points_model(Bonds(0.3, 1e-6, breakaway=0.1), [1.0], [1.0]))
+        find_point(modes, DRIVE, points_model(Bonds(0.3, 1e-6, breakaway=0.1), [1.0], [1.0]))
     with pytest.raises(PatchfemError, match="interface 2"):
-        Group(modes, (2, Spring(1.0)))
+        LawGroup(modes, (2, Spring(1.0)))
     with pytest.raises(PatchfemError, match="on at least one interface"):
-        Group(modes, [])
+        LawGroup(modes, [])
     with pytest.raises(PatchfemError, match="finite stiffness > 0"):
         Jenkins([1.0, -1.0], [1.0, 1.0])
     with pytest.raises(PatchfemError, match="no mode moves"):
@@ -327,7 +342,7 @@ def test_exact_rows_that_depend_on_others_are_left_out_at_any_size(size):
 
 def test_refuses_to_call_an_unbalanced_motion_steady():
     modes = sdof()
-    group = Group(modes, Jenkins([10.0], [0.08]), 256)
-    balance = balance_of(modes, group, 256)
+    group = LawGroup(modes, Jenkins([10.0], [0.08]), 256)
+    balance = make_balance(modes, group, 256)
     with pytest.raises(NotConverged, match="did not converge in"):
         solve_newton(balance, np.full(15, 3.0), 1.0, 1.0, 7, most=2)

@@ -8,15 +8,20 @@ from scipy.special import ellipk
 
 from patchfem import plan, run
 from patchfem.core import G_N, ModalBasis, NotConverged, PatchfemError, SineDrive
-from patchfem.dynamics.harmonic.backbone import FreeBalance, trace
-from patchfem.dynamics.harmonic.balance import periodic_response
-from patchfem.dynamics.harmonic.branch import backbone, branches, levels, response
-from patchfem.dynamics.harmonic.continuation import follow
-from patchfem.dynamics.harmonic.forces import Group
+from patchfem.dynamics.harmonic.backbone import FreeBalance, trace_free_motions
+from patchfem.dynamics.harmonic.balance import make_cycle_response
+from patchfem.dynamics.harmonic.branch import (
+    find_backbone,
+    find_branches,
+    trace_over_frequency,
+    trace_over_level,
+)
+from patchfem.dynamics.harmonic.continuation import PathSettings, follow_curve
+from patchfem.dynamics.harmonic.forces import LawGroup
 from patchfem.dynamics.harmonic.harmonic import Balance
-from patchfem.dynamics.harmonic.laws import Jenkins, Spring, synthesis
-from patchfem.dynamics.harmonic.point import point
-from patchfem.dynamics.harmonic.stability import monodromy_of, with_stability
+from patchfem.dynamics.harmonic.laws import Jenkins, Spring, evaluate_series
+from patchfem.dynamics.harmonic.point import find_point
+from patchfem.dynamics.harmonic.stability import add_stability, find_motion_monodromy
 from patchfem.dynamics.periodic import find_multipliers
 
 W = 2 * np.pi * 143
@@ -38,7 +43,7 @@ def test_exact_a_circle_and_its_folds():
     def circle(x, p):
         return np.array([x[0] ** 2 + p**2 - 1]), np.array([[2 * x[0]]]), np.array([2 * p])
 
-    path = follow(circle, [0.6], 0.8, (-0.5, 2.0), True, 0.05, 0.05)
+    path = follow_curve(circle, [0.6], 0.8, (-0.5, 2.0), True, PathSettings(0.05, 0.05))
     assert (
         path.ended == "start"
         and path.p[-1] == -0.5
@@ -55,7 +60,9 @@ def test_exact_a_lopsided_fold():
         e = np.exp(-5 * x[0] ** 3)
         return x * e - p, np.array([[e * (1 - 15 * x[0] ** 3)]]), np.array([-1.0])
 
-    path = follow(curve, [0.1], 0.1 * np.exp(-0.005), (0.05, 1.0), True, 0.1, 0.1, scale=1.0)
+    path = follow_curve(
+        curve, [0.1], 0.1 * np.exp(-0.005), (0.05, 1.0), True, PathSettings(0.1, 0.1, size=1.0)
+    )
     assert path.ended == "start" and path.folds == (
         pytest.approx(15 ** (-1 / 3) * np.exp(-1 / 3), abs=5e-5),
     )
@@ -67,7 +74,7 @@ def test_exact_a_pitchfork_is_a_crossing():
     def fork(x, p):
         return x * (p - 1 / 3) - x**3, np.array([[p - 1 / 3 - 3 * x[0] ** 2]]), x
 
-    path = follow(fork, [0.0], 0.0, (0.0, 1.0), True, 0.02, 0.02, scale=1.0)
+    path = follow_curve(fork, [0.0], 0.0, (0.0, 1.0), True, PathSettings(0.02, 0.02, size=1.0))
     assert (
         path.ended == "end" and len(path.crossings) == 1 and abs(path.crossings[0] - 1 / 3) < 0.02
     )
@@ -75,7 +82,7 @@ def test_exact_a_pitchfork_is_a_crossing():
 
 def test_refuses_a_start_off_every_branch():
     with pytest.raises(NotConverged, match="the first point of the curve"):
-        follow(
+        follow_curve(
             lambda x, p: (x**2 + 1 + p**2, np.diag(2 * x), np.array([2 * p])),
             [0.3],
             0.5,
@@ -97,10 +104,10 @@ def duffing(drive, friction=0.0):
 def test_exact_both_stable_branches_by_time_integration():
     """At 160 Hz DOP853 stays on each stable branch over 5 cycles and leaves the unstable one at its multiplier."""
     drive = SineDrive(LEVEL, 2 * np.pi * 160)
-    found = branches(RIG, drive, STIFF, tolerance=1e-7)
+    found = find_branches(RIG, drive, STIFF, tolerance=1e-7)
     assert [p.stable for p in found] == [True, False, True]
     for p in found:
-        r = periodic_response(p, RIG, drive, 200)
+        r = make_cycle_response(p, RIG, drive, 200)
         start = np.array([r.modal[0, 0], r.modal_rate[0, 0]])
         run_ = solve_ivp(
             duffing(drive),
@@ -116,11 +123,11 @@ def test_exact_both_stable_branches_by_time_integration():
         ).max() < 3e-4 * p.amplitude([1.0])
         assert not np.isnan(run_.y).any()
     middle = found[1]
-    vector = np.linalg.eig(monodromy_of(middle, RIG))
+    vector = np.linalg.eig(find_motion_monodromy(middle, RIG))
     k = int(np.argmax(np.abs(vector[0])))
     # the state of the map is (z, z'/omega)
     push = vector[1][:, k].real * np.array([1.0, drive.omega])
-    r = periodic_response(middle, RIG, drive, 200)
+    r = make_cycle_response(middle, RIG, drive, 200)
     start = np.array([r.modal[0, 0], r.modal_rate[0, 0]])
     push *= 1e-6 / abs(push[0])
     ends = [
@@ -141,7 +148,7 @@ def test_exact_both_stable_branches_by_time_integration():
 def test_exact_levels_jump_up_and_come_back():
     """The level at 150 Hz, raised: the folds of the one-harmonic relation level(amplitude)."""
     drive = SineDrive(LEVEL, 2 * np.pi * 150)
-    found = levels(RIG, drive, STIFF, (0.2 * G_N, 12 * G_N), harmonics=1)
+    found = trace_over_level(RIG, drive, STIFF, (0.2 * G_N, 12 * G_N), harmonics=1)
 
     def level(a):
         return a * np.hypot(
@@ -159,9 +166,9 @@ def test_exact_levels_jump_up_and_come_back():
 def test_refuses_what_is_no_sweep():
     for bad in ([100.0], [100.0, -5.0], [100.0, np.nan, 120.0]):
         with pytest.raises(PatchfemError, match="positive"):
-            response(RIG, SineDrive(1.0, W), STIFF, bad)
+            trace_over_frequency(RIG, SineDrive(1.0, W), STIFF, bad)
         with pytest.raises(PatchfemError, match="positive"):
-            levels(RIG, SineDrive(1.0, W), STIFF, bad)
+            trace_over_level(RIG, SineDrive(1.0, W), STIFF, bad)
 
 
 # ---- multipliers
@@ -169,8 +176,8 @@ def test_refuses_what_is_no_sweep():
 
 def test_exact_multipliers_of_the_linear_modes():
     modes = five()
-    found = with_stability(
-        point(modes, SineDrive(1.0, 1.2), Spring(0.0), harmonics=1), modes
+    found = add_stability(
+        find_point(modes, SineDrive(1.0, 1.2), Spring(0.0), harmonics=1), modes
     ).multipliers
     power = np.exp(2 * np.pi / 1.2 * modes.omega * (-0.02 + 1j * np.sqrt(1 - 0.02**2)))
     want = np.concatenate([power, power.conj()])
@@ -182,8 +189,8 @@ def test_exact_multipliers_of_the_linear_modes():
 def test_exact_a_perturbed_march_of_elements(omega):
     """Five modes, 40 elements: the map of the modal state, memories as they are, by central differences of a march."""
     modes, (k, w), drive = five(), many(40), SineDrive(1.5, omega)
-    p = point(modes, drive, Jenkins(k, w), tolerance=1e-5)
-    r = periodic_response(p, modes, drive, 2000)
+    p = find_point(modes, drive, Jenkins(k, w), tolerance=1e-5)
+    r = make_cycle_response(p, modes, drive, 2000)
     stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), k, w)[1]
     start = np.concatenate([r.modal[0], r.modal_rate[0]])
     columns = []
@@ -192,7 +199,7 @@ def test_exact_a_perturbed_march_of_elements(omega):
         push[j] = 1e-4
         ends = [march(modes, drive, k, w, start + s * push, stretch, 2000)[0][-1] for s in (1, -1)]
         columns.append((ends[0] - ends[1]) / 2e-4)
-    found = monodromy_of(p, modes, 4096)
+    found = find_motion_monodromy(p, modes, 4096)
     unit = np.repeat([1.0, omega], 5)
     block = (found[:10, :10] * unit[:, None] / unit)[:, [0, 1, 4, 5, 6]]
     assert np.abs(block - np.array(columns).T).max() < 1.5e-3 * np.abs(block).max()
@@ -202,8 +209,8 @@ def test_exact_a_perturbed_march_of_elements(omega):
 def test_exact_bonds_forget_as_a_march_does():
     """One mode and the recursion: the whole map (z, v, u) by DOP853 on z'' and u' = (q' - |q'| u)/length."""
     modes, drive, limit, length = sdof(0.05), SineDrive(1.0, 1.2), 0.4, 0.3
-    p = point(modes, drive, bonds(limit, length), tolerance=1e-6)
-    r = periodic_response(p, modes, drive, 4096)
+    p = find_point(modes, drive, bonds(limit, length), tolerance=1e-6)
+    r = make_cycle_response(p, modes, drive, 4096)
 
     def rhs(t, y):
         z, v, u = y
@@ -216,7 +223,7 @@ def test_exact_bonds_forget_as_a_march_does():
     assert end(start) == pytest.approx(start, abs=2e-5)
     columns = np.stack([(end(start + d) - end(start - d)) / 2e-4 for d in 1e-4 * np.eye(3)], axis=1)
     unit = np.array([1.0, 1.2, 1 / length])  # rates over the angle, the stretch u length
-    found = monodromy_of(p, modes, 4096) * unit[:, None] / unit
+    found = find_motion_monodromy(p, modes, 4096) * unit[:, None] / unit
     assert found == pytest.approx(columns, abs=2e-5)
 
 
@@ -226,7 +233,7 @@ def test_exact_bonds_forget_as_a_march_does():
 def test_exact_the_jacobian_of_the_free_balance():
     """Against central differences, with a law of the rate and coupled modes."""
     modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
-    group = Group(modes, [of_speed(0.4, 0.3), Spring(0.3, 0.8), bonds(0.5, 0.4)], 1024)
+    group = LawGroup(modes, [of_speed(0.4, 0.3), Spring(0.3, 0.8), bonds(0.5, 0.4)], 1024)
     equations = FreeBalance(Balance(modes, group.rows, group), 1, 3, 2.0)
     x = np.append(np.random.default_rng(4).normal(size=7) * 0.5, [1.1, 0.07])
     found = np.stack(
@@ -242,9 +249,9 @@ def test_exact_the_jacobian_of_the_free_balance():
 def test_exact_the_free_motion_balances_every_mode():
     """Coupled damping: the modal equations with the balancing negative damping, harmonic by harmonic."""
     modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
-    group = Group(modes, Jenkins(*many(20)), 512)
+    group = LawGroup(modes, Jenkins(*many(20)), 512)
     omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), 1)
-    for free in trace(
+    for free in trace_free_motions(
         FreeBalance(Balance(modes, group.rows, group), 1, 5, omega), [0.05, 0.3], omega, shape
     ):
         for k in range(6):
@@ -260,7 +267,7 @@ def test_exact_the_free_motion_balances_every_mode():
 
 def test_exact_backbone_of_the_undamped_duffing_oscillator():
     """Period 4 K(m)/sqrt(1 + c a^2), m = c a^2/(2 (1 + c a^2)); a is the peak, the amplitudes are of one harmonic."""
-    found = backbone(sdof(0.0), Spring(0.0, 0.5), np.array([0.3, 1.0, 2.0]), harmonics=15)
+    found = find_backbone(sdof(0.0), Spring(0.0, 0.5), np.array([0.3, 1.0, 2.0]), harmonics=15)
     for a, f, z in zip(found.slide, found.frequency, found.damping):
         c = 0.5 * a * a
         assert f == pytest.approx(np.sqrt(1 + c) / (4 * ellipk(c / (2 * (1 + c)))), rel=1e-4)
@@ -296,7 +303,7 @@ steps_per_cycle = 600
 def test_exact_backbone_is_that_of_the_loops_of_a_bench(text, law):
     """A scene's bench measures stiffness and area of the loop; with one harmonic they are the backbone's."""
     omega, amplitudes = W, np.array([4.0])
-    found = backbone(RIG, law, amplitudes * 1e-6, harmonics=1)
+    found = find_backbone(RIG, law, amplitudes * 1e-6, harmonics=1)
     for k, amplitude in enumerate(amplitudes):
         result = run(plan(BENCH.format(law=text, amplitude=amplitude)))
         stiffness = result.measures["equivalent_stiffness"].value
@@ -312,7 +319,7 @@ def test_exact_backbone_ends_at_the_held_and_the_free_modes():
     """Five modes: at small amplitude those of the held contact, at large ones the free ones; the ring-down of a march
     between them loses what the backbone says."""
     modes, (k, w) = five(), many(50)
-    found = backbone(modes, Jenkins(k, w), np.array([1e-3, 0.2, 1.0, 300.0]), harmonics=9)
+    found = find_backbone(modes, Jenkins(k, w), np.array([1e-3, 0.2, 1.0, 300.0]), harmonics=9)
     held = np.sqrt(
         np.linalg.eigvalsh(
             np.diag(modes.omega**2) + np.outer(modes.slide, modes.slide) * k.sum() / 2
@@ -326,7 +333,7 @@ def test_order_of_the_loss_of_an_iwan_joint():
     """Limit slides spread like w^chi: the loss in microslip goes like A^(3 + chi) (Segalman 2005), 4000 elements."""
     chi = -0.4
     w = ((np.arange(4000) + 0.5) / 4000) ** (1 / (1 + chi))
-    found = backbone(
+    found = find_backbone(
         sdof(0.0), Jenkins(np.full(4000, 1e-6), w), np.array([0.1, 0.2, 0.4]), harmonics=1
     )
     slope = np.diff(np.log(found.loss)) / np.log(2)
@@ -337,17 +344,17 @@ def test_order_of_the_loss_of_an_iwan_joint():
 def test_exact_backbone_is_where_the_response_is_in_quadrature():
     """With one harmonic the forced motion 90 degrees behind, at the balancing level, is the free one."""
     law, modes = Jenkins([0.2], [0.5]), sdof(0.01)
-    free = backbone(modes, law, np.array([2.0]), harmonics=1)
+    free = find_backbone(modes, law, np.array([2.0]), harmonics=1)
     omega = 2 * np.pi * free.frequency[0]
     level = 2 * free.damping[0] * omega**2 * 2.0
-    forced = point(modes, SineDrive(level, omega), law, harmonics=1)
+    forced = find_point(modes, SineDrive(level, omega), law, harmonics=1)
     assert np.abs(forced.coefficients[0, 1]) == pytest.approx(2.0, rel=1e-6)
     assert np.angle(forced.coefficients[0, 1] / (-1j)) == pytest.approx(np.pi / 2, abs=1e-6)
 
 
 def test_refuses_amplitudes_that_fall():
     with pytest.raises(PatchfemError, match="in rising order"):
-        backbone(RIG, Spring(1.0), np.array([2.0, 1.0]))
+        find_backbone(RIG, Spring(1.0), np.array([2.0, 1.0]))
     with pytest.raises(PatchfemError, match="mode 3"):
-        backbone(RIG, Spring(1.0), np.array([2.0]), mode=3)
-    assert synthesis(np.array([1.0, 1.0 + 0j]), 4) == pytest.approx([2, 1, 0, 1])
+        find_backbone(RIG, Spring(1.0), np.array([2.0]), mode=3)
+    assert evaluate_series(np.array([1.0, 1.0 + 0j]), 4) == pytest.approx([2, 1, 0, 1])

@@ -7,10 +7,10 @@ from scene_texts import NONLOCAL, POINT, STRUCTURE
 
 from patchfem import plan
 from patchfem.core import ModalBasis, NotConverged, SineDrive
-from patchfem.dynamics.harmonic.balance import find_regime, periodic_response
-from patchfem.dynamics.harmonic.branch import response
-from patchfem.dynamics.harmonic.laws import Jenkins, Spring, synthesis
-from patchfem.dynamics.harmonic.point import group_of, point
+from patchfem.dynamics.harmonic.balance import find_regime, make_cycle_response
+from patchfem.dynamics.harmonic.branch import trace_over_frequency
+from patchfem.dynamics.harmonic.laws import Jenkins, Spring, evaluate_series
+from patchfem.dynamics.harmonic.point import find_point, make_group
 from patchfem.response.loops import interface_loop
 from patchfem.response.measures import (
     compute_acceleration_peak,
@@ -41,13 +41,13 @@ def test_exact_measures_of_a_run_of_a_scene(law):
         result.plan.model.rig.drive.signal,
     )
     limit = 0.3 * LOAD
-    p = point(
+    p = find_point(
         modes,
         drive,
         Jenkins([limit / 20e-6], [20e-6]) if law == "elastic-plastic" else bonds(limit, 20e-6),
         tolerance=1e-5,
     )
-    r = periodic_response(p, modes, drive, 1000)
+    r = make_cycle_response(p, modes, drive, 1000)
     dt = np.full(1001, drive.period / 1000)
     dt[[0, -1]] /= 2
     q, f = (compute_harmonic(r.time, dt, v, drive.omega) for v in (r.slide, r.force))
@@ -82,17 +82,17 @@ def test_exact_many_interfaces_on_few_modes():
     )
     laws = [(i, Jenkins([0.1], [0.02 + 0.01 * i])) for i in range(30)]
     drive = SineDrive(1.0, 0.9)
-    p = point(modes, drive, laws, tolerance=1e-4)
+    p = find_point(modes, drive, laws, tolerance=1e-4)
     assert p.coefficients.shape[0] == 30 and p.error < 1e-4
-    r = periodic_response(p, modes, drive, 1024)
-    forces = group_of(modes, laws).forces(p.coefficients, drive.omega, 1024)
+    r = make_cycle_response(p, modes, drive, 1024)
+    forces = make_group(modes, laws).forces(p.coefficients, drive.omega, 1024)
     dt = drive.period / 1024
     slip = sum((forces[i] * (r.modal_rate[:-1] @ faces[i])).sum() for i in range(30)) * dt
     viscous = modes.mass * dt * ((r.modal_rate[:-1] ** 2) @ (2 * modes.zeta * modes.omega)).sum()
     work = -modes.mass * dt * ((r.modal_rate @ modes.base) * drive.values(r.time))[:-1].sum()
     assert slip > 0 and work == pytest.approx(slip + viscous, rel=1e-3)
     k = np.arange(p.modal.shape[0])[:, None]
-    accel = synthesis((-((drive.omega * k) ** 2) * p.modal).T, 1024)
+    accel = evaluate_series((-((drive.omega * k) ** 2) * p.modal).T, 1024)
     push = -np.outer(modes.base, drive.values(r.time[:-1])) - faces.T @ forces / modes.mass
     rest = (
         push
@@ -105,10 +105,10 @@ def test_exact_many_interfaces_on_few_modes():
 def test_always_a_sweep_finds_what_cold_starts_find():
     modes, law = sdof(0.01), Jenkins([4.0, 1.0], [0.05, 0.5])
     values = np.linspace(0.12, 0.4, 15)
-    swept = response(modes, SineDrive(1.0, 1.0), law, values, tolerance=1e-4)
+    swept = trace_over_frequency(modes, SineDrive(1.0, 1.0), law, values, tolerance=1e-4)
     assert swept.ended == "listed" and swept.values == pytest.approx(values)
     for p in swept.points:
-        cold = point(modes, SineDrive(1.0, p.omega), law, tolerance=1e-4)
+        cold = find_point(modes, SineDrive(1.0, p.omega), law, tolerance=1e-4)
         assert p.amplitude([1.0]) == pytest.approx(cold.amplitude([1.0]), rel=3e-4)
 
 
@@ -121,15 +121,17 @@ def test_exact_regimes():
         (0.6, ("slides", 1.0)),
     ):
         # swing amplitude*2 without dynamics: far below resonance with a stiff spring the slide is level/stiffness
-        p = point(modes, SineDrive(amplitude * 1e4, 1.0), [Spring(1e4), law], harmonics=7)
+        p = find_point(modes, SineDrive(amplitude * 1e4, 1.0), [Spring(1e4), law], harmonics=7)
         name, share = find_regime(p)
         assert (name, share) == (want[0], pytest.approx(want[1]))
-    assert find_regime(point(modes, DRIVE, Spring(3.0), harmonics=1)) == ("no friction", 0.0)
+    assert find_regime(find_point(modes, DRIVE, Spring(3.0), harmonics=1)) == ("no friction", 0.0)
     assert (
-        find_regime(point(modes, SineDrive(1e-4, 0.5), bonds(1.0, 1.0), harmonics=3))[0] == "stuck"
+        find_regime(find_point(modes, SineDrive(1e-4, 0.5), bonds(1.0, 1.0), harmonics=3))[0]
+        == "stuck"
     )
     assert (
-        find_regime(point(modes, SineDrive(1.0, 0.5), bonds(0.1, 0.1), harmonics=7))[0] == "slides"
+        find_regime(find_point(modes, SineDrive(1.0, 0.5), bonds(0.1, 0.1), harmonics=7))[0]
+        == "slides"
     )
 
 
@@ -141,11 +143,11 @@ def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit
         with pytest.raises(
             NotConverged, match="undamped mode that is driven at its natural frequency"
         ):
-            point(modes, DRIVE, law)
+            find_point(modes, DRIVE, law)
         return
-    p = point(modes, DRIVE, law, tolerance=1e-4)
+    p = find_point(modes, DRIVE, law, tolerance=1e-4)
     assert np.abs(p.forces[0, 1] - 1j) < 1e-6  # the whole drive of the first harmonic
-    r = periodic_response(p, modes, DRIVE, 4000)
+    r = make_cycle_response(p, modes, DRIVE, 4000)
     k, w = np.array([20.0]), np.array([limit / 20.0])
     stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), k, w)[1]
     rows, _ = march(
@@ -157,6 +159,6 @@ def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit
 def test_refuses_a_tolerance_that_no_ladder_reaches():
     """A nearly rigid element at resonance: 255 harmonics are not enough for 1e-9, and it is said."""
     with pytest.raises(NotConverged, match="the motion still has an error"):
-        point(
+        find_point(
             sdof(0.05), SineDrive(1.0, 0.7), [Spring(0.1), Jenkins([1.0], [0.1])], tolerance=1e-12
         )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import G_N, ModalBasis, SineDrive
-from patchfem.dynamics.harmonic.branch import branches
+from patchfem.dynamics.harmonic.branch import find_branches
 from patchfem.dynamics.harmonic.laws import Jenkins, Spring
 
 
@@ -16,5 +16,5 @@ def test_exact_three_motions_near_the_end_of_the_upper_branch():
     modes = ModalBasis(("axial",), w * one, 0.003 * one, one, one, one, mass)
     laws = [(0, Jenkins([limit / 1e-6], [1e-6])), (modes.output, Spring(0.0, 2e10))]
     for hertz in np.linspace(147.2, 147.6, 5):
-        found = branches(modes, SineDrive(6 * G_N, 2 * np.pi * hertz), laws)
+        found = find_branches(modes, SineDrive(6 * G_N, 2 * np.pi * hertz), laws)
         assert [p.stable for p in found] == [True, False, True], hertz

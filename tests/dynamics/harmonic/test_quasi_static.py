@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from patchfem.core import ModalBasis, NotConverged, PatchfemError
 from patchfem.dynamics.harmonic import quasi_static
-from patchfem.dynamics.harmonic.forces import Group
+from patchfem.dynamics.harmonic.forces import LawGroup
 from patchfem.dynamics.harmonic.laws import Jenkins, SpeedLaw, Spring
 from patchfem.friction.laws import tanh
 
@@ -28,28 +28,32 @@ def held(modes, group):
 
 def test_exact_one_mode_on_elastic_plastic_elements():
     """omega^2 = omega_0^2 + F(A)/(m A) and zeta = zeta_0 omega_0/omega + loss/(2 pi m omega^2 A^2)."""
-    group, a = Group(ONE, Jenkins(STIFF, LIMIT)), np.geomspace(3e-5, 3e-3, 9)
+    group, a = LawGroup(ONE, Jenkins(STIFF, LIMIT)), np.geomspace(3e-5, 3e-3, 9)
     force = (STIFF * np.minimum(a[:, None], LIMIT)).sum(axis=1)
     loss = (4 * STIFF * LIMIT * np.maximum(a[:, None] - LIMIT, 0)).sum(axis=1)
     omega = np.sqrt(700.0**2 + force / (0.5 * a))
-    found = quasi_static.static_motions(ONE, group, a, held(ONE, group))
+    found = quasi_static.find_static_motions(ONE, group, a, held(ONE, group))
     assert [one.omega for one in found] == pytest.approx(omega, rel=1e-12)
     assert [one.zeta for one in found] == pytest.approx(
         0.002 * 700 / omega + loss / (2 * np.pi * 0.5 * (omega * a) ** 2), rel=1e-12
     )
-    again = quasi_static.static_motions_from_loops(
-        ONE, ONE.slide, held(ONE, group), a, [quasi_static.Loops(*one) for one in zip(force, loss)]
+    again = quasi_static.find_static_motions_from_loops(
+        ONE,
+        ONE.slide,
+        held(ONE, group),
+        a,
+        [quasi_static.StaticLoops(*one) for one in zip(force, loss)],
     )
     assert [one.omega for one in again] == pytest.approx(omega, rel=1e-12)
 
 
 def test_exact_an_amplitude_without_an_equilibrium_leaves_the_others_as_they_are(monkeypatch):
     group, a, plain = (
-        Group(ONE, Jenkins(STIFF, LIMIT)),
+        LawGroup(ONE, Jenkins(STIFF, LIMIT)),
         np.geomspace(3e-5, 3e-3, 4),
         quasi_static._solve_equilibrium,
     )
-    whole = quasi_static.static_motions(ONE, group, a, held(ONE, group))
+    whole = quasi_static.find_static_motions(ONE, group, a, held(ONE, group))
 
     def failing(modes, laws, mode, share, *more):
         if share == a[2]:
@@ -57,7 +61,7 @@ def test_exact_an_amplitude_without_an_equilibrium_leaves_the_others_as_they_are
         return plain(modes, laws, mode, share, *more)
 
     monkeypatch.setattr(quasi_static, "_solve_equilibrium", failing)
-    found = quasi_static.static_motions(ONE, group, a, held(ONE, group))
+    found = quasi_static.find_static_motions(ONE, group, a, held(ONE, group))
     assert np.isnan(found[2].omega) and np.isnan(found[2].z).all()
     assert [found[k].omega for k in (0, 1, 3)] == pytest.approx(
         [whole[k].omega for k in (0, 1, 3)], rel=1e-12
@@ -66,9 +70,9 @@ def test_exact_an_amplitude_without_an_equilibrium_leaves_the_others_as_they_are
 
 def test_exact_a_linear_spring_is_the_held_mode():
     modes = modes_of([700.0, 2500.0], [0.002, 0.01], [1.0, 0.6], [1.0, -0.3])
-    group = Group(modes, Spring(2e5))
+    group = LawGroup(modes, Spring(2e5))
     omega, shape = held(modes, group)
-    [found] = quasi_static.static_motions(modes, group, [1e-4], (omega, shape))
+    [found] = quasi_static.find_static_motions(modes, group, [1e-4], (omega, shape))
     assert found.omega == pytest.approx(omega, rel=1e-9) and found.z == pytest.approx(
         1e-4 * shape, rel=1e-7
     )
@@ -78,9 +82,9 @@ def test_exact_a_linear_spring_is_the_held_mode():
 def test_exact_two_modes_hold_at_the_least_energy():
     """At a share q of the shape the coordinates make the energy of modes and elements least."""
     modes = modes_of([700.0, 2500.0], [0.002, 0.01], [1.0, 0.6], [1.0, -0.3])
-    group, share = Group(modes, Jenkins(STIFF, LIMIT)), 3e-4
+    group, share = LawGroup(modes, Jenkins(STIFF, LIMIT)), 3e-4
     omega, shape = held(modes, group)
-    [found] = quasi_static.static_motions(modes, group, [share], (omega, shape))
+    [found] = quasi_static.find_static_motions(modes, group, [share], (omega, shape))
 
     def energy(z):
         u = abs(modes.slide @ z)
@@ -99,6 +103,6 @@ def test_exact_two_modes_hold_at_the_least_energy():
 
 def test_refuses_friction_that_follows_the_speed():
     friction = SimpleNamespace(static=0.3, reference_speed=1e-3)
-    group = Group(ONE, SpeedLaw(tanh.from_keys(friction, 1.0).element(9.0)))
+    group = LawGroup(ONE, SpeedLaw(tanh.from_keys(friction, 1.0).element(9.0)))
     with pytest.raises(PatchfemError, match="sliding speed"):
-        quasi_static.static_motions(ONE, group, [1e-4], (700.0, np.ones(1)))
+        quasi_static.find_static_motions(ONE, group, [1e-4], (700.0, np.ones(1)))

@@ -146,7 +146,7 @@ def runs_of_cases(
     -------
     Runs
     """
-    histories.load_kernels(say)
+    histories.load_event_kernels(say)
     rig = cases[0].model.rig
     histories.announce_runs(
         rig.modes, rig.drive.signal, cases[0].groups, cycles, window, len(cases)

@@ -12,13 +12,13 @@ import numpy as np
 from ....compiled import load
 from ....core import IntegratedMeasures, NotConverged, Outcome, SineDrive
 from ....dynamics.harmonic import branch as branches
-from ....dynamics.harmonic.balance import cycle_energy, periodic_response
+from ....dynamics.harmonic.balance import find_cycle_energies, make_cycle_response
 from ....dynamics.harmonic.balance import find_regime as balanced_regime
-from ....dynamics.harmonic.forces import Group
+from ....dynamics.harmonic.forces import LawGroup
 from ....dynamics.harmonic.laws import Interlock, Spring
-from ....dynamics.harmonic.point import point as periodic_point
+from ....dynamics.harmonic.point import find_point as periodic_point
 from ....dynamics.harmonic.point import refine_point
-from ....dynamics.harmonic.stability import with_stability
+from ....dynamics.harmonic.stability import add_stability
 from ....dynamics.integrated import EngineResult
 from ....formatting import format_length
 from ....response.errors import finer_errors
@@ -33,7 +33,7 @@ SAMPLES = 4096  # samples of the cycle from which measures are computed
 
 
 class Balanced(Reader):
-    """Reader of one cycle of a harmonic balance; turns: `Periodic.turns` of this cycle."""
+    """Reader of one cycle of a harmonic balance; turns: `SteadyMotion.turns` of this cycle."""
 
     turns: tuple = ()
 
@@ -91,24 +91,24 @@ class BalanceFinder:
             model.accuracy.harmonics,
         )
         self.numerics = numerics
-        self.group, self.tolerance = Group(rig.modes, parts), model.accuracy.tolerance
+        self.group, self.tolerance = LawGroup(rig.modes, parts), model.accuracy.tolerance
 
     def point(self, drive, near=None) -> tuple:
-        """Return the Solution of the steady motion under a sine, and its Periodic.
+        """Return the Solution of the steady motion under a sine, and its SteadyMotion.
 
         The errors come from twice as many harmonics and from twice as many samples.
 
         Parameters
         ----------
         drive : SineDrive
-        near : Periodic, optional
+        near : SteadyMotion, optional
             Point of a curve from which the solution starts, if there are several motions.
         """
         begin = perf_counter()
         found = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
         )
-        stable, notes = with_stability(found, self.modes), ()
+        stable, notes = add_stability(found, self.modes), ()
         if not stable.stable:
             found, stable, notes = self._lasting(drive, found, stable)
         values, response, book = self._measured(found, drive)
@@ -147,18 +147,18 @@ class BalanceFinder:
         ), found
 
     def _errors(self, values: dict, found, drive, read) -> dict:
-        """Return errors of the measures of a Periodic by name.
+        """Return errors of the measures of a SteadyMotion by name.
 
-        If no finer Periodic converges, they are the error of the balance itself.
+        If no finer SteadyMotion converges, they are the error of the balance itself.
 
         Parameters
         ----------
         values : dict
             Measures by name.
-        found : Periodic
+        found : SteadyMotion
         drive : SineDrive
         read : callable
-            Function (Periodic, drive) that returns measures by name.
+            Function (SteadyMotion, drive) that returns measures by name.
         """
         out = {name: abs(v) * min(found.error, 1.0) for name, v in values.items()}
         try:
@@ -173,11 +173,11 @@ class BalanceFinder:
         }
 
     def _lasting(self, drive, found, stable) -> tuple:
-        """Return the smallest stable Periodic under the same drive, its multipliers, and a note.
+        """Return the smallest stable SteadyMotion under the same drive, its multipliers, and a note.
 
         If none is found, the unstable one that was given is returned.
         """
-        every = branches.branches(self.modes, drive, self.group, self.tolerance)
+        every = branches.find_branches(self.modes, drive, self.group, self.tolerance)
         lasts = [one for one in every if one.stable]
         if not lasts:
             return found, stable, ()
@@ -194,17 +194,17 @@ class BalanceFinder:
                 '"march" gives the motion that is reached from rest'
             )
         )
-        return found, with_stability(found, self.modes), (note,)
+        return found, add_stability(found, self.modes), (note,)
 
     def shown(self, drive, near=None) -> CurvePoint:
         """Return a point of a curve without its errors."""
         found = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
         )
-        return self._shown(with_stability(found, self.modes))
+        return self._shown(add_stability(found, self.modes))
 
     def _shown(self, found) -> CurvePoint:
-        """Return the point of a curve of a Periodic with its multipliers."""
+        """Return the point of a curve of a SteadyMotion with its multipliers."""
         kind, stable = balanced_regime(found)[0], bool(found.stable)
         drive = SineDrive(found.level, found.omega, self.model.rig.drive.signal.moving)
         return CurvePoint(
@@ -220,7 +220,7 @@ class BalanceFinder:
 
     def _read(self, found, drive) -> dict:
         """Return the measures of a curve, by name."""
-        response = periodic_response(found, self.modes, drive, SAMPLES)
+        response = make_cycle_response(found, self.modes, drive, SAMPLES)
         row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {
             COLUMN_MEASURES["amplitude"]: found.amplitude(row),
@@ -231,8 +231,8 @@ class BalanceFinder:
 
     def _measured(self, found, drive, samples: int = SAMPLES) -> tuple:
         """Return the measures by name, the Response of a cycle, and its energies [J]."""
-        response = periodic_response(found, self.modes, drive, samples)
-        book = cycle_energy(found, self.modes) | {
+        response = make_cycle_response(found, self.modes, drive, samples)
+        book = find_cycle_energies(found, self.modes) | {
             "stored": 0.0,
             "iterations": float(found.iterations),
         }
@@ -252,7 +252,7 @@ class BalanceFinder:
     def curve(self, drive) -> tuple:
         """Return the points of the curve over frequency, through its folds, and the folds [Hz]."""
         first = SineDrive(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
-        branch = branches.response(
+        branch = branches.trace_over_frequency(
             self.modes,
             first,
             self.group,
@@ -268,7 +268,7 @@ class BalanceFinder:
 
         The frequency is scaled by the swept range.
         """
-        return branches.distance(one.near, other.near, self._range)
+        return branches.measure_distance(one.near, other.near, self._range)
 
     def between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
         """Return the point of a curve at a fraction of the arc length between two of its points.
@@ -277,7 +277,9 @@ class BalanceFinder:
         """
         drive = replace(one.drive, omega=one.near.omega)
         return self._of_branch(
-            branches.point_between(self.modes, drive, one.near, other.near, share, self._range),
+            branches.find_point_between(
+                self.modes, drive, one.near, other.near, share, self._range
+            ),
             drive,
         )
 
@@ -288,8 +290,8 @@ class BalanceFinder:
         return 2 * np.pi * abs(drive.high - drive.low)
 
     def _of_branch(self, found, drive) -> CurvePoint:
-        """Return a Periodic of a branch as a point of a curve with its errors."""
-        found = with_stability(found, self.modes) if found.stable is None else found
+        """Return a SteadyMotion of a branch as a point of a curve with its errors."""
+        found = add_stability(found, self.modes) if found.stable is None else found
         point = self._shown(found)._replace(regime="stable" if found.stable else "unstable")
         errors = self._errors(point.values, point.near, point.drive, self._read)
         least = {"acceleration_distortion": LAST}  # error in addition to that relative to the value

@@ -77,7 +77,7 @@ class Maps(Followed):
     name, elements, tries_another = "", None, False
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
-        histories.load_kernels(say)
+        histories.load_event_kernels(say)
         self.model, self.numerics, self.modes, self.patch, self.frames = (
             model,
             numerics,
