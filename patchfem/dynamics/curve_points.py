@@ -1,5 +1,6 @@
 """Adaptive points of a curve, denser where its curvature is larger.
- If the middle point b of three points a, b, c deviates by e from the line from a to c, a parabola
+
+If the middle point b of three points a, b, c deviates by e from the line from a to c, a parabola
 through them deviates by e h_ab^2/(4 h_ab h_bc) from its chord in the middle of ab. An interval is
 halved while this exceeds three quarters of the permitted error of the largest of the three values,
 because a curve may bend more on one side of b than on the other. A peak is found if its flanks show

@@ -5,7 +5,8 @@ omega A^2. Where both are equal a motion repeats: one mode under Coulomb frictio
 |c| omega), to first order in the damping (den Hartog's balance). Beyond the largest of these
 amplitudes friction no longer holds the motion: flutter. Below it the motion decays, to rest or to
 a smaller limit cycle that lasts.
- `find_relay_cycles` is exact for rigid friction, which is a relay of the sliding velocity (Tsypkin
+
+`find_relay_cycles` is exact for rigid friction, which is a relay of the sliding velocity (Tsypkin
 1984, ch. 6); `find_balance_cycles` serves every law of harmonic balance: it is the motion of
 `harmonic.backbone` whose damping is 0.
 """

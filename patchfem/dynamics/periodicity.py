@@ -1,7 +1,8 @@
 """Check whether a motion under a periodic drive has become periodic.
 
 If it has, the remaining cycles equal the last one and need not be computed.
- The motion is checked after FIRST_CHECK cycles, then after twice as many each time. The changes
+
+The motion is checked after FIRST_CHECK cycles, then after twice as many each time. The changes
 between three checks bound the change in the remaining cycles: either the changes decrease by a
 constant factor, as in a decaying transient, or they stay equal, as in a creeping motion. A period
 of two cycles shows only in the change over the last cycle.

@@ -1,5 +1,6 @@
 """Exact step of damped modes under any drive and interface forces constant over the step.
- The step is computed from the matrix exponential of each mode, or of all modes together where
+
+The step is computed from the matrix exponential of each mode, or of all modes together where
 damping couples them, so resonance without damping, rigid modes and overdamped modes need no special
 case (report, eqs 3.5-3.10, with i w_i where 3.7 and 3.9 print i w). The effect of the drive and the
 energies of a step are sums over its Gauss points, exact to round-off for a drive that is smooth in

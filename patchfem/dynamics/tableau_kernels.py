@@ -1,7 +1,8 @@
 """Coefficients of the Runge-Kutta method DOP853 of order 8, with error estimates.
 
 The estimates have orders 5 and 3, and the dense output (extension) has order 7.
- Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd edition, II.5 and
+
+Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd edition, II.5 and
 II.6 (the method of Dormand and Prince). The order conditions are tested.
 """
 

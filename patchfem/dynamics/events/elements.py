@@ -1,5 +1,6 @@
 """Parallel elements of an interface, rigid (Coulomb) and elastic-plastic, and their memory.
- All elements share the relative displacement of their interface. The elastic-plastic ones are
+
+All elements share the relative displacement of their interface. The elastic-plastic ones are
 sorted by yield slide, the stretch at which they slip.
 """
 

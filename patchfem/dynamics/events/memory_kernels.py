@@ -1,12 +1,14 @@
 """Memory of elastic-plastic elements under one relative displacement (compiled).
- The elements of an interface are sorted by yield slide, the relative displacement at which they
+
+The elements of an interface are sorted by yield slide, the relative displacement at which they
 yield. The elements that slip are always the first ones of the list: all were stretched by the same
 moves, so an element with a shorter yield slide yields before one with a longer one (Masing). At a
 turning point the elements that slip stop together, stretched to +-y, and stay a group: each slips
 again after 2 y in the other direction, or all of them where the relative displacement comes back to
 the turning point. A group that slips as a whole is forgotten. So every event costs the same,
 whatever the number of elements. The tests compare with elements that are followed one by one.
- A rigid element, Coulomb friction, may stand before the list. While it sticks the relative
+
+A rigid element, Coulomb friction, may stand before the list. While it sticks the relative
 displacement does not change (`stick_kernels` chooses which ones stick after an event); while it
 slips it adds a constant force.
 """

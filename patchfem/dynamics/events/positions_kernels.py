@@ -1,5 +1,6 @@
 """Named positions in the arrays of the event engine.
- A kernel reads `row[ROW.duration]` or `sums[LEDGER.drive_work]`. The classes below state unit and
+
+A kernel reads `row[ROW.duration]` or `sums[LEDGER.drive_work]`. The classes below state unit and
 meaning of every position; their instances at the end of the module are what kernels and callers
 import.
 """

@@ -1,7 +1,8 @@
 """Backbone of a mode with a contact: frequency and damping ratio over amplitude.
 
 A negative damping that balances friction sustains the motion.
- z'' + (D - 2 zeta omega) z' + Omega^2 z + faces^T F/m = 0 has, for every amplitude of the mode's
+
+z'' + (D - 2 zeta omega) z' + Omega^2 z + faces^T F/m = 0 has, for every amplitude of the mode's
 coordinate, one periodic motion with its own omega and zeta: zeta is the loss of a cycle over 8 pi
 times the mean kinetic energy, what a slow free decay loses (extended periodic motion concept: Krack
 2015). With one harmonic and one mode of slide s this is omega^2 = omega_0^2 + s^2 K_eq/m and zeta =

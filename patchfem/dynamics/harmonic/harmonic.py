@@ -1,15 +1,18 @@
 """Harmonic balance under a sine, with the interface rows as unknowns.
 
 The linear part is exact.
- With theta = omega t every quantity is x(theta) = Re sum_k X_k exp(i k theta), k = 0..H, and the
+
+With theta = omega t every quantity is x(theta) = Re sum_k X_k exp(i k theta), k = 0..H, and the
 modes are condensed to the rows that touch: q_k = q_k(drive) - G_k F_k, G_k = faces (Omega^2 - k^2
 omega^2 + i k omega D)^-1 faces^T/m. The contact is any callable from the harmonics of the slides to
 those of the forces with their Jacobian (alternating frequency/time), so the laws stay outside.
 Harmonics above H of the force that the contact returns tell what the truncation leaves out.
- A mode that a harmonic finds without stiffness and damping (a rigid mode at k = 0, an undamped one
+
+A mode that a harmonic finds without stiffness and damping (a rigid mode at k = 0, an undamped one
 at its own frequency) has no receptance: its coordinate becomes an unknown of its own and the
 balance of its forces an equation of its own.
- Method: Krack & Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019; damped Newton:
+
+Method: Krack & Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019; damped Newton:
 Deuflhard 2004.
 """
 

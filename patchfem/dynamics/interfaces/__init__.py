@@ -4,7 +4,8 @@ Equation of a step. Over a step of dt the friction force enters as its mean over
 work is exact:
 
     dq = free - beta F(dq),
- with the increment dq of the relative displacement, its value `free` without friction, and the
+
+with the increment dq of the relative displacement, its value `free` without friction, and the
 compliance beta of the modes. Every contact has the functions solve_step (this equation),
 apply_increment (F over a prescribed dq), commit_step (move the memory) and read_state (force,
 energy, slip).

@@ -1,7 +1,8 @@
 """A contact of bond points behind shear modes, `arrays.ShearedPoints` (compiled).
 
 The load is constant.
- For most of a cycle of gross slip all points drag: their bonds are those of a slide without end,
+
+For most of a cycle of gross slip all points drag: their bonds are those of a slide without end,
 and a further slide in the same direction has the force weight length load at every point, whatever
 its size. Such a step has a closed form in the modes alone (`solve_dragging_step`). The slide of a
 point is that of the holder minus psi^T b at all times. `march.loop_kernels` calls the functions of

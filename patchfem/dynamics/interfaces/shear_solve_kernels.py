@@ -7,7 +7,8 @@ STEP_DAMPING (db - db of the step before) is added, which removes two thirds of 
 changes a smooth motion to second order. With `ending` the pieces spring back while the holder
 stands: kappa (b + db) = psi^T f with the forces after the slide, which only loses energy as long
 as a force grows with the slide.
- Both are minima of convex functions where no slope of a point is below 0; Newton's method with a
+
+Both are minima of convex functions where no slope of a point is below 0; Newton's method with a
 line search finds them. The forces of some laws may decrease as their points slide, and then several
 minima exist: the one found lies downhill from where the last steps lead, to which pieces without
 mass would jump. c is an `arrays.ShearedPoints`, or a tuple with its fields from `weight` on. `law`
