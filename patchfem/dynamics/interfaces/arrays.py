@@ -357,3 +357,49 @@ class ModalArrays(NamedTuple):
     beta: float
     mass: float
     workspace: np.ndarray
+
+
+class StepBounds(NamedTuple):
+    """Bounds of a march of folded cycles.
+
+    - goal: tolerance of the friction force of a step [N]
+    - force: friction limit [N]
+    - travel: displacement of the output beyond which the march ends [m]
+    """
+
+    goal: float
+    force: float
+    travel: float
+
+
+class LargestSlide(NamedTuple):
+    """Sample of the largest slide, in a system of n modes.
+
+    - row: (2 n + 7,) the present sample
+    - kept: (2 n + 10,) sample of the largest slide so far, with the sums there
+    - number: (1,) its number, counted from the first step
+    """
+
+    row: np.ndarray
+    kept: np.ndarray
+    number: np.ndarray
+
+
+class FoldedCycles(NamedTuple):
+    """What `march.passing_kernels` keeps of cycles without their samples.
+
+    - bounds, largest: as above
+    - ledger: (9,) of `march.loop_kernels.march`
+    - sums: (5,) sums over these cycles [J], named in `passing_kernels`
+    - totals: (3,) the first three sums before these cycles [J]
+    - trace: (4, s + 1) samples of the output and waves of the drive, named in `passing_kernels`
+    - workspace: (14, k) space for a block of k steps
+    """
+
+    bounds: StepBounds
+    largest: LargestSlide
+    ledger: np.ndarray
+    sums: np.ndarray
+    totals: np.ndarray
+    trace: np.ndarray
+    workspace: np.ndarray

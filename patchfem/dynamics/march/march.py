@@ -733,62 +733,70 @@ class Run:
 
         Return whether the march got there.
         """
-        n = 2 * self.modes.omega.size
         around = self.prop.steps
-        table = None
-        far = np.zeros(self.width + 3)
-        at = np.zeros(1, np.int64)
-        number = -1
         kernels = load(PASSING)
-        workspace = np.zeros(n + 7), far, at, np.zeros((14, kernels.BLOCK))
+        n_rows = 2 * kernels.N_BLOCK_ROWS
+        largest = arrays.LargestSlide(
+            row=np.zeros(2 * self.modes.omega.size + 7),
+            kept=np.zeros(self.width + 3),
+            number=np.full(1, -1),
+        )
+        folded = arrays.FoldedCycles(
+            bounds=arrays.StepBounds(
+                goal=GOAL * self.model.limit,
+                force=float(self.model.limit),
+                travel=float(self.travel),
+            ),
+            largest=largest,
+            ledger=self.ledger,
+            sums=np.zeros(5),
+            totals=self.totals,
+            trace=np.zeros((4, 0)),
+            workspace=np.zeros((n_rows, kernels.BLOCK)),
+        )
+        table = None
+        largest_at = -1
         while self.done < steps and self.outcome is None:
+            # A fraction of a cycle comes first.
             size = (steps - self.done) % around or around
-            count = (
-                min((steps - self.done) // size, cycles_to_next_check(self.done // around))
-                if size == around
-                else 1
-            )
-            seen, sums, begin, (rows, row) = (
-                np.zeros((count, 4)),
-                np.zeros(5),
-                self.done,
-                self.table(size * count),
-            )
-            if rows is not table:
+            count = 1
+            if size == around:
+                count = min((steps - self.done) // size, cycles_to_next_check(self.done // around))
+            rows, first_row = self.table(size * count)
+            is_new_size = folded.trace.shape[1] != size + 1
+            if is_new_size:
+                folded = folded._replace(trace=self._drive_trace(size))
+            if is_new_size or rows is not table:
                 table = rows
-                held = kernels.march_folded_cycles.bind_arguments(
-                    self.state,
-                    self.modal_system,
-                    rows,
-                    self.contact,
-                    GOAL * self.model.limit,
-                    float(self.model.limit),
-                    float(self.travel),
-                    self.ledger,
-                    self.totals,
-                    *workspace,
+                bound = kernels.march_folded_cycles.bind_arguments(
+                    self.state, self.modal_system, rows, self.contact, folded
                 )
-            phase = 2 * np.pi * (begin % around + np.arange(size + 1)) / around
-            at[0] = -1
-            trace = np.array([0 * phase, 0 * phase, np.cos(phase), np.sin(phase)])
-            did, status = kernels.march_folded_cycles.call_with_bound_args(
-                held, row, sums, trace, seen
-            )
-            self.done = begin + did
-            number = begin + int(at[0]) - row if at[0] >= 0 else number
-            self.totals += sums[:3]
-            self.second += sums[3:]
+            folded.sums[:] = 0.0
+            largest.number[0] = -1
+            cycles = np.zeros((count, 4))
+            did, status = kernels.march_folded_cycles.call_with_bound_args(bound, first_row, cycles)
+            if largest.number[0] >= 0:
+                largest_at = self.done + int(largest.number[0]) - first_row
+            self.done += did
+            self.totals += folded.sums[:3]
+            self.second += folded.sums[3:]
             self._judge(status)
-            samples.extremes += [*zip(*seen[:, :2].T.tolist())]
-            samples.phasors += (seen[:, 2] + 1j * seen[:, 3]).tolist()
-            left = (steps - self.done) // around
-            if self.done % around == 0 and self.outcome is None and self.repeats(left):
-                self.leave_out(left)
-                samples.extremes += samples.extremes[-1:] * left
-                samples.phasors += samples.phasors[-1:] * left
-        if number >= 0:
-            samples.keep_early(far[None], np.array([number]))
+            samples.extremes += [*zip(*cycles[:, :2].T.tolist())]
+            samples.phasors += (cycles[:, 2] + 1j * cycles[:, 3]).tolist()
+            n_left = (steps - self.done) // around
+            if self.done % around == 0 and self.outcome is None and self.repeats(n_left):
+                self.leave_out(n_left)
+                samples.extremes += samples.extremes[-1:] * n_left
+                samples.phasors += samples.phasors[-1:] * n_left
+        if largest_at >= 0:
+            samples.keep_early(largest.kept[None], np.array([largest_at]))
         return self.outcome is None
+
+    def _drive_trace(self, size: int) -> np.ndarray:
+        """Return the trace of a cycle of `size` steps from here, with the waves of the drive."""
+        around = self.prop.steps
+        phase = 2 * np.pi * (self.done % around + np.arange(size + 1)) / around
+        return np.array([0 * phase, 0 * phase, np.cos(phase), np.sin(phase)])
 
     def cycles(self, size: int, stop: int, frames: int, snapshots: list) -> list:
         """March a cycle, or several whole cycles at once.

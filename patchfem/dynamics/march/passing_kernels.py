@@ -7,6 +7,8 @@ points slip one way the friction is constant, and the modes of the pieces altern
 next. What is left of such a step are the modes of the rig, at 25 ns in place of 150.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...compiled.jit import njit
@@ -24,7 +26,7 @@ from ..modal_kernels import (
     write_modes,
 )
 
-# Places in `sums` [J].
+# Places in `sums` of `interfaces.arrays.FoldedCycles` [J].
 WORK_SUM = 0  # friction work
 LOSS_SUM = 1  # dissipated energy
 CREATED_SUM = 2  # created energy
@@ -53,8 +55,23 @@ BLOCK = 32  # number of steps of a drag that are tried at once
 RATE_TOL = 1e-12  # product of two rates over the square of the largest one above which they have the same sign
 
 
+class PieceSwing(NamedTuple):
+    """Shear modes of the pieces in the next step of a drag.
+
+    - min_increment: increment of the slide that all points need to slip on [m].
+    - taken: work that the points do on the modes [J].
+    - energy: energy of the interface at the start of the step [J].
+    - rise: increase of the energy of the modes [J].
+    """
+
+    min_increment: float
+    taken: float
+    energy: float
+    rise: float
+
+
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def add_step(work, rise, q, after, mean, limit, sums):
+def add_step(work, rise, q, after, mean, folded):
     """Add a step to the sums.
 
     Parameters
@@ -69,13 +86,11 @@ def add_step(work, rise, q, after, mean, limit, sums):
         Slide at the end [m].
     mean : float
         Mean of the forces at both ends [N].
-    limit : float
-        Friction limit [N].
-    sums : (5,) array
-        Sums [J], named at the top of the module; updated in place.
+    folded : interfaces.arrays.FoldedCycles
     """
+    sums = folded.sums
     lost = work - rise
-    noise = limit * (1e-12 * abs(after - q) + 1e-15 * abs(q))
+    noise = folded.bounds.force * (1e-12 * abs(after - q) + 1e-15 * abs(q))
     sums[WORK_SUM] += work
     sums[LOSS_SUM] += lost if lost > -noise else 0.0
     sums[CREATED_SUM] -= lost if lost < -noise else 0.0
@@ -84,33 +99,26 @@ def add_step(work, rise, q, after, mean, limit, sums):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def keep_largest(row, number, totals, sums, far, far_at):
-    """Keep a sample in `far`, in the form of `Run.cycles`, if its slide is the largest so far.
+def keep_largest(number, folded):
+    """Keep the present sample, in the form of `Run.cycles`, if its slide is the largest so far.
 
     Parameters
     ----------
-    row : (2 n + 7,) array
-        Space for a sample.
     number : int
         Number of the sample.
-    totals : (3,) array
-        The first three sums before these cycles.
-    sums : (5,) array
-        Sums [J], named at the top of the module; updated in place.
-    far : (2 n + 10,) array
-        Sample of the largest slide, with the sums there; updated in place.
-    far_at : (1,) array
-        Number of that sample, from the first step.
+    folded : interfaces.arrays.FoldedCycles
     """
+    row = folded.largest.row
+    kept = folded.largest.kept
     n = row.size - 7
-    if not abs(row[n]) > abs(far[n]):
+    if not abs(row[n]) > abs(kept[n]):
         return
     for k in range(n + 6):
-        far[k] = row[k]
+        kept[k] = row[k]
     for k in range(3):
-        far[n + 6 + k] = totals[k] + sums[k]
-    far[n + 9] = 0.0
-    far_at[0] = number
+        kept[n + 6 + k] = folded.totals[k] + folded.sums[k]
+    kept[n + 9] = 0.0
+    folded.largest.number[0] = number
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -133,13 +141,15 @@ def swing_pieces(interface, did, slides):
     way = interface.flow[DRAG_DIRECTION]
     last = interface.last
     for k in range(interface.y.shape[1]):
-        swing = (
-            2 * (way * interface.drag[DRAG_FORCE, k] / interface.kappa[k - 1] - interface.b[k - 1])
-            if k > 0
-            else 0.0
-        )
+        swing = 0.0
+        if k > 0:
+            middle = way * interface.drag[DRAG_FORCE, k] / interface.kappa[k - 1]
+            swing = 2 * (middle - interface.b[k - 1])
         for m in range(max(0, did - 3), did):
-            here = slides[m] if k == 0 else swing if m % 2 == 0 else -swing
+            if k == 0:
+                here = slides[m]
+            else:
+                here = swing if m % 2 == 0 else -swing
             interface.y[0, k] = 3 * (here - last[0, k]) + last[1, k]
             last[1, k] = last[0, k]
             last[0, k] = here
@@ -210,22 +220,90 @@ def move_mode(k, count, motion, modal_system, table, at, accel, workspace):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def march_drag(
-    first,
-    count,
-    i,
-    q,
-    motion,
-    modal_system,
-    table,
-    interface,
-    travel,
-    limit,
-    ledger,
-    sums,
-    trace,
-    workspace,
-):
+def compute_piece_swing(interface):
+    """Return the `PieceSwing` of the next step in which all points slip in one direction."""
+    way = interface.flow[DRAG_DIRECTION]
+    min_increment = 0.0
+    taken = 0.0
+    energy = interface.eps[0] * interface.drag[DRAG_FORCE, 0]
+    rise = 0.0
+    for k in range(interface.b.size):
+        y = 2 * (way * interface.drag[DRAG_FORCE, k + 1] / interface.kappa[k] - interface.b[k])
+        min_increment += interface.drag[MAX_MODE_SLIDE, k + 1] * abs(y)
+        taken += way * interface.drag[DRAG_FORCE, k + 1] * y
+        energy += 0.5 * interface.kappa[k] * interface.b[k] * interface.b[k]
+        rise += interface.kappa[k] * y * (interface.b[k] + 0.5 * y)
+    return PieceSwing(min_increment, taken, energy, rise)
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def add_drag_steps(block, i, q, at, force, modal_system, table, interface, folded):
+    """Add the steps of a block to ledger, sums and trace until the points no longer all slip.
+
+    The row SLIDE_ROW of the workspace then has the increments of the slide in these steps.
+
+    Parameters
+    ----------
+    block : int
+        Number of steps in the workspace.
+    i : int
+        Number of the sample in the cycle.
+    q : float
+        Slide at the start [m].
+    at : int
+        Row of the table for the first step.
+    force : float
+        Friction force [N].
+    modal_system : interfaces.arrays.ModalArrays
+    table : (s, k) array
+        Table of `propagator.Propagator`.
+    interface : interfaces.arrays.ShearedPoints
+    folded : interfaces.arrays.FoldedCycles
+
+    Returns
+    -------
+    int
+        Number of steps.
+    """
+    way = interface.flow[DRAG_DIRECTION]
+    size = 2 * modal_system.slide.size
+    ledger = folded.ledger
+    workspace = folded.workspace
+    pieces = compute_piece_swing(interface)
+    did = 0
+    for s in range(block):
+        after = workspace[SLIDE_ROW, s]
+        dq = after - q
+        if way * dq <= pieces.min_increment:
+            break
+        # the modes of the pieces move forward in one step and back in the next one
+        did = s + 1
+        sign = 1.0 if s % 2 == 0 else -1.0
+        is_forward = 0.5 * (1.0 + sign)
+        power = workspace[DRIVE_WORK, s] + table[at + s, 4 * size]
+        add_step(force * dq, sign * pieces.rise, q, after, force, folded)
+        ledger[LEDGER.drive_work] += power
+        ledger[LEDGER.viscous_loss] += workspace[VISCOUS_LOSS, s] + table[at + s, 4 * size + 1]
+        ledger[LEDGER.drive_power] += abs(power)
+        ledger[LEDGER.friction_loss] += force * dq - sign * pieces.taken
+        modal_energy = 0.5 * modal_system.mass * workspace[ENERGY_ROW, s]
+        ledger[LEDGER.max_stored] = max(
+            ledger[LEDGER.max_stored], pieces.energy + is_forward * pieces.rise + modal_energy
+        )
+        ledger[LEDGER.friction_work] += force * dq
+        folded.trace[OUTPUT, i + did] = workspace[OUTPUT_ROW, s]
+        folded.trace[OUTPUT_RATE, i + did] = workspace[RATE_ROW, s]
+        q = after
+        workspace[SLIDE_ROW, s] = dq
+        interface.flow[TOTAL_SLIDE] += dq
+        is_finite = np.isfinite(q + workspace[SPEED_ROW, s])
+        if not (abs(workspace[OUTPUT_ROW, s]) <= folded.bounds.travel and is_finite):
+            break
+    return did
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def march_drag(first, count, i, q, motion, modal_system, table, interface, folded):
     """March on while all points slip one way.
 
     The sample at the end of the last step is not read; no sample before it has a larger slide in its direction.
@@ -248,115 +326,97 @@ def march_drag(
     table : (s, k) array
         Table of `propagator.Propagator`.
     interface : interfaces.arrays.ShearedPoints
-    travel : float
-        Largest displacement of the output [m].
-    limit : float
-        Friction limit [N].
-    ledger : (9,) array
-        See `loop_kernels.march`.
-    sums : (5,) array
-        Sums [J], named at the top of the module; updated in place.
-    trace : (4, s + 1) array
-        Samples of the output and waves of the drive, named at the top of the module.
-    workspace : (14, BLOCK) array
-        Space for a block of steps.
+    folded : interfaces.arrays.FoldedCycles
 
     Returns
     -------
     int
         Number of steps.
     """
-    way = interface.flow[DRAG_DIRECTION]
+    workspace = folded.workspace
     n = motion.shape[1]
-    size = 2 * motion.shape[1]
     at = first % table.shape[0]
-    force = way * interface.drag[DRAG_FORCE, 0]
+    force = interface.flow[DRAG_DIRECTION] * interface.drag[DRAG_FORCE, 0]
     accel = modal_system.workspace[0]
-    begun = modal_system.workspace[1:]
-    least = 0.0
-    taken = 0.0
-    energy = interface.eps[0] * interface.drag[DRAG_FORCE, 0]
-    swing = 0.0
-    for k in range(interface.b.size):
-        y = 2 * (way * interface.drag[DRAG_FORCE, k + 1] / interface.kappa[k] - interface.b[k])
-        least += interface.drag[MAX_MODE_SLIDE, k + 1] * abs(y)
-        taken += way * interface.drag[DRAG_FORCE, k + 1] * y
-        energy += 0.5 * interface.kappa[k] * interface.b[k] * interface.b[k]
-        swing += interface.kappa[k] * y * (interface.b[k] + 0.5 * y)
+    start = modal_system.workspace[1:]
     write_friction_accelerations(force, modal_system.slide, modal_system.mass, accel)
     block = min(count, workspace.shape[1], table.shape[0] - at)
     for row in range(N_BLOCK_ROWS):
         for s in range(block):
             workspace[row, s] = 0.0
     for k in range(n):
-        begun[0, k] = motion[0, k]
-        begun[1, k] = motion[1, k]
+        start[0, k] = motion[0, k]
+        start[1, k] = motion[1, k]
         move_mode(k, block, motion, modal_system, table, at, accel[k], workspace)
-    did = 0
-    for s in range(block):
-        after = workspace[SLIDE_ROW, s]
-        dq = after - q
-        if way * dq <= least:
-            break
-        # the modes of the pieces move forward in one step and back in the next one
-        did = s + 1
-        swings = 1.0 if s % 2 == 0 else -1.0
-        odd = 0.5 * (1.0 + swings)
-        power = workspace[DRIVE_WORK, s] + table[at + s, 4 * size]
-        add_step(force * dq, swings * swing, q, after, force, limit, sums)
-        ledger[LEDGER.drive_work] += power
-        ledger[LEDGER.viscous_loss] += workspace[VISCOUS_LOSS, s] + table[at + s, 4 * size + 1]
-        ledger[LEDGER.drive_power] += abs(power)
-        ledger[LEDGER.friction_loss] += force * dq - swings * taken
-        ledger[LEDGER.max_stored] = max(
-            ledger[LEDGER.max_stored],
-            energy + odd * swing + 0.5 * modal_system.mass * workspace[ENERGY_ROW, s],
-        )
-        ledger[LEDGER.friction_work] += force * dq
-        trace[OUTPUT, i + did] = workspace[OUTPUT_ROW, s]
-        trace[OUTPUT_RATE, i + did] = workspace[RATE_ROW, s]
-        q = after
-        workspace[SLIDE_ROW, s] = dq
-        interface.flow[TOTAL_SLIDE] += dq
-        if not (
-            abs(workspace[OUTPUT_ROW, s]) <= travel and np.isfinite(q + workspace[SPEED_ROW, s])
-        ):
-            break
+    did = add_drag_steps(block, i, q, at, force, modal_system, table, interface, folded)
     if did < block:
         for k in range(n):
-            motion[0, k] = begun[0, k]
-            motion[1, k] = begun[1, k]
+            motion[0, k] = start[0, k]
+            motion[1, k] = start[1, k]
             move_mode(k, did, motion, modal_system, table, at, accel[k], workspace[N_BLOCK_ROWS:])
     if did:
         swing_pieces(interface, did, workspace[SLIDE_ROW])
     return did
 
 
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
+def march_step(at, q, v, motion, modal_system, table, interface, folded):
+    """March a step in which points may stick or slip; return the friction work [J].
+
+    Parameters
+    ----------
+    at : int
+        Row of the table for this step.
+    q : float
+        Slide at the start [m].
+    v : float
+        Its speed [m/s].
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    table : (s, k) array
+        Table of `propagator.Propagator`.
+    interface : interfaces.arrays.ShearedPoints
+    folded : interfaces.arrays.FoldedCycles
+
+    Returns
+    -------
+    float
+    """
+    beta = modal_system.beta
+    dt = modal_system.dt
+    accel = modal_system.workspace[0]
+    free = free_increment(motion, modal_system, 0, table, at)
+    dq, _, turns = contact.solve_step(free, beta, q, v, dt, interface, folded.bounds.goal)
+    used = (free - dq) / beta
+    write_friction_accelerations(used, modal_system.slide, modal_system.mass, accel)
+    work = used * dq
+    scratch = modal_system.workspace[1:]
+    move_modes(motion, modal_system, table, at, accel, scratch, folded.ledger)
+    count_iterations(turns, work, folded.ledger)
+    speed = 0.0
+    for k in range(modal_system.slide.size):
+        speed += modal_system.slide[k] * motion[1, k]
+    lost, _ = contact.commit_step(dq, used, q, v, speed, dt, interface)
+    folded.ledger[LEDGER.friction_loss] += lost
+    return work
+
+
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def march_folded_cycle(
-    first,
-    motion,
-    modal_system,
-    table,
-    interface,
-    goal,
-    limit,
-    travel,
-    ledger,
-    sums,
-    totals,
-    trace,
-    row,
-    far,
-    far_at,
-    workspace,
-):
+def march_folded_cycle(first, motion, modal_system, table, interface, folded):
     """March a cycle.
 
     Parameters
     ----------
-    first, motion, ..., workspace
-        See `march_folded_cycles`, of which only `cycles` is missing.
+    first : int
+        Row of the table for the first step; the rows are used in turns.
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    table : (s, k) array
+        Table of `propagator.Propagator`.
+    interface : interfaces.arrays.ShearedPoints
+    folded : interfaces.arrays.FoldedCycles
 
     Returns
     -------
@@ -365,15 +425,12 @@ def march_folded_cycle(
     int
         Status of `loop_kernels`.
     """
+    trace = folded.trace
+    row = folded.largest.row
     count = trace.shape[1] - 1
     n = motion.shape[1]
-    size = 2 * motion.shape[1]
-    dt = modal_system.dt
-    around = table.shape[0]
-    accel = modal_system.workspace[0]
-    scratch = modal_system.workspace[1:]
     i = 0
-    open_step = False
+    is_step_open = False
     work = 0.0
     q0 = 0.0
     force0 = 0.0
@@ -382,63 +439,39 @@ def march_folded_cycle(
         q, v, out = write_modes(row, motion, modal_system)
         force, energy, slip = contact.read_state(interface, q, v)
         status = write_interface(
-            row[: size + 6],
+            row[: 2 * n + 6],
             force,
             energy,
             slip,
             out,
-            travel,
+            folded.bounds.travel,
             energy + modal_energy(motion, modal_system),
-            ledger,
+            folded.ledger,
         )
-        if open_step:
-            add_step(work, energy - energy0, q0, q, 0.5 * (force0 + force), limit, sums)
+        if is_step_open:
+            add_step(work, energy - energy0, q0, q, 0.5 * (force0 + force), folded)
         rate = 0.0
         for k in range(n):
             rate += modal_system.output[k] * motion[1, k]
         trace[OUTPUT, i] = out
         trace[OUTPUT_RATE, i] = rate
-        keep_largest(row, first + i, totals, sums, far, far_at)
+        keep_largest(first + i, folded)
         if status or i == count:
             return i, status
         if interface.flow[DRAG_DIRECTION] != 0.0 and modal_system.dense.size == 0:
             did = march_drag(
-                first + i,
-                count - i,
-                i,
-                q,
-                motion,
-                modal_system,
-                table,
-                interface,
-                travel,
-                limit,
-                ledger,
-                sums,
-                trace,
-                workspace,
+                first + i, count - i, i, q, motion, modal_system, table, interface, folded
             )
             if did:
                 i = i + did
-                open_step = False
+                is_step_open = False
                 continue
-        at = (first + i) % around
-        free = free_increment(motion, modal_system, 0, table, at)
-        dq, _, turns = contact.solve_step(free, modal_system.beta, q, v, dt, interface, goal)
-        used = (free - dq) / modal_system.beta
-        write_friction_accelerations(used, modal_system.slide, modal_system.mass, accel)
-        work = used * dq
-        move_modes(motion, modal_system, table, at, accel, scratch, ledger)
-        count_iterations(turns, work, ledger)
-        after = 0.0
-        for k in range(n):
-            after += modal_system.slide[k] * motion[1, k]
-        lost, _ = contact.commit_step(dq, used, q, v, after, dt, interface)
-        ledger[LEDGER.friction_loss] += lost
+        at = (first + i) % table.shape[0]
+        work = march_step(at, q, v, motion, modal_system, table, interface, folded)
         q0 = q
         force0 = force
         energy0 = energy
-        open_step = True
+        is_step_open = True
         i = i + 1
 
 
@@ -493,35 +526,13 @@ def read_cycle(trace, dt, cycles):
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def march_folded_cycles(
-    first,
-    sums,
-    trace,
-    cycles,
-    motion,
-    modal_system,
-    table,
-    interface,
-    goal,
-    limit,
-    travel,
-    ledger,
-    totals,
-    row,
-    far,
-    far_at,
-    workspace,
-):
+def march_folded_cycles(first, cycles, motion, modal_system, table, interface, folded):
     """March cycles of which the extremes, phasors and sums are kept.
 
     Parameters
     ----------
     first : int
         Row of the table for the first step; the rows are used in turns.
-    sums : (5,) array
-        Sums [J], named at the top of the module; updated in place.
-    trace : (4, s + 1) array
-        Samples of the output and waves of the drive, named at the top of the module.
     cycles : (k, 4) array
         Extremes and phasors of the cycles, which are written.
     motion : (2, n) array
@@ -530,24 +541,7 @@ def march_folded_cycles(
     table : (s, k) array
         Table of `propagator.Propagator`.
     interface : interfaces.arrays.ShearedPoints
-    goal : float
-        Tolerance of a step [N].
-    limit : float
-        Friction limit [N].
-    travel : float
-        Largest displacement of the output [m].
-    ledger : (9,) array
-        See `loop_kernels.march`.
-    totals : (3,) array
-        The first three sums before these cycles.
-    row : (2 n + 7,) array
-        Space for a sample.
-    far : (2 n + 10,) array
-        Sample of the largest slide, with the sums there; updated in place.
-    far_at : (1,) array
-        Number of that sample, from the first step.
-    workspace : (14, BLOCK) array
-        Space for a block of steps.
+    folded : interfaces.arrays.FoldedCycles
 
     Returns
     -------
@@ -556,27 +550,12 @@ def march_folded_cycles(
     int
         Status of `loop_kernels`.
     """
-    count = trace.shape[1] - 1
+    count = folded.trace.shape[1] - 1
     for cycle in range(cycles.shape[0]):
         did, status = march_folded_cycle(
-            first + cycle * count,
-            motion,
-            modal_system,
-            table,
-            interface,
-            goal,
-            limit,
-            travel,
-            ledger,
-            sums,
-            totals,
-            trace,
-            row,
-            far,
-            far_at,
-            workspace,
+            first + cycle * count, motion, modal_system, table, interface, folded
         )
         if status:
             return cycle * count + did, status
-        read_cycle(trace, modal_system.dt, cycles[cycle])
+        read_cycle(folded.trace, modal_system.dt, cycles[cycle])
     return cycles.shape[0] * count, 0
