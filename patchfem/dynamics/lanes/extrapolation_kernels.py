@@ -73,7 +73,21 @@ class Changes(NamedTuple):
 
 @njit(**NJIT_INLINE)
 def last_changes(row, place, workspace, lane):
-    """Return the last `Changes` of a row of the workspace; place: its index in a cycle end."""
+    """Return the last `Changes` of a row of the workspace.
+
+    Parameters
+    ----------
+    row : int
+        Row of the workspace.
+    place : int
+        Index of the row in the end of a cycle.
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+
+    Returns
+    -------
+    Changes
+    """
     last = workspace[(CYCLE_ENDS + place) * LANES + lane]
     second = workspace[(CYCLE_ENDS + CYCLE_END_SIZE + place) * LANES + lane]
     third = workspace[(CYCLE_ENDS + 2 * CYCLE_END_SIZE + place) * LANES + lane]
@@ -102,7 +116,19 @@ def push_cycle_end(lane, workspace):
 
 @njit(**NJIT_INLINE)
 def has_cut_extremes(lane, workspace, lowest, highest):
-    """Return whether an extreme of the last cycle is at its start or end instead of a reversal."""
+    """Return whether an extreme of the last cycle is at its start or end instead of a reversal.
+
+    Parameters
+    ----------
+    lane, workspace
+        See `rigid_kernels.friction_force`.
+    lowest, highest : float
+        Smallest and largest slide of the last cycle [m].
+
+    Returns
+    -------
+    bool
+    """
     x = workspace[SLIDE * LANES + lane]
     start = workspace[CYCLE_ENDS * LANES + lane]
     start_speed = workspace[(CYCLE_ENDS + 1) * LANES + lane]

@@ -17,6 +17,7 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws import tanh_kernels as friction
 from .rigid_kernels import (
     PROOF_TOL,
+    LaneState,
     StepOutcome,
     StickReading,
     TriedStep,
@@ -46,7 +47,6 @@ from .rows_kernels import (
     SLIDE,
     SLIP_SIGN,
     SPEED,
-    STEP,
     STIFFNESS,
     WORK_SUM,
 )
@@ -146,7 +146,7 @@ def law_numbers(workspace, lane):
 
 
 @njit(**NJIT_INLINE)
-def layer_of_speeds(numbers, angle):
+def speed_layer(numbers, angle):
     """Return the speed at the edge of the layer, and the change of the speed in a part of a step through it.
 
     The numbers of a law with a layer begin with its limit and 1 over the speed of the layer.
@@ -155,38 +155,40 @@ def layer_of_speeds(numbers, angle):
 
 
 @njit(**NJIT_INLINE)
-def friction_force(x, v, slip_sign, memory, sine, workspace, lane):
+def friction_force(state, sine, workspace, lane):
     """Return the friction over the mass in the angle of the drive [m], positive if it resists positive slip.
 
     Parameters
     ----------
-    x, v, slip_sign, memory, sine, workspace, lane
+    state, sine, workspace, lane
         See `rigid_kernels.friction_force`.
 
     Returns
     -------
     float
     """
-    return friction.rate_equation(law_numbers(workspace, lane), memory, v, slip_sign)[0]
+    numbers = law_numbers(workspace, lane)
+    return friction.rate_equation(numbers, state.memory, state.speed, state.slip_sign)[0]
 
 
 @njit(**NJIT_INLINE)
-def friction_rate(v, acceleration, slip_sign, memory, workspace, lane, when):
+def friction_rate(state, acceleration, workspace, lane, when):
     """Return the rate of the friction.
 
     Parameters
     ----------
-    v, acceleration, slip_sign, memory, workspace, lane, when
+    state, acceleration, workspace, lane, when
         See `rigid_kernels.friction_rate`.
 
     Returns
     -------
     float
     """
+    numbers = law_numbers(workspace, lane)
     _, gain, by_stretch, by_rate = friction.rate_equation(
-        law_numbers(workspace, lane), memory, v, slip_sign
+        numbers, state.memory, state.speed, state.slip_sign
     )
-    return by_stretch * gain * v + by_rate * acceleration
+    return by_stretch * gain * state.speed + by_rate * acceleration
 
 
 @njit(**NJIT_INLINE)
@@ -202,21 +204,38 @@ def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
     -------
     float
     """
-    return friction_force(x, 0.0, slip_sign, event_memory, 0.0, workspace, lane)
+    return friction_force(LaneState(x, 0.0, slip_sign, event_memory), 0.0, workspace, lane)
 
 
 @njit(**NJIT_INLINE)
 def irreversible_slide(x, memory, workspace, lane):
     """Return the irreversible part of a slide [m].
 
-    The arguments are those of `rigid_kernels.irreversible_slide`.
+    Parameters
+    ----------
+    x, memory, workspace, lane
+        See `rigid_kernels.irreversible_slide`.
+
+    Returns
+    -------
+    float
     """
     return x - memory
 
 
 @njit(**NJIT_INLINE)
 def slip_increment(memory, event_memory, memory1, workspace, lane):
-    """Return the friction work of the last step over the mass [m^2], which replaces the slip path."""
+    """Return the friction work of the last step over the mass [m^2], which replaces the slip path.
+
+    Parameters
+    ----------
+    memory, event_memory, memory1, workspace, lane
+        See `rigid_kernels.slip_increment`.
+
+    Returns
+    -------
+    float
+    """
     return workspace[STEP_WORK * LANES + lane]
 
 
@@ -301,15 +320,13 @@ def runge_kutta_step(workspace, lane, state, slip_sign, sines, angle):
 @njit(**NJIT_INLINE)
 def set_derived_state(workspace, lane):
     """Set the friction of a lane from its state."""
-    workspace[FRICTION * LANES + lane] = friction_force(
+    state = LaneState(
         workspace[SLIDE * LANES + lane],
         workspace[SPEED * LANES + lane],
         workspace[SLIP_SIGN * LANES + lane],
         workspace[MEMORY * LANES + lane],
-        0.0,
-        workspace,
-        lane,
     )
+    workspace[FRICTION * LANES + lane] = friction_force(state, 0.0, workspace, lane)
 
 
 restore_derived_state = set_derived_state
@@ -329,20 +346,30 @@ def flow_state(workspace, lane):
 
 @njit(**NJIT_INLINE)
 def is_sticking(v, slip_sign, memory, workspace, lane):
-    """Return 1 if at most SLIP_FRACTION of the slide is irreversible, otherwise 0."""
+    """Return 1 if at most SLIP_FRACTION of the slide is irreversible, otherwise 0.
+
+    Parameters
+    ----------
+    v, slip_sign, memory, workspace, lane
+        See `rigid_kernels.is_sticking`.
+
+    Returns
+    -------
+    float
+    """
     gain = friction.rate_equation(law_numbers(workspace, lane), memory, v, slip_sign)[1]
     return 1.0 if abs(1 - gain) < SLIP_FRACTION else 0.0
 
 
 @njit(**NJIT_INLINE)
-def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
+def try_step(workspace, lane, step, is_observed):
     """Compute a step as if no event lay inside it: no reversal, no kink of the law and no layer of speeds.
 
     A step that is read must not contain the start or the end of a stick, nor a change of sign of the stretch.
 
     Parameters
     ----------
-    workspace, lane, s0, c0, s1, c1, is_observed
+    workspace, lane, step, is_observed
         See `rigid_kernels.try_step`.
 
     Returns
@@ -350,12 +377,11 @@ def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
     TriedStep
     """
     slip_sign = workspace[SLIP_SIGN * LANES + lane]
-    angle = workspace[STEP * LANES + lane]
     state = flow_state(workspace, lane)
-    sines = (s0, workspace[MIDPOINT_FACTOR * LANES + lane] * (s0 + s1), s1)
-    end, work = runge_kutta_step(workspace, lane, state, slip_sign, sines, angle)
+    sines = (step.s0, workspace[MIDPOINT_FACTOR * LANES + lane] * (step.s0 + step.s1), step.s1)
+    end, work = runge_kutta_step(workspace, lane, state, slip_sign, sines, step.angle)
     if friction.HAS_SPEED_LAYER:
-        edge_speed, width = layer_of_speeds(law_numbers(workspace, lane), angle)
+        edge_speed, width = speed_layer(law_numbers(workspace, lane), step.angle)
         slowest = 0.0 if state.speed * end.speed < 0.0 else min(abs(state.speed), abs(end.speed))
         event = (slowest < edge_speed and abs(end.speed - state.speed) > width) or (
             is_observed and state.speed * end.speed <= 0.0
@@ -382,15 +408,39 @@ def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def hermite_root(y0, y1, m0, m1):
-    """Return the root in [0, 1] of the cubic with these values and slopes at its ends, from its secant on."""
+    """Return the root in [0, 1] of a cubic by Newton's method, which starts at its secant.
+
+    Parameters
+    ----------
+    y0, y1, m0, m1 : float
+        Values and slopes of the cubic at 0 and 1.
+
+    Returns
+    -------
+    float
+    """
     c2 = 3 * (y1 - y0) - 2 * m0 - m1
     c3 = m0 + m1 - 2 * (y1 - y0)
     return newton_on_cubic(y0, m0, c2, c3, y0 / (y0 - y1))
 
 
 @njit(**NJIT_INLINE)
-def acceleration_at(workspace, lane, state, sine):
-    """Return the acceleration of a `FlowState`."""
+def flow_acceleration(workspace, lane, state, sine):
+    """Return the acceleration of a `FlowState`.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    state : FlowState
+    sine : float
+        Sine of the drive.
+
+    Returns
+    -------
+    float
+        [m]
+    """
     return (
         workspace[DRIVE * LANES + lane] * sine
         - workspace[DAMPING * LANES + lane] * state.speed
@@ -422,8 +472,8 @@ def find_first_event(workspace, lane, start, end, slip_sign, sines, angle):
         is_reversal = True
         fraction = 0.0
         if slip_sign * v > 0.0:
-            a = acceleration_at(workspace, lane, start, sines[0])
-            a1 = acceleration_at(workspace, lane, end, sines[2])
+            a = flow_acceleration(workspace, lane, start, sines[0])
+            a1 = flow_acceleration(workspace, lane, end, sines[2])
             fraction = hermite_root(v, v1, angle * a, angle * a1)
     if friction.HAS_ZERO_KINK and start.stretch * end.stretch < 0.0:
         gain = friction.rate_equation(numbers, start.stretch, v, slip_sign)[1]
@@ -477,7 +527,22 @@ def slide_at_reversal(x, v, x1, v1, angle):
 
 @njit(**NJIT_INLINE)
 def advance_angle(sine, cosine, angle):
-    """Return sine and cosine an angle of up to a fifth of a radian later, to 1e-9."""
+    """Return sine and cosine after a further angle of up to a fifth of a radian, to 1e-9.
+
+    Parameters
+    ----------
+    sine, cosine : float
+        Sine and cosine before the angle.
+    angle : float
+        [rad]
+
+    Returns
+    -------
+    float
+        Sine.
+    float
+        Cosine.
+    """
     t = angle
     t2 = t * t
     cosine_part = 1 + t2 * (-1 / 2 + t2 * (1 / 24 - t2 * (1 / 720)))
@@ -552,8 +617,10 @@ def add_part_readings(workspace, lane, start, first, end, last, angle):
     stiffness = workspace[STIFFNESS * LANES + lane]
     sine, cosine, a = first
     sine1, cosine1, a1 = last
-    rate = friction_rate(start.speed, a, SIGN_IN_LAYER, 0.0, workspace, lane, AT_START)
-    rate1 = friction_rate(end.speed, a1, SIGN_IN_LAYER, 0.0, workspace, lane, AT_END)
+    first_state = LaneState(start.slide, start.speed, SIGN_IN_LAYER, 0.0)
+    last_state = LaneState(end.slide, end.speed, SIGN_IN_LAYER, 0.0)
+    rate = friction_rate(first_state, a, workspace, lane, AT_START)
+    rate1 = friction_rate(last_state, a1, workspace, lane, AT_END)
     jerk = output * (drive * cosine - damping * a - stiffness * start.speed - rate) + base * cosine
     jerk1 = (
         output * (drive * cosine1 - damping * a1 - stiffness * end.speed - rate1) + base * cosine1
@@ -573,9 +640,25 @@ def add_part_readings(workspace, lane, start, first, end, last, angle):
 
 @njit(**NJIT_INLINE)
 def count_layer_parts(workspace, lane, state, s0, s1, angle):
-    """Return the number of equal parts in which a step passes through a layer of speeds."""
+    """Return the number of equal parts in which a step passes through a layer of speeds.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    state : FlowState
+        State at the start of the step.
+    s0, s1 : float
+        Sine of the drive at both ends of the step.
+    angle : float
+        [rad]
+
+    Returns
+    -------
+    int
+    """
     numbers = law_numbers(workspace, lane)
-    edge_speed, width = layer_of_speeds(numbers, angle)
+    edge_speed, width = speed_layer(numbers, angle)
     sines = (s0, workspace[MIDPOINT_FACTOR * LANES + lane] * (s0 + s1), s1)
     end, _ = runge_kutta_step(workspace, lane, state, SIGN_IN_LAYER, sines, angle)
     v = state.speed
@@ -586,7 +669,7 @@ def count_layer_parts(workspace, lane, state, s0, s1, angle):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def resolve_layer_step(workspace, lane, s0, c0, s1, c1, angle):
+def resolve_layer_step(workspace, lane, step):
     """Compute a step of a law with a layer of speeds in parts that follow the layer.
 
     Where the other forces drive the speed one way whatever the friction is, the parts are equal in speed, otherwise equal
@@ -594,7 +677,7 @@ def resolve_layer_step(workspace, lane, s0, c0, s1, c1, angle):
 
     Parameters
     ----------
-    workspace, lane, s0, c0, s1, c1, angle
+    workspace, lane, step
         See `rigid_kernels.resolve_step`.
 
     Returns
@@ -606,18 +689,18 @@ def resolve_layer_step(workspace, lane, s0, c0, s1, c1, angle):
     drive = workspace[DRIVE * LANES + lane]
     damping = workspace[DAMPING * LANES + lane]
     stiffness = workspace[STIFFNESS * LANES + lane]
-    edge_speed, width = layer_of_speeds(numbers, angle)
+    edge_speed, width = speed_layer(numbers, step.angle)
     start_speed = state.speed
-    free = drive * s0 - damping * start_speed - stiffness * state.slide
+    free = drive * step.s0 - damping * start_speed - stiffness * state.slide
     start_rate = free - state.friction
     side = 1.0 if free > 0.0 else -1.0
-    change = angle * abs(drive * c0 - damping * start_rate - stiffness * start_speed)
+    change = step.angle * abs(drive * step.c0 - damping * start_rate - stiffness * start_speed)
     flies = side * free > FREE_FLIGHT_FACTOR * numbers[1] + change
     n_parts = MAX_LAYER_PARTS
     if not flies:
-        n_parts = count_layer_parts(workspace, lane, state, s0, s1, angle)
-    s = s0
-    c = c0
+        n_parts = count_layer_parts(workspace, lane, state, step.s0, step.s1, step.angle)
+    s = step.s0
+    c = step.c0
     a = start_rate
     done = 0.0
     work = 0.0
@@ -627,7 +710,7 @@ def resolve_layer_step(workspace, lane, s0, c0, s1, c1, angle):
     loss_sum = 0.0
     for n in range(n_parts):
         v = state.speed
-        rest = angle - done
+        rest = step.angle - done
         is_last = n == n_parts - 1
         part = LayerPart(0.0, state, 0.0)
         follows = flies and not is_last and side * v < edge_speed
@@ -637,24 +720,24 @@ def resolve_layer_step(workspace, lane, s0, c0, s1, c1, angle):
             follows = 0.0 < part.angle < rest
         if not follows:
             is_last = flies or is_last
-            t = rest if is_last else angle / n_parts
-            end_sine = s1 if is_last else advance_angle(s, c, t)[0]
+            t = rest if is_last else step.angle / n_parts
+            end_sine = step.s1 if is_last else advance_angle(s, c, t)[0]
             sines = (s, advance_angle(s, c, t / 2)[0], end_sine)
             end, part_work = runge_kutta_step(workspace, lane, state, SIGN_IN_LAYER, sines, t)
             part = LayerPart(t, end, part_work)
         t = part.angle
         end = part.end
-        s2 = s1
-        c2 = c1
+        s2 = step.s1
+        c2 = step.c1
         if not is_last:
             s2, c2 = advance_angle(s, c, t)
         v1 = end.speed
-        a1 = acceleration_at(workspace, lane, end, s2)
+        a1 = flow_acceleration(workspace, lane, end, s2)
         if workspace[IS_OBSERVED * LANES + lane] > 0.0:
             add_part_readings(workspace, lane, state, (s, c, a), end, (s2, c2, a1), t)
         if v * v1 <= 0.0 and v != 0.0:
             place = hermite_root(v, v1, t * a, t * a1)
-            event = (done + place * t) / angle
+            event = (done + place * t) / step.angle
             event_slide = hermite_cubic(state.slide, end.slide, t * v, t * v1, place)
         # Hermite's rule of the integrals of sin x' and x'^2 over the part.
         work_sum += t * (s * v + s2 * v1 + t / 6 * (c * v + s * a - c2 * v1 - s2 * a1)) / 2
@@ -670,10 +753,12 @@ def resolve_layer_step(workspace, lane, s0, c0, s1, c1, angle):
     v = start_speed
     v1 = state.speed
     # The trapezoidal rule over the run adds the ends of this step, and its correction the ends of the run.
-    work_ends = angle / 12 * (c1 * v1 + s1 * a - c0 * v - s0 * start_rate)
-    loss_ends = angle / 6 * (v1 * a - v * start_rate)
-    workspace[WORK_SUM * LANES + lane] += work_sum / angle + work_ends - (s0 * v + s1 * v1) / 2
-    workspace[LOSS_SUM * LANES + lane] += loss_sum / angle + loss_ends - (v * v + v1 * v1) / 2
+    work_ends = step.angle / 12 * (step.c1 * v1 + step.s1 * a - step.c0 * v - step.s0 * start_rate)
+    loss_ends = step.angle / 6 * (v1 * a - v * start_rate)
+    workspace[WORK_SUM * LANES + lane] += (
+        work_sum / step.angle + work_ends - (step.s0 * v + step.s1 * v1) / 2
+    )
+    workspace[LOSS_SUM * LANES + lane] += loss_sum / step.angle + loss_ends - (v * v + v1 * v1) / 2
     workspace[FRICTION * LANES + lane] = state.friction
     workspace[STRETCH_SQUARE * LANES + lane] = state.square
     workspace[STEP_WORK * LANES + lane] = work
@@ -699,14 +784,14 @@ def resolve_layer_step(workspace, lane, s0, c0, s1, c1, angle):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
+def resolve_step(workspace, lane, step):
     """Compute a step that ends and starts anew where the slide reverses and where the law has a kink.
 
     The irreversible part of the slide reverses at a kink, so its range is updated here.
 
     Parameters
     ----------
-    workspace, lane, s0, c0, s1, c1, angle
+    workspace, lane, step
         See `rigid_kernels.resolve_step`.
 
     Returns
@@ -714,7 +799,7 @@ def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
     StepOutcome
     """
     if friction.HAS_SPEED_LAYER:
-        return resolve_layer_step(workspace, lane, s0, c0, s1, c1, angle)
+        return resolve_layer_step(workspace, lane, step)
     numbers = law_numbers(workspace, lane)
     state = flow_state(workspace, lane)
     first_sign = workspace[SLIP_SIGN * LANES + lane]
@@ -724,10 +809,10 @@ def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
     done = 0.0
     work = 0.0
     for part in range(MAX_PARTS):
-        rest = angle - done
-        sine = s0 * cos(done) + c0 * sin(done)
+        rest = step.angle - done
+        sine = step.s0 * cos(done) + step.c0 * sin(done)
         middle = done + rest / 2
-        sines = (sine, s0 * cos(middle) + c0 * sin(middle), s1)
+        sines = (sine, step.s0 * cos(middle) + step.c0 * sin(middle), step.s1)
         end, part_work = runge_kutta_step(workspace, lane, state, slip_sign, sines, rest)
         first = find_first_event(workspace, lane, state, end, slip_sign, sines, rest)
         fraction = first.fraction
@@ -738,8 +823,8 @@ def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
             for _ in range(1 + N_CORRECTIONS):
                 event_angle = done + fraction * rest
                 middle = done + fraction * rest / 2
-                event_sine = s0 * cos(event_angle) + c0 * sin(event_angle)
-                sines = (sine, s0 * cos(middle) + c0 * sin(middle), event_sine)
+                event_sine = step.s0 * cos(event_angle) + step.c0 * sin(event_angle)
+                sines = (sine, step.s0 * cos(middle) + step.c0 * sin(middle), event_sine)
                 reached, part_work = runge_kutta_step(
                     workspace, lane, state, slip_sign, sines, fraction * rest
                 )
@@ -749,7 +834,7 @@ def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
                 rate = friction.rate_equation(numbers, z, v, slip_sign)[1] * v
                 if first.is_reversal:
                     miss = v
-                    rate = acceleration_at(workspace, lane, reached, event_sine)
+                    rate = flow_acceleration(workspace, lane, reached, event_sine)
                 if abs(miss) < rest * abs(rate):
                     fraction = min(max(fraction - miss / (rest * rate), 0.0), 1.0)
             work += part_work
@@ -764,7 +849,7 @@ def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
                 workspace[MIN_SLIP * LANES + lane] = min(workspace[MIN_SLIP * LANES + lane], slip)
         if first.is_reversal:
             slip_sign = -slip_sign
-            event = done / angle
+            event = done / step.angle
             at_reversal = state
     workspace[FRICTION * LANES + lane] = end.friction
     workspace[STRETCH_SQUARE * LANES + lane] = end.square
@@ -787,7 +872,7 @@ def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def stretch_at(start, end, numbers, angle, u):
+def stretch_in_segment(start, end, numbers, angle, u):
     """Return the stretch inside a segment of a step.
 
     Parameters
@@ -819,15 +904,22 @@ def stretch_at(start, end, numbers, angle, u):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def sticks_at(start, end, numbers, angle, u):
+def is_stuck_in_segment(start, end, numbers, angle, u):
     """Return whether the interface sticks inside a segment of a step.
 
-    The arguments are those of `stretch_at`.
+    Parameters
+    ----------
+    start, end, numbers, angle, u
+        See `stretch_in_segment`.
+
+    Returns
+    -------
+    bool
     """
     speed = hermite_cubic(
         start.state.speed, end.state.speed, angle * start.acceleration, angle * end.acceleration, u
     )
-    stretch = stretch_at(start, end, numbers, angle, u)
+    stretch = stretch_in_segment(start, end, numbers, angle, u)
     gain = friction.rate_equation(numbers, stretch, speed, start.state.slip_sign)[1]
     return abs(1 - gain) < SLIP_FRACTION
 
@@ -839,7 +931,7 @@ def find_stick_change(start, end, numbers, angle, low, high):
     Parameters
     ----------
     start, end, numbers, angle
-        See `stretch_at`.
+        See `stretch_in_segment`.
     low, high : float
         Bounds of the fraction of the segment.
 
@@ -847,10 +939,10 @@ def find_stick_change(start, end, numbers, angle, low, high):
     -------
     float
     """
-    sticks = sticks_at(start, end, numbers, angle, low)
+    sticks = is_stuck_in_segment(start, end, numbers, angle, low)
     for _ in range(N_HALVINGS):
         u = 0.5 * (low + high)
-        if sticks_at(start, end, numbers, angle, u) == sticks:
+        if is_stuck_in_segment(start, end, numbers, angle, u) == sticks:
             low = u
         else:
             high = u
@@ -861,13 +953,21 @@ def find_stick_change(start, end, numbers, angle, low, high):
 def find_zero_stretch(start, end, numbers, angle):
     """Find by bisection where the stretch changes its sign in a segment of a step.
 
-    The arguments are those of `stretch_at`.
+    Parameters
+    ----------
+    start, end, numbers, angle
+        See `stretch_in_segment`.
+
+    Returns
+    -------
+    float
+        Fraction of the segment.
     """
     low = 0.0
     high = 1.0
     for _ in range(N_HALVINGS):
         u = 0.5 * (low + high)
-        is_negative = stretch_at(start, end, numbers, angle, u) < 0.0
+        is_negative = stretch_in_segment(start, end, numbers, angle, u) < 0.0
         if is_negative == (start.state.memory < 0.0):
             low = u
         else:
@@ -900,12 +1000,12 @@ def stick_fractions(start, end, workspace, lane, angle):
         if not friction.HAS_ZERO_KINK:
             v = start.state.speed
             extreme_slip = hermite_cubic(x, x1, angle * v, angle * end.state.speed, turnover)
-    sticks = sticks_at(start, end, numbers, angle, 0.0)
-    last_sticks = sticks_at(start, end, numbers, angle, 1.0)
+    sticks = is_stuck_in_segment(start, end, numbers, angle, 0.0)
+    last_sticks = is_stuck_in_segment(start, end, numbers, angle, 1.0)
     if sticks != last_sticks:
         u = find_stick_change(start, end, numbers, angle, 0.0, 1.0)
         return StickReading(u if sticks else 1 - u, u if sticks else 2.0, extreme_slip)
-    if sticks or not sticks_at(start, end, numbers, angle, turnover):
+    if sticks or not is_stuck_in_segment(start, end, numbers, angle, turnover):
         return StickReading(1.0 if sticks else 0.0, 2.0, extreme_slip)
     # The interface slips at both ends, with stretches of opposite sign.
     release = find_stick_change(start, end, numbers, angle, turnover, 1.0)

@@ -49,7 +49,7 @@ def lane_state(workspace, lane):
 
 
 @njit(**NJIT_INLINE)
-def resolve_lane_step(workspace, lane, s0, c0, s1, c1, angle):
+def resolve_lane_step(workspace, lane, step):
     """Move a lane over a step that contains an event, and add to its sums.
 
     Parameters
@@ -57,10 +57,7 @@ def resolve_lane_step(workspace, lane, s0, c0, s1, c1, angle):
     workspace : array
         See `rows_kernels`.
     lane : int
-    s0, c0, s1, c1 : float
-        Sine and cosine of the drive at both ends of the step.
-    angle : float
-        Angle of the step [rad].
+    step : AngleStep
 
     Returns
     -------
@@ -69,7 +66,7 @@ def resolve_lane_step(workspace, lane, s0, c0, s1, c1, angle):
     StepOutcome
     """
     before = lane_state(workspace, lane)
-    outcome = law.resolve_step(workspace, lane, s0, c0, s1, c1, angle)
+    outcome = law.resolve_step(workspace, lane, step)
     x1 = outcome.slide
     v1 = outcome.speed
     workspace[SLIDE * LANES + lane] = x1
@@ -81,26 +78,26 @@ def resolve_lane_step(workspace, lane, s0, c0, s1, c1, angle):
     )
     # A jump of the acceleration inside the step adds this to the error of the trapezoidal rule.
     u = outcome.event
-    edge = outcome.jump * angle * (u * (1 - u) / 2 - 1 / 12)
-    workspace[WORK_SUM * LANES + lane] += s1 * v1 - (s0 + u * (s1 - s0)) * edge
+    edge = outcome.jump * step.angle * (u * (1 - u) / 2 - 1 / 12)
+    workspace[WORK_SUM * LANES + lane] += step.s1 * v1 - (step.s0 + u * (step.s1 - step.s0)) * edge
     workspace[LOSS_SUM * LANES + lane] += v1 * v1 - 2 * outcome.event_speed * edge
-    workspace[POWER_SUM * LANES + lane] += abs(s1 * v1)
+    workspace[POWER_SUM * LANES + lane] += abs(step.s1 * v1)
     highest = max(x1, outcome.reversal_slide)
     lowest = min(x1, outcome.reversal_slide)
     workspace[MAX_SLIDE * LANES + lane] = max(workspace[MAX_SLIDE * LANES + lane], highest)
     workspace[MIN_SLIDE * LANES + lane] = min(workspace[MIN_SLIDE * LANES + lane], lowest)
-    workspace[COS_SUM * LANES + lane] += x1 * c1
-    workspace[SIN_SUM * LANES + lane] += x1 * s1
+    workspace[COS_SUM * LANES + lane] += x1 * step.c1
+    workspace[SIN_SUM * LANES + lane] += x1 * step.s1
     return before, outcome
 
 
 @njit(**NJIT_INLINE)
-def accept_step(workspace, lane, before, s1, c1, tried, extreme):
+def accept_step(workspace, lane, before, step, tried, extreme):
     """Move a lane by a tried step and add to its sums, unless the step contains an event: the lane is then marked.
 
     Parameters
     ----------
-    workspace, lane, s1, c1
+    workspace, lane, step
         See `resolve_lane_step`.
     before : LaneState
         State before the step.
@@ -115,7 +112,7 @@ def accept_step(workspace, lane, before, s1, c1, tried, extreme):
     """
     event = tried.has_event
     moves = 0.0 if event else 1.0
-    power = moves * (s1 * tried.speed)
+    power = moves * (step.s1 * tried.speed)
     highest = workspace[MAX_SLIDE * LANES + lane]
     lowest = workspace[MIN_SLIDE * LANES + lane]
     path = law.slip_increment(before.memory, tried.memory, tried.memory, workspace, lane)
@@ -129,30 +126,49 @@ def accept_step(workspace, lane, before, s1, c1, tried, extreme):
     workspace[POWER_SUM * LANES + lane] += abs(power)
     workspace[MAX_SLIDE * LANES + lane] = highest if event else max(highest, extreme)
     workspace[MIN_SLIDE * LANES + lane] = lowest if event else min(lowest, extreme)
-    workspace[COS_SUM * LANES + lane] += moves * (tried.slide * c1)
-    workspace[SIN_SUM * LANES + lane] += moves * (tried.slide * s1)
+    workspace[COS_SUM * LANES + lane] += moves * (tried.slide * step.c1)
+    workspace[SIN_SUM * LANES + lane] += moves * (tried.slide * step.s1)
     return moves
 
 
 @njit(**NJIT_INLINE)
-def try_lane_step(workspace, lane, s0, c0, s1, c1, angle):
+def try_lane_step(workspace, lane, step):
     """Move a lane over a step without an event.
 
     A lane with an event stays where it is and is marked.
+
+    Parameters
+    ----------
+    workspace, lane, step
+        See `resolve_lane_step`.
     """
     before = lane_state(workspace, lane)
-    tried = law.try_step(workspace, lane, s0, c0, s1, c1, False)
+    tried = law.try_step(workspace, lane, step, False)
     extreme = tried.slide
     if law.records_own_peaks():
-        extreme = law.slide_at_reversal(before.slide, before.speed, tried.slide, tried.speed, angle)
-    accept_step(workspace, lane, before, s1, c1, tried, extreme)
+        extreme = law.slide_at_reversal(
+            before.slide, before.speed, tried.slide, tried.speed, step.angle
+        )
+    accept_step(workspace, lane, before, step, tried, extreme)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def collect_marked_lanes(workspace, marked, n_busy):
-    """Write the numbers of the marked lanes among the first `n_busy` into marked (LANES + 1,).
+    """List the marked lanes.
 
-    Returns the number of these lanes.
+    Parameters
+    ----------
+    workspace : array
+        See `rows_kernels`.
+    marked : (LANES + 1,) array
+        Numbers of the marked lanes, which are written.
+    n_busy : int
+        Number of lanes that have a case.
+
+    Returns
+    -------
+    int
+        Number of marked lanes.
     """
     count = 0
     for lane in range(n_busy):
@@ -163,7 +179,17 @@ def collect_marked_lanes(workspace, marked, n_busy):
 
 @njit(**NJIT_INLINE)
 def load_case(case, lane, cases, motion, workspace):
-    """Put a case into a lane; arguments as of `loop_kernels.march`."""
+    """Put a case into a lane.
+
+    Parameters
+    ----------
+    case : int
+        Number of the case.
+    lane : int
+        Number of the lane.
+    cases, motion, workspace
+        See `loop_kernels.march`.
+    """
     for n in range(N_NUMBERS):
         workspace[(FIRST_NUMBER + n) * LANES + lane] = cases[case, n]
     size = cases.shape[1] - N_NUMBERS
@@ -180,7 +206,17 @@ def load_case(case, lane, cases, motion, workspace):
 
 @njit(**NJIT_INLINE)
 def copy_lane(lane, other, workspace, table_size):
-    """Put the case of another lane, with a table of so many numbers, into a lane."""
+    """Put the case of another lane into a lane.
+
+    Parameters
+    ----------
+    lane, other : int
+        Numbers of both lanes.
+    workspace : array
+        See `rows_kernels`.
+    table_size : int
+        Number of numbers in the table of a case.
+    """
     for n in range(len(workspace) // LANES - table_size):
         workspace[n * LANES + lane] = workspace[n * LANES + other]
     table = len(workspace) - table_size * (LANES - lane)
@@ -191,7 +227,15 @@ def copy_lane(lane, other, workspace, table_size):
 
 @njit(**NJIT_INLINE)
 def store_motion(case, lane, workspace, motion):
-    """Write the motion of a lane into the row of its case."""
+    """Write the motion of a lane into the row of its case.
+
+    Parameters
+    ----------
+    case, lane : int
+        Numbers of the case and of its lane.
+    workspace, motion
+        See `loop_kernels.march`.
+    """
     for n in range(motion.shape[1]):
         motion[case, n] = workspace[(n if n < N_STATE else n - N_STATE + LAW_STATE) * LANES + lane]
 
@@ -214,9 +258,16 @@ def start_cycle(lane, workspace):
 
 @njit(**NJIT_INLINE)
 def finish_cycle(lane, workspace, cycle_history, phasor_factor):
-    """Write the extremes and the phasor of a cycle into cycle_history (4,), and start the next cycle.
+    """Write the extremes and the phasor of a cycle, and start the next cycle.
 
-    phasor_factor is 2 over the number of steps of a cycle.
+    Parameters
+    ----------
+    lane, workspace
+        See `resolve_lane_step`.
+    cycle_history : (4,) array
+        Smallest and largest slide and phasor [m], which are written.
+    phasor_factor : float
+        2 over the number of steps of a cycle.
     """
     drift = workspace[START_SLIDE * LANES + lane] - workspace[SLIDE * LANES + lane]
     cycle_history[0] = workspace[MIN_SLIDE * LANES + lane]

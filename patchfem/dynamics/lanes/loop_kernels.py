@@ -11,6 +11,7 @@ from . import extrapolation_kernels as extrapolation
 from . import lane_kernels as lanes
 from . import observation_kernels as observation
 from . import rigid_kernels as law
+from .rigid_kernels import AngleStep
 from .rows_kernels import (
     CASE_INDEX,
     CYCLE_INDEX,
@@ -34,22 +35,24 @@ from .rows_kernels import (
 
 @njit(**NJIT_INLINE)
 def march_cycle(workspace, marked, table, n_busy):
-    """March the first lanes, `n_busy` of them, over a cycle of the drive.
+    """March the lanes that have a case over a cycle of the drive.
 
-    The arguments are those of `march`.
+    Parameters
+    ----------
+    workspace, marked, table
+        See `march`.
+    n_busy : int
+        Number of lanes that have a case; they are the first ones.
     """
     angle = table[2, 0]
     width = (n_busy + (1 << GROUP_BITS) - 1) >> GROUP_BITS << GROUP_BITS
     for k in range(table.shape[1] - 1):
-        s0 = table[0, k]
-        c0 = table[1, k]
-        s1 = table[0, k + 1]
-        c1 = table[1, k + 1]
-        law.prepare_step(workspace, s0, c0)
+        step = AngleStep(table[0, k], table[1, k], table[0, k + 1], table[1, k + 1], angle)
+        law.prepare_step(workspace, step.s0, step.c0)
         for lane in range(width):
-            lanes.try_lane_step(workspace, lane, s0, c0, s1, c1, angle)
+            lanes.try_lane_step(workspace, lane, step)
         for n in range(lanes.collect_marked_lanes(workspace, marked, n_busy)):
-            lanes.resolve_lane_step(workspace, marked[n], s0, c0, s1, c1, angle)
+            lanes.resolve_lane_step(workspace, marked[n], step)
 
 
 @njit(**NJIT_INLINE)

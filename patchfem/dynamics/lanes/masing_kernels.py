@@ -20,6 +20,7 @@ from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from . import power_curve_kernels as curve
 from .rigid_kernels import (
     PROOF_TOL,
+    AngleStep,
     StepOutcome,
     StickReading,
     TriedStep,
@@ -175,12 +176,26 @@ def can_extrapolate(workspace, lane):
 def restore_derived_state(workspace, lane):
     """Set what follows from an extrapolated motion."""
     set_derived_state(workspace, lane)
-    curve.start_at(clamped_place(workspace[SLIDE * LANES + lane], workspace, lane), workspace, lane)
+    curve.start_lookup(
+        clamped_place(workspace[SLIDE * LANES + lane], workspace, lane), workspace, lane
+    )
 
 
 @njit(**NJIT_INLINE)
 def place_on_curve(x, workspace, lane):
-    """Return the slide since the last reversal over that at which all sliders slip."""
+    """Return the slide since the last reversal over that at which all sliders slip.
+
+    Parameters
+    ----------
+    x : float
+        Slide [m].
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+
+    Returns
+    -------
+    float
+    """
     return workspace[INVERSE_LENGTH * LANES + lane] * (x - workspace[TURN_SLIDE * LANES + lane])
 
 
@@ -189,6 +204,17 @@ def clamped_place(x, workspace, lane):
     """Return the abscissa of a slide on the curve, limited to [MIN_PLACE, slip of all sliders].
 
     A branch whose sliders do not all slip yet goes on to 2, so that a step beyond 1 finds where its event is.
+
+    Parameters
+    ----------
+    x : float
+        Slide [m].
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+
+    Returns
+    -------
+    float
     """
     place = max(place_on_curve(x, workspace, lane), MIN_PLACE)
     return min(place, 2.0 - workspace[ALL_SLIP * LANES + lane])
@@ -196,7 +222,24 @@ def clamped_place(x, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def branch_friction(x, workspace, lane, when=curve.IN_TABLE):
-    """Return the friction of the branch at a slide and its slope; `when` is that of the curve."""
+    """Return the friction of the branch at a slide and its slope.
+
+    Parameters
+    ----------
+    x : float
+        Slide [m].
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    when : int
+        See `irreversible_slide`.
+
+    Returns
+    -------
+    float
+        Friction [m].
+    float
+        Slope.
+    """
     m = workspace[BRANCH_SCALE * LANES + lane]
     side = workspace[DIRECTION * LANES + lane]
     spring = workspace[SPRING * LANES + lane]
@@ -269,35 +312,35 @@ def slider_energy(x, memory, slip, workspace, lane):
 
 
 @njit(**NJIT_INLINE)
-def friction_force(x, v, slip_sign, memory, sine, workspace, lane):
+def friction_force(state, sine, workspace, lane):
     """Return the friction over the mass in the angle of the drive [m], which is the memory of the case.
 
     Parameters
     ----------
-    x, v, slip_sign, memory, sine, workspace, lane
+    state, sine, workspace, lane
         See `rigid_kernels.friction_force`.
 
     Returns
     -------
     float
     """
-    return memory
+    return state.memory
 
 
 @njit(**NJIT_INLINE)
-def friction_rate(v, acceleration, slip_sign, memory, workspace, lane, when):
+def friction_rate(state, acceleration, workspace, lane, when):
     """Return the rate of the friction, by the slope that the last step noted for this instant.
 
     Parameters
     ----------
-    v, acceleration, slip_sign, memory, workspace, lane, when
+    state, acceleration, workspace, lane, when
         See `rigid_kernels.friction_rate`.
 
     Returns
     -------
     float
     """
-    return v * workspace[(TANGENT_START + when) * LANES + lane]
+    return state.speed * workspace[(TANGENT_START + when) * LANES + lane]
 
 
 @njit(**NJIT_INLINE)
@@ -344,14 +387,37 @@ def stick_fractions(start, end, workspace, lane, angle):
 def slip_increment(memory, event_memory, memory1, workspace, lane):
     """Return the path of slip of the last step [m].
 
-    The arguments are those of `rigid_kernels.slip_increment`.
+    Parameters
+    ----------
+    memory, event_memory, memory1, workspace, lane
+        See `rigid_kernels.slip_increment`.
+
+    Returns
+    -------
+    float
     """
     return workspace[STEP_SLIP * LANES + lane]
 
 
 @njit(**NJIT_INLINE)
 def acceleration_and_rate(workspace, lane, state, s0, c0):
-    """Return the acceleration of a `BranchState` and the rate of the acceleration."""
+    """Return the acceleration of a `BranchState` and the rate of the acceleration.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    state : BranchState
+    s0, c0 : float
+        Sine and cosine of the drive at this state.
+
+    Returns
+    -------
+    float
+        Acceleration [m].
+    float
+        Its rate [m].
+    """
     damping = workspace[DAMPING * LANES + lane]
     stiffness = workspace[STIFFNESS * LANES + lane]
     drive = workspace[DRIVE * LANES + lane]
@@ -376,6 +442,11 @@ def prepare_step(workspace, s0, c0):
     """Look up the curves of all lanes at the predicted slides at the end of the next step.
 
     A Taylor series predicts the slides.
+
+    Parameters
+    ----------
+    workspace, s0, c0
+        See `rigid_kernels.prepare_step`.
     """
     if curve.LOOKS_AHEAD:
         for lane in range(LANES):
@@ -385,11 +456,11 @@ def prepare_step(workspace, s0, c0):
             x1 = state.slide + t * (state.speed + t * (a0 / 2 + t * j0 / 6))
             workspace[CURVE_PLACE * LANES + lane] = clamped_place(x1, workspace, lane)
         for lane in range(LANES):
-            curve.prepare(workspace, lane)
+            curve.prepare_lookup(workspace, lane)
 
 
 @njit(**NJIT_INLINE)
-def hermite_step(workspace, lane, start, s0, c0, s1, c1, angle, when=curve.IN_TABLE):
+def hermite_step(workspace, lane, start, step, when=curve.IN_TABLE):
     """Integrate the motion of a branch over an angle by Hermite's rule.
 
     The rule uses the acceleration and its rate at both ends. The law is evaluated once, at the slide that a Taylor series
@@ -400,10 +471,7 @@ def hermite_step(workspace, lane, start, s0, c0, s1, c1, angle, when=curve.IN_TA
     workspace, lane
         See `rigid_kernels.friction_force`.
     start : BranchState
-    s0, c0, s1, c1 : float
-        Sine and cosine of the drive at both ends.
-    angle : float
-        [rad]
+    step : AngleStep
     when : int
         See `irreversible_slide`.
 
@@ -416,16 +484,16 @@ def hermite_step(workspace, lane, start, s0, c0, s1, c1, angle, when=curve.IN_TA
     drive = workspace[DRIVE * LANES + lane]
     x = start.slide
     v = start.speed
-    t = angle
-    a0, j0 = acceleration_and_rate(workspace, lane, start, s0, c0)
+    t = step.angle
+    a0, j0 = acceleration_and_rate(workspace, lane, start, step.s0, step.c0)
     predicted = x + t * (v + t * (a0 / 2 + t * j0 / 6))
     friction, tangent = branch_friction(predicted, workspace, lane, when)
     x1 = predicted
     v1 = v + t * (a0 + t * j0 / 2)
     for _ in range(2):
         friction1 = friction + tangent * (x1 - predicted)
-        a1 = drive * s1 - damping * v1 - stiffness * x1 - friction1
-        j1 = drive * c1 - damping * a1 - (stiffness + tangent) * v1
+        a1 = drive * step.s1 - damping * v1 - stiffness * x1 - friction1
+        j1 = drive * step.c1 - damping * a1 - (stiffness + tangent) * v1
         x1 = x + t * (v + t * ((7 * a0 + 3 * a1) / 20 + t * (3 * j0 - 2 * j1) / 60))
         v1 = v + t * ((a0 + a1) / 2 + t * (j0 - j1) / 12)
     return BranchState(x1, v1, friction + tangent * (x1 - predicted), tangent)
@@ -433,7 +501,20 @@ def hermite_step(workspace, lane, start, s0, c0, s1, c1, angle, when=curve.IN_TA
 
 @njit(**NJIT_INLINE)
 def next_event_slide(x, workspace, lane):
-    """Return the slide at which a step from x ends at the latest: that of the next event, or the longest step."""
+    """Return the slide at which a step ends at the latest: that of the next event, or the longest step.
+
+    Parameters
+    ----------
+    x : float
+        Slide at the start of the step [m].
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+
+    Returns
+    -------
+    float
+        [m]
+    """
     side = workspace[DIRECTION * LANES + lane]
     length = workspace[BRANCH_SCALE * LANES + lane] * workspace[YIELD_LENGTH * LANES + lane]
     longest = curve.MAX_STEP + BEYOND_ALL * workspace[ALL_SLIP * LANES + lane]
@@ -443,12 +524,12 @@ def next_event_slide(x, workspace, lane):
 
 
 @njit(**NJIT_INLINE)
-def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
+def try_step(workspace, lane, step, is_observed):
     """Compute a step as if no event lay inside it: no reversal and no closing of a loop.
 
     Parameters
     ----------
-    workspace, lane, s0, c0, s1, c1, is_observed
+    workspace, lane, step, is_observed
         See `rigid_kernels.try_step`.
 
     Returns
@@ -457,8 +538,7 @@ def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
     """
     state = branch_state(workspace, lane)
     side = workspace[DIRECTION * LANES + lane]
-    angle = workspace[STEP * LANES + lane]
-    end = hermite_step(workspace, lane, state, s0, c0, s1, c1, angle, curve.PREPARED)
+    end = hermite_step(workspace, lane, state, step, curve.PREPARED)
     event = (
         side * end.speed < 0.0
         or side * (end.slide - next_event_slide(state.slide, workspace, lane)) > 0.0
@@ -537,13 +617,34 @@ def find_first_event(workspace, lane, start, a0, end, a1, angle):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def stacked_slide(k, workspace, lane):
-    """Return the slide of the kth reversal on the stack."""
+    """Return the slide of the kth reversal on the stack.
+
+    Parameters
+    ----------
+    k : int
+        Index on the stack.
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+
+    Returns
+    -------
+    float
+        [m]
+    """
     return workspace[(REVERSALS + REVERSAL_SIZE * k) * LANES + lane]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def restore_reversal(k, workspace, lane):
-    """Continue from the kth reversal on the stack, and forget those after it."""
+    """Continue from the kth reversal on the stack, and forget those after it.
+
+    Parameters
+    ----------
+    k : int
+        Index on the stack.
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    """
     for n in range(REVERSAL_SIZE):
         stacked = workspace[(REVERSALS + REVERSAL_SIZE * k + n) * LANES + lane]
         workspace[(TURN_SLIDE + n) * LANES + lane] = stacked
@@ -663,7 +764,15 @@ def closing_slide(workspace, lane):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_next_event(x, workspace, lane):
-    """Note the slide of the next event, and whether half of the friction slips."""
+    """Store the slide of the next event, and whether half of the friction slips.
+
+    Parameters
+    ----------
+    x : float
+        Present slide [m].
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    """
     set_derived_state(workspace, lane)
     side = workspace[DIRECTION * LANES + lane]
     length = workspace[BRANCH_SCALE * LANES + lane] * workspace[YIELD_LENGTH * LANES + lane]
@@ -682,14 +791,14 @@ def find_next_event(x, workspace, lane):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
+def resolve_step(workspace, lane, step):
     """Compute a step with its reversals and closings of loops.
 
     The event of the outcome is the start or the end of a slip of half of the friction, otherwise a reversal.
 
     Parameters
     ----------
-    workspace, lane, s0, c0, s1, c1, angle
+    workspace, lane, step
         See `rigid_kernels.resolve_step`.
 
     Returns
@@ -702,34 +811,30 @@ def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
     event_kind = NO_EVENT
     reversal_slide = state.slide
     is_reversed = False
-    s = s0
-    c = c0
-    rest = angle
+    rest = step  # what is left of the step
     path = 0.0
     stick_angle = 0.0
     slip = irreversible_slide(state.slide, state.friction, workspace, lane)
     workspace[TANGENT_START * LANES + lane] = state.tangent
     workspace[STICK_FRACTION * LANES + lane] = 0.0
     for n_events in range(MAX_EVENTS + 1):
-        end = hermite_step(workspace, lane, state, s, c, s1, c1, rest)
-        a0, _ = acceleration_and_rate(workspace, lane, state, s, c)
-        a1, _ = acceleration_and_rate(workspace, lane, end, s1, c1)
-        first = find_first_event(workspace, lane, state, a0, end, a1, rest)
-        if first.kind == NO_EVENT or n_events == MAX_EVENTS or rest <= 0.0:
+        end = hermite_step(workspace, lane, state, rest)
+        a0, _ = acceleration_and_rate(workspace, lane, state, rest.s0, rest.c0)
+        a1, _ = acceleration_and_rate(workspace, lane, end, step.s1, step.c1)
+        first = find_first_event(workspace, lane, state, a0, end, a1, rest.angle)
+        if first.kind == NO_EVENT or n_events == MAX_EVENTS or rest.angle <= 0.0:
             break
-        t = first.fraction * rest
-        se, ce = drive_after(s, c, t)
+        t = first.fraction * rest.angle
+        se, ce = drive_after(rest.s0, rest.c0, t)
         slip_before = slip
         sign_before = workspace[SLIP_SIGN * LANES + lane]
-        reached = hermite_step(workspace, lane, state, s, c, se, ce, t)
+        reached = hermite_step(workspace, lane, state, AngleStep(rest.s0, rest.c0, se, ce, t))
         x = reached.slide
         v = 0.0 if first.kind == REVERSAL else reached.speed
         friction, tangent_before = branch_friction(x, workspace, lane)
         slip = irreversible_slide(x, friction, workspace, lane)
         path += abs(slip - slip_before)
-        s = se
-        c = ce
-        rest -= t
+        rest = AngleStep(se, ce, step.s1, step.c1, rest.angle - t)
         stick_angle += t if sign_before == 0.0 else 0.0
         if first.kind == REVERSAL:
             reversal_slide = x
@@ -746,17 +851,17 @@ def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
         kind = SLIP_CHANGE if changes_slip else first.kind
         if kind >= event_kind:
             event_kind = kind
-            event_fraction = 1 - rest / angle
+            event_fraction = 1 - rest.angle / step.angle
             event = state
             workspace[TANGENT_BEFORE * LANES + lane] = tangent_before
             workspace[TANGENT_AFTER * LANES + lane] = tangent
-            fraction = stick_angle / (angle - rest) if changes_slip else 0.0
+            fraction = stick_angle / (step.angle - rest.angle) if changes_slip else 0.0
             workspace[STICK_FRACTION * LANES + lane] = fraction
     last_slip = irreversible_slide(end.slide, end.friction, workspace, lane)
     workspace[STEP_SLIP * LANES + lane] = path + abs(last_slip - slip)
     workspace[TANGENT * LANES + lane] = end.tangent
     workspace[TANGENT_END * LANES + lane] = end.tangent
-    curve.start_at(clamped_place(end.slide, workspace, lane), workspace, lane)
+    curve.start_lookup(clamped_place(end.slide, workspace, lane), workspace, lane)
     if event_kind == NO_EVENT:
         event = end
         workspace[TANGENT_BEFORE * LANES + lane] = end.tangent

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from ...compiled.jit import njit
 from . import lane_kernels as lanes
 from . import rigid_kernels as law
-from .rigid_kernels import LaneState, cubic_peak, drive_after
+from .rigid_kernels import AngleStep, LaneState, cubic_peak, drive_after
 from .rows_kernels import (
     BASE_GAIN,
     CASE_INDEX,
@@ -83,11 +83,22 @@ class Peaks(NamedTuple):
 
 
 @njit(**NJIT_INLINE)
-def instant_at(workspace, lane, sine, cosine, state):
-    """Return the `Instant` of a state."""
-    friction = law.friction_force(
-        state.slide, state.speed, state.slip_sign, state.memory, sine, workspace, lane
-    )
+def make_instant(workspace, lane, sine, cosine, state):
+    """Return the `Instant` of a state.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    sine, cosine : float
+        Sine and cosine of the drive.
+    state : LaneState
+
+    Returns
+    -------
+    Instant
+    """
+    friction = law.friction_force(state, sine, workspace, lane)
     acceleration = (
         workspace[DRIVE * LANES + lane] * sine
         - workspace[DAMPING * LANES + lane] * state.speed
@@ -99,7 +110,19 @@ def instant_at(workspace, lane, sine, cosine, state):
 
 @njit(**NJIT_INLINE)
 def output_acceleration(workspace, lane, instant):
-    """Return the absolute acceleration of the output [m s-2]."""
+    """Return the absolute acceleration of the output.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    instant : Instant
+
+    Returns
+    -------
+    float
+        [m s-2]
+    """
     return (
         workspace[OUTPUT_GAIN * LANES + lane] * instant.acceleration
         + workspace[BASE_GAIN * LANES + lane] * instant.sine
@@ -108,7 +131,21 @@ def output_acceleration(workspace, lane, instant):
 
 @njit(**NJIT_INLINE)
 def output_jerk(workspace, lane, instant, friction_rate):
-    """Return the rate of the acceleration of the output, from the rate of the friction."""
+    """Return the rate of the absolute acceleration of the output in the angle of the drive.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    instant : Instant
+    friction_rate : float
+        Rate of the friction [m].
+
+    Returns
+    -------
+    float
+        [m s-2]
+    """
     free_rate = (
         workspace[DRIVE * LANES + lane] * instant.cosine
         - workspace[DAMPING * LANES + lane] * instant.acceleration
@@ -140,8 +177,8 @@ def segment_peaks(workspace, lane, first, last, angle, when, last_when):
     -------
     Peaks
     """
-    rate = friction_rate_at(workspace, lane, first, when)
-    last_rate = friction_rate_at(workspace, lane, last, last_when)
+    rate = instant_friction_rate(workspace, lane, first, when)
+    last_rate = instant_friction_rate(workspace, lane, last, last_when)
     acceleration = cubic_peak(
         output_acceleration(workspace, lane, first),
         output_acceleration(workspace, lane, last),
@@ -153,41 +190,46 @@ def segment_peaks(workspace, lane, first, last, angle, when, last_when):
 
 
 @njit(**NJIT_INLINE)
-def friction_rate_at(workspace, lane, instant, when):
-    """Return the rate of the friction at an instant of the step."""
-    state = instant.state
-    return law.friction_rate(
-        state.speed,
-        instant.acceleration,
-        state.slip_sign,
-        state.memory,
-        workspace,
-        lane,
-        when,
-    )
+def instant_friction_rate(workspace, lane, instant, when):
+    """Return the rate of the friction at an instant of the step.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    instant : Instant
+    when : int
+        See `segment_peaks`.
+
+    Returns
+    -------
+    float
+        [m]
+    """
+    return law.friction_rate(instant.state, instant.acceleration, workspace, lane, when)
 
 
 @njit(**NJIT_INLINE)
-def observe_step(workspace, lane, s0, c0, s1, c1, angle):
+def observe_step(workspace, lane, step):
     """Move a lane over a step without an event and add its readings.
 
     A lane that has an event is marked and stays.
 
     Parameters
     ----------
-    workspace, lane, s0, c0, s1, c1, angle
+    workspace, lane, step
         See `lane_kernels.resolve_lane_step`.
     """
     state = lanes.lane_state(workspace, lane)
-    first = instant_at(workspace, lane, s0, c0, state)
+    first = make_instant(workspace, lane, step.s0, step.c0, state)
     stick = law.is_sticking(state.speed, state.slip_sign, state.memory, workspace, lane)
-    tried = law.try_step(workspace, lane, s0, c0, s1, c1, True)
+    tried = law.try_step(workspace, lane, step, True)
     event = tried.has_event
     x1 = tried.slide
     end = LaneState(x1, tried.speed, state.slip_sign, tried.memory)
-    last = instant_at(workspace, lane, s1, c1, end)
+    last = make_instant(workspace, lane, step.s1, step.c1, end)
     slip = law.irreversible_slide(x1, tried.memory, workspace, lane)
-    peaks = segment_peaks(workspace, lane, first, last, angle, AT_START, AT_END)
+    peaks = segment_peaks(workspace, lane, first, last, step.angle, AT_START, AT_END)
     # All rows are read before the first one is written, otherwise a compiler does not take several lanes at once.
     highest = workspace[MAX_SLIDE * LANES + lane]
     lowest = workspace[MIN_SLIDE * LANES + lane]
@@ -199,21 +241,21 @@ def observe_step(workspace, lane, s0, c0, s1, c1, angle):
     force_at_min = workspace[FORCE_AT_MIN * LANES + lane]
     acceleration = workspace[MAX_ACCELERATION * LANES + lane]
     friction = workspace[MAX_FORCE * LANES + lane]
-    stick_now = current_stick + angle * stick
-    moves = lanes.accept_step(workspace, lane, state, s1, c1, tried, x1)
+    stick_now = current_stick + step.angle * stick
+    moves = lanes.accept_step(workspace, lane, state, step, tried, x1)
     work = moves * 0.5 * (first.friction + last.friction) * (x1 - state.slide)
     workspace[MAX_ACCELERATION * LANES + lane] = (
         acceleration if event else max(acceleration, peaks.acceleration)
     )
     workspace[MAX_FORCE * LANES + lane] = friction if event else max(friction, peaks.friction)
-    workspace[STICK_ANGLE * LANES + lane] += moves * angle * stick
+    workspace[STICK_ANGLE * LANES + lane] += moves * step.angle * stick
     workspace[LONGEST_STICK * LANES + lane] = longest if event else max(longest, stick_now)
     workspace[CURRENT_STICK * LANES + lane] = current_stick if event else stick * stick_now
     workspace[MAX_SLIP * LANES + lane] = max_slip if event else max(max_slip, slip)
     workspace[MIN_SLIP * LANES + lane] = min_slip if event else min(min_slip, slip)
     workspace[LOOP_WORK * LANES + lane] += work
     workspace[LOOP_WORK_SIZE * LANES + lane] += abs(work)
-    add_sample(workspace, lane, s1, c1, moves * x1, moves * last.friction)
+    add_sample(workspace, lane, step.s1, step.c1, moves * x1, moves * last.friction)
     # The slide does not reverse at an extreme of a step without an event.
     workspace[FORCE_AT_MAX * LANES + lane] = force_at_max if event or not x1 > highest else nan
     workspace[FORCE_AT_MIN * LANES + lane] = force_at_min if event or not x1 < lowest else nan
@@ -221,7 +263,17 @@ def observe_step(workspace, lane, s0, c0, s1, c1, angle):
 
 @njit(**NJIT_INLINE)
 def add_sample(workspace, lane, sine, cosine, slide, friction):
-    """Add a sample to the phasors and to the means."""
+    """Add a sample to the phasors and to the means.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    sine, cosine : float
+        Sine and cosine of the drive.
+    slide, friction : float
+        [m]
+    """
     workspace[COS_1 * LANES + lane] += slide * cosine
     workspace[SIN_1 * LANES + lane] += slide * sine
     workspace[COS_3 * LANES + lane] += slide * (cosine * (4 * cosine * cosine - 3))
@@ -231,30 +283,30 @@ def add_sample(workspace, lane, sine, cosine, slide, friction):
 
 
 @njit(**NJIT_INLINE)
-def observe_event_step(workspace, lane, s0, c0, s1, c1, angle):
+def observe_event_step(workspace, lane, step):
     """Move a lane over a step with an event and add its readings, those before and after the event.
 
     Parameters
     ----------
-    workspace, lane, s0, c0, s1, c1, angle
+    workspace, lane, step
         See `lane_kernels.resolve_lane_step`.
     """
     highest = workspace[MAX_SLIDE * LANES + lane]
     lowest = workspace[MIN_SLIDE * LANES + lane]
-    start, outcome = lanes.resolve_lane_step(workspace, lane, s0, c0, s1, c1, angle)
-    event_angle = outcome.event * angle
-    se, ce = drive_after(s0, c0, event_angle)
+    start, outcome = lanes.resolve_lane_step(workspace, lane, step)
+    event_angle = outcome.event * step.angle
+    se, ce = drive_after(step.s0, step.c0, event_angle)
     x = outcome.event_slide
     v = outcome.event_speed
     memory = outcome.event_memory
     before = LaneState(x, v, start.slip_sign, memory)
     after = LaneState(x, v, outcome.slip_sign, memory)
     end = LaneState(outcome.slide, outcome.speed, outcome.slip_sign, outcome.memory)
-    first = instant_at(workspace, lane, s0, c0, start)
-    first_end = instant_at(workspace, lane, se, ce, before)
-    second = instant_at(workspace, lane, se, ce, after)
-    last = instant_at(workspace, lane, s1, c1, end)
-    add_sticks(workspace, lane, (first, first_end), (second, last), outcome.event, angle)
+    first = make_instant(workspace, lane, step.s0, step.c0, start)
+    first_end = make_instant(workspace, lane, se, ce, before)
+    second = make_instant(workspace, lane, se, ce, after)
+    last = make_instant(workspace, lane, step.s1, step.c1, end)
+    add_sticks(workspace, lane, (first, first_end), (second, last), outcome.event, step.angle)
     add_slip_range(workspace, lane, before, end)
     reversal_force = law.friction_at_reversal(
         outcome.reversal_slide, start.slip_sign, start.memory, memory, workspace, lane
@@ -264,7 +316,7 @@ def observe_event_step(workspace, lane, s0, c0, s1, c1, angle):
             workspace, lane, first, first_end, event_angle, AT_START, BEFORE_EVENT
         )
         last_peaks = segment_peaks(
-            workspace, lane, second, last, angle - event_angle, AFTER_EVENT, AT_END
+            workspace, lane, second, last, step.angle - event_angle, AFTER_EVENT, AT_END
         )
         add_peaks(workspace, lane, peaks.acceleration, peaks.friction)
         add_peaks(workspace, lane, last_peaks.acceleration, last_peaks.friction)
@@ -274,7 +326,7 @@ def observe_event_step(workspace, lane, s0, c0, s1, c1, angle):
         last_work = 0.5 * (second.friction + last.friction) * (outcome.slide - x)
         workspace[LOOP_WORK * LANES + lane] += work + last_work
         workspace[LOOP_WORK_SIZE * LANES + lane] += abs(work) + abs(last_work)
-    add_sample(workspace, lane, s1, c1, outcome.slide, last.friction)
+    add_sample(workspace, lane, step.s1, step.c1, outcome.slide, last.friction)
     is_reversed = start.speed != 0.0 and start.speed * outcome.speed <= 0.0
     force = reversal_force if is_reversed else nan
     if max(outcome.slide, outcome.reversal_slide) > highest:
@@ -285,7 +337,17 @@ def observe_event_step(workspace, lane, s0, c0, s1, c1, angle):
 
 @njit(**NJIT_INLINE)
 def add_peaks(workspace, lane, acceleration, friction):
-    """Update the largest acceleration and the largest friction."""
+    """Update the largest acceleration and the largest friction.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    acceleration : float
+        Absolute acceleration of the output [m s-2].
+    friction : float
+        Absolute friction [m].
+    """
     workspace[MAX_ACCELERATION * LANES + lane] = max(
         workspace[MAX_ACCELERATION * LANES + lane], acceleration
     )
@@ -294,7 +356,15 @@ def add_peaks(workspace, lane, acceleration, friction):
 
 @njit(**NJIT_INLINE)
 def add_slip_range(workspace, lane, event, end):
-    """Update the range of the irreversible slide with the states at the event and at the end of a step."""
+    """Update the range of the irreversible slide with the states at the event and at the end of a step.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    event, end : LaneState
+        States at the event and at the end of the step.
+    """
     slip = law.irreversible_slide(event.slide, event.memory, workspace, lane)
     last_slip = law.irreversible_slide(end.slide, end.memory, workspace, lane)
     workspace[MAX_SLIP * LANES + lane] = max(
@@ -354,11 +424,21 @@ def add_sticks(workspace, lane, first, second, event, angle):
 
 @njit(**NJIT_INLINE)
 def lane_friction(lane, workspace, sine):
-    """Return the friction of a lane [m] at a sine of the drive."""
-    state = lanes.lane_state(workspace, lane)
-    return law.friction_force(
-        state.slide, state.speed, state.slip_sign, state.memory, sine, workspace, lane
-    )
+    """Return the friction of a lane [m] at a sine of the drive.
+
+    Parameters
+    ----------
+    lane, workspace
+        See `rigid_kernels.friction_force`.
+    sine : float
+        Sine of the drive.
+
+    Returns
+    -------
+    float
+        [m]
+    """
+    return law.friction_force(lanes.lane_state(workspace, lane), sine, workspace, lane)
 
 
 @njit(**NJIT_INLINE)
@@ -413,17 +493,35 @@ def finish_observed_cycle(lane, workspace, is_first, n_cycles, angle):
 
 @njit(**NJIT_INLINE)
 def record_accelerations(workspace, acceleration, step, sine):
-    """Write the acceleration of the output after so many steps, unless `acceleration` (n, 0) asks for none."""
+    """Write the acceleration of the output after a step.
+
+    Parameters
+    ----------
+    workspace, acceleration
+        See `loop_kernels.observe`.
+    step : int
+        Number of steps that are done.
+    sine : float
+        Sine of the drive.
+    """
     for lane in range(LANES if acceleration.shape[1] > 0 else 0):
         case = workspace[CASE_INDEX * LANES + lane]
         if case >= 0.0:
-            instant = instant_at(workspace, lane, sine, 0.0, lanes.lane_state(workspace, lane))
+            instant = make_instant(workspace, lane, sine, 0.0, lanes.lane_state(workspace, lane))
             acceleration[int(case), step] = output_acceleration(workspace, lane, instant)
 
 
 @njit(**NJIT_INLINE)
 def load_observed_cases(first, cases, order, motion, workspace):
-    """Put the cases from the number `first` of the order into the lanes and clear their readings."""
+    """Put cases into the lanes and clear their readings.
+
+    Parameters
+    ----------
+    first : int
+        Place of the first case in the order.
+    cases, order, motion, workspace
+        See `loop_kernels.observe`.
+    """
     for lane in range(LANES):
         lanes.load_case(order[min(first + lane, len(order) - 1)], lane, cases, motion, workspace)
         for n in range(FIRST_READING, FIRST_READING + N_READINGS):
@@ -455,13 +553,10 @@ def observe_cycle(workspace, marked, table, n_busy, acceleration, first_step):
     for lane in range(n_busy):
         start_observed_cycle(lane, workspace)
     for k in range(table.shape[1] - 1):
-        s0 = table[0, k]
-        c0 = table[1, k]
-        s1 = table[0, k + 1]
-        c1 = table[1, k + 1]
-        law.prepare_step(workspace, s0, c0)
+        step = AngleStep(table[0, k], table[1, k], table[0, k + 1], table[1, k + 1], angle)
+        law.prepare_step(workspace, step.s0, step.c0)
         for lane in range(width):
-            observe_step(workspace, lane, s0, c0, s1, c1, angle)
+            observe_step(workspace, lane, step)
         for n in range(lanes.collect_marked_lanes(workspace, marked, n_busy)):
-            observe_event_step(workspace, marked[n], s0, c0, s1, c1, angle)
-        record_accelerations(workspace, acceleration, first_step + k + 1, s1)
+            observe_event_step(workspace, marked[n], step)
+        record_accelerations(workspace, acceleration, first_step + k + 1, step.s1)

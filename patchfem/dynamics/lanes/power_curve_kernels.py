@@ -19,7 +19,7 @@ N_CURVE_STATE = 0  # number of rows that the curve has in the state of the law
 MAX_STEP = (
     1e300  # longest step, over YIELD_LENGTH; the curve bends so little that no step is too long
 )
-LOOKS_AHEAD = False  # whether `prepare` has something to do
+LOOKS_AHEAD = False  # whether `prepare_lookup` has something to do
 # The numbers of the curve are everywhere the same; see `table_curve_kernels`.
 IN_TABLE = 0
 PREPARED = 0
@@ -94,7 +94,24 @@ def power(w, a):
 
 @njit(**NJIT_INLINE)
 def force_and_slope(w, workspace, lane, when):
-    """Return the force at w > 0 and its slope."""
+    """Return the force at w > 0 and its slope.
+
+    Parameters
+    ----------
+    w : float
+        Abscissa, above 0.
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    when : int
+        See `masing_kernels.irreversible_slide`.
+
+    Returns
+    -------
+    float
+        Force.
+    float
+        Slope.
+    """
     exponent = workspace[EXPONENT * LANES + lane]
     p = workspace[FRACTION * LANES + lane] * power(w, exponent)
     return w * (1 - p / (exponent + 1)), 1 - p
@@ -122,20 +139,46 @@ def mean_slip(w, force, workspace, lane, when):
 
 @njit(**NJIT_INLINE)
 def loading_work(w, force, workspace, lane):
-    """Return the integral of the force up to w; arguments as of `mean_slip`."""
+    """Return the integral of the force up to an abscissa.
+
+    Parameters
+    ----------
+    w, force, workspace, lane
+        See `mean_slip`.
+
+    Returns
+    -------
+    float
+    """
     return w * (w / 2 - (w - force) / (workspace[EXPONENT * LANES + lane] + 2))
 
 
 @njit(**NJIT_INLINE)
-def prepare(workspace, lane):
+def prepare_lookup(workspace, lane):
     """Look up the curve of a lane; there is nothing to look up."""
 
 
 @njit(**NJIT_INLINE)
 def finish_step(workspace, lane, event):
-    """Keep what the step looked up; there is nothing to keep."""
+    """Store what the step looked up; there is nothing to store.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    event : bool
+        Whether the step has an event.
+    """
 
 
 @njit(**NJIT_INLINE)
-def start_at(w, workspace, lane):
-    """Look up the curve at the start of a step; there is nothing to look up."""
+def start_lookup(w, workspace, lane):
+    """Look up the curve at the start of a step; there is nothing to look up.
+
+    Parameters
+    ----------
+    w : float
+        Abscissa at the start of the step.
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    """

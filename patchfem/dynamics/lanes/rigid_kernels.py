@@ -55,6 +55,20 @@ class LaneState(NamedTuple):
     memory: float
 
 
+class AngleStep(NamedTuple):
+    """Step over an angle [rad] of the drive.
+
+    - `s0`, `c0`, `s1`, `c1`: sine and cosine of the drive at its start and at its end.
+    - `angle`: angle of the step [rad].
+    """
+
+    s0: float
+    c0: float
+    s1: float
+    c1: float
+    angle: float
+
+
 class TriedStep(NamedTuple):
     """State after a step without an event, and whether the step has one, which makes the state useless."""
 
@@ -169,7 +183,22 @@ def cubic_peak(g0, g1, m0, m1):
 
 @njit(**NJIT_INLINE)
 def drive_after(sine, cosine, angle):
-    """Return sine and cosine of the drive an angle of up to a step later, by their Taylor series."""
+    """Return sine and cosine of the drive after a further angle, by their Taylor series.
+
+    Parameters
+    ----------
+    sine, cosine : float
+        Sine and cosine before the angle.
+    angle : float
+        At most that of a step [rad].
+
+    Returns
+    -------
+    float
+        Sine.
+    float
+        Cosine.
+    """
     square = angle * angle
     cosine_part = 1 - square / 2 + square * square / 24
     sine_part = angle * (1 - square / 6 + square * square / 120)
@@ -177,13 +206,12 @@ def drive_after(sine, cosine, angle):
 
 
 @njit(**NJIT_INLINE)
-def friction_force(x, v, slip_sign, memory, sine, workspace, lane):
+def friction_force(state, sine, workspace, lane):
     """Return the friction over the mass in the angle of the drive [m], positive if it resists positive slip.
 
     Parameters
     ----------
-    x, v, slip_sign, memory : float
-        The fields of a `LaneState`.
+    state : LaneState
     sine : float
         Sine of the drive.
     workspace : array
@@ -194,23 +222,23 @@ def friction_force(x, v, slip_sign, memory, sine, workspace, lane):
     -------
     float
     """
-    stick_force = workspace[DRIVE * LANES + lane] * sine - workspace[STIFFNESS * LANES + lane] * x
+    stiffness = workspace[STIFFNESS * LANES + lane]
+    stick_force = workspace[DRIVE * LANES + lane] * sine - stiffness * state.slide
     limit = workspace[STATIC * LANES + lane]
-    if slip_sign == 0.0:
+    if state.slip_sign == 0.0:
         return min(max(stick_force, -limit), limit)
-    return slip_sign * workspace[KINETIC * LANES + lane]
+    return state.slip_sign * workspace[KINETIC * LANES + lane]
 
 
 @njit(**NJIT_INLINE)
-def friction_rate(v, acceleration, slip_sign, memory, workspace, lane, when):
+def friction_rate(state, acceleration, workspace, lane, when):
     """Return the rate of the friction.
 
     The result is 0 for a rigid contact, whose output does not move in a stick.
 
     Parameters
     ----------
-    v, slip_sign, memory : float
-        Fields of a `LaneState`.
+    state : LaneState
     acceleration : float
         Second derivative of the slide [m].
     workspace, lane
@@ -227,7 +255,15 @@ def friction_rate(v, acceleration, slip_sign, memory, workspace, lane, when):
 
 @njit(**NJIT_INLINE)
 def prepare_step(workspace, s0, c0):
-    """Prepare a step of all lanes; there is nothing to prepare."""
+    """Prepare a step of all lanes; there is nothing to prepare.
+
+    Parameters
+    ----------
+    workspace : array
+        See `rows_kernels`.
+    s0, c0 : float
+        Sine and cosine of the drive at the start of the step.
+    """
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
@@ -258,13 +294,41 @@ def slide_at_reversal(x, v, x1, v1, angle):
 
 @njit(**NJIT_INLINE)
 def irreversible_slide(x, memory, workspace, lane):
-    """Return the irreversible part of a slide [m]; arguments as of `friction_force`."""
+    """Return the irreversible part of a slide.
+
+    Parameters
+    ----------
+    x : float
+        Slide [m].
+    memory : float
+        Memory of the law.
+    workspace, lane
+        See `friction_force`.
+
+    Returns
+    -------
+    float
+        [m]
+    """
     return memory
 
 
 @njit(**NJIT_INLINE)
 def slip_increment(memory, event_memory, memory1, workspace, lane):
-    """Return the path of slip of a step [m], from the memories at its start, event and end."""
+    """Return the path of slip of a step.
+
+    Parameters
+    ----------
+    memory, event_memory, memory1 : float
+        Memory of the law at the start of the step, at its event and at its end.
+    workspace, lane
+        See `friction_force`.
+
+    Returns
+    -------
+    float
+        [m]
+    """
     return abs(event_memory - memory) + abs(memory1 - event_memory)
 
 
@@ -290,7 +354,19 @@ def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def is_sticking(v, slip_sign, memory, workspace, lane):
-    """Return 1 if the interface sticks and 0 if it slips; arguments as of `friction_force`."""
+    """Return 1 if the interface sticks and 0 if it slips.
+
+    Parameters
+    ----------
+    v, slip_sign, memory : float
+        Fields of a `LaneState`.
+    workspace, lane
+        See `friction_force`.
+
+    Returns
+    -------
+    float
+    """
     return 1.0 if slip_sign == 0.0 else 0.0
 
 
@@ -353,7 +429,19 @@ def newton_on_cubic(y0, m0, c2, c3, guess):
 
 @njit(**NJIT_INLINE)
 def linear_step(workspace, lane, s0, c0):
-    """Return the `Motion` after a step in a slip, by the coefficients of the exact step."""
+    """Return the `Motion` after a step in a slip, by the coefficients of the exact step.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `friction_force`.
+    s0, c0 : float
+        Sine and cosine of the drive at the start of the step.
+
+    Returns
+    -------
+    Motion
+    """
     x = workspace[SLIDE * LANES + lane]
     v = workspace[SPEED * LANES + lane]
     friction = workspace[SLIP_SIGN * LANES + lane] * workspace[KINETIC * LANES + lane]
@@ -375,15 +463,14 @@ def linear_step(workspace, lane, s0, c0):
 
 
 @njit(**NJIT_INLINE)
-def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
+def try_step(workspace, lane, step, is_observed):
     """Compute a step as if no event lay inside it: no stop, release or reversal.
 
     Parameters
     ----------
     workspace, lane
         See `friction_force`.
-    s0, c0, s1, c1 : float
-        Sine and cosine of the drive at both ends of the step.
+    step : AngleStep
     is_observed : bool
         Whether the step is read; a speed that ends at 0 is then a reversal.
 
@@ -393,9 +480,9 @@ def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
     """
     x = workspace[SLIDE * LANES + lane]
     slip_sign = workspace[SLIP_SIGN * LANES + lane]
-    end = linear_step(workspace, lane, s0, c0)
+    end = linear_step(workspace, lane, step.s0, step.c0)
     is_stuck = slip_sign == 0.0
-    force = workspace[DRIVE * LANES + lane] * s1 - workspace[STIFFNESS * LANES + lane] * x
+    force = workspace[DRIVE * LANES + lane] * step.s1 - workspace[STIFFNESS * LANES + lane] * x
     is_released = abs(force) > workspace[STATIC * LANES + lane]
     stops = slip_sign * end.speed < 0.0 or (is_observed and end.speed == 0.0)
     x1 = x if is_stuck else end.slide
@@ -438,75 +525,109 @@ def motion_from_rest(workspace, lane, angle, force, force_rate, force_bend):
 
 @njit(**NJIT_INLINE)
 def slide_by_force(t, damping, stiffness):
-    """Return the slide an angle t after rest under a force of 1."""
+    """Return the slide after rest under a force of 1.
+
+    Parameters
+    ----------
+    t : float
+        Angle since the rest [rad].
+    damping, stiffness : float
+        Coefficients of the equation of motion.
+
+    Returns
+    -------
+    float
+    """
     e2 = damping * damping - stiffness
     return t * t * (0.5 + t * (-damping / 6 + t * (e2 / 24 - t * damping * (e2 - stiffness) / 120)))
 
 
 @njit(**NJIT_INLINE)
 def speed_by_force(t, damping, stiffness):
-    """Return the speed an angle t after rest under a force of 1."""
+    """Return the speed after rest under a force of 1.
+
+    Parameters
+    ----------
+    t, damping, stiffness
+        See `slide_by_force`.
+
+    Returns
+    -------
+    float
+    """
     e2 = damping * damping - stiffness
     return t * (1.0 + t * (-damping / 2 + t * (e2 / 6 - t * damping * (e2 - stiffness) / 24)))
 
 
 @njit(**NJIT_INLINE)
-def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
+def resolve_step(workspace, lane, step):
     """Compute a step with the stop or release inside it.
 
     A stop that does not hold to the end of its step becomes a release before the next step.
 
     Parameters
     ----------
-    workspace, lane, s0, c0, s1, c1
+    workspace, lane, step
         See `try_step`.
-    angle : float
-        Angle of the step [rad].
 
     Returns
     -------
     StepOutcome
     """
     if workspace[SLIP_SIGN * LANES + lane] == 0.0:
-        return release(workspace, lane, s0, c0, s1, c1, angle)
-    return stop(workspace, lane, s0, c0, s1, c1, angle)
+        return resolve_release(workspace, lane, step)
+    return resolve_stop(workspace, lane, step)
 
 
 @njit(**NJIT_INLINE)
-def release(workspace, lane, s0, c0, s1, c1, angle):
+def resolve_release(workspace, lane, step):
     """Compute a step from a stick, in which the interface may start to slip.
 
-    The arguments are those of `resolve_step`.
+    Parameters
+    ----------
+    workspace, lane, step
+        See `resolve_step`.
+
+    Returns
+    -------
+    StepOutcome
     """
     x = workspace[SLIDE * LANES + lane]
     stiffness = workspace[STIFFNESS * LANES + lane]
     drive = workspace[DRIVE * LANES + lane]
     static = workspace[STATIC * LANES + lane]
-    n0 = drive * s0 - stiffness * x
-    n1 = drive * s1 - stiffness * x
+    n0 = drive * step.s0 - stiffness * x
+    n1 = drive * step.s1 - stiffness * x
     side = 1.0 if n1 > 0.0 else -1.0
     reserve = static - side * n0
     reserve1 = static - side * n1
     if not reserve1 < 0.0:
         return StepOutcome(x, 0.0, 0.0, x, 1.0, x, 0.0, x, x, 0.0)
     lowest = -1.0 if reserve < 0.0 else 0.0
-    slope = -angle * side * drive * c0
-    root = cubic_root(reserve, reserve1, slope, -angle * side * drive * c1, lowest)
+    slope = -step.angle * side * drive * step.c0
+    root = cubic_root(reserve, reserve1, slope, -step.angle * side * drive * step.c1, lowest)
     force = side * (static - root.value)
     net_force = force - side * workspace[KINETIC * LANES + lane]
-    force_rate = -side * root.slope / angle
+    force_rate = -side * root.slope / step.angle
     force_bend = -(force + stiffness * x)
-    rest = angle - root.place * angle
+    rest = step.angle - root.place * step.angle
     end = motion_from_rest(workspace, lane, rest, net_force, force_rate, force_bend)
     x1 = x + end.slide
     return StepOutcome(x1, end.speed, side, x1, root.place, x, 0.0, x, x1, net_force)
 
 
 @njit(**NJIT_INLINE)
-def stop(workspace, lane, s0, c0, s1, c1, angle):
+def resolve_stop(workspace, lane, step):
     """Compute a step from a slip, which may stop and then stick or slip back.
 
-    The arguments are those of `resolve_step`.
+    Parameters
+    ----------
+    workspace, lane, step
+        See `resolve_step`.
+
+    Returns
+    -------
+    StepOutcome
     """
     x = workspace[SLIDE * LANES + lane]
     v = workspace[SPEED * LANES + lane]
@@ -515,7 +636,7 @@ def stop(workspace, lane, s0, c0, s1, c1, angle):
     stiffness = workspace[STIFFNESS * LANES + lane]
     drive = workspace[DRIVE * LANES + lane]
     friction = sign * workspace[KINETIC * LANES + lane]
-    end = linear_step(workspace, lane, s0, c0)
+    end = linear_step(workspace, lane, step.s0, step.c0)
     if not sign * end.speed < 0.0:
         return StepOutcome(
             end.slide,
@@ -529,11 +650,11 @@ def stop(workspace, lane, s0, c0, s1, c1, angle):
             end.slide,
             0.0,
         )
-    rate = sign * (drive * s0 - stiffness * x - damping * v - friction)
-    rate1 = sign * (drive * s1 - stiffness * end.slide - damping * end.speed - friction)
-    root = cubic_root(sign * v, sign * end.speed, angle * rate, angle * rate1, 0.0)
-    stop_slide = x + sign * angle * root.integral
-    acceleration = root.slope * sign / angle
+    rate = sign * (drive * step.s0 - stiffness * x - damping * v - friction)
+    rate1 = sign * (drive * step.s1 - stiffness * end.slide - damping * end.speed - friction)
+    root = cubic_root(sign * v, sign * end.speed, step.angle * rate, step.angle * rate1, 0.0)
+    stop_slide = x + sign * step.angle * root.integral
+    acceleration = root.slope * sign / step.angle
     sticks = abs(acceleration + friction) <= workspace[STATIC * LANES + lane]
     if sticks:
         return StepOutcome(
@@ -548,7 +669,7 @@ def stop(workspace, lane, s0, c0, s1, c1, angle):
             stop_slide,
             -acceleration,
         )
-    rest = angle - root.place * angle
+    rest = step.angle - root.place * step.angle
     x1 = end.slide + 2 * friction * slide_by_force(rest, damping, stiffness)
     v1 = end.speed + 2 * friction * speed_by_force(rest, damping, stiffness)
     return StepOutcome(

@@ -242,9 +242,20 @@ def case_numbers(law: str, cases: Cases, steps: int) -> np.ndarray:
 
 
 def step_coefficients(cases: Cases, spring, angle: float) -> np.ndarray:
-    """Return the coefficients (n, 10) of an exact step with a spring parallel to the mode.
+    """Return the coefficients of an exact step with a spring parallel to the mode.
 
-    `rows_kernels` names the columns.
+    Parameters
+    ----------
+    cases : Cases
+    spring : (n,) array
+        Stiffness of the spring over that of the mode.
+    angle : float
+        Angle of the step [rad].
+
+    Returns
+    -------
+    (n, 10) array
+        Its columns are named in `rows_kernels`.
     """
     quarters = np.arange(N_TERMS) * np.pi / 2
     sines = np.round(np.sin(quarters)).tolist()
@@ -306,7 +317,20 @@ def initial_motion(law: str, cases: Cases) -> np.ndarray:
 
 
 def law_state(law: str, motion, name: str) -> np.ndarray:
-    """Return a row (n,) of the state of a law by its name."""
+    """Return a row of the state of a law by its name.
+
+    Parameters
+    ----------
+    law : str
+    motion : array
+        Motions of the cases, as `loop_kernels.march` writes them.
+    name : str
+        Name of the row in the kernels of the law.
+
+    Returns
+    -------
+    (n,) array
+    """
     row = getattr(law_kernels(law), name)
     return motion[:, rows.N_STATE + row - rows.LAW_STATE]
 

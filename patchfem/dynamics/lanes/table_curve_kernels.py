@@ -42,7 +42,7 @@ N_CURVE_STATE = N_ROWS - CURVE_STATE  # number of rows that the curve has in the
 MAX_STEP = (
     0.25  # longest step, over YIELD_LENGTH; Newton's method finds the end of a longer one badly
 )
-LOOKS_AHEAD = True  # whether `prepare` has something to do
+LOOKS_AHEAD = True  # whether `prepare_lookup` has something to do
 # Where the numbers of the curve are: in the table, looked up by `prepare`, or those of the start of the step.
 IN_TABLE = 0
 PREPARED = 1
@@ -51,7 +51,17 @@ AT_START = 2
 
 @njit(**NJIT_INLINE)
 def walk_to(first_guess, w, workspace, lane):
-    """Search up or down from a yield for the last one not beyond w, and store its index."""
+    """Find the last yield not beyond an abscissa by walking from a guess, and store its index.
+
+    Parameters
+    ----------
+    first_guess : int
+        Index of a yield.
+    w : float
+        Abscissa.
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    """
     n = first_guess
     table = TABLE_START + TABLE_SIZE * lane
     while w >= workspace[table + N_COLUMNS * (n + 1)]:
@@ -63,9 +73,20 @@ def walk_to(first_guess, w, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def find_yield(w, workspace, lane):
-    """Return the workspace index of the last yield not beyond w.
+    """Return the workspace index of the last yield not beyond an abscissa.
 
-    The yield found last is tried first, then the first yield of the interval of the table that contains w.
+    The yield of the last search is tried first, then the first yield of the interval of the table that contains w.
+
+    Parameters
+    ----------
+    w : float
+        Abscissa.
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+
+    Returns
+    -------
+    int
     """
     k = int(workspace[YIELD_INDEX * LANES + lane])
     table = TABLE_START + TABLE_SIZE * lane
@@ -79,7 +100,7 @@ def find_yield(w, workspace, lane):
 
 
 @njit(**NJIT_INLINE)
-def prepare(workspace, lane):
+def prepare_lookup(workspace, lane):
     """Look up the curve of a lane at CURVE_PLACE."""
     start = int(workspace[YIELD_INDEX * LANES + lane])
     walk_to(start, workspace[CURVE_PLACE * LANES + lane], workspace, lane)
@@ -91,7 +112,15 @@ def prepare(workspace, lane):
 
 @njit(**NJIT_INLINE)
 def finish_step(workspace, lane, event):
-    """Start the next step where this one ended, unless it contains an event."""
+    """Start the next step where this one ended, unless it contains an event.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    event : bool
+        Whether the step has an event.
+    """
     force = workspace[START_FORCE * LANES + lane]
     moment = workspace[START_MOMENT * LANES + lane]
     workspace[START_FORCE * LANES + lane] = (
@@ -103,8 +132,16 @@ def finish_step(workspace, lane, event):
 
 
 @njit(**NJIT_INLINE)
-def start_at(w, workspace, lane):
-    """Look up the curve at the start of a step."""
+def start_lookup(w, workspace, lane):
+    """Look up the curve at the start of a step.
+
+    Parameters
+    ----------
+    w : float
+        Abscissa at the start of the step.
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    """
     place = find_yield(w, workspace, lane)
     workspace[START_FORCE * LANES + lane] = workspace[place + FORCE]
     workspace[START_MOMENT * LANES + lane] = workspace[place + MOMENT]
@@ -112,7 +149,24 @@ def start_at(w, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def force_and_slope(w, workspace, lane, when):
-    """Return the force at w > 0 and its slope."""
+    """Return the force at w > 0 and its slope.
+
+    Parameters
+    ----------
+    w : float
+        Abscissa, above 0.
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    when : int
+        See `masing_kernels.irreversible_slide`.
+
+    Returns
+    -------
+    float
+        Force.
+    float
+        Slope.
+    """
     if when == PREPARED:
         slope = workspace[PREPARED_SLOPE * LANES + lane]
         return workspace[PREPARED_FORCE * LANES + lane] + slope * w, slope
@@ -148,6 +202,16 @@ def mean_slip(w, force, workspace, lane, when):
 
 @njit(**NJIT_INLINE)
 def loading_work(w, force, workspace, lane):
-    """Return the integral of the force up to w; arguments as of `mean_slip`."""
+    """Return the integral of the force up to an abscissa.
+
+    Parameters
+    ----------
+    w, force, workspace, lane
+        See `mean_slip`.
+
+    Returns
+    -------
+    float
+    """
     place = find_yield(w, workspace, lane)
     return (w * (force + workspace[place + FORCE]) - workspace[place + MOMENT]) / 2

@@ -13,6 +13,7 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from .rigid_kernels import (
     N_KEPT,
+    LaneState,
     Motion,
     StepOutcome,
     StickReading,
@@ -127,40 +128,40 @@ def can_extrapolate(workspace, lane):
 
 
 @njit(**NJIT_INLINE)
-def friction_force(x, v, slip_sign, memory, sine, workspace, lane):
+def friction_force(state, sine, workspace, lane):
     """Return the friction over the mass in the angle of the drive [m], positive if it resists positive slip.
 
     Parameters
     ----------
-    x, v, slip_sign, memory, sine, workspace, lane
+    state, sine, workspace, lane
         See `rigid_kernels.friction_force`.
 
     Returns
     -------
     float
     """
-    if slip_sign == 0.0:
-        return workspace[SPRING * LANES + lane] * (x - memory)
-    return slip_sign * workspace[KINETIC * LANES + lane]
+    if state.slip_sign == 0.0:
+        return workspace[SPRING * LANES + lane] * (state.slide - state.memory)
+    return state.slip_sign * workspace[KINETIC * LANES + lane]
 
 
 @njit(**NJIT_INLINE)
-def friction_rate(v, acceleration, slip_sign, memory, workspace, lane, when):
+def friction_rate(state, acceleration, workspace, lane, when):
     """Return the rate of the friction.
 
     The result is 0 after an event, because a stick that starts there moves with its slip.
 
     Parameters
     ----------
-    v, acceleration, slip_sign, memory, workspace, lane, when
+    state, acceleration, workspace, lane, when
         See `rigid_kernels.friction_rate`.
 
     Returns
     -------
     float
     """
-    rate = workspace[SPRING * LANES + lane] * v
-    return rate if slip_sign == 0.0 and when != AFTER_EVENT else 0.0
+    rate = workspace[SPRING * LANES + lane] * state.speed
+    return rate if state.slip_sign == 0.0 and when != AFTER_EVENT else 0.0
 
 
 @njit(**NJIT_INLINE)
@@ -177,7 +178,7 @@ def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
     float
     """
     limit = workspace[KINETIC * LANES + lane]
-    friction = friction_force(x, 0.0, slip_sign, memory, 0.0, workspace, lane)
+    friction = friction_force(LaneState(x, 0.0, slip_sign, memory), 0.0, workspace, lane)
     return min(max(friction, -limit), limit)
 
 
@@ -206,7 +207,17 @@ def stick_fractions(start, end, workspace, lane, angle):
 
 @njit(**NJIT_INLINE)
 def linear_step(workspace, lane, s0, c0):
-    """Return the `Motion` after a step that stays in the stick or the slip in which it starts."""
+    """Return the `Motion` after a step that stays in the stick or the slip in which it starts.
+
+    Parameters
+    ----------
+    workspace, lane, s0, c0
+        See `rigid_kernels.linear_step`.
+
+    Returns
+    -------
+    Motion
+    """
     x = workspace[SLIDE * LANES + lane]
     v = workspace[SPEED * LANES + lane]
     is_stuck = workspace[SLIP_SIGN * LANES + lane] == 0.0
@@ -230,12 +241,12 @@ def linear_step(workspace, lane, s0, c0):
 
 
 @njit(**NJIT_INLINE)
-def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
+def try_step(workspace, lane, step, is_observed):
     """Compute a step as if no event lay inside it: no stop, yield or reversal.
 
     Parameters
     ----------
-    workspace, lane, s0, c0, s1, c1, is_observed
+    workspace, lane, step, is_observed
         See `rigid_kernels.try_step`.
 
     Returns
@@ -246,7 +257,7 @@ def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
     slip_sign = workspace[SLIP_SIGN * LANES + lane]
     memory = workspace[MEMORY * LANES + lane]
     length = workspace[YIELD_LENGTH * LANES + lane]
-    end = linear_step(workspace, lane, s0, c0)
+    end = linear_step(workspace, lane, step.s0, step.c0)
     is_stuck = slip_sign == 0.0
     yields = is_stuck and abs(end.slide - memory) > length
     is_reversed = v * end.speed < 0.0 or (is_observed and end.speed == 0.0)
@@ -258,8 +269,20 @@ def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
 def slip_correction(angle, damping, stiffness, event):
     """Return the `Motion` to add at an angle after an event that engages or releases the spring.
 
-    It solves d'' + damping d' + stiffness d = factor (speed t + rate t^2/2 + second_rate t^3/6) from rest, with the fields
-    of the `CurveEvent`, by its Taylor series.
+    It solves d'' + damping d' + stiffness d = factor (speed t + rate t^2/2 + second_rate t^3/6) from rest, with the
+    fields of the event, by its Taylor series.
+
+    Parameters
+    ----------
+    angle : float
+        Angle since the event [rad].
+    damping, stiffness : float
+        Coefficients of the equation of motion.
+    event : CurveEvent
+
+    Returns
+    -------
+    Motion
     """
     t = angle
     t2 = t * t
@@ -285,9 +308,21 @@ def slip_correction(angle, damping, stiffness, event):
 def find_reversal_in_slip(event, spring, angle):
     """Find the angle from a yield to the reversal of the slip by Newton's method.
 
-    The result is at most `angle`.
-
     The speed of the stick goes on as a parabola, and the slip adds the force that the spring lacks.
+
+    Parameters
+    ----------
+    event : CurveEvent
+        The yield.
+    spring : float
+        Stiffness of the spring.
+    angle : float
+        Largest angle [rad].
+
+    Returns
+    -------
+    float
+        [rad]
     """
     v = event.speed
     a = event.rate
@@ -328,7 +363,7 @@ def continue_in_stick(start, damping, stiffness, force, angle):
 
 
 @njit(**NJIT_INLINE)
-def slide_on(curve, u):
+def slide_on_curve(curve, u):
     """Return the slide at a fraction of the step of a `SpeedCurve`."""
     return curve.x + curve.angle * u * (
         curve.v + u * (curve.m0 / 2 + u * (curve.c2 / 3 + u * curve.c3 / 4))
@@ -336,16 +371,28 @@ def slide_on(curve, u):
 
 
 @njit(**NJIT_INLINE)
-def speed_on(curve, u):
+def speed_on_curve(curve, u):
     """Return the speed at a fraction of the step of a `SpeedCurve`."""
     return curve.v + u * (curve.m0 + u * (curve.c2 + u * curve.c3))
 
 
 @njit(**NJIT_INLINE)
-def event_on(curve, u, speed, factor):
-    """Return the `CurveEvent` at a fraction of the step of a `SpeedCurve`, with a given speed.
+def event_on_curve(curve, u, speed, factor):
+    """Return the event at a fraction of the step of a curve.
 
-    The speed is known more accurately than from the curve.
+    Parameters
+    ----------
+    curve : SpeedCurve
+    u : float
+        Fraction of the step.
+    speed : float
+        Speed there, which is known more accurately than from the curve.
+    factor : float
+        Stiffness that the event releases, negative if it engages the spring.
+
+    Returns
+    -------
+    CurveEvent
     """
     rate = (curve.m0 + u * (2 * curve.c2 + 3 * curve.c3 * u)) / curve.angle
     second_rate = (2 * curve.c2 + 6 * curve.c3 * u) / (curve.angle * curve.angle)
@@ -382,14 +429,14 @@ def find_yield(curve, memory, side, length, top, highest):
         bow = curve.angle * max(bend, TINY)
         u = max(top - sqrt(2 * (highest - length) / bow), 0.0)
     for _ in range(N_NEWTON):
-        miss = side * (slide_on(curve, u) - memory) - length
-        speed = side * speed_on(curve, u)
+        miss = side * (slide_on_curve(curve, u) - memory) - length
+        speed = side * speed_on_curve(curve, u)
         u = min(max(u - miss / (curve.angle * speed), 0.0), top) if speed > 0.0 else u
     return u
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
+def resolve_step(workspace, lane, step):
     """Compute a step with the stop, the yield or the reversal inside it.
 
     The speed of the step without an event is taken as a cubic, and the slide as its integral, so an event is found to the
@@ -397,7 +444,7 @@ def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
 
     Parameters
     ----------
-    workspace, lane, s0, c0, s1, c1, angle
+    workspace, lane, step
         See `rigid_kernels.resolve_step`.
 
     Returns
@@ -411,14 +458,16 @@ def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
     damping = workspace[DAMPING * LANES + lane]
     stiffness = workspace[STIFFNESS * LANES + lane]
     drive = workspace[DRIVE * LANES + lane]
-    end = linear_step(workspace, lane, s0, c0)
-    friction = friction_force(x, v, sign, memory, s0, workspace, lane)
-    friction1 = friction_force(end.slide, end.speed, sign, memory, s1, workspace, lane)
-    m0 = angle * (drive * s0 - damping * v - stiffness * x - friction)
-    m1 = angle * (drive * s1 - damping * end.speed - stiffness * end.slide - friction1)
+    end = linear_step(workspace, lane, step.s0, step.c0)
+    start_state = LaneState(x, v, sign, memory)
+    end_state = LaneState(end.slide, end.speed, sign, memory)
+    friction = friction_force(start_state, step.s0, workspace, lane)
+    friction1 = friction_force(end_state, step.s1, workspace, lane)
+    m0 = step.angle * (drive * step.s0 - damping * v - stiffness * x - friction)
+    m1 = step.angle * (drive * step.s1 - damping * end.speed - stiffness * end.slide - friction1)
     c2 = 3 * (end.speed - v) - 2 * m0 - m1
     c3 = m0 + m1 - 2 * (end.speed - v)
-    curve = SpeedCurve(x, v, m0, c2, c3, angle)
+    curve = SpeedCurve(x, v, m0, c2, c3, step.angle)
     is_crossed = v * end.speed < 0.0
     is_reversed = is_crossed or (sign != 0.0 and sign * v < 0.0)
     u = 0.0 if is_reversed else 1.0
@@ -456,14 +505,14 @@ def resolve_slip(workspace, lane, curve, end, is_reversed, reversal):
             end.slide, end.speed, sign, memory, 1.0, end.slide, end.speed, memory, end.slide, 0.0
         )
     spring = workspace[SPRING * LANES + lane]
-    turn = slide_on(curve, reversal)
+    turn = slide_on_curve(curve, reversal)
     memory = turn - sign * length
     x1 = end.slide
     v1 = end.speed
     if reversal < 1.0:
         rest = curve.angle - reversal * curve.angle
         stiffness = workspace[STIFFNESS * LANES + lane] + spring
-        event = event_on(curve, reversal, 0.0, -spring)
+        event = event_on_curve(curve, reversal, 0.0, -spring)
         change = slip_correction(rest, workspace[DAMPING * LANES + lane], stiffness, event)
         x1 += change.slide
         v1 += change.speed
@@ -474,14 +523,21 @@ def resolve_slip(workspace, lane, curve, end, is_reversed, reversal):
 def resolve_stick(workspace, lane, curve, end, is_reversed, reversal):
     """Compute a step from a stick, in which the element may yield.
 
-    The arguments are those of `resolve_slip`.
+    Parameters
+    ----------
+    workspace, lane, curve, end, is_reversed, reversal
+        See `resolve_slip`.
+
+    Returns
+    -------
+    StepOutcome
     """
     memory = workspace[MEMORY * LANES + lane]
     spring = workspace[SPRING * LANES + lane]
     length = workspace[YIELD_LENGTH * LANES + lane]
     damping = workspace[DAMPING * LANES + lane]
     stiffness = workspace[STIFFNESS * LANES + lane]
-    turn = slide_on(curve, reversal) if is_reversed else end.slide
+    turn = slide_on_curve(curve, reversal) if is_reversed else end.slide
     side = 1.0 if turn > memory else -1.0
     if not is_reversed or abs(turn - memory) <= abs(end.slide - memory):
         side = 1.0 if end.slide > memory else -1.0
@@ -493,14 +549,14 @@ def resolve_stick(workspace, lane, curve, end, is_reversed, reversal):
     turns_beyond = is_reversed and side * (turn - memory) > length
     top = reversal if turns_beyond else 1.0
     u = find_yield(curve, memory, side, length, top, highest)
-    event_speed = speed_on(curve, u)
+    event_speed = speed_on_curve(curve, u)
     event_slide = memory + side * length
     if u >= 1.0:
         return StepOutcome(
             end.slide, end.speed, side, memory, u, event_slide, event_speed, memory, turn, 0.0
         )
     rest = curve.angle - u * curve.angle
-    event = event_on(curve, u, event_speed, spring)
+    event = event_on_curve(curve, u, event_speed, spring)
     change = slip_correction(rest, damping, stiffness, event)
     sign1 = side
     x1 = end.slide + change.slide
@@ -512,7 +568,7 @@ def resolve_stick(workspace, lane, curve, end, is_reversed, reversal):
         if is_reversed:
             slip_angle = find_reversal_in_slip(event, spring, rest)
             change = slip_correction(slip_angle, damping, stiffness, event)
-            turn = slide_on(curve, u + slip_angle / curve.angle) + change.slide
+            turn = slide_on_curve(curve, u + slip_angle / curve.angle) + change.slide
             sign1 = 0.0
             memory1 = turn - side * length
             force = spring * (memory1 - memory)
