@@ -5,6 +5,8 @@ which only a few are sides, so comparing a motion with the sides is faster than 
 `sets` is a `set_arrays.SetArrays`; motions are d [m] and t [rad].
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba.core.options import DefaultOptions
 
@@ -15,6 +17,14 @@ NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 ROUND_OFF = 1e-13  # rounding error of a force or gap over the largest of its terms
 # half width of the box in which polygons are computed, in the units of `polygon_units`
 BOX_HALF_WIDTH = 100.0
+
+
+class HalfPlane(NamedTuple):
+    """Rigid displacements (d, t) with constant + by_d d + by_t t >= 0."""
+
+    constant: float
+    by_d: float
+    by_t: float
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -46,21 +56,49 @@ def write_limits(sets, slot):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def clip_polygon(old, new, n_corners, c0, c1, c2, node):
-    """Clip a polygon by the half plane c0 + c1 d + c2 t >= 0; return its number of corners.
+def half_plane_value(half_plane, d, t):
+    """Return constant + by_d d + by_t t, which is negative outside the half plane.
 
-    The result is -1 if the corners are too many.
+    Parameters
+    ----------
+    half_plane : HalfPlane
+    d, t : float
+        Rigid displacement in the units of the half plane.
+
+    Returns
+    -------
+    float
+    """
+    return half_plane.constant + half_plane.by_d * d + half_plane.by_t * t
 
 
-    old, new: (3, k) corners before and after. A corner has two coordinates and the node whose line
-    leads to the next corner, -1 for the box. The method is that of Sutherland and Hodgman (Comm. ACM
-    17, 32, 1974).
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def clip_polygon(old, new, n_corners, half_plane, node):
+    """Clip a polygon by a half plane and return its number of corners.
+
+    The method is that of Sutherland and Hodgman (Comm. ACM 17, 32, 1974).
+
+    Parameters
+    ----------
+    old, new : (3, k) ndarray
+        Corners before and after; `new` is written. A corner has two coordinates and the node whose
+        line leads to the next corner, -1 for the box.
+    n_corners : int
+        Number of corners before.
+    half_plane : HalfPlane
+    node : int
+        Node whose contact condition is the half plane.
+
+    Returns
+    -------
+    int
+        Number of corners, -1 if `new` has too few columns for them.
     """
     n_new = 0
     for k in range(n_corners):
         follower = k + 1 if k + 1 < n_corners else 0
-        a = c0 + c1 * old[0, k] + c2 * old[1, k]
-        b = c0 + c1 * old[0, follower] + c2 * old[1, follower]
+        a = half_plane_value(half_plane, old[0, k], old[1, k])
+        b = half_plane_value(half_plane, old[0, follower], old[1, follower])
         if n_new + 2 > new.shape[1]:
             return -1
         if a >= 0:
@@ -104,15 +142,16 @@ def write_polygon(sets, slot):
         is_end = is_end or in_contact[i] != in_contact[i - 1] or in_contact[i] != in_contact[i + 1]
         if is_end != (step < n_nodes):
             continue
-        c0 = unknowns[0, i] - polygons.limits[slot, 0 if in_contact[i] else 1]
-        c1 = unknowns[1, i] * unit_d
-        c2 = unknowns[2, i] * unit_t
+        limit = polygons.limits[slot, 0 if in_contact[i] else 1]
+        half_plane = HalfPlane(
+            unknowns[0, i] - limit, unknowns[1, i] * unit_d, unknowns[2, i] * unit_t
+        )
         smallest = np.inf
         for k in range(n_corners):
-            smallest = min(smallest, c0 + c1 * old[0, k] + c2 * old[1, k])
+            smallest = min(smallest, half_plane_value(half_plane, old[0, k], old[1, k]))
         if smallest >= 0:
             continue
-        n_corners = clip_polygon(old, new, n_corners, c0, c1, c2, i)
+        n_corners = clip_polygon(old, new, n_corners, half_plane, i)
         if n_corners <= 0:
             return
         old, new = new, old
@@ -131,7 +170,15 @@ def write_polygon(sets, slot):
 def is_in_box(sets, d, t):
     """Return whether a rigid displacement lies in the box in which polygons are computed.
 
-    d: displacement [m]; t: rotation [rad].
+    Parameters
+    ----------
+    sets : set_arrays.SetArrays
+    d, t : float
+        Displacement [m] and rotation [rad].
+
+    Returns
+    -------
+    bool
     """
     unit_d, unit_t = polygon_units(sets)
     return abs(d) <= BOX_HALF_WIDTH * unit_d and abs(t) <= BOX_HALF_WIDTH * unit_t
@@ -139,9 +186,22 @@ def is_in_box(sets, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def side_margin(sets, slot, side, d, t):
-    """Return how far the force [N] or gap [m] of the node of a side is above its limit.
+    """Return the force [N] or gap [m] of the node of a side, less its limit.
 
-    d: displacement [m]; t: rotation [rad].
+    Parameters
+    ----------
+    sets : set_arrays.SetArrays
+    slot : int
+        Slot of the set.
+    side : int
+        Side of the polygon of the set.
+    d, t : float
+        Displacement [m] and rotation [rad].
+
+    Returns
+    -------
+    float
+        Negative beyond the side.
     """
     i = sets.polygons.nodes[slot, side]
     limit = sets.polygons.limits[slot, 0 if sets.stored.in_contact[slot, i] else 1]
@@ -153,9 +213,19 @@ def side_margin(sets, slot, side, d, t):
 def is_inside(sets, slot, d, t):
     """Return whether a displacement lies in the polygon of a set; False without a polygon.
 
-    d: displacement [m]; t: rotation [rad].
+    This takes a few multiplications per side, instead of one pass over the nodes.
 
-    Cost: a few multiplications per side, instead of one pass over the nodes.
+    Parameters
+    ----------
+    sets : set_arrays.SetArrays
+    slot : int
+        Slot of the set.
+    d, t : float
+        Displacement [m] and rotation [rad].
+
+    Returns
+    -------
+    bool
     """
     n_sides = sets.polygons.n_sides[slot]
     if n_sides == 0 or not is_in_box(sets, d, t):

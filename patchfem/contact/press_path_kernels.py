@@ -3,31 +3,37 @@
 `sets` is a `set_arrays.SetArrays`, `slot` the slot of a stored set; motions are d [m] and t [rad].
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..compiled.jit import njit
 from .polygon_kernels import NJIT_NO_REFCOUNT, find_exit, is_inside
-from .press_kernels import FASTMATH_MINIMUM, check_set, compute_energy, find_set
+from .press_kernels import FASTMATH_MINIMUM, ContactBounds, check_set, compute_energy, find_set
 
 # fraction of the increment beyond a border at which the next set is determined; it is larger than
 # rounding errors
 BORDER_STEP = 1e-10
 
 
+class HolderMotion(NamedTuple):
+    """Heave -d [m] and rotation t [rad] of the holder, or an increment of both."""
+
+    heave: float
+    rotation: float
+
+
 @njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
-def find_first_failure(sets, slot, d, t, dd, dt, min_force, min_gap):
+def find_first_failure(sets, slot, motion, change, bounds):
     """Return the fraction of an increment at which a node first violates contact conditions.
 
     Parameters
     ----------
     sets : set_arrays.SetArrays
     slot : int
-    d, t : float
-        Motion at which the increment begins.
-    dd, dt : float
-        The increment.
-    min_force, min_gap : float
-        Bounds of nodes in contact and of open nodes, from `press_kernels.check_set`.
+    motion, change : HolderMotion
+        Heave and rotation at which the increment begins, and the increment.
+    bounds : press_kernels.ContactBounds
 
     Returns
     -------
@@ -40,9 +46,9 @@ def find_first_failure(sets, slot, d, t, dd, dt, min_force, min_gap):
     in_contact = sets.stored.in_contact[slot]
     fraction = np.inf
     for i in range(in_contact.size):
-        rate = by_d[i] * dd + by_t[i] * dt
-        value = constant[i] + by_d[i] * d + by_t[i] * t
-        margin = value - (min_force if in_contact[i] else min_gap)
+        rate = -by_d[i] * change.heave + by_t[i] * change.rotation
+        value = constant[i] - by_d[i] * motion.heave + by_t[i] * motion.rotation
+        margin = value - (bounds.min_force if in_contact[i] else bounds.min_gap)
         if rate < 0:
             fraction = min(fraction, max(margin, 0.0) / -rate)
     return fraction
@@ -50,10 +56,24 @@ def find_first_failure(sets, slot, d, t, dd, dt, min_force, min_gap):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def cross_side(sets, slot, side, d, t):
-    """Return the slot of the set beyond a side of the polygon of a set; -1 if none is found.
+    """Find the set beyond a side of the polygon of a set.
 
-    d, t: motion just beyond the side. side: -1 if the side is not known. The set is stored with the
-    side, so the next crossing needs no search.
+    The set is stored with the side, so the next crossing needs no search.
+
+    Parameters
+    ----------
+    sets : set_arrays.SetArrays
+    slot : int
+        Slot of the set before the side.
+    side : int
+        Side of its polygon, -1 if the side is not known.
+    d, t : float
+        Displacement [m] and rotation [rad] just beyond the side.
+
+    Returns
+    -------
+    int
+        Slot of the set beyond the side, -1 if none is found.
     """
     if side < 0:
         return find_set(sets, slot, d, t)
@@ -70,16 +90,16 @@ def cross_side(sets, slot, side, d, t):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find_border(sets, slot, start, heave, rotation, heave_change, rotation_change):
-    """Find where an increment ends the validity of a contact set, beyond its fraction `start`.
+def find_border(sets, slot, start, motion, change):
+    """Find where a contact set ceases to hold on an increment, beyond its fraction `start`.
 
     Parameters
     ----------
     sets : set_arrays.SetArrays
     slot : int
     start : float
-    heave, rotation, heave_change, rotation_change : float
-        Motion at the beginning of the increment, and the increment.
+    motion, change : HolderMotion
+        Heave and rotation at which the increment begins, and the increment.
 
     Returns
     -------
@@ -88,27 +108,30 @@ def find_border(sets, slot, start, heave, rotation, heave_change, rotation_chang
     side : int
         Side of the polygon of the set, -1 if it is not known.
     """
-    end_d = -(heave + heave_change)
-    end_t = rotation + rotation_change
+    end_d = -(motion.heave + change.heave)
+    end_t = motion.rotation + change.rotation
     if is_inside(sets, slot, end_d, end_t):
         return 1.0, -1
-    d = -(heave + start * heave_change)
-    t = rotation + start * rotation_change
+    start_motion = HolderMotion(
+        motion.heave + start * change.heave, motion.rotation + start * change.rotation
+    )
+    d = -start_motion.heave
+    t = start_motion.rotation
     remainder = 1 - start
     fraction, side = find_exit(
-        sets, slot, d, t, -remainder * heave_change, remainder * rotation_change
+        sets, slot, d, t, -remainder * change.heave, remainder * change.rotation
     )
     if side >= 0:
         return min(start + max(fraction, 0.0) * remainder, 1.0), side
-    holds, min_force, min_gap = check_set(sets, slot, end_d, end_t)
+    holds, end_bounds = check_set(sets, slot, end_d, end_t)
     if holds:
         return 1.0, -1
-    _, start_force, start_gap = check_set(sets, slot, d, t)
-    min_force = min(min_force, start_force)
-    min_gap = min(min_gap, start_gap)
-    fraction = find_first_failure(
-        sets, slot, d, t, -heave_change, rotation_change, min_force, min_gap
+    _, start_bounds = check_set(sets, slot, d, t)
+    bounds = ContactBounds(
+        min(end_bounds.min_force, start_bounds.min_force),
+        min(end_bounds.min_gap, start_bounds.min_gap),
     )
+    fraction = find_first_failure(sets, slot, start_motion, change, bounds)
     return min(start + max(fraction, 0.0), 1.0), -1
 
 
@@ -135,31 +158,33 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
     int
         Slot of the set at the end, -1 if none is found.
     """
+    motion = HolderMotion(heave, rotation)
+    change = HolderMotion(heave_change, rotation_change)
     out[:] = 0.0
     start = 0.0
     border_step = BORDER_STEP
     # the number of sets is limited, because rounding errors may make a path return to the same sets
     for _ in range(20 * sets.x.size + 100):
-        end, side = find_border(sets, slot, start, heave, rotation, heave_change, rotation_change)
-        _, heave_slope, rotation_slope = compute_energy(
+        end, side = find_border(sets, slot, start, motion, change)
+        at_start = compute_energy(
             sets, slot, heave + start * heave_change, rotation + start * rotation_change
         )
-        energy, end_heave_slope, end_rotation_slope = compute_energy(
+        at_end = compute_energy(
             sets, slot, heave + end * heave_change, rotation + end * rotation_change
         )
         coefficients = sets.stored.energy[slot]
         half_length = 0.5 * (end - start)
         first_moment = 0.5 * (end * end - start * start)
-        out[0] += half_length * (heave_slope + end_heave_slope)
-        out[1] += half_length * (rotation_slope + end_rotation_slope)
+        out[0] += half_length * (at_start.heave_slope + at_end.heave_slope)
+        out[1] += half_length * (at_start.rotation_slope + at_end.rotation_slope)
         out[5] += first_moment * coefficients[3]
         out[6] -= first_moment * coefficients[4]
         out[8] += first_moment * coefficients[5]
         start = end
         if start >= 1.0:
-            out[2] = energy
-            out[3] = end_heave_slope
-            out[4] = end_rotation_slope
+            out[2] = at_end.value
+            out[3] = at_end.heave_slope
+            out[4] = at_end.rotation_slope
             out[7] = out[6]
             return slot
         beyond = min(start + border_step, 1.0)

@@ -76,18 +76,31 @@ class HolderLoads(NamedTuple):
     - spring: Stiffness [N m/rad] of the holder against the rotation about y.
     """
 
-    load: float | None
-    moment: float | None
-    roll_moment: float | None
-    spring: float
+    load: float | None = None
+    moment: float | None = None
+    roll_moment: float | None = None
+    spring: float = 0.0
 
 
 class HolderPosition(NamedTuple):
     """Approach delta [m] and rotations theta about y and roll about x [rad] of the holder."""
 
     delta: float
-    theta: float
-    roll: float
+    theta: float = 0.0
+    roll: float = 0.0
+
+
+class StripModel(NamedTuple):
+    """Equal strips that one holder presses.
+
+    - compliance: Compliance [m/N] of each strip; rigid pieces (0) need asperities.
+    - layout: Nodes of the strips.
+    - asperities: Pressure law of the asperities; None if the pieces are bare.
+    """
+
+    compliance: StripCompliance
+    layout: StripLayout
+    asperities: LinearAsperities | SmoothAsperities | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -209,17 +222,7 @@ def split_into_strips(pieces: Compliance, count: int) -> StripProperties:
 
 
 def compute_strip_residuals(
-    asperities,
-    compliance: StripCompliance,
-    x,
-    weight,
-    gap,
-    force,
-    delta: float,
-    theta: float,
-    load=None,
-    moment=None,
-    spring: float = 0.0,
+    strips: StripModel, gap, force, position: HolderPosition, loads: HolderLoads
 ) -> MappingProxyType:
     """Compute the relative residuals of the contact conditions for pressed strips.
 
@@ -228,27 +231,23 @@ def compute_strip_residuals(
 
     Parameters
     ----------
-    asperities : LinearAsperities, SmoothAsperities or None
-    compliance : StripCompliance
-    x, weight : (m,) ndarray
-        Positions [m] and nodal areas [m2] of one strip.
+    strips : StripModel
     gap, force : (s, m) ndarray
-        Gap [m] before loading and forces [N].
-    delta, theta : float
-        Approach [m] and rotation [rad] beyond that in the gap.
-    load, moment : float, optional
-        Prescribed load [N] and moment [N m].
-    spring : float
-        Stiffness of the holder [N m/rad].
+        Gap [m] before loading, with the rotation about x, and forces [N].
+    position : HolderPosition
+        Approach and rotation about y beyond that in the gap.
+    loads : HolderLoads
 
     Returns
     -------
     mapping
         tension; penetration and complementarity of bare strips, law of an asperity layer, each of the worst strip;
-        force_balance and moment_balance where they are prescribed.
+        force_balance, moment_balance and roll_balance where load or moment are given.
     """
+    compliance, (x, weight, offsets), asperities = strips
+    theta = position.theta
     displacement = compliance.product(force.ravel()).reshape(force.shape)
-    opening = gap + theta * x - delta + displacement
+    opening = gap + theta * x - position.delta + displacement
     depth = np.ptp(gap, axis=1) + np.abs(displacement).max() + abs(theta) * np.ptp(x)
     depth += MIN_TOTAL_FORCE
     largest = max(force.max(), np.exp(MIN_LOG_PRESSURE))
@@ -266,58 +265,44 @@ def compute_strip_residuals(
         mismatch = np.abs(force - weight * asperities.pressure(opening))
         mismatch -= weight * np.exp(MIN_LOG_PRESSURE)
         residuals["law"] = np.max(np.maximum(0.0, mismatch.max(axis=1)) / (largest + gain))
+    load = loads.load
     if load is not None:
         residuals["force_balance"] = abs(force.sum() - load) / load
-    if moment is not None:
-        held = spring * theta
-        missing = abs((force @ x).sum() - moment - held)
-        residuals["moment_balance"] = missing / (load * np.ptp(x) + abs(held))
+    if loads.moment is not None:
+        spring_moment = loads.spring * theta
+        missing = abs((force @ x).sum() - loads.moment - spring_moment)
+        residuals["moment_balance"] = missing / (load * np.ptp(x) + abs(spring_moment))
+    if loads.roll_moment is not None:
+        missing = abs(force.sum(axis=1) @ offsets - loads.roll_moment)
+        residuals["roll_balance"] = missing / (load * np.ptp(offsets))
     return MappingProxyType({key: float(value) for key, value in residuals.items()})
 
 
 def press_strips(
-    compliance: np.ndarray | StripCompliance,
-    x: np.ndarray,
-    weight: np.ndarray,
-    offsets: np.ndarray,
+    strips: StripModel,
     gap: np.ndarray,
-    roll: float = 0.0,
-    load: float | None = None,
-    moment: float | None = None,
+    loads: HolderLoads,
     approach: float | None = None,
     rotation: float = 0.0,
-    spring: float = 0.0,
-    asperities=None,
-    roll_moment: float | None = None,
+    roll: float = 0.0,
 ) -> StripsState:
     """Press strips by one holder, under a load or by an approach.
 
+    If nothing touches, the outcome is no_contact.
+
     Parameters
     ----------
-    compliance : (m, m) ndarray or StripCompliance
-        Compliance [m/N] of each strip; rigid pieces (0) need asperities.
-    x, weight : (m,) ndarray
-        Positions [m] and nodal areas [m2] of one strip.
-    offsets : (s,) ndarray
-        Distances y [m] of the strips from the middle.
+    strips : StripModel
     gap : (m,) or (s, m) ndarray
         Gap [m] with the prescribed rotation about y.
-    roll : float
-        Rotation [rad] about x; a positive one opens the gap at +y.
-    load : float, optional
-        Load [N] of all strips; if nothing touches, the outcome is no_contact.
-    moment : float, optional
-        Moment sum f x [N m] of a rotation about y that is free; without it the rotation is prescribed.
+    loads : HolderLoads
+        Its spring is unloaded at `rotation`. A roll under a moment is free from `roll` on.
     approach : float, optional
         Approach [m] in place of a load, at prescribed rotations.
     rotation : float
-        Rotation [rad] that is already contained in the gap.
-    spring : float
-        Stiffness [N m/rad] of the holder against the rotation about y, unloaded at `rotation`.
-    asperities : LinearAsperities, SmoothAsperities, optional
-        Pressure law of the asperities; without a law the pieces are bare.
-    roll_moment : float, optional
-        Moment sum f y [N m] of a roll that is free from `roll` on; without it the roll is prescribed.
+        Rotation [rad] about y that is already contained in the gap.
+    roll : float
+        Rotation [rad] about x; a positive one opens the gap at +y.
 
     Returns
     -------
@@ -331,74 +316,42 @@ def press_strips(
     NotConverged
         If a residual exceeds 1e-9.
     """
-    layout = StripLayout(x, weight, np.atleast_1d(np.asarray(offsets, float)))
-    if not isinstance(compliance, StripCompliance):
-        compliance = StripCompliance(compliance)
-    loads = HolderLoads(load, moment, roll_moment, spring)
-    gap = np.broadcast_to(gap, (layout.offsets.size, x.size)) + roll * layout.offsets[:, None]
-    _refuse_controls(asperities, x, gap, loads, approach)
-    _refuse_roll(layout.offsets, load, roll_moment)
-    if load == 0:
+    offsets = strips.layout.offsets
+    gap = np.broadcast_to(gap, (offsets.size, strips.layout.x.size)) + roll * offsets[:, None]
+    _refuse_controls(strips, gap, loads, approach)
+    _refuse_roll(offsets, loads)
+    if loads.load == 0:
         position = HolderPosition(float(gap.min()), rotation, roll)
-        return _make_state(asperities, layout, np.zeros(gap.shape), gap - gap.min(), position)
+        return _make_state(strips, np.zeros(gap.shape), gap - gap.min(), position)
+    asperities = strips.asperities
     if isinstance(asperities, ExponentialAsperities) and asperities.reference is None:
-        mean_pressure = load / (weight.sum() * layout.offsets.size)
-        asperities = replace(asperities, reference=mean_pressure)
-    problem = _holder_problem(layout, gap, loads)
+        mean_pressure = loads.load / (strips.layout.weight.sum() * offsets.size)
+        strips = strips._replace(asperities=replace(asperities, reference=mean_pressure))
+    problem = _holder_problem(strips.layout, gap, loads)
     with one_thread():
         if isinstance(asperities, SmoothAsperities):
-            solution = _press_with_asperities(asperities, compliance, layout, problem, approach)
+            solution = _press_with_asperities(strips, problem, approach)
         else:
-            solution = _press_bare(asperities, compliance, layout, problem, approach)
+            solution = _press_bare(strips, problem, approach)
     force = solution.force.reshape(gap.shape)
     change = _holder_position(solution.motion, loads)
-    gap = gap + change.roll * layout.offsets[:, None]
-    residuals = _check_strips(asperities, compliance, layout, gap, force, change, loads)
-    opening = _strip_opening(asperities, compliance, layout, gap, solution, change)
-    position = HolderPosition(change.delta, rotation + change.theta, roll + change.roll)
-    return _make_state(
-        asperities, layout, force, opening, position, solution.n_iterations, residuals
-    )
-
-
-def _check_strips(
-    asperities, compliance, layout: StripLayout, gap, force, position, loads: HolderLoads
-) -> MappingProxyType:
-    """Return the residuals of pressed strips; NotConverged if one is too large.
-
-    gap: (s, m) [m] before loading, with the rotation about x; position: HolderPosition beyond that in
-    the gap.
-    """
-    residuals = compute_strip_residuals(
-        asperities,
-        compliance,
-        layout.x,
-        layout.weight,
-        gap,
-        force,
-        delta=position.delta,
-        theta=position.theta,
-        load=loads.load,
-        moment=loads.moment,
-        spring=loads.spring,
-    )
-    if loads.roll_moment is not None:
-        error = abs(force.sum(axis=1) @ layout.offsets - loads.roll_moment)
-        relative_error = float(error / (loads.load * np.ptp(layout.offsets)))
-        residuals = MappingProxyType({**residuals, "roll_balance": relative_error})
+    gap = gap + change.roll * offsets[:, None]
+    residuals = compute_strip_residuals(strips, gap, force, change, loads)
     # one node of a single strip may carry the load; `unilateral.solve` then chooses the rotation
-    if not isinstance(asperities, SmoothAsperities) and layout.offsets.size > 1:
+    if not isinstance(asperities, SmoothAsperities) and offsets.size > 1:
         _refuse_loose_holder(force, loads)
     _refuse_strip_residuals(asperities, residuals)
-    return residuals
+    opening = _strip_opening(strips, gap, solution, change)
+    position = HolderPosition(change.delta, rotation + change.theta, roll + change.roll)
+    return _make_state(strips, force, opening, position, solution.n_iterations, residuals)
 
 
-def _strip_opening(asperities, compliance, layout: StripLayout, gap, solution, position):
+def _strip_opening(strips: StripModel, gap, solution, position: HolderPosition) -> np.ndarray:
     """Return the gap (s, m) [m] of pressed strips; with asperities, of their mean planes.
 
-    gap: (s, m) [m] before loading, with the rotation about x; position: HolderPosition beyond that in
-    the gap.
+    gap: (s, m) [m] before loading, with the rotation about x; position: that beyond the gap.
     """
+    compliance, layout, asperities = strips
     if isinstance(asperities, SmoothAsperities):
         return solution.separation.reshape(gap.shape)
     force = solution.force.reshape(gap.shape)
@@ -432,8 +385,9 @@ def _holder_position(motion, loads: HolderLoads) -> HolderPosition:
     return HolderPosition(float(motion[0]), theta, roll)
 
 
-def _press_bare(asperities, compliance, layout: StripLayout, problem: ContactProblem, approach):
+def _press_bare(strips: StripModel, problem: ContactProblem, approach) -> ContactSolution:
     """Solve bare strips, or strips with a linear asperity layer, which adds to the compliance."""
+    compliance, layout, asperities = strips
     warm_start = compliance.warm_start
     if asperities is not None:
         compliance = compliance.add_to_diagonal(1 / (asperities.k * layout.weight))
@@ -464,14 +418,13 @@ def _press_bare(asperities, compliance, layout: StripLayout, problem: ContactPro
     return solution
 
 
-def _press_with_asperities(
-    asperities, compliance, layout: StripLayout, problem: ContactProblem, approach
-):
+def _press_with_asperities(strips: StripModel, problem: ContactProblem, approach):
     """Solve strips with an asperity layer of a smooth pressure law.
 
     Each motion is scaled: the largest closing of a node per unit of motion becomes 1, and load and moments become
     comparable.
     """
+    compliance, layout, asperities = strips
     scale = 1 / np.abs(problem.motions).max(axis=0)
     scaled = problem._replace(
         motions=problem.motions * scale,
@@ -487,8 +440,9 @@ def _press_with_asperities(
     return solution._replace(motion=np.array([approach]))
 
 
-def _refuse_controls(asperities, x, gap, loads: HolderLoads, approach) -> None:
+def _refuse_controls(strips: StripModel, gap, loads: HolderLoads, approach) -> None:
     """Raise PatchfemError for controls without a solution."""
+    asperities = strips.asperities
     load = loads.load
     moment = loads.moment
     if (load is None) == (approach is None) or (moment is not None and load is None):
@@ -499,7 +453,7 @@ def _refuse_controls(asperities, x, gap, loads: HolderLoads, approach) -> None:
             "contact.load: the load must be >= 0, and load, approach and gap must be finite"
         )
     if load and moment is not None and not loads.spring:
-        refuse_tipping(moment / load, 0.0, np.ptp(x) / 2)
+        refuse_tipping(moment / load, 0.0, np.ptp(strips.layout.x) / 2)
     if (
         load is None
         and isinstance(asperities, ExponentialAsperities)
@@ -511,11 +465,13 @@ def _refuse_controls(asperities, x, gap, loads: HolderLoads, approach) -> None:
         )
 
 
-def _refuse_roll(offsets, load, roll_moment) -> None:
+def _refuse_roll(offsets, loads: HolderLoads) -> None:
     """Raise PatchfemError for a free roll that the strips cannot balance.
 
     This is a roll without load or second strip, or with a load line beyond the strips.
     """
+    load = loads.load
+    roll_moment = loads.roll_moment
     if roll_moment is None:
         return
     if load is None or offsets.size < 2:
@@ -559,8 +515,7 @@ def _refuse_strip_residuals(asperities, residuals) -> None:
 
 
 def _make_state(
-    asperities,
-    layout,
+    strips: StripModel,
     force,
     opening,
     position: HolderPosition,
@@ -568,6 +523,7 @@ def _make_state(
     residuals=(),
 ) -> StripsState:
     """Return the frozen state of strips; without load its outcome is no_contact."""
+    _, layout, asperities = strips
     is_pressed = force.sum() > 0
     stiffness = None
     if asperities is not None:

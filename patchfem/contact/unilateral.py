@@ -178,7 +178,7 @@ def solve(
     return ContactSolution(solution.force, solution.motion + rest, solution.stiffness, n_iterations)
 
 
-def solve_forces(c, x, gap, target, start=None, max_iterations: int = 100, spring: float = 0.0):
+def solve_forces(c, x, gap, target, start=None, spring: float = 0.0) -> PlainSolution:
     """Solve a contact problem of a patch given as plain arrays.
 
     Parameters
@@ -191,8 +191,6 @@ def solve_forces(c, x, gap, target, start=None, max_iterations: int = 100, sprin
         Nothing with the approach contained in the gap, load [N], or load and moment [N m].
     start : (m,) bool ndarray, optional
         Contact set of a similar problem.
-    max_iterations : int
-        As in `solve`.
     spring : float
         Stiffness of the holder [N m/rad].
 
@@ -202,22 +200,12 @@ def solve_forces(c, x, gap, target, start=None, max_iterations: int = 100, sprin
     """
     touch = gap.min() if target.size else 0.0
     problem = patch_problem(x, gap - touch, *map(float, target), spring=spring)
-    solution = solve(StripCompliance(c), problem, start, max_iterations)
+    solution = solve(StripCompliance(c), problem, start)
     solution.motion[:1] += touch
     return PlainSolution(solution.force, solution.motion, solution.n_iterations)
 
 
-def compute_residuals(
-    c,
-    x,
-    gap,
-    force,
-    delta: float,
-    theta: float,
-    load: float,
-    moment: float | None = None,
-    spring: float = 0.0,
-) -> MappingProxyType:
+def compute_residuals(c, x, problem: ContactProblem, solution: ContactSolution) -> MappingProxyType:
     """Compute the relative residuals of the contact conditions for a solution.
 
     An opening is relative to the sum of the magnitudes of its terms at the same node, so a spike of the gap elsewhere
@@ -227,18 +215,21 @@ def compute_residuals(
     ----------
     c : (m, m) ndarray
         Compliance [m/N].
-    x, gap, force : (m,) ndarray
-        Positions [m], gap [m] and forces [N].
-    delta, theta : float
-        Approach [m] and rotation [rad].
-    load, moment, spring : float
-        Load [N], moment [N m] of a free rotation and stiffness of the holder [N m/rad].
+    x : (m,) ndarray
+        Positions [m].
+    problem : ContactProblem
+    solution : ContactSolution
 
     Returns
     -------
     mapping
         force_balance, moment_balance (if the rotation is free), penetration, tension, complementarity.
     """
+    gap = problem.gap
+    force = solution.force
+    delta = solution.closing
+    theta = solution.theta
+    load = float(problem.target[0]) if problem.target.size else float(force.sum())
     opening = gap + theta * x - delta + c @ force
     loaded = np.flatnonzero(force)
     span = slice(loaded[0], loaded[-1] + 1)
@@ -250,9 +241,10 @@ def compute_residuals(
         "tension": max(0.0, -force.min()) / load,
         "complementarity": np.abs(force * relative_opening).sum() / load,
     }
-    if moment is not None:
-        residuals["moment_balance"] = abs(force @ x - moment - spring * theta) / (
-            load * np.ptp(x) + abs(spring * theta)
+    if problem.target.size > 1:
+        spring_moment = problem.springs[1] * theta
+        residuals["moment_balance"] = abs(force @ x - problem.target[1] - spring_moment) / (
+            load * np.ptp(x) + abs(spring_moment)
         )
     return MappingProxyType({key: float(value) for key, value in residuals.items()})
 
@@ -490,18 +482,7 @@ def check_solution(c, x, problem: ContactProblem, solution: ContactSolution) -> 
         If a residual exceeds 1e-12.
     """
     force = solution.force
-    loads = problem.target
-    residuals = compute_residuals(
-        c,
-        x,
-        problem.gap,
-        force,
-        delta=solution.closing,
-        theta=solution.theta,
-        load=float(loads[0]) if loads.size else float(force.sum()),
-        moment=float(loads[1]) if loads.size > 1 else None,
-        spring=float(problem.springs[1]) if loads.size > 1 else 0.0,
-    )
+    residuals = compute_residuals(c, x, problem, solution)
     refuse_residuals(residuals, RESIDUAL_TOL)
     opening = problem.gap + solution.theta * x - solution.closing + c @ force
     return np.where(force > 0, 0.0, np.maximum(opening, 0.0)), residuals

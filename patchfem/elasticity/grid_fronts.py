@@ -525,7 +525,7 @@ def predict_seconds(nx: int, ny: int, is_mirrored: bool) -> float:
     ----------
     nx, ny : int
         Columns and rows of nodes, with those of the far face.
-    mirrored : bool
+    is_mirrored : bool
         Whether the piece is mirror-symmetric in x.
 
     Returns
@@ -546,8 +546,16 @@ def predict_seconds(nx: int, ny: int, is_mirrored: bool) -> float:
 def predict_bytes(nx: int, ny: int, is_mirrored: bool) -> float:
     """Predict the peak memory [bytes] of assembling and condensing one piece.
 
-    This includes the stencil, the factors, the updates and the compliance. The parameters are those
-    of `predict_seconds`.
+    This includes the stencil, the factors, the updates and the compliance.
+
+    Parameters
+    ----------
+    nx, ny, is_mirrored
+        As in `predict_seconds`.
+
+    Returns
+    -------
+    float
     """
     work = predict_work(nx, ny, is_mirrored)
     return BYTES_PER_NUMBER * (work.factor_entries + work.other_entries)
@@ -557,8 +565,16 @@ def predict_bytes(nx: int, ny: int, is_mirrored: bool) -> float:
 def predict_work(nx: int, ny: int, is_mirrored: bool) -> WorkEstimate:
     """Estimate the operation count and the storage of condensing one piece.
 
-    Nodes are counted but not numbered, so the estimate is cheap. The parameters are those of
-    `predict_seconds`.
+    Nodes are counted but not numbered, so the estimate is cheap.
+
+    Parameters
+    ----------
+    nx, ny, is_mirrored
+        As in `predict_seconds`.
+
+    Returns
+    -------
+    WorkEstimate
     """
     is_halved = is_mirrored and nx > 3
     columns = (nx + 1) // 2 if is_halved else nx

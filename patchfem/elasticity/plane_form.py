@@ -9,7 +9,18 @@ from skfem.quadrature import get_quadrature
 def plane_elasticity(u, v, w):
     """Integrand sigma(u) : eps(v) of the weak form.
 
-    w.lam and w.mu are the Lame constants [Pa] of the plane problem at the quadrature points.
+    Parameters
+    ----------
+    u, v : DiscreteField
+        Displacement and test function.
+    w : FormExtraParams
+        Its fields lam and mu are the Lame constants [Pa] of the plane problem at the quadrature
+        points.
+
+    Returns
+    -------
+    ndarray
+        Integrand at the quadrature points [Pa].
     """
     (ux_x, ux_y), (uy_x, uy_y) = u.grad
     (vx_x, vx_y), (vy_x, vy_y) = v.grad

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 from scipy.integrate import quad
 from scipy.stats import norm
-from skins import longer, solve, tangent
+from skins import longer, solve, strips_of, tangent
 
 from patchfem.contact import asperity_layer
 from patchfem.contact.asperity_laws import (
@@ -22,8 +22,12 @@ from patchfem.contact.asperity_laws import (
     peak_integral,
 )
 from patchfem.contact.stiffness import tangential_stiffness
-from patchfem.contact.strip_compliance import StripCompliance
-from patchfem.contact.strips import STRIP_RESIDUAL_TOL, compute_strip_residuals
+from patchfem.contact.strips import (
+    STRIP_RESIDUAL_TOL,
+    HolderLoads,
+    HolderPosition,
+    compute_strip_residuals,
+)
 from patchfem.contact.unilateral import press
 from patchfem.core import NotConverged, Outcome, PatchfemError
 
@@ -383,6 +387,10 @@ def test_always_the_independent_check_sees_a_wrong_force():
         wrong = state.force.copy()
         wrong[3], wrong[4] = wrong[3] * 1.001, wrong[4] - 0.001 * wrong[3]
         checks = compute_strip_residuals(
-            skin, StripCompliance(c), x, weight, 1e-5 * x[None], wrong[None], state.delta, 0.0, LOAD
+            strips_of(c, x, weight, np.zeros(1), skin),
+            1e-5 * x[None],
+            wrong[None],
+            HolderPosition(state.delta),
+            HolderLoads(LOAD),
         )
         assert checks["law"] > STRIP_RESIDUAL_TOL and checks["force_balance"] < STRIP_RESIDUAL_TOL

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
-from skins import solve, tangent
+from skins import press_strips, solve, tangent
 
 from patchfem.closed_forms.contact import (
     wedge_on_asperities,
@@ -21,7 +21,6 @@ from patchfem.contact.stiffness import tangential_stiffness
 from patchfem.contact.strip_compliance import StripCompliance
 from patchfem.contact.strips import (
     STRIP_RESIDUAL_TOL,
-    press_strips,
     split_into_strips,
     strip_offsets,
     strips_stiffness,

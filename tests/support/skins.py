@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from patchfem.contact import strips
 from patchfem.contact.asperity_laws import ExponentialAsperities, LinearAsperities
-from patchfem.contact.strips import press_strips
+from patchfem.contact.strip_compliance import StripCompliance
 from patchfem.contact.unilateral import press, press_to_approach
 from patchfem.core import Compliance, Interface, Outcome
 
@@ -27,6 +28,24 @@ class State(NamedTuple):
     iterations: int
     outcome: Outcome
     residuals: dict
+
+
+def strips_of(c, x, weight, offsets, asperities=None):
+    """Strips of a compliance that is an array, or that has diagonals of their own."""
+    compliance = c if isinstance(c, StripCompliance) else StripCompliance(c)
+    layout = strips.StripLayout(x, weight, offsets)
+    return strips.StripModel(compliance, layout, asperities)
+
+
+def press_strips(
+    c, x, weight, offsets, gap, roll=0.0, load=None, moment=None, asperities=None, **control
+):
+    """The state of strips under a load and its moments, or by an approach."""
+    moments = {key: control.pop(key) for key in ("roll_moment", "spring") if key in control}
+    loads = strips.HolderLoads(load, moment, **moments)
+    return strips.press_strips(
+        strips_of(c, x, weight, offsets, asperities), gap, loads, roll=roll, **control
+    )
 
 
 def solve(skin, c, x, weight, gap, load=None, moment=None, approach=None, rotation=0.0, spring=0.0):

@@ -25,7 +25,14 @@ FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 def drop_first_node(upper, a, row):
     """Turn the factor of the nodes from a on into that of the nodes from a + 1 on, in place.
 
-    row: (m,) workspace.
+    Parameters
+    ----------
+    upper : (m, m) ndarray
+        Upper factor; only its rows and columns from a on are used.
+    a : int
+        First node of the stretches.
+    row : (m,) ndarray
+        Workspace.
     """
     n_nodes = row.size
     for i in range(a + 1, n_nodes):
@@ -44,7 +51,17 @@ def drop_first_node(upper, a, row):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def substitute_forward(upper, a, stop, y):
-    """Solve U^T z = y on the nodes from a to stop; z is written to y."""
+    """Solve U^T z = y on a stretch of nodes; z is written to y.
+
+    Parameters
+    ----------
+    upper : (m, m) ndarray
+        Upper factor U.
+    a, stop : int
+        First node of the stretch, and the node after its last one.
+    y : (m,) ndarray
+        Right-hand side, overwritten on the stretch.
+    """
     for j in range(a, stop):
         value = y[j] / upper[j, j]
         y[j] = value
@@ -74,8 +91,23 @@ def write_sums(stretches, a):
 def solve_motion(load, moment, spring, is_free, sums, stop):
     """Return closing [m] and theta [rad] of the stretch before stop.
 
-    sums: those of one left end, from `write_sums`. The equations are closing a - theta b = load and closing b - theta
-    (c + spring) = moment; theta is 0 unless it is free.
+    With the sums a, b and c of the stretch, the equations are closing a - theta b = load and
+    closing b - theta (c + spring) = moment; theta is 0 unless it is free.
+
+    Parameters
+    ----------
+    load, moment, spring : float
+        Load [N] and moment [N m], both with the part of the gap, and stiffness [N m/rad].
+    is_free : int
+        1 if the rotation is free, else 0.
+    sums : (3, m + 1) ndarray
+        Sums of one left end, from `write_sums`.
+    stop : int
+        Node after the last one of the stretch.
+
+    Returns
+    -------
+    closing, theta : float
     """
     a = sums[0, stop]
     b = sums[1, stop]
@@ -90,9 +122,26 @@ def solve_motion(load, moment, spring, is_free, sums, stop):
 def find_end(stretches, a, y, limit, loads, is_free):
     """Return the end of the longest stretch from node a that ends like a contact.
 
-    The last node of the stretch is pressed, and the next node is open. The end is 0 if there is none before limit.
+    The last node of the stretch is pressed, and the next node is open.
 
-    y: (k,) U^-T of the gap from a on; loads: (3,) as in `arrays.Cases`.
+    Parameters
+    ----------
+    stretches : arrays.NestedStretches
+    a : int
+        First node of the stretch.
+    y : (k,) ndarray
+        U^-T of the gap from a on.
+    limit : int
+        Node before which the stretch has to end.
+    loads : (3,) ndarray
+        As in `arrays.Cases`.
+    is_free : int
+        1 if the rotation is free, else 0.
+
+    Returns
+    -------
+    int
+        Node after the last one of the stretch, 0 if there is no such stretch.
     """
     unit_closing = stretches.unit[0]
     unit_arm = stretches.unit[1]
@@ -119,7 +168,16 @@ def find_end(stretches, a, y, limit, loads, is_free):
 def move_left_end(stretches, a, b, is_start):
     """Move the left end from a to b: factor, `unit`, and the sums of the left ends on the way.
 
-    is_start: the sums of the left end a are written as well. Cost: 2 m^2 multiplications for each node.
+    A step by one node takes 2 m^2 multiplications.
+
+    Parameters
+    ----------
+    stretches : arrays.NestedStretches
+        Written.
+    a, b : int
+        Left ends before and after.
+    is_start : int
+        1 if the sums of the left end a are written as well, else 0.
     """
     if is_start:
         write_sums(stretches, a)

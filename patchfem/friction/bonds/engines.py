@@ -79,7 +79,20 @@ class EngineChoice:
 
 
 def unsupported_reason(engine: str, reading: str, order: float) -> str:
-    """Return why an engine cannot sum a law, and which one can; "" if it can."""
+    """Return why an engine cannot sum a law, and which engine can.
+
+    Parameters
+    ----------
+    engine, reading : str
+        Values of accuracy.quadrature and friction.reading.
+    order : float
+        Order p of the law.
+
+    Returns
+    -------
+    str
+        "" if the engine can sum the law.
+    """
     if engine == "recursion" and (reading != "stretch" or order != 1):
         return 'works only with reading = "stretch" and order = 1; use "auto" or "merged"'
     return ""

@@ -152,7 +152,20 @@ def masing_loop(stiffness, yield_displacement, amplitude) -> SteadyLoop:
 
 
 def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
-    """Return `masing_loop` for a [friction] table, a load [N] and amplitudes [m]."""
+    """Return the steady loop of the law of a [friction] table.
+
+    Parameters
+    ----------
+    friction : model of a [friction] table
+    load : float
+        Normal load [N].
+    amplitude : float or array
+        Amplitudes [m] of the relative displacement.
+
+    Returns
+    -------
+    SteadyLoop
+    """
     length = friction.bond_length
     return masing_loop(np.array([friction.static * load / length]), np.array([length]), amplitude)
 

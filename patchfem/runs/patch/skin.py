@@ -11,7 +11,8 @@ import numpy as np
 
 from ...contact import asperity_laws
 from ...contact.edges import MIN_RELATIVE_PRESSURE
-from ...contact.strips import press_strips
+from ...contact.strip_compliance import StripCompliance
+from ...contact.strips import HolderLoads, StripLayout, StripModel, press_strips
 from ...core import Compliance, ContactState, PatchfemError, frozen_array
 from ...formatting import format_length, format_quantity
 from ...model import peaks as traces
@@ -129,20 +130,12 @@ def press_through_asperities(
     """
     interface = pieces.interface
     by = asked.loading.approach
-    load = asked.loading.load if by is None else None
-    state = press_strips(
-        pieces.normal,
-        interface.x,
-        interface.weight,
-        np.zeros(1),
-        gap,
-        load=load,
-        moment=moment if by is None else None,
-        approach=by,
-        rotation=angle,
-        spring=spring if by is None else 0.0,
-        asperities=skin_law(asked),
-    )
+    loads = HolderLoads()
+    if by is None:
+        loads = HolderLoads(asked.loading.load, moment, spring=spring)
+    layout = StripLayout(interface.x, interface.weight, np.zeros(1))
+    strips = StripModel(StripCompliance(pieces.normal), layout, skin_law(asked))
+    state = press_strips(strips, gap, loads, approach=by, rotation=angle)
     answer = ContactState(
         frozen_array(cut_off_pressure(state.pressure[0])),
         state.gap[0],

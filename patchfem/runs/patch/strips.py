@@ -9,7 +9,15 @@ import numpy as np
 from ...contact import edges, stiffness
 from ...contact.asperity_laws import LinearAsperities, SmoothAsperities
 from ...contact.strip_compliance import StripCompliance
-from ...contact.strips import press_strips, split_into_strips, strip_offsets, strips_stiffness
+from ...contact.strips import (
+    HolderLoads,
+    StripLayout,
+    StripModel,
+    press_strips,
+    split_into_strips,
+    strip_offsets,
+    strips_stiffness,
+)
 from ...core import Compliance, ContactState, frozen_array
 from .skin import MIN_RELATIVE_PRESSURE, cut_off_pressure, skin_law
 
@@ -47,21 +55,13 @@ def press_strips_of_patch(
     skin = make_asperities(asked)
     by = asked.loading.approach
     one = split_into_strips(pieces, count)
-    state = press_strips(
-        StripCompliance(one.normal, added, warm_start),
-        interface.x,
-        one.weight,
-        strip_offsets(asked.pieces.width, count),
-        gap,
-        roll,
-        asked.loading.load if by is None else None,
-        moment if by is None else None,
-        by,
-        angle,
-        spring if by is None else 0.0,
-        skin,
-        roll_moment=None if offset is None else asked.loading.load * offset,
-    )
+    layout = StripLayout(interface.x, one.weight, strip_offsets(asked.pieces.width, count))
+    strips = StripModel(StripCompliance(one.normal, added, warm_start), layout, skin)
+    roll_moment = None if offset is None else asked.loading.load * offset
+    loads = HolderLoads(roll_moment=roll_moment)
+    if by is None:
+        loads = HolderLoads(asked.loading.load, moment, roll_moment, spring)
+    state = press_strips(strips, gap, loads, approach=by, rotation=angle, roll=roll)
     mean = (
         cut_off_pressure(state.pressure) if isinstance(skin, SmoothAsperities) else state.pressure
     ).mean(axis=0)
