@@ -46,7 +46,7 @@ class FreeSpace(NamedTuple):
 
 
 @contextmanager
-def write_atomically(path, need: int | None = None) -> Iterator[Path]:
+def write_atomically(path, needed_bytes: int | None = None) -> Iterator[Path]:
     """Yield the path of a partial file, which is renamed to `path` on success and else removed.
 
     A device or a pipe is written directly.
@@ -54,7 +54,7 @@ def write_atomically(path, need: int | None = None) -> Iterator[Path]:
     Parameters
     ----------
     path : path-like
-    need : int or None
+    needed_bytes : int or None
         Bytes that will be written, if they are known.
 
     Raises
@@ -71,18 +71,18 @@ def write_atomically(path, need: int | None = None) -> Iterator[Path]:
         try:
             yield path
         except OSError as error:
-            raise explain_write_error(error, path, path, need) from None
+            raise explain_write_error(error, path, path, needed_bytes) from None
         return
     partial = make_partial_path(path)
     try:
         _remove_stale_partials(path)
-        if need is not None and (shortage := describe_space_shortage(path, need)):
+        if needed_bytes is not None and (shortage := describe_space_shortage(path, needed_bytes)):
             raise WriteError(shortage)
         yield partial
         os.replace(partial, path)
         PLACED_PATHS.append(path)
     except OSError as error:
-        raise explain_write_error(error, path, partial, need) from None
+        raise explain_write_error(error, path, partial, needed_bytes) from None
     finally:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
@@ -160,19 +160,19 @@ def find_free_space(path: Path) -> FreeSpace:
     return FreeSpace(free, "is free on its disk", False)
 
 
-def describe_space_shortage(path: Path, need: int) -> str:
-    """Return a message if `need` bytes do not fit at `path`, else ""."""
+def describe_space_shortage(path: Path, needed_bytes: int) -> str:
+    """Return a message if `needed_bytes` bytes do not fit at `path`, else ""."""
     space = find_free_space(path)
-    if need <= space.size:
+    if needed_bytes <= space.size:
         return ""
     return (
-        f"{format_path(path)}: not enough space: {format_bytes(need)} needed, "
+        f"{format_path(path)}: not enough space: {format_bytes(needed_bytes)} needed, "
         f"{format_bytes(space.size)} {space.limit}"
     )
 
 
 def explain_write_error(
-    error: OSError, path: Path, partial: Path, need: int | None = None
+    error: OSError, path: Path, partial: Path, needed_bytes: int | None = None
 ) -> WriteError:
     """Return the error to raise for a file that could not be written.
 
@@ -183,7 +183,7 @@ def explain_write_error(
         Target.
     partial : Path
         Partial file; the target itself for a device.
-    need : int or None
+    needed_bytes : int or None
         Bytes to be written, if they are known.
 
     Returns
@@ -206,7 +206,11 @@ def explain_write_error(
                 "remove files"
             )
         if error.errno in NO_SPACE_ERRNOS or (error.errno is None and remaining < MIN_FREE_BYTES):
-            needed = f"more than {format_bytes(written)}" if need is None else format_bytes(need)
+            needed = (
+                f"more than {format_bytes(written)}"
+                if needed_bytes is None
+                else format_bytes(needed_bytes)
+            )
             reason = f" ({os.strerror(error.errno)})" if error.errno else ""
             size = space.size if space.is_file_limit else space.size + written
             return WriteError(

@@ -257,7 +257,7 @@ def _follow_profile(
     f_low = -1.0
     high = None
     near = fit.u
-    tolerance = QUICK_PROFILE_TOL if fit.model.quick else PROFILE_TOL
+    tolerance = QUICK_PROFILE_TOL if fit.model.is_quick else PROFILE_TOL
     # the step doubles until the end is bracketed; bracketing and the secant method need fewer than 40 evaluations
     for _ in range(40):
         f, point = evaluate(step, near)

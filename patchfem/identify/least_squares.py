@@ -309,7 +309,7 @@ def descend(model: CubeResidual, u, free) -> Descent:
     else:
         return start._replace(is_converged=False)
     size = max(float(np.abs(model.with_penalty(point(begin))).max()), 1e-300)
-    ftol = QUICK_COST_TOL if model.quick else COST_TOL
+    ftol = QUICK_COST_TOL if model.is_quick else COST_TOL
     result = least_squares(
         lambda p: model.with_penalty(point(p)) / size,
         begin,

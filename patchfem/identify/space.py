@@ -101,15 +101,15 @@ class CubeResidual:
     residual : callable
         Function of values (n,) that returns a residual (r,).
     space : SearchSpace
-    quick : bool
+    is_quick : bool
         Whether evaluations are expensive, so that derivatives are one-sided and of first order, and ends
         of profiles are accurate to 1 %.
     """
 
-    def __init__(self, residual: Callable, space: SearchSpace, *, quick: bool = False):
+    def __init__(self, residual: Callable, space: SearchSpace, *, is_quick: bool = False):
         self.residual = residual
         self.space = space
-        self.quick = quick
+        self.is_quick = is_quick
         self.evaluations = 0
         self.failures = 0
         self.reason = ""
@@ -176,7 +176,7 @@ class CubeResidual:
         """Evaluate the residual at points beside u, by their number of steps along a coordinate."""
         neighbours = {}
         for n_steps in (1, -1, 2, -2):
-            if self.quick and neighbours:
+            if self.is_quick and neighbours:
                 break
             point = np.array(u, float)
             point[i] += n_steps * DIFFERENCE_STEP

@@ -182,12 +182,12 @@ def split_cells(path, line_number: int, line: str, names: list) -> dict:
     return {name: cell.strip() for name, cell in zip(names, cells)}
 
 
-def parse_number(where: str, cell: str, factor: float) -> float:
+def parse_number(location: str, cell: str, factor: float) -> float:
     """Convert the text of a cell to a number in SI.
 
     Parameters
     ----------
-    where : str
+    location : str
         Beginning of the error message, such as ``a.csv:3: force``.
     cell : str
     factor : float
@@ -203,10 +203,10 @@ def parse_number(where: str, cell: str, factor: float) -> float:
         If the cell is not a finite number, or larger than `MAX_VALUE`.
     """
     if not NUMBER_PATTERN.fullmatch(cell) or not isfinite(float(cell)):
-        raise PatchfemError(f"{where}: '{cell[:80]}' is not a finite number")
+        raise PatchfemError(f"{location}: '{cell[:80]}' is not a finite number")
     value = float(cell) * factor
     if abs(value) > MAX_VALUE:
         raise PatchfemError(
-            f"{where}: {value:g} in SI is outside the computable range, {MAX_VALUE:g}"
+            f"{location}: {value:g} in SI is outside the computable range, {MAX_VALUE:g}"
         )
     return value

@@ -110,9 +110,9 @@ def _read_block(path: Path, line_number: int, lines: list, names: list, factors:
     texts = []
     for number, line in enumerate(lines, line_number):
         cells = split_cells(path, number, line, names)
-        where = f"{path}:{number}: "
+        location = f"{path}:{number}: "
         numbers.append(
-            [parse_number(where + name, cells[name], factor) for name, factor in factors.items()]
+            [parse_number(location + name, cells[name], factor) for name, factor in factors.items()]
         )
         texts.append([cells[name] for name in names if name not in factors])
     return np.array(numbers).reshape(len(lines), len(factors)), texts

@@ -35,7 +35,7 @@ _HEADER_CELL_PATTERN = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]
 _COLUMN_PATTERN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
 
 
-def read_records(path, requests: list, exported: Mapping = EXPORTED_NAMES) -> Records:
+def read_records(path, requests: list, exported_names: Mapping = EXPORTED_NAMES) -> Records:
     """Read records over time.
 
     Parameters
@@ -43,7 +43,7 @@ def read_records(path, requests: list, exported: Mapping = EXPORTED_NAMES) -> Re
     path : path-like
     requests : list of RequestedChannel
         Without any, the channels whose quantity the file states are read.
-    exported : Mapping
+    exported_names : Mapping
         Quantity -> names of `patchfem export` that stand for it, as in `loops.find_standard_name`.
 
     Returns
@@ -62,20 +62,20 @@ def read_records(path, requests: list, exported: Mapping = EXPORTED_NAMES) -> Re
     if ending == ".mat":
         return _read_matlab(path, requests)
     if ending in UNIVERSAL_EXTENSIONS:
-        return _read_universal(path, requests, exported)
+        return _read_universal(path, requests, exported_names)
     if ending in EXTENSIONS:
-        return select_channels(path, _read_table(path, exported), requests, [])
+        return select_channels(path, _read_table(path, exported_names), requests, [])
     raise PatchfemError(f"{path}: the name of an imported file must end in {', '.join(EXTENSIONS)}")
 
 
-def _read_universal(path: Path, requests: list, exported: Mapping) -> Records:
+def _read_universal(path: Path, requests: list, exported_names: Mapping) -> Records:
     notes = []
     channels = universal.make_channels(path, universal.read_datasets(path), notes)
     names = [channel.name for channel in channels]
     if MOTION_CHANNELS <= set(names):
         # The data types do not distinguish the displacements of an export; the names do.
         channels = [
-            channel._replace(quantity=_find_quantity(channel.name, names, exported))
+            channel._replace(quantity=_find_quantity(channel.name, names, exported_names))
             for channel in channels
         ]
     if not channels:
@@ -86,13 +86,13 @@ def _read_universal(path: Path, requests: list, exported: Mapping) -> Records:
     return select_channels(path, channels, requests, notes)
 
 
-def _find_quantity(name: str, names: list, exported: Mapping) -> str:
+def _find_quantity(name: str, names: list, exported_names: Mapping) -> str:
     """Return the quantity that the name of a column states, or "" if it states none."""
-    quantity = find_standard_name(name, names, exported)
+    quantity = find_standard_name(name, names, exported_names)
     return quantity if quantity in CHANNEL_UNITS else ""
 
 
-def _read_table(path: Path, exported: Mapping) -> list:
+def _read_table(path: Path, exported_names: Mapping) -> list:
     """Read the numeric columns of a table as channels; columns that contain text are left out."""
     header, *lines = read_text(path, "a measured table").rstrip("\n").split("\n")
     separator = max(",;\t", key=header.count)
@@ -121,7 +121,7 @@ def _read_table(path: Path, exported: Mapping) -> list:
         unit = head[2] or head[3] or ""
         values = np.array(cells, float)
         channels.append(
-            Channel(head[1], "", _find_quantity(column, columns, exported), unit, values)
+            Channel(head[1], "", _find_quantity(column, columns, exported_names), unit, values)
         )
     return channels
 

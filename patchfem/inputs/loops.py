@@ -123,7 +123,9 @@ def read_loop(path, units: Mapping = SLIDE_UNITS) -> Loop:
     )
 
 
-def find_standard_name(name: str, names: Container, exported: Mapping = EXPORTED_NAMES) -> str:
+def find_standard_name(
+    name: str, names: Container, exported_names: Mapping = EXPORTED_NAMES
+) -> str:
     """Return the quantity for which a column of `patchfem export` stands, or the name itself.
 
     Parameters
@@ -132,14 +134,14 @@ def find_standard_name(name: str, names: Container, exported: Mapping = EXPORTED
         Column.
     names : Container
         All columns of the table. A column that has the name of the quantity has priority.
-    exported : Mapping
+    exported_names : Mapping
         Quantity -> columns that stand for it; the first that is in the table does.
 
     Returns
     -------
     str
     """
-    for quantity, candidates in exported.items():
+    for quantity, candidates in exported_names.items():
         present = [candidate for candidate in candidates if candidate in names]
         if quantity not in names and present[:1] == [name]:
             return quantity

@@ -83,20 +83,20 @@ def _make_record_error(path: Path) -> PatchfemError:
     )
 
 
-def _parse_row(where: str, cells: dict, factors: dict) -> MeasuredRow:
+def _parse_row(location: str, cells: dict, factors: dict) -> MeasuredRow:
     flag = cells.get("flag", "")
     if set(flag) - set(FLAG_MEANINGS):
         raise PatchfemError(
-            f"{where}flag '{flag[:40]}' is unknown; possible letters are {', '.join(FLAG_MEANINGS)}"
+            f"{location}flag '{flag[:40]}' is unknown; possible letters are {', '.join(FLAG_MEANINGS)}"
         )
     values = dict.fromkeys(COLUMN_UNITS)
     for name, factor in factors.items():
         if cells[name]:
-            values[name] = parse_number(where + name, cells[name], factor)
+            values[name] = parse_number(location + name, cells[name], factor)
             if values[name] < 0:
-                raise PatchfemError(f"{where}{name}: '{cells[name][:40]}' is below 0")
+                raise PatchfemError(f"{location}{name}: '{cells[name][:40]}' is below 0")
     if values["frequency"] is None or values["input"] is None:
-        raise PatchfemError(f"{where}frequency and input are needed in every row")
+        raise PatchfemError(f"{location}frequency and input are needed in every row")
     return MeasuredRow(**values, flag=flag)
 
 

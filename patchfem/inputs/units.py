@@ -58,7 +58,7 @@ def normalize_unit(text: str) -> str:
     return text
 
 
-def find_unit_factor(quantity: str, unit: str, where: str = "") -> float:
+def find_unit_factor(quantity: str, unit: str, location: str = "") -> float:
     """Return the factor that converts a value in a unit to SI.
 
     Parameters
@@ -67,7 +67,7 @@ def find_unit_factor(quantity: str, unit: str, where: str = "") -> float:
         Key of `CHANNEL_UNITS`.
     unit : str
         Unit in any spelling that `normalize_unit` knows.
-    where : str
+    location : str
         Beginning of the error message.
 
     Returns
@@ -83,6 +83,6 @@ def find_unit_factor(quantity: str, unit: str, where: str = "") -> float:
     name = normalize_unit(unit)
     if name not in units:
         raise PatchfemError(
-            f"{where}{quantity} [{unit[:40]}]: unknown unit; use one of {', '.join(filter(None, units))}"
+            f"{location}{quantity} [{unit[:40]}]: unknown unit; use one of {', '.join(filter(None, units))}"
         )
     return units[name]

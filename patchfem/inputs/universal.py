@@ -37,13 +37,13 @@ class FunctionType(IntEnum):
     FREQUENCY_RESPONSE = 4
 
 
-def read_datasets(path, where: str = "") -> list[dict]:
+def read_datasets(path, location: str = "") -> list[dict]:
     """Read the datasets 55, 58 and 164 of a universal file in order, as pyuff returns them.
 
     Parameters
     ----------
     path : path-like
-    where : str
+    location : str
         Beginning of the error messages.
 
     Returns
@@ -61,19 +61,19 @@ def read_datasets(path, where: str = "") -> list[dict]:
         import pyuff
     except ImportError:
         raise Missing(
-            f"{where}reading universal files needs the package pyuff; run pip install "
+            f"{location}reading universal files needs the package pyuff; run pip install "
             "'patchfem[lab]'"
         ) from None
     path = Path(path)
-    check_file(path, "export fewer channels or a part of the record", where)
-    with refuse_damage(f"{where}{path}: cannot be read as a universal file"):
+    check_file(path, "export fewer channels or a part of the record", location)
+    with refuse_damage(f"{location}{path}: cannot be read as a universal file"):
         file = pyuff.UFF(str(path))
         types = [int(kind) for kind in file.get_set_types()]
         numbers = [number for number, kind in enumerate(types) if kind in (55, 58, 164)]
         datasets = [file.read_sets(number) for number in numbers]
     if not datasets:
         raise PatchfemError(
-            f"{where}{path}: no dataset 55 (modes) or 58 (records, frequency responses); its datasets: "
+            f"{location}{path}: no dataset 55 (modes) or 58 (records, frequency responses); its datasets: "
             f"{', '.join(map(str, types)) or 'none'}"
         )
     return datasets
@@ -124,14 +124,16 @@ def _is_record(dataset: dict) -> bool:
 
 def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes: list) -> Channel:
     """Make a channel of a record; factors: unit conversion of dataset 164, or None."""
-    where = f"{path}: record {number}"
+    location = f"{path}: record {number}"
     values = np.asarray(dataset["data"])
     time = np.asarray(dataset["x"], float)
     if np.iscomplexobj(values):
-        raise PatchfemError(f"{where}: the values are complex, but a record over time must be real")
+        raise PatchfemError(
+            f"{location}: the values are complex, but a record over time must be real"
+        )
     if values.size != int(dataset["num_pts"]) or time.size != values.size:
         raise PatchfemError(
-            f"{where}: {values.size} values, but {dataset['num_pts']} are announced; the file is damaged"
+            f"{location}: {values.size} values, but {dataset['num_pts']} are announced; the file is damaged"
         )
     quantity = _find_quantity(int(dataset["ordinate_spec_data_type"]))
     unit = normalize_unit(_clean_text(dataset["ordinate_axis_units_lab"]))

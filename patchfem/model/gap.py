@@ -64,7 +64,7 @@ class Gap:
     profile: Path | None
     average: float | None
     limit: float | None
-    rough: bool
+    is_rough: bool
     side: str
     material: bool = False
 
@@ -100,14 +100,14 @@ class Gap:
                 pairs.append((keys, evaluate(keys)))
         return pairs
 
-    def averaging_length(self, x, loaded) -> float | None:
+    def averaging_length(self, x, loaded_nodes) -> float | None:
         """Return the length [m] over which the profile is averaged in the contact.
 
         Parameters
         ----------
         x : (m,) ndarray
             Coordinates of the nodes [m].
-        loaded : (m,) ndarray of bool
+        loaded_nodes : (m,) ndarray of bool
             Whether a node carries pressure.
 
         Returns
@@ -118,7 +118,7 @@ class Gap:
         """
         if self.profile is None:
             return None
-        beside = loaded[1:] | loaded[:-1]
+        beside = loaded_nodes[1:] | loaded_nodes[:-1]
         longest = np.diff(x)[beside].max(initial=0.0) or np.diff(x).max()
         return float(max(longest, self.average or profiles.find_sample_spacing(self.profile)))
 
@@ -149,7 +149,7 @@ class Gap:
                 x,
                 ProfileLengths(self.average, self.limit),
                 float(x[-1] - x[0]) / DEFAULT_CELLS,
-                is_rough=self.rough,
+                is_rough=self.is_rough,
                 is_material=self.material,
             )
             gap = gap + heights
@@ -178,7 +178,7 @@ def build_gap(contact: Contact, lengths: ProfileLengths, resolve_path: Callable)
         profile=resolve_path(profile.file) if profile is not None else None,
         average=lengths.average,
         limit=lengths.limit,
-        rough=contact.asperities is not None,
+        is_rough=contact.asperities is not None,
         side=find_shape_side(contact),
         material=profile is not None and profile.heights == "surface",
     )

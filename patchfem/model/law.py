@@ -66,7 +66,7 @@ class InterfaceLaw:
 
 
 def make_effective_law(
-    law: Friction, width: float | None, where: Callable, load: float | None = None
+    law: Friction, width: float | None, locate_key: Callable, load: float | None = None
 ) -> Friction:
     """Return the keys of a law changed by the effects that only modify numbers of the law.
 
@@ -78,7 +78,7 @@ def make_effective_law(
     law : Friction
     width : float or None
         Width [m] of the contact across the path.
-    where : callable
+    locate_key : callable
         Function of a key that returns file and line for a message.
     load : float, optional
         Normal load [N].
@@ -96,7 +96,7 @@ def make_effective_law(
         return complete_bond_length(law, load)
     changes = {"temperature": None, "spread": None}
     if law.temperature is not None and law.rest_growth is not None:
-        rest_growth, slip_growth = _scale_growth_rates(law, where)
+        rest_growth, slip_growth = _scale_growth_rates(law, locate_key)
         changes |= {"rest_growth": rest_growth, "slip_growth": slip_growth}
     if law.spread is not None:
         factor = spread.pad_factor(width, law.spread)
@@ -105,7 +105,7 @@ def make_effective_law(
     return complete_bond_length(law.model_copy(update=changes), load)
 
 
-def _scale_growth_rates(law: Friction, where: Callable) -> tuple:
+def _scale_growth_rates(law: Friction, locate_key: Callable) -> tuple:
     """Return the growth rates of bonds at rest and in slip at the surface temperature."""
     heat = law.temperature
     try:
@@ -118,7 +118,7 @@ def _scale_growth_rates(law: Friction, where: Callable) -> tuple:
             heat.slip_activation,
         )
     except PatchfemError as error:
-        raise PatchfemError(f"{where('friction.temperature')}: {error}") from None
+        raise PatchfemError(f"{locate_key('friction.temperature')}: {error}") from None
 
 
 def complete_bond_length(law: Friction, load) -> Friction:

@@ -260,7 +260,7 @@ class PatchModel:
         if self.mesh.element_size:
             return self.mesh.element_size
         automatic = self.pieces.length / DEFAULT_CELLS
-        if self.gap.rough and self.gap.average:
+        if self.gap.is_rough and self.gap.average:
             return min(automatic, self.gap.average)
         return automatic
 
@@ -284,7 +284,7 @@ class PatchModel:
     def with_element_size(self, size: float | None) -> "PatchModel":
         """Return the patch with an element size [m]; None lets the tolerance choose the mesh."""
         gap = self.gap
-        if not gap.rough and self.mesh.file is None:
+        if not gap.is_rough and self.mesh.file is None:
             gap = replace(gap, average=size, limit=size)
         return replace(self, mesh=replace(self.mesh, element_size=size), gap=gap)
 

@@ -247,9 +247,9 @@ def build_rig(scene, joint: float | None = None) -> Rig:
     return replace(rig, structure=structure)
 
 
-def _build(scene, own: ModalBasis, interfaces: tuple, joint: float | None = None) -> Rig:
+def _build(scene, own_modes: ModalBasis, interfaces: tuple, joint: float | None = None) -> Rig:
     """Build the rig of a scene from its modes without the bonded spring."""
-    modes = build_modes(scene, own)
+    modes = build_modes(scene, own_modes)
     friction = RigFriction(
         interfaces=interfaces,
         names=tuple(make_interface_names(scene.structure)),
@@ -262,7 +262,7 @@ def _build(scene, own: ModalBasis, interfaces: tuple, joint: float | None = None
         start=build_start(scene, modes),
         friction=friction,
         springs=_build_springs(scene.structure, modes),
-        first_mode=_build_first_mode(scene, own, modes),
+        first_mode=_build_first_mode(scene, own_modes, modes),
         structure=_build_structure(scene, modes, joint),
     )
 
@@ -303,25 +303,25 @@ def _build_springs(structure, modes: ModalBasis) -> RigSprings:
     return RigSprings(stiffness, interlock, cubic, travel)
 
 
-def _build_first_mode(scene, own: ModalBasis, modes: ModalBasis) -> FirstMode:
+def _build_first_mode(scene, own_modes: ModalBasis, modes: ModalBasis) -> FirstMode:
     """Build the first mode that is not rigid.
 
-    `own` are the modes without the bonded spring, `modes` the coordinates of the rig.
+    `own_modes` are the modes without the bonded spring, `modes` the coordinates of the rig.
     """
-    frequency, mass = find_first_elastic_mode(scene, own)
-    slide = own.interfaces[0] if len(own.interfaces) else own.output
-    elastic = np.flatnonzero(own.omega > 0)
+    frequency, mass = find_first_elastic_mode(scene, own_modes)
+    slide = own_modes.interfaces[0] if len(own_modes.interfaces) else own_modes.output
+    elastic = np.flatnonzero(own_modes.omega > 0)
     first = int(elastic[0]) if elastic.size else 0
     # both bases describe the same masses, so a least-squares fit converts the coordinates
     own_from_modes = np.eye(slide.size)
-    if modes is not own and modes.shapes is not None:
+    if modes is not own_modes and modes.shapes is not None:
         own_from_modes = modes.shapes
-        if own.shapes is not None:
-            own_from_modes = np.linalg.lstsq(own.shapes, modes.shapes, rcond=None)[0]
+        if own_modes.shapes is not None:
+            own_from_modes = np.linalg.lstsq(own_modes.shapes, modes.shapes, rcond=None)[0]
     order = [first, *(k for k in range(slide.size) if k != first)]
     contact_mass = 0.0
     if abs(slide[first]) > MIN_SLIDE_FRACTION * np.abs(slide).max(initial=0.0):
-        contact_mass = float(own.mass / slide[first] ** 2)
+        contact_mass = float(own_modes.mass / slide[first] ** 2)
     return FirstMode(frequency, mass, contact_mass, (slide[:, None] * own_from_modes)[order])
 
 

@@ -131,7 +131,7 @@ class SlidePath:
             rel_disp = np.concatenate([run_in, self.run_in - rel_disp[1:]])
         return SlideSamples(time, rel_disp, max(0, time.size - 1 - steps), 2 * np.pi / period)
 
-    def steps(self, tolerance: float, pinned: int | None, length: float | None) -> int:
+    def steps(self, tolerance: float, pinned_steps: int | None, length: float | None) -> int:
         """Return the number of steps per cycle that a tolerance needs.
 
         It is a multiple of four, so that reversals are samples. A constant slide, a dwell and a file
@@ -141,7 +141,7 @@ class SlidePath:
         Parameters
         ----------
         tolerance : float
-        pinned : int or None
+        pinned_steps : int or None
             Number of steps that the scene gives instead.
         length : float or None
             Length [m] of the bonds.
@@ -152,8 +152,8 @@ class SlidePath:
             legs = self._legs()
         if legs is not None and self.kind != "constant":
             min_steps = MIN_STEPS_PER_LEG * (legs[0].size - 1)
-        if pinned is not None:
-            return 4 * ceil(max(pinned, min_steps) / 4)
+        if pinned_steps is not None:
+            return 4 * ceil(max(pinned_steps, min_steps) / 4)
         per_cycle = REFERENCE_STEPS * sqrt(REFERENCE_ERROR / tolerance)
         cycles = 1.0
         if legs is not None:

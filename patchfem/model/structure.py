@@ -22,7 +22,7 @@ from .law import InterfaceLaw, build_interface_laws, find_normal_load
 MIN_MODE_FRACTION = 1e-12
 
 
-def build_modes(scene, own: ModalBasis | None = None) -> ModalBasis:
+def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
     """Build the modes of a rig with its linear bonded spring.
 
     The field `base` is the participation of the drive. Of a moving base it is the participation of
@@ -33,7 +33,7 @@ def build_modes(scene, own: ModalBasis | None = None) -> ModalBasis:
     Parameters
     ----------
     scene : Scene
-    own : ModalBasis, optional
+    own_modes : ModalBasis, optional
         Result of `build_own_modes`, if it is known.
 
     Returns
@@ -45,7 +45,7 @@ def build_modes(scene, own: ModalBasis | None = None) -> ModalBasis:
     PatchfemError
         If a file lacks something, or if a bonded spring has no single interface to act on.
     """
-    modes = _split_into_strips(scene, build_own_modes(scene) if own is None else own)
+    modes = _split_into_strips(scene, build_own_modes(scene) if own_modes is None else own_modes)
     if modes.faces is not None and not len(modes.faces):
         # without an interface there is no friction, and the motion of the output replaces the slide
         modes = replace(modes, faces=None)
@@ -271,7 +271,7 @@ def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
     return modes.omega / (2 * pi)
 
 
-def find_first_elastic_mode(scene, own: ModalBasis) -> tuple:
+def find_first_elastic_mode(scene, own_modes: ModalBasis) -> tuple:
     """Return the frequency [Hz] and the mass [kg] of the first mode that is not rigid.
 
     The mass is structure.moving_mass, or else the modal mass at the output. If the mode does not move
@@ -281,11 +281,11 @@ def find_first_elastic_mode(scene, own: ModalBasis) -> tuple:
     Parameters
     ----------
     scene : Scene
-    own : ModalBasis
+    own_modes : ModalBasis
         Modes without the bonded spring, from `build_own_modes`.
     """
     structure = scene.structure
-    frequencies = own.omega / (2 * pi)
+    frequencies = own_modes.omega / (2 * pi)
     if structure.mode and structure.measured == "free":
         frequencies = np.array([mode.frequency for mode in structure.mode])
     elastic = np.flatnonzero(frequencies > 0)
@@ -293,10 +293,10 @@ def find_first_elastic_mode(scene, own: ModalBasis) -> tuple:
     frequency = float(frequencies[first]) if elastic.size else 0.0
     if structure.mode or (structure.file is not None and structure.moving_mass is not None):
         return frequency, structure.moving_mass
-    squared = np.square(own.output)
+    squared = np.square(own_modes.output)
     total = max(float(squared.sum()), 1e-300)
     moves_output = squared[first] > MIN_MODE_FRACTION * total
-    return frequency, float(own.mass / (squared[first] if moves_output else total))
+    return frequency, float(own_modes.mass / (squared[first] if moves_output else total))
 
 
 def needs_strip_displacements(scene) -> bool:

@@ -292,22 +292,22 @@ def _find_rows(name, matrix: matrices.Matrix, key: str) -> np.ndarray:
     PatchfemError
         If the matrix has no such coordinate; its `key` is the key at fault.
     """
-    where = f"structure.reduced.{key}"
+    full_key = f"structure.reduced.{key}"
     n = matrix.values.shape[0]
     if not isinstance(name, str):
         if name > n:
             raise PatchfemError(
-                f"there is no coordinate {name}: the matrices have {n}, numbered from 1", where
+                f"there is no coordinate {name}: the matrices have {n}, numbered from 1", full_key
             )
         return np.array([name - 1])
     row_range = RANGE_PATTERN.fullmatch(name)
     if key == "moved" and row_range:
-        return _list_rows_in_range(row_range, n, where)
+        return _list_rows_in_range(row_range, n, full_key)
     if matrix.places is None:
         raise PatchfemError(
             f"'{name}' names a node, but the files name no nodes; give row numbers of the matrices, "
             "which start at 1",
-            where,
+            full_key,
         )
     if key == "moved" and name in DIRECTION_NAMES:
         return np.flatnonzero(matrix.places[:, 1] == DIRECTION_NAMES.index(name) + 1)
@@ -315,17 +315,17 @@ def _find_rows(name, matrix: matrices.Matrix, key: str) -> np.ndarray:
     if match is None:
         raise PatchfemError(
             f"'{name}' is not a node with a direction; write node:direction, such as \"1201:x\"",
-            where,
+            full_key,
         )
     node = int(match[1])
     direction = DIRECTION_NAMES.index(match[2]) + 1 if match[2] else 0
     rows = np.flatnonzero((matrix.places == (node, direction)).all(axis=1))
     if not rows.size:
-        raise PatchfemError(f"the files have no {name}; {_list_directions(matrix, node)}", where)
+        raise PatchfemError(f"the files have no {name}; {_list_directions(matrix, node)}", full_key)
     return rows
 
 
-def _list_rows_in_range(row_range: re.Match, n: int, where: str) -> np.ndarray:
+def _list_rows_in_range(row_range: re.Match, n: int, full_key: str) -> np.ndarray:
     """Return the row indices, counted from 0, of a range "a..b" or "a..b:n" of row numbers."""
     first = int(row_range[1])
     last = int(row_range[2])
@@ -335,7 +335,7 @@ def _list_rows_in_range(row_range: re.Match, n: int, where: str) -> np.ndarray:
         raise PatchfemError(
             f"'{row_range[0]}' is not a range of rows from 1 to {n}; write 'a..b:n' for n rows from "
             "a to b",
-            where,
+            full_key,
         )
     return np.arange(first - 1, last, max(int(step), 1))
 

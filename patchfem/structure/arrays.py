@@ -163,10 +163,10 @@ def build_basis(
         raise PatchfemError(f"structure.file: {message}") from None
 
 
-def _refuse_missing(data: dict, what: str) -> None:
+def _refuse_missing(data: dict, missing_name: str) -> None:
     """Raise PatchfemError for an array that the file does not contain."""
     names = ", ".join(data) or "none that patchfem knows"
-    raise PatchfemError(f"lacks {what}; the file contains {names}")
+    raise PatchfemError(f"lacks {missing_name}; the file contains {names}")
 
 
 def _build_basis_from_matrices(

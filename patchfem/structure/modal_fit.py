@@ -413,7 +413,7 @@ def identify_modes(frequency, measured: dict, notes: list) -> MeasuredModes:
         If the modes explain too little of the responses.
     """
     reference = _choose_reference(measured)
-    places = [place for place, driven in measured if driven == reference]
+    places = [direction for direction, driven in measured if driven == reference]
     driven = places.index(reference)
     if len(places) < len(measured):
         notes.append(
@@ -424,13 +424,15 @@ def identify_modes(frequency, measured: dict, notes: list) -> MeasuredModes:
     omega = 2 * np.pi * frequency[is_positive]
     if omega.size < 8 or (np.diff(omega) <= 0).any():
         raise PatchfemError("structure.file: at least 8 frequencies in rising order are needed")
-    data = np.stack([measured[place, reference][0][is_positive] for place in places], axis=1)
+    data = np.stack(
+        [measured[direction, reference][0][is_positive] for direction in places], axis=1
+    )
     is_moving = np.abs(data).max(axis=0) > 0
     if not is_moving[driven]:
         raise PatchfemError(
             f"structure.file: the response at the driven point itself, {_format_direction(reference)}, is zero"
         )
-    power = np.array([measured[place, reference][1] for place in places])
+    power = np.array([measured[direction, reference][1] for direction in places])
     poles = fit_poles(omega, data[:, is_moving], power[is_moving])
     residues = np.zeros((poles.w.size, len(places)))
     residues[:, is_moving] = poles.fit.compute_residues(poles.theta).modes
@@ -454,7 +456,7 @@ def identify_modes(frequency, measured: dict, notes: list) -> MeasuredModes:
     notes += _note_modes_below(poles, data[0, is_moving])
     notes += _check_misfit(poles, int(is_scaled.sum()))
     shapes = residues[is_scaled] / np.sqrt(own[is_scaled])[:, None]
-    motion = {place: shapes[:, k] for k, place in enumerate(places)}
+    motion = {direction: shapes[:, k] for k, direction in enumerate(places)}
     return MeasuredModes(w[is_scaled] / (2 * np.pi), zeta[is_scaled], motion, notes)
 
 
@@ -489,15 +491,15 @@ def _note_modes_below(poles: FittedPoles, first_response) -> list:
     ]
 
 
-def _format_direction(place) -> str:
+def _format_direction(direction) -> str:
     """Return the name of a measured degree of freedom for messages, such as "12:x"."""
-    node, axis = place
+    node, axis = direction
     return f"{node}:{DIRECTION_NAMES[axis]}"
 
 
 def _choose_reference(measured: dict):
     """Return the reference with a driving-point response and the most responses."""
-    candidates = [reference for place, reference in measured if place == reference]
+    candidates = [reference for direction, reference in measured if direction == reference]
     if not candidates:
         references = sorted({reference for _, reference in measured})
         names = ", ".join(_format_direction(reference) for reference in references)

@@ -155,7 +155,11 @@ def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
     """
     wanted, residual = computed.asked.wanted, make_residual(cells, computed, seen, "bound")
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
-    quick, drawn, random = CubeResidual(residual, box, quick=True), np.random.default_rng(SEED), 0
+    quick, drawn, random = (
+        CubeResidual(residual, box, is_quick=True),
+        np.random.default_rng(SEED),
+        0,
+    )
     ends = run_descents(quick, [box.unit(one) for one in begins], before_descent=computed.forget)
     while True:
         points = drawn.random((starts - random, SCREEN, len(wanted)))

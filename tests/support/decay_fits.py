@@ -165,7 +165,7 @@ def least(one: Made, place: Path, wanted: list) -> float:
 
     box = make_space([key.low for key in wanted], [key.high for key in wanted])
     return descend(
-        CubeResidual(residual, box, quick=True),
+        CubeResidual(residual, box, is_quick=True),
         box.unit(list(one.truth.values())),
         range(len(wanted)),
     ).cost

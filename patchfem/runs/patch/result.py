@@ -253,7 +253,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
             "the value with the smaller error is given; on these points short waves are treated as in infinite "
             f"layers; {_mesh_clause(model, patch)}"
         )
-    elif patch.averaging is not None and not asked.gap.rough:
+    elif patch.averaging is not None and not asked.gap.is_rough:
         out.append(
             "where the profile is in contact, its heights are averaged over a length of "
             f"{format_length(patch.averaging, 3)}; the errors include the effect of the choice of this length"

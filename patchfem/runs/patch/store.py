@@ -43,7 +43,7 @@ def content_key(asked) -> tuple:
     mesh = asked.mesh
     interface = asked.interface
     shapes = tuple((name, tuple(part)) for name, part in gap.shapes)
-    heights = (gap.profile, gap.average, gap.limit, gap.rough, gap.side, gap.material)
+    heights = (gap.profile, gap.average, gap.limit, gap.is_rough, gap.side, gap.material)
     return (
         asked.pieces,
         asked.loading,

@@ -237,11 +237,11 @@ def _find_default_values(model: type[Table]) -> dict[str, Any]:
     return {name: key.get_default(call_default_factory=True) for name, key in optional.items()}
 
 
-def advise_on_name(got: str, names: Iterable[str]) -> str:
+def advise_on_name(written_name: str, names: Iterable[str]) -> str:
     """Return the advice for a wrong name: ``did you mean 'x'? use one of x, y``."""
     known = list(names)
-    near = get_close_matches(got, known, 1, MIN_NAME_SIMILARITY)
-    near = near or [name for name in known if name.lower() == got.lower()]
+    near = get_close_matches(written_name, known, 1, MIN_NAME_SIMILARITY)
+    near = near or [name for name in known if name.lower() == written_name.lower()]
     question = f"did you mean '{near[0]}'? " if near else ""
     return f"{question}use one of {', '.join(known)}"
 
