@@ -206,11 +206,9 @@ def explain_write_error(
                 "remove files"
             )
         if error.errno in NO_SPACE_ERRNOS or (error.errno is None and remaining < MIN_FREE_BYTES):
-            needed = (
-                f"more than {format_bytes(written)}"
-                if needed_bytes is None
-                else format_bytes(needed_bytes)
-            )
+            needed = f"more than {format_bytes(written)}"
+            if needed_bytes is not None:
+                needed = format_bytes(needed_bytes)
             reason = f" ({os.strerror(error.errno)})" if error.errno else ""
             size = space.size if space.is_file_limit else space.size + written
             return WriteError(

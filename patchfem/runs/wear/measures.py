@@ -266,14 +266,8 @@ def worn_friction(model, found, motion: dict, error: float | None) -> dict:
     change, area = model.wear.friction, float(found.patch.pieces.interface.weight.sum())
     deep = [mean_depth(found.patch, one.depth) for one in found.moments[-3:]]
     off = None if error is None else error / area
-    ends = (
-        ()
-        if off is None
-        else tuple(
-            change.compute_worn_law(model.friction, max(deep[-1] + sign * off, 0.0))
-            for sign in (-1, 1)
-        )
-    )
+    depths = () if off is None else (deep[-1] - off, deep[-1] + off)
+    ends = [change.compute_worn_law(model.friction, max(depth, 0.0)) for depth in depths]
     law, out = change.compute_worn_law(model.friction, deep[-1]), {}
     for name, key in (("static_coefficient", "static"), ("bond_length", "bond_length")):
         value, row = getattr(law, key), TABLE[name]

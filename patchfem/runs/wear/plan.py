@@ -59,11 +59,9 @@ def jumps_about(model) -> int:
     def changing(worn):
         """Return the slip path with the friction coefficient at the mean worn depth."""
         mean = float(worn @ area / area.sum())
-        return (
-            path * (wear.friction.compute_worn_law(law, mean).static / law.static)
-            if law.static
-            else path
-        )
+        if not law.static:
+            return path
+        return path * (wear.friction.compute_worn_law(law, mean).static / law.static)
 
     slides = (
         changing if wear.uses_friction_work and wear.friction is not None else lambda worn: path
