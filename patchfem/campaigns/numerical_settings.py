@@ -145,15 +145,21 @@ def _uniform_meshes(model: Model) -> list:
 
 
 def _integer_values(model: Model, knob: str) -> list:
-    """Return values of a setting that is a whole number, around the value of the scene."""
+    """Return values of a setting that is a whole number, around the value of the scene.
+
+    A small value of the scene has fewer coarser values: a quarter and a half of 1 are no numbers of
+    shear modes.
+    """
     pinned, middle = _scene_value(model, knob), _middle(model, knob)
-    words, out = "{} " + knob.replace("_", " "), []
+    words, models = "{} " + knob.replace("_", " "), {}
     for power in range(-2, N_VALUES - 2):
         value = max(1, round(middle * 2.0**power))
         own = not power and (pinned or knob == "steps_per_cycle")
         if own or knob != "steps_per_cycle" or 4 <= value <= MAX_STEPS:
-            turned = model if own else _with_integer(model, knob, value)
-            out.append(Setting(str(value), float(value), words.format(value), turned))
+            models[value] = model if own else _with_integer(model, knob, value)
+    out = []
+    for value, turned in models.items():
+        out.append(Setting(str(value), float(value), words.format(value), turned))
     if not pinned and knob != "steps_per_cycle":
         out.append(
             Setting("by tolerance", None, words.format("").strip() + " set by the tolerance", model)

@@ -11,7 +11,7 @@ from scene_texts import BENCH, PIECE
 
 import patchfem as pf
 from patchfem import build
-from patchfem.campaigns import numerical_settings
+from patchfem.campaigns import cost, numerical_settings
 from patchfem.campaigns.cost import (
     TOLERANCE,
     Cost,
@@ -20,6 +20,7 @@ from patchfem.campaigns.cost import (
     fastest_run,
     sentence,
 )
+from patchfem.core import NotConverged, PatchfemError
 from patchfem.export.cost import lines_of
 from patchfem.runs.run import run
 
@@ -34,6 +35,28 @@ substrate = "steel"
 angle = "5e-5 rad"
 [accuracy]
 tolerance = {tolerance}
+"""
+)
+
+WORN = (
+    PIECE
+    + """\
+load = "2000 N"
+element_size = "0.5 mm"
+substrate = "steel"
+[contact.crown]
+radius = "1 m"
+[friction]
+law = "coulomb"
+static = 0.3
+[slide]
+kind = "sine"
+amplitude = "20 um"
+frequency = "10 Hz"
+[wear]
+coefficient = "1e-14 m^2/N"
+cycles = 100000
+jumps = 1
 """
 )
 
@@ -220,3 +243,21 @@ def test_exact_a_bench_without_pieces_has_the_steps_as_its_knob():
         found = build(text)
         assert numerical_settings.applicable_settings(found) == ["steps_per_cycle"]
     assert len(curve(found, "steps_per_cycle")) > 2
+
+
+def test_always_a_setting_of_one_has_each_value_once(monkeypatch):
+    """A quarter and a half of one jump are one jump: it is run once, and one value that runs is no curve."""
+    worn = build(WORN)
+    labels = [one.label for one in numerical_settings.settings(worn, "jumps")]
+    assert labels == ["1", "2", "4"]
+    assert [one.label for one in curve(worn, "jumps")] == labels
+    run_plan = cost.run
+
+    def run_one_jump(planned, **options):
+        if planned.model.wear.jumps > 1:
+            raise NotConverged("more than one jump")
+        return run_plan(planned, **options)
+
+    monkeypatch.setattr(cost, "run", run_one_jump)
+    with pytest.raises(PatchfemError, match="fewer than three values"):
+        curve(worn, "jumps")

@@ -184,7 +184,7 @@ def solve_models(
         if isinstance(model, PatchfemError):
             found.fail(case, str(model))
             continue
-        place = _place(model, study) if keep is None else ALONE
+        place = _place(model, study) if keep is None else NO_BATCH
         groups.setdefault(place[:2], []).append(case)
         if place.failure:
             failures[place.failure] += 1
@@ -249,7 +249,7 @@ class Place(NamedTuple):
     failure: str = ""
 
 
-ALONE = Place(None, None)
+NO_BATCH = Place(None, None)
 
 
 def _place(model: Model, study: int) -> Place:
@@ -257,9 +257,9 @@ def _place(model: Model, study: int) -> Place:
     batch = None
     try:
         batch = choose_batch(model, study)
-        return ALONE if batch is None else Place(batch, batch.group(model))
+        return NO_BATCH if batch is None else Place(batch, batch.group(model))
     except Exception as error:  # the model is run again by itself, which reports its error
-        return ALONE._replace(failure=_describe_failure(batch, error))
+        return NO_BATCH._replace(failure=_describe_failure(batch, error))
 
 
 def _describe_failure(batch: Batch | None, error: Exception) -> str:
