@@ -169,6 +169,7 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     if not series:
         return _remove_unbounded(_why_unbounded(fine), measures_from_series([mine], {}))
     missed_peak = unresolved_rounding(fine)
+    series = _with_parts_of_finest(fine, series)
     found = [values(one) for one in reversed(series)]
     nested = all(cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *series)))
     # none of several meshes that do not resolve a rounding shows its effect
@@ -185,6 +186,37 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
         if error < out[name].error:
             out[name] = replace(out[name], value=value, error=error, engine=patch_rows.ON_POINTS)
     return _remove_unbounded(_why_unbounded(fine), out)
+
+
+def _with_parts_of_finest(fine: Patch, series: list) -> list:
+    """Return the coarser patches that see as many parts of the contact as the finest one.
+
+    A part of a few cells next to a step may be missing on a coarse mesh. The change to such a mesh
+    shows this part and no order of convergence, so that neither this mesh nor coarser ones count.
+
+    Parameters
+    ----------
+    fine : Patch
+    series : list of Patch
+        From fine to coarse.
+
+    Returns
+    -------
+    list of Patch
+        At least the first one, whose change is then the only one that the error rests on.
+    """
+    if not fine.jumps:
+        return series
+    n_parts = _count_parts(fine.active)
+    n_alike = next(
+        (k for k, one in enumerate(series) if _count_parts(one.active) != n_parts), len(series)
+    )
+    return series[: max(n_alike, 1)]
+
+
+def _count_parts(active) -> int:
+    """Return the number of intervals in contact of a contact set (m,) of bool."""
+    return int(active[0]) + int(np.count_nonzero(active[1:] & ~active[:-1]))
 
 
 def _with_corner_errors(found: dict, fine: Patch, coarse: Patch) -> dict:
