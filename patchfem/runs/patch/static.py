@@ -62,7 +62,7 @@ class PatchLoads(NamedTuple):
         """Return the gaps (q, m) [m] at x (m,) [m]."""
         if len(self.shapes) == self.load.size:
             return np.array([gap.evaluate(x).heights for gap in self.shapes])
-        return np.broadcast_to(self.shapes[0].at(x[:, None])[0].T, (self.load.size, x.size))
+        return np.broadcast_to(self.shapes[0].evaluate(x[:, None])[0].T, (self.load.size, x.size))
 
 
 class Level(NamedTuple):

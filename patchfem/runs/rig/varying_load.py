@@ -37,7 +37,7 @@ def varying_load_model(model: Model, numerics: Numerics, patch):
         None under [normal].
     """
     load, sets = (
-        (model.point.at, None)
+        (model.point.evaluate, None)
         if patch is None
         else (None, march.contact_sets_of(patch, model.patch.loading.rotational_stiffness))
     )
