@@ -89,7 +89,7 @@ def means(kind: str) -> dict:
             if row.compute is not None:
                 found[row.name].append(row.compute(of))
         found["band_amplitude"].append(band_amplitude(spectrum, *BAND))
-        found["dominant_wavelength"].append(spectrum.dominant)
+        found["dominant_wavelength"].append(spectrum.dominant_wavelength)
     return {
         name: float(np.mean([one for one in values if one is not None]))
         for name, values in found.items()

@@ -7,7 +7,7 @@ import numpy as np
 from ...formatting import choose_axis_unit
 from ...surface.profile import level, resample_evenly
 from ...surface.quantity import Quantity
-from ...surface.roughness.parameters import Heights, abbott
+from ...surface.roughness.parameters import Heights, abbott_curve
 from ...surface.roughness.spectrum import Spectrum
 from ..drawing.charts import axis, chart, line, mark
 from ..drawing.pictures import BLUE, draw_charts, make_figure, returns_svg
@@ -84,7 +84,7 @@ def abbott_core_chart(heights: Heights, names: tuple = ("Mr1", "Mr2")) -> dict:
 
     names: names of the two material ratios at the ends of the core.
     """
-    ratio, height = abbott(heights)
+    ratio, height = abbott_curve(heights)
     core = heights.core
     up, um = choose_axis_unit(height, "m")
     marks = [line(100 * ratio, height * um, "accent")]
@@ -138,9 +138,15 @@ def draw_statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: f
                 right=band[1] * scale,
             )
         )
-    if spectrum.dominant is not None:
+    if spectrum.dominant_wavelength is not None:
         marks.append(
-            mark("rule", "warm", "dominant wavelength", x=spectrum.dominant * scale, dash="dashed")
+            mark(
+                "rule",
+                "warm",
+                "dominant wavelength",
+                x=spectrum.dominant_wavelength * scale,
+                dash="dashed",
+            )
         )
     if cutoff is not None:
         marks.append(mark("rule", GREY, "cut-off", x=cutoff * scale, dash="dotted"))
@@ -276,7 +282,7 @@ def draw_both_heights(heights: tuple) -> str:
 
 def _abbott_chart(heights: tuple) -> dict:
     """Chart the Abbott curves of heights (k,) [m] before and after."""
-    curves = [abbott(Heights(z, 1.0)) for z in heights]
+    curves = [abbott_curve(Heights(z, 1.0)) for z in heights]
     up, um = choose_axis_unit(np.concatenate([height for _, height in curves]), "m")
     lines = []
     for (ratio, height), (colour, name) in zip(curves, SIDES):

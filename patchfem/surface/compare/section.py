@@ -274,11 +274,10 @@ def _widen_by_level_error(flank: FlankEnd, depth, noise, draws, correlation, wor
     level_variance = float(np.var(draws[:, near].mean(axis=1))) - noise_variance
     level_error = SIDE * np.sqrt(max(level_variance, 0.0))
     first = flank.first
-    moved = [
-        find_end(depth + by, noise, correlation, worn).first for by in (level_error, -level_error)
-    ]
-    outward = np.hypot(first - flank.low, first - min(first, *moved))
-    inward = np.hypot(flank.high - first, max(first, *moved) - first)
+    raised = find_end(depth + level_error, noise, correlation, worn).first
+    lowered = find_end(depth - level_error, noise, correlation, worn).first
+    outward = np.hypot(first - flank.low, first - min(first, raised, lowered))
+    inward = np.hypot(flank.high - first, max(first, raised, lowered) - first)
     return flank._replace(
         low=max(first - int(np.ceil(outward)), 0),
         high=min(first + int(np.ceil(inward)), depth.size - 1),

@@ -184,7 +184,7 @@ def read_head(path, text: str) -> Head:
             )
         plain = line[:MAX_LINE].lstrip("#%/").strip() if is_comment else line
         if len(plain) <= MAX_LINE:
-            names = _has_names_with_units(plain, is_comment=is_comment)
+            names = _find_names_with_units(plain, is_comment=is_comment)
             if names:
                 return Head(lines, names, [], split_cells(plain).delimiter, number, stop + 1)
         if not is_comment and line.strip(" \t,;|"):
@@ -208,7 +208,7 @@ def has_column_names(cells: list) -> bool:
     return len({parse_column(cell).role for cell in cells} & {"x", "y", "z", "index"}) > 1
 
 
-def _has_names_with_units(line: str, *, is_comment: bool) -> list:
+def _find_names_with_units(line: str, *, is_comment: bool) -> list:
     """Return the cells of a line that names x and z with units, [] for any other line.
 
     Further words after the last column of a comment are left out.

@@ -114,7 +114,7 @@ def read_scan(path, head: Head, facts: dict, units: tuple | None, body: str) -> 
 
 
 def _is_even(values) -> bool:
-    """Return whether numbers (n,) rise by one step."""
+    """Return whether numbers (n,) increase by one step."""
     steps = np.diff(values)
     return bool(steps[0] > 0 and np.ptp(steps) < MAX_UNEVEN * steps[0])
 

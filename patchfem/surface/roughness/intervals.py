@@ -114,7 +114,7 @@ class Intervals:
     @cached_property
     def is_short(self) -> bool:
         """Whether the trace is too short for its longest waves, so Rq would grow with its length."""
-        wave = self.spectrum.dominant
+        wave = self.spectrum.dominant_wavelength
         if wave is None or wave * MIN_WAVES <= self.heights.length:
             return False
         return self.freedom("power") < MIN_FREEDOM
@@ -122,7 +122,7 @@ class Intervals:
     def freedom(self, kind: str) -> float:
         """Return the degrees of freedom of the mean square "power", "slope" or "band"."""
         spectrum = self.spectrum
-        density = spectrum.within(*self.band) if kind == "band" else spectrum.density
+        density = spectrum.density_between(*self.band) if kind == "band" else spectrum.density
         if kind == "slope":
             density = density * np.sin(np.pi * spectrum.frequency * self.heights.step) ** 2
         if not density.any():

@@ -41,13 +41,13 @@ def average_reports(reports: list[RoughnessReport]) -> list[Means]:
         for name, first in tables[0].items():
             if all(name in table for table in tables):
                 values[name] = average_quantities(
-                    [_without_interval(table[name]) for table in tables], first.text
+                    [_drop_interval(table[name]) for table in tables], first.text
                 )
         out.append(Means(kind, len(same_kind), values, _describe_caution(same_kind)))
     return out
 
 
-def _without_interval(value: Quantity) -> Quantity:
+def _drop_interval(value: Quantity) -> Quantity:
     """Drop the interval of a parameter; only skewness and the step of a window may be negative."""
     is_signed = value.name.endswith("sk") or value.name == "ASH"
     return value._replace(low=None if is_signed else 0.0, high=None)

@@ -48,7 +48,7 @@ class Heights:
         return self.z[: count * size].reshape(count, size)
 
     @cached_property
-    def ordered(self) -> np.ndarray:
+    def descending(self) -> np.ndarray:
         """Heights (n,) [m] from the highest to the lowest."""
         return np.sort(self.z)[::-1]
 
@@ -122,7 +122,7 @@ def mean_spacing(heights: Heights) -> float | None:
     An element reaches from a rise through the mean line to the next rise, or from a fall to the
     next fall; the mean is over both kinds. None if the trace holds no element.
     """
-    places = crossings(heights)
+    places = find_crossings(heights)
     if places.size < 3:
         return None
     spans = np.concatenate([np.diff(places[::2]), np.diff(places[1::2])])
@@ -131,7 +131,7 @@ def mean_spacing(heights: Heights) -> float | None:
 
 def mean_element_height(heights: Heights) -> float | None:
     """Compute Rc, the mean height [m] of the elements of `mean_spacing`; None without elements."""
-    places = crossings(heights)
+    places = find_crossings(heights)
     if places.size < 3:
         return None
     starts = np.floor(places / heights.step).astype(int) + 1
@@ -139,7 +139,7 @@ def mean_element_height(heights: Heights) -> float | None:
     return float((parts[1:] + parts[:-1]).mean())
 
 
-def crossings(heights: Heights) -> np.ndarray:
+def find_crossings(heights: Heights) -> np.ndarray:
     """Find the positions [m] where a hill ends and a dale begins, or the reverse.
 
     The mean line cuts the trace into hills and dales. Those lower than 10 % of Rz or narrower than
@@ -178,10 +178,10 @@ class Core(NamedTuple):
     top: float
 
 
-def abbott(heights: Heights, count: int = 501) -> tuple[np.ndarray, np.ndarray]:
+def abbott_curve(heights: Heights, count: int = 501) -> tuple[np.ndarray, np.ndarray]:
     """Compute the Abbott curve: material ratio (count,) from 0 to 1 and height (count,) [m]."""
     ratio = np.linspace(0.0, 1.0, count)
-    return ratio, np.interp(ratio, _material_ratios(heights.z.size), heights.ordered)
+    return ratio, np.interp(ratio, _material_ratios(heights.z.size), heights.descending)
 
 
 def _material_ratios(count: int) -> np.ndarray:
@@ -196,7 +196,7 @@ def fit_core(heights: Heights) -> Core | None:
     with the areas of the peaks above and the valleys below. The second filter stage of ISO 13565-1
     is not used.
     """
-    z = heights.ordered
+    z = heights.descending
     n = z.size
     if n < 5 or z[0] == z[-1]:
         return None
@@ -223,7 +223,7 @@ def fit_core(heights: Heights) -> Core | None:
 
 
 def _ratio_above(z, level: float) -> float:
-    """Return the fraction of the length above a level, for ordered heights z (n,)."""
+    """Return the fraction of the length above a level, for descending heights z (n,)."""
     n = z.size
     k = int(np.searchsorted(-z, -level))
     if k in (0, n):
@@ -234,13 +234,13 @@ def _ratio_above(z, level: float) -> float:
 
 def material_volume(heights: Heights, ratio: float) -> float:
     """Compute the volume of material above the height of a material ratio, per area [m3/m2]."""
-    return float(np.maximum(heights.ordered - _height_at(heights, ratio), 0.0).mean())
+    return float(np.maximum(heights.descending - _height_at(heights, ratio), 0.0).mean())
 
 
 def void_volume(heights: Heights, ratio: float) -> float:
     """Compute the volume of void below the height of a material ratio, per area [m3/m2]."""
-    return float(np.maximum(_height_at(heights, ratio) - heights.ordered, 0.0).mean())
+    return float(np.maximum(_height_at(heights, ratio) - heights.descending, 0.0).mean())
 
 
 def _height_at(heights: Heights, ratio: float) -> float:
-    return float(np.interp(ratio, _material_ratios(heights.z.size), heights.ordered))
+    return float(np.interp(ratio, _material_ratios(heights.z.size), heights.descending))

@@ -87,7 +87,7 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
     """
     clean = _remove_spikes(trace)
     removed = int((clean.missing & ~trace.missing).sum())
-    flat = _short_waves(clean, cutoff)
+    flat = _filter_short_waves(clean, cutoff)
     fine = rms_moments(flat)
     coarse = rms_moments(flat, 2) if flat.z.size >= 2 * MIN_SAMPLES - 1 else None
     dust = ()
@@ -123,7 +123,7 @@ def _remove_spikes(trace: Profile) -> Profile:
     return clean if (clean.missing & ~trace.missing).mean() <= MAX_SPIKE_FRACTION else trace
 
 
-def _short_waves(trace: Profile, cutoff: float | None) -> Profile:
+def _filter_short_waves(trace: Profile, cutoff: float | None) -> Profile:
     tilted = resample_evenly(trace)
     flat = level(tilted)
     if flat.z.size >= MIN_SAMPLES and not np.ptp(flat.z) > ROUND_OFF * np.ptp(tilted.z):

@@ -143,7 +143,7 @@ def _report_trace(
     values = [_make_quantity(row, row.compute(heights), intervals) for row in rows.PRIMARY]
     dominant, band = rows.WAVES
     values += [
-        _make_quantity(dominant, intervals.spectrum.dominant, intervals),
+        _make_quantity(dominant, intervals.spectrum.dominant_wavelength, intervals),
         _make_band_quantity(band, trace, intervals),
     ]
     waviness = None
@@ -160,11 +160,11 @@ def _report_trace(
         for row in rows.WINDOW:
             value = float(trace.z[-1] - trace.z[0]) if row.compute is None else row.compute(heights)
             values.append(_make_quantity(row, value, intervals))
-    notes = trace.notes + _spike_note(part)
+    notes = trace.notes + _describe_spikes(part)
     if trace.x.size != part.x.size and short is None:
-        notes += _resampling_note(part, trace, primary)
+        notes += _describe_resampling(part, trace, primary)
     if roughness is not None:
-        notes += _short_trace_note(roughness, cutoff)
+        notes += _describe_short_trace(roughness, cutoff)
     return RoughnessReport(
         source=trace.source,
         sampling=Sampling(trace.length, heights.step, (trace.x.size,), part.x.size),
@@ -203,7 +203,7 @@ def _report_scan(
         if value is None:
             reason = missing_reason(surface, row.name)
         quantities.append(Quantity(value, low, high, row.unit, row.text, reason, row.name))
-    notes = scan.notes + _spike_note(scan)
+    notes = scan.notes + _describe_spikes(scan)
     missing = int(np.isnan(flat.z).sum())
     if missing:
         notes += (
@@ -316,7 +316,7 @@ def _make_band_quantity(row: Parameter, trace: Profile, intervals: Intervals) ->
     )
 
 
-def _spike_note(surface: Profile | Areal) -> tuple:
+def _describe_spikes(surface: Profile | Areal) -> tuple:
     """Describe the spikes of a surface in a sentence, () without any."""
     is_spike = find_scan_spikes(surface) if isinstance(surface, Areal) else find_spikes(surface)
     count = int(is_spike.sum())
@@ -333,7 +333,7 @@ def _spike_note(surface: Profile | Areal) -> tuple:
     return (f"{surface.source}: {count} of {is_spike.size} heights {clause} in every parameter",)
 
 
-def _resampling_note(part: Profile, trace: Profile, primary: Profile) -> tuple:
+def _describe_resampling(part: Profile, trace: Profile, primary: Profile) -> tuple:
     """State by how much resampling changes Pa and Pq of an uneven trace.
 
     Straight lines between samples cut peaks and valleys off. The reference are the heights of the
@@ -358,7 +358,7 @@ def _resampling_note(part: Profile, trace: Profile, primary: Profile) -> tuple:
     )
 
 
-def _short_trace_note(roughness: Profile, cutoff: float) -> tuple:
+def _describe_short_trace(roughness: Profile, cutoff: float) -> tuple:
     """State that a roughness profile is shorter than one section, () if it is not."""
     if roughness.length >= cutoff * (1 - 1e-9):
         return ()

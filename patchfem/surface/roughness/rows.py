@@ -47,7 +47,7 @@ class Parameter(NamedTuple):
     kind: str = ""
 
 
-def _core(field: str) -> Callable:
+def _read_core(field: str) -> Callable:
     return lambda heights: None if heights.core is None else getattr(heights.core, field)
 
 
@@ -119,7 +119,7 @@ _BASE = (  # names without their letter
         "m",
         "core height: drop, from 0 to 100 %, of the straight line through the flattest 40 % of the "
         "Abbott curve",
-        _core("height"),
+        _read_core("height"),
         "ratio",
     ),
     Parameter(
@@ -127,7 +127,7 @@ _BASE = (  # names without their letter
         "m",
         "reduced peak height: height of a triangle on the base Mr1 with the area of the peaks "
         "above the core",
-        _core("peak_height"),
+        _read_core("peak_height"),
         "ratio",
     ),
     Parameter(
@@ -135,21 +135,21 @@ _BASE = (  # names without their letter
         "m",
         "reduced valley depth: height of a triangle on the base 1 - Mr2 with the area of the "
         "valleys below the core",
-        _core("valley_depth"),
+        _read_core("valley_depth"),
         "ratio",
     ),
     Parameter(
         "Mr1",
         "1",
         "fraction of the length of the trace where the surface lies above the core",
-        _core("first_ratio"),
+        _read_core("first_ratio"),
         "fraction",
     ),
     Parameter(
         "Mr2",
         "1",
         "fraction of the length of the trace where the surface lies above the bottom of the core",
-        _core("second_ratio"),
+        _read_core("second_ratio"),
         "fraction",
     ),
     Parameter(
@@ -183,7 +183,7 @@ WAVES = (
         "dominant_wavelength",
         "m",
         "wavelength of the octave with the largest mean square height, of the levelled trace",
-        lambda heights: estimate_spectrum(heights.z, heights.step).dominant,
+        lambda heights: estimate_spectrum(heights.z, heights.step).dominant_wavelength,
         "wave",
     ),
     Parameter(
@@ -221,32 +221,32 @@ WINDOW = (
 )
 
 
-def _distribution(name: str, unit: str, text: str, compute: Callable) -> Parameter:
+def _make_distribution_row(name: str, unit: str, text: str, compute: Callable) -> Parameter:
     """Make a row of a scan that depends only on how often each height occurs."""
     return Parameter(name, unit, text, lambda surface: compute(surface.heights))
 
 
 AREAL = (
-    _distribution(
+    _make_distribution_row(
         "Sa", "m", "mean of the absolute heights about the reference surface", mean_absolute
     ),
-    _distribution(
+    _make_distribution_row(
         "Sq", "m", "root mean square of the heights about the reference surface", root_mean_square
     ),
-    _distribution("Ssk", "1", "skewness: mean cube of the heights over Sq^3", skewness),
-    _distribution(
+    _make_distribution_row("Ssk", "1", "skewness: mean cube of the heights over Sq^3", skewness),
+    _make_distribution_row(
         "Sku",
         "1",
         "kurtosis: mean fourth power of the heights over Sq^4, 3 for a Gaussian surface",
         kurtosis,
     ),
-    _distribution(
+    _make_distribution_row(
         "Sp", "m", "height of the highest point above the reference surface", _highest_peak
     ),
-    _distribution(
+    _make_distribution_row(
         "Sv", "m", "depth of the lowest point below the reference surface", _deepest_valley
     ),
-    _distribution("Sz", "m", "height from the lowest to the highest point", total_height),
+    _make_distribution_row("Sz", "m", "height from the lowest to the highest point", total_height),
     Parameter(
         "Sdq",
         "1",
@@ -274,46 +274,46 @@ AREAL = (
         "falls to 0.2; 1 if isotropic",
         aspect_ratio,
     ),
-    _distribution(
+    _make_distribution_row(
         "Sk",
         "m",
         "core height: drop, from 0 to 100 %, of the least-squares line through the flattest 40 % "
         "of the Abbott curve",
-        _core("height"),
+        _read_core("height"),
     ),
-    _distribution(
+    _make_distribution_row(
         "Spk",
         "m",
         "reduced peak height: height of a triangle on the base Smr1 with the volume of the peaks "
         "above the core",
-        _core("peak_height"),
+        _read_core("peak_height"),
     ),
-    _distribution(
+    _make_distribution_row(
         "Svk",
         "m",
         "reduced valley depth: height of a triangle on the base 1 - Smr2 with the volume of the "
         "valleys below the core",
-        _core("valley_depth"),
+        _read_core("valley_depth"),
     ),
-    _distribution(
+    _make_distribution_row(
         "Smr1",
         "1",
         "fraction of the area where the surface lies above the core",
-        _core("first_ratio"),
+        _read_core("first_ratio"),
     ),
-    _distribution(
+    _make_distribution_row(
         "Smr2",
         "1",
         "fraction of the area where the surface lies above the bottom of the core",
-        _core("second_ratio"),
+        _read_core("second_ratio"),
     ),
-    _distribution(
+    _make_distribution_row(
         "Vmp",
         "m",
         "volume of the peaks per area: material above the material ratio 10 %",
         lambda heights: material_volume(heights, PEAK_RATIO),
     ),
-    _distribution(
+    _make_distribution_row(
         "Vmc",
         "m",
         "volume of the core's material per area: between the material ratios 10 % and 80 %",
@@ -321,13 +321,13 @@ AREAL = (
             material_volume(heights, VALLEY_RATIO) - material_volume(heights, PEAK_RATIO)
         ),
     ),
-    _distribution(
+    _make_distribution_row(
         "Vvc",
         "m",
         "volume of the core's void per area: between the material ratios 10 % and 80 %",
         lambda heights: void_volume(heights, PEAK_RATIO) - void_volume(heights, VALLEY_RATIO),
     ),
-    _distribution(
+    _make_distribution_row(
         "Vvv",
         "m",
         "volume of the valleys' void per area: below the material ratio 80 %",

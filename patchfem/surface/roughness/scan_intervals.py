@@ -43,7 +43,7 @@ def scan_intervals(z: np.ndarray, values: dict) -> ScanIntervals:
     return ScanIntervals(bounds, is_uneven=False)
 
 
-class Scatter(NamedTuple):
+class MomentScatter(NamedTuple):
     """Relative variance of the mean square; means of rho^3, rho^4 and |rho|^3 over all lags."""
 
     variance: float
@@ -52,7 +52,7 @@ class Scatter(NamedTuple):
     absolute_cubes: float
 
 
-def _estimate_scatter(z: np.ndarray) -> Scatter:
+def _estimate_scatter(z: np.ndarray) -> MomentScatter:
     """Estimate the scatter of the moments from the power spectrum under a cosine taper."""
     from scipy.fft import fft2, irfft2, rfft2
 
@@ -68,4 +68,4 @@ def _estimate_scatter(z: np.ndarray) -> Scatter:
         float((part * lags).sum()) / (m * n) for part in (rho**3, rho**4, np.abs(rho**3))
     )
     variance = float((power**2).sum() / power.sum() ** 2)
-    return Scatter(variance, abs(cubes), fourths, absolute_cubes)
+    return MomentScatter(variance, abs(cubes), fourths, absolute_cubes)

@@ -41,8 +41,8 @@ class Spectrum:
         return self.density * low, self.density * high
 
     @cached_property
-    def dominant(self) -> float | None:
-        """Wavelength [m] whose octave holds most height, None for a flat trace.
+    def dominant_wavelength(self) -> float | None:
+        """Wavelength [m] whose octave contains most of the mean square, None for a flat trace.
 
         It starts at the largest frequency times density, among waves of which the trace holds at
         least two, and moves to the centroid of the density within the width of the tapers around
@@ -70,7 +70,7 @@ class Spectrum:
         ends = np.interp([1 / high, 1 / low], self.frequency, total)
         return float(ends[1] - ends[0])
 
-    def within(self, low: float, high: float) -> np.ndarray:
+    def density_between(self, low: float, high: float) -> np.ndarray:
         """Return the density (k,) [m3] of the waves from `low` to `high` [m], 0 elsewhere."""
         return np.where(
             (self.frequency >= 1 / high) & (self.frequency <= 1 / low), self.density, 0.0
@@ -114,7 +114,7 @@ def estimate_spectrum(z: np.ndarray, step: float, tapers: int | None = None) -> 
     frequency = np.arange(1, density.size + 1) / ((n + 1) * step) / 2
     first = Spectrum(frozen_array(frequency), frozen_array(density), MIN_TAPERS, length)
     if tapers is None:
-        wave = first.dominant
+        wave = first.dominant_wavelength
         wanted = MIN_TAPERS if wave is None else np.floor(2 * BLUR_FRACTION * length / wave) - 1
         tapers = int(np.clip(wanted, MIN_TAPERS, MAX_TAPERS))
     if tapers == MIN_TAPERS:

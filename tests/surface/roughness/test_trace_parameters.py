@@ -8,8 +8,8 @@ from scipy.stats import norm
 
 from patchfem.surface.roughness.parameters import (
     Heights,
-    abbott,
-    crossings,
+    abbott_curve,
+    find_crossings,
     fit_core,
     mean_element_height,
     mean_spacing,
@@ -67,13 +67,13 @@ def test_exact_small_and_narrow_hills_do_not_count():
     z = np.sin(2 * np.pi * x / 4000 + 0.5) + 0.04 * np.sin(2 * np.pi * x / 50)
     found = Heights(z, UM, 8000 * UM)
     assert (np.diff(z > 0) != 0).sum() > 20
-    assert crossings(found).size == 20
+    assert find_crossings(found).size == 20
     assert mean_spacing(found) == pytest.approx(4000 * UM, rel=0.005)
     spiked = z.copy()
     spiked[200:210] -= 3  # deep enough, but narrower than 1 % of the section
-    assert crossings(Heights(spiked, UM, 8000 * UM)).size == 20
+    assert find_crossings(Heights(spiked, UM, 8000 * UM)).size == 20
     # without a cut-off there is no section to compare with
-    assert crossings(Heights(spiked, UM)).size == 22
+    assert find_crossings(Heights(spiked, UM)).size == 22
 
 
 def test_exact_a_trace_without_two_elements_has_no_spacing():
@@ -126,7 +126,7 @@ def test_exact_a_plateau_with_valleys():
 
 
 def test_exact_abbott_curve_of_a_sine():
-    ratio, level = abbott(wave(), 101)
+    ratio, level = abbott_curve(wave(), 101)
     assert level == pytest.approx(UM * np.cos(np.pi * ratio), abs=0.01 * UM)
 
 

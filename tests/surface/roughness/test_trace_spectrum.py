@@ -43,7 +43,7 @@ def test_exact_the_integral_is_the_mean_square():
 def test_exact_the_amplitude_and_wavelength_of_a_sine(wavelength, phase):
     trace = sine(np.arange(4000) * UM, 7e-6, wavelength * UM, phase)
     assert trace_amplitude(trace) == pytest.approx(7e-6, rel=5e-3)
-    assert estimate_spectrum(level(trace).z, UM).dominant == pytest.approx(
+    assert estimate_spectrum(level(trace).z, UM).dominant_wavelength == pytest.approx(
         wavelength * UM, rel=0.01
     )
     # what the tapers leak: 1e-5 of the mean square
@@ -72,7 +72,7 @@ def test_always_the_density_of_a_ring_surface_is_found():
 
 
 def test_exact_a_flat_trace_has_no_dominant_wave():
-    assert estimate_spectrum(np.zeros(100), UM).dominant is None
+    assert estimate_spectrum(np.zeros(100), UM).dominant_wavelength is None
 
 
 @pytest.mark.parametrize(
