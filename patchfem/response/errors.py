@@ -251,8 +251,10 @@ def observed_orders(fine: dict, half: dict, quarter: dict) -> dict:
     }
 
 
-def add_errors(values: dict, *errors: dict, least: float = 0.0, size: float = np.inf) -> dict:
-    """Return measures by name with the sum of the given errors, plus `least` of the value.
+def add_errors(
+    values: dict, *errors: dict, min_relative_error: float = 0.0, size: float = np.inf
+) -> dict:
+    """Return measures by name with the sum of the given errors, plus `min_relative_error` of the value.
 
     The error of a measure that a coarse run does not have is its absolute value.
 
@@ -262,7 +264,7 @@ def add_errors(values: dict, *errors: dict, least: float = 0.0, size: float = np
         Values by name.
     errors : dict
         Errors by name; the dicts are added.
-    least : float
+    min_relative_error : float
         Fraction of the value that is added [1].
     size : float
         Displacement that the drive itself causes [m], as in `floor_of`.
@@ -270,14 +272,14 @@ def add_errors(values: dict, *errors: dict, least: float = 0.0, size: float = np
     out, amplitude = {}, values.get("relative_displacement_amplitude", 0.0)
     for name, value in values.items():
         parts = [part.get(name, abs(value)) for part in errors]
-        error = total_error(name, value, parts, least, amplitude)
+        error = total_error(name, value, parts, min_relative_error, amplitude)
         out[name] = Measure(
             float(value), find_row(name).unit, float(error), float(error_floor(name, size))
         )
     return out
 
 
-def total_error(name: str, value, parts, least: float, size):
+def total_error(name: str, value, parts, min_relative_error: float, size):
     """Return the error of a measure of one run, or (n,) of many, from its parts.
 
     Parameters
@@ -287,16 +289,16 @@ def total_error(name: str, value, parts, least: float, size):
         Value of the measure.
     parts : sequence
         Errors that add up.
-    least : float
+    min_relative_error : float
         Fraction of the value that is added [1].
     size : float or (n,)
         Amplitude of the output [m].
     """
-    error = sum(parts) + np.abs(value) * least
+    error = sum(parts) + np.abs(value) * min_relative_error
     if name == "slip_start_phase":  # the error of a phase modulo pi is at most pi/2
         return np.minimum(error, np.pi / 2)
     if name in ERROR_MEASURES:  # the value itself is an error
         return np.maximum(error, np.abs(value))
     if name == "drift_per_cycle":  # a difference of means, which has their round-off
-        return error + max(MEAN_ROUND_OFF, least) * np.abs(size)
+        return error + max(MEAN_ROUND_OFF, min_relative_error) * np.abs(size)
     return error

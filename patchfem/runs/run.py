@@ -293,7 +293,7 @@ def marches(what: Plan) -> bool:
     if what.model.rig is None:
         return False
 
-    return engines.ENGINES[what.engine].resumes
+    return engines.ENGINES[what.engine].saves_state
 
 
 def _has_no_load(model: Model) -> bool:

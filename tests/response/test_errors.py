@@ -204,7 +204,9 @@ def test_exact_errors_depend_on_the_kind_of_measure():
     for its error; a drift is a difference of means with digits of the amplitude."""
     values = {NAME: 2e-3, "slip_start_phase": 3.0, "energy_balance": 4e-9, "drift_per_cycle": 1e-12}
     parts = {NAME: 1e-6, "slip_start_phase": 1.8, "energy_balance": 1e-10, "drift_per_cycle": 1e-15}
-    found = {name: one.error for name, one in add_errors(values, parts, least=1e-9).items()}
+    found = {
+        name: one.error for name, one in add_errors(values, parts, min_relative_error=1e-9).items()
+    }
     assert found == {
         NAME: pytest.approx(1e-6 + 2e-12, rel=1e-12),
         "slip_start_phase": np.pi / 2,

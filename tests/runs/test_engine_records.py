@@ -20,7 +20,7 @@ def test_always_every_engine_has_a_row_of_what_it_takes():
     assert set(ENGINES) == set(ENGINE_SUPPORT) and set(AUTOMATIC) <= set(ENGINES.values())
     for one in ENGINE_SUPPORT.values():
         assert set(one.features.split()) <= set(FEATURE_FINDERS)
-    assert {one.like for one in FINDERS.values()} <= set(ENGINES)
+    assert {one.engine for one in FINDERS.values()} <= set(ENGINES)
 
 
 def motions():

@@ -114,7 +114,7 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
     notes = [
         *decays.slip_sentences(
             {"method decay": reason},
-            lambda: engine.in_space(
+            lambda: engine.coarser_in_space(
                 release.model, release.numerics, joint.patch, joint.coarse, release.solution
             ),
         ),
@@ -191,7 +191,9 @@ def _refine(joint: Joint, release: Release, amplitudes) -> RefinedRelease:
         limit = np.maximum(tolerance * np.abs(reading.value), reading.reading_error)
         is_small = (reading.run_error <= limit).all(axis=0)
         is_met = known.any() and is_small[known].all()
-        has_steps = engine.in_time(model, how, joint.patch) and "steps_per_cycle" not in how.pinned
+        has_steps = (
+            engine.coarser_in_time(model, how, joint.patch) and "steps_per_cycle" not in how.pinned
+        )
         if is_met or doublings == MAX_DOUBLINGS or not has_steps:
             break
         how = how.finer()
@@ -223,8 +225,8 @@ def _read_with_errors(joint: Joint, release: Release, amplitudes) -> DecayReadin
         return known[variant]
 
     coarser = [
-        *engine.in_time(model, how, joint.patch),
-        *engine.in_space(model, how, joint.patch, joint.coarse, found),
+        *engine.coarser_in_time(model, how, joint.patch),
+        *engine.coarser_in_space(model, how, joint.patch, joint.coarse, found),
     ]
     for one in coarser:
         if one.runs:

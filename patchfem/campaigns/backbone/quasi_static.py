@@ -129,7 +129,7 @@ def _by_bench_loops(joint: Joint, amplitudes) -> Curve:
         frequency = joint.held[0] / (2 * np.pi)
         settled = settle_loop(joint.model, joint.patch, float(slide), frequency)
         changes = estimate_pass_errors(settled.model, patches, settled.run, settled.steps)[0]
-        measures = add_errors(settled.run.values, *changes, least=MIN_FLOOR)
+        measures = add_errors(settled.run.values, *changes, min_relative_error=MIN_FLOOR)
         stiffness, area = (settled.run.values[name] for name in LOOP_MEASURES)
         stiffness_error, area_error = (
             measures[name].error + change for name, change in zip(LOOP_MEASURES, settled.change)

@@ -434,8 +434,8 @@ def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple
         fine.values["slip_amplitude"] <= least,
         fine.lost,
         errors,
-        MARCH.least,
-        MARCH.closes,
+        MARCH.min_relative_error,
+        MARCH.max_balance_error,
         again=False,
     )
     return runs, parts

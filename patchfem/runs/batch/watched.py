@@ -77,7 +77,7 @@ class MotionObserver:
     ):
         self.model, self.patch, self.say, self.windowed = model, patch, say, windowed
         self.numerics = choose(model)
-        steady = ENGINES[self.numerics.engine].steady
+        steady = ENGINES[self.numerics.engine].finds_periodic_motion
         line = model.kind == "linear" and not model.rig.springs.is_nonlinear
         self.by = "" if not steady else "line" if line else choose_steady_method(model).name
         self.made, self.before = {}, before.made if before is not None else {}

@@ -69,7 +69,7 @@ def run_prescribed(
     if estimate:
         patches = [patch, *(one for one in coarse if one is not None)]
         others, seconds["error"], left = estimate_pass_errors(model, patches, fine, steps, say)
-    found = add_errors(fine.values, *others, least=1e-10)
+    found = add_errors(fine.values, *others, min_relative_error=1e-10)
     fields, created, power = (
         {},
         fine.values["energy_created"],

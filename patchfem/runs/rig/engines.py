@@ -70,49 +70,50 @@ class Engine(NamedTuple):
     The fields that name a function are "module function" of this folder, or "" for none.
 
     - method: value of accuracy.method that selects it; "" if only "auto" does.
-    - dearer: function (model) -> reason why the next engine is better for a model that names none,
+    - why_not_cheapest: function (model) -> reason why the next engine is better for a model that names none,
       or "".
     - solve: function (model, numerics, patch, frames, say, progress) -> Solution.
-    - chosen: function (model, Numerics) -> Numerics of this engine.
+    - choose_numerics: function (model, Numerics) -> Numerics of this engine.
     - refuse: function (model, numerics) that raises Missing if a run would take too long.
     - cost: function (model, numerics, points) -> Cost.
-    - words: function (model, numerics) -> sentences of a plan.
+    - plan_sentences: function (model, numerics) -> sentences of a plan.
     - notes: function (model, numerics, patch, Solution) -> notes of a run.
-    - in_time: function (model, numerics, patch) -> list of `CoarserRuns`.
-    - in_space: function (model, numerics, patch, coarse, solution) -> list of `CoarserRuns`.
-    - least: smallest relative error.
-    - closes: error of the energy balance above which a run has not converged; None if the error
+    - coarser_in_time: function (model, numerics, patch) -> list of `CoarserRuns`.
+    - coarser_in_space: function (model, numerics, patch, coarse, solution) -> list of `CoarserRuns`.
+    - min_relative_error: relative error of every measure that no coarse run shows, such as round-off;
+      it is added to the errors by coarse runs.
+    - max_balance_error: error of the energy balance above which a run has not converged; None if the error
       estimate of the balance decides, inf for methods that state their loss.
-    - tells: numbers of a run that the summary contains.
-    - resumes: whether it saves its state during a run.
-    - steady: whether it finds periodic motions.
+    - summary_numbers: numbers of a run that the summary contains.
+    - saves_state: whether it saves its state during a run.
+    - finds_periodic_motion: whether it finds periodic motions.
     """
 
     name: str
     method: str
     solve: str
-    in_time: Callable
-    in_space: Callable
+    coarser_in_time: Callable
+    coarser_in_space: Callable
     cost: str
-    dearer: Callable = lambda model: ""
-    chosen: str = ""
+    why_not_cheapest: Callable = lambda model: ""
+    choose_numerics: str = ""
     refuse: str = ""
-    words: str = "plan bond_sum_sentences"
+    plan_sentences: str = "plan bond_sum_sentences"
     notes: str = ""
-    least: float = 1e-9
-    closes: float | None = BALANCE_ROUND_OFF
-    tells: tuple = ()
-    resumes: bool = False
-    steady: bool = False
+    min_relative_error: float = 1e-9
+    max_balance_error: float | None = BALANCE_ROUND_OFF
+    summary_numbers: tuple = ()
+    saves_state: bool = False
+    finds_periodic_motion: bool = False
 
-    def in_modes(self, model: Model, numerics, patch) -> list:
+    def richer_in_modes(self, model: Model, numerics, patch) -> list:
         """Return the run with more modes of a reduced structure; [] if no mode is left out.
 
         For a march, it has a quarter of the steps.
         """
         if model.rig.structure.richer_rig is None:
             return []
-        few = _fewer(numerics, 4) if self.in_time is _march_in_time else numerics
+        few = _fewer(numerics, 4) if self.coarser_in_time is _march_in_time else numerics
         beside = None if few is numerics else Variant(few, patch)
         return [
             CoarserRuns(
@@ -178,13 +179,13 @@ class Finder(NamedTuple):
 
     - words: text of a plan.
     - solve: "module class" of this folder.
-    - like: name of the engine whose code it runs and whose numerical settings apply.
+    - engine: name of the engine whose code it runs and whose numerical settings apply.
     """
 
     name: str
     words: str
     solve: str
-    like: str
+    engine: str
 
 
 FINDERS = {
@@ -384,7 +385,7 @@ def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """Return the coarse runs of a steady motion: its own errors, and coarser meshes."""
     meshed = (
         _pieces_in_space(model, numerics, patch, coarse, solution)
-        if choose_steady_method(model).like == PIECES.name
+        if choose_steady_method(model).engine == PIECES.name
         else []
     )
     return [*_own_errors(model, numerics, patch, coarse, solution), *meshed]
@@ -410,7 +411,7 @@ EXACT = Engine(
     _none,
     _exact_in_space,
     "costs exact_cost",
-    dearer=reason_to_march_events,
+    why_not_cheapest=reason_to_march_events,
     refuse="costs refuse_endless",
 )
 PIECES = Engine(
@@ -420,8 +421,8 @@ PIECES = Engine(
     _none,
     _pieces_in_space,
     "costs exact_cost",
-    dearer=reason_to_march_elements,
-    chosen="numerics yield_numerics",
+    why_not_cheapest=reason_to_march_elements,
+    choose_numerics="numerics yield_numerics",
     refuse="costs refuse_endless",
 )
 SMOOTH = Engine(
@@ -431,11 +432,11 @@ SMOOTH = Engine(
     _smooth_in_time,
     _own_errors,
     "costs smooth_cost",
-    dearer=reason_to_march_smooth_law,
-    chosen="numerics smooth_numerics",
-    least=3e-8,
-    closes=None,
-    tells=("iterations",),
+    why_not_cheapest=reason_to_march_smooth_law,
+    choose_numerics="numerics smooth_numerics",
+    min_relative_error=3e-8,
+    max_balance_error=None,
+    summary_numbers=("iterations",),
 )
 MARCH = Engine(
     "march",
@@ -444,11 +445,11 @@ MARCH = Engine(
     _march_in_time,
     _march_in_space,
     "plan march_cost",
-    chosen="numerics march_numerics",
+    choose_numerics="numerics march_numerics",
     refuse="lists refuse_long_list",
     notes="motion_warnings marched_elements",
-    tells=("steps_per_cycle", "iterations"),
-    resumes=True,
+    summary_numbers=("steps_per_cycle", "iterations"),
+    saves_state=True,
 )
 HARMONIC = Engine(
     "harmonic",
@@ -457,10 +458,10 @@ HARMONIC = Engine(
     _none,
     _steady_in_space,
     "plan steady_cost",
-    words="plan steady_words",
+    plan_sentences="plan steady_words",
     notes="motion_warnings unmoved_elements",
-    closes=None,
-    steady=True,
+    max_balance_error=None,
+    finds_periodic_motion=True,
 )
 ENGINES = {engine.name: engine for engine in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC)}
 AUTOMATIC = (EXACT, PIECES, SMOOTH, MARCH)  # engines in the order in which they are tried
@@ -474,7 +475,11 @@ def describe_balance_error(engine: Engine, measures: dict) -> str:
     found = measures.get("energy_balance")
     if found is None or found.value is None:
         return ""
-    bar = max(BALANCE_ROUND_OFF, found.error or 0.0) if engine.closes is None else engine.closes
+    bar = (
+        max(BALANCE_ROUND_OFF, found.error or 0.0)
+        if engine.max_balance_error is None
+        else engine.max_balance_error
+    )
     if not found.value > bar:  # a motion that is not finite was detected before
         return ""
     return (
@@ -499,13 +504,13 @@ def choose_engine(model: Model, per_point: bool = False) -> Engine:
     return next(
         one
         for one in AUTOMATIC
-        if not (one.lacks(model) or one.dearer(model) or (per_point and one is SMOOTH))
+        if not (one.lacks(model) or one.why_not_cheapest(model) or (per_point and one is SMOOTH))
     )
 
 
 def unused_settings(model: Model, engine: str) -> list:
     """Return sentences on the settings in [accuracy] of a rig that its engine does not use."""
-    by = choose_steady_method(model).like if ENGINES[engine].steady else engine
+    by = choose_steady_method(model).engine if ENGINES[engine].finds_periodic_motion else engine
     where = {
         "steps_per_cycle": f"for engine '{engine}', which has no steps,",
         "harmonics": "if the steady motion is found by the exact solution from event to event",

@@ -43,7 +43,7 @@ def collect_warnings(run) -> list:
     book, harmonics = raw.book, raw.extra.get("harmonics")
     steps = (
         run.numerics.steps
-        if "steps_per_cycle" in ENGINES[run.numerics.engine].tells
+        if "steps_per_cycle" in ENGINES[run.numerics.engine].summary_numbers
         else raw.extra.get("steps_per_cycle")
     )
     out = [

@@ -115,7 +115,7 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
         per_point or model.side == "lower",
         frozenset(pinned),
     )
-    return engine.call("chosen", model, found) or found
+    return engine.call("choose_numerics", model, found) or found
 
 
 def march_numerics(model: Model, found: Numerics) -> Numerics:

@@ -162,7 +162,9 @@ def cost(model: Model, per_point: bool, points: int) -> Cost:
     rows_key = "drive.file" if "file" in rig.drive.waveform.required_keys else "drive.duration"
     structure = MemoryPart(MODE_PAIR * count**2, f"{count} modes", "structure")
     drive = MemoryPart(DRIVE_ROW * rows, f"{rows} rows of the drive", rows_key)
-    words = tuple(engine.call("words", model, numerics)) if model.friction is not None else ()
+    words = (
+        tuple(engine.call("plan_sentences", model, numerics)) if model.friction is not None else ()
+    )
     whole = Cost(parts=(structure, drive), words=words, sizes={"modes": count}, engine=engine.name)
     return whole + engine.call("cost", model, numerics, points)
 
@@ -430,7 +432,7 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
     harmonics = model.accuracy.harmonics or 0
     balance = HARMONIC_PAIR * (2.0 * harmonics * max(1, len(rig.friction.interfaces))) ** 2
     parts = (MemoryPart(balance, f"{harmonics} harmonics", "accuracy.harmonics"),)
-    code = STEADY_CODES[finder.like] or march_code(model)
+    code = STEADY_CODES[finder.engine] or march_code(model)
     return Cost({"motion": seconds}, parts, (), places) + code.cost()
 
 

@@ -228,7 +228,7 @@ def _add_decay(run: Coupled, coarse) -> tuple:
         found,
         decays.slip_sentences(
             whys,
-            lambda: ENGINES[run.numerics.engine].in_space(
+            lambda: ENGINES[run.numerics.engine].coarser_in_space(
                 run.model, run.numerics, run.patch, coarse, raw
             ),
         ),
@@ -238,7 +238,7 @@ def _add_decay(run: Coupled, coarse) -> tuple:
 def _set_floors(run: Coupled) -> Coupled:
     """Return the run with the final floors of its measures, without values if no motion exists."""
     found = set_final_floors(run.measures, run.model.accuracy.tolerance)
-    if ENGINES[run.numerics.engine].steady and run.outcome is Outcome.GROWS:
+    if ENGINES[run.numerics.engine].finds_periodic_motion and run.outcome is Outcome.GROWS:
         found = reasons.find_missing_unbounded(found)
     return replace(run, measures=found)
 
@@ -246,7 +246,7 @@ def _set_floors(run: Coupled) -> Coupled:
 def _extra(run: Coupled, notes: list) -> dict:
     """Return the other data of a Result: settings, levels, events, energies, notes."""
     raw, numerics, rig = run.raw, run.numerics, run.model.rig
-    tells = ENGINES[numerics.engine].tells
+    tells = ENGINES[numerics.engine].summary_numbers
     numbers = {"steps_per_cycle": numerics.steps, "iterations": raw.book.get("iterations")}
     out = (
         {"engine": numerics.engine, "cycles": numerics.cycles}
@@ -281,83 +281,147 @@ def _solve(model, numerics, patch, coarse, seconds, say, progress, estimated) ->
     Steps per cycle that the scene does not fix are doubled until the error of the displacement is
     within the tolerance.
     """
-    engine, made = ENGINES[numerics.engine], {}
-    has_fields = patch is not None and not model.patch.mesh.can_gather_points
-    frames = FRAMES if has_fields or model.rig.friction.has_partial_slip else 0
-    passes = Passes(progress, _expected_steps(engine, model, numerics, patch, coarse, estimated))
-    size = model.rig.displacement_scale
-
-    def go(meant, numerics, patch, frames=0, say=None):
-        """Run the engine as one pass, and return the Solution."""
-        return passes.told(
-            numerics.steps,
-            lambda progress: engine.run(meant, numerics, patch, frames, say, progress),
-        )
-
-    found = go(model, numerics, patch, frames, say)
+    run = _RefinedRun(model, numerics, patch, coarse, say, progress, estimated)
+    engine, size = run.engine, model.rig.displacement_scale
+    found = run.solve_fine(numerics)
     seconds |= {"march": found.seconds} | (found.prepare or {})
-    wide = _whole_period(model, numerics, found)
-    if wide > numerics.window:
-        numerics = replace(numerics, window=wide)
-        found = go(model, numerics, patch, frames, say)
+    n_cycles = _whole_period(model, numerics, found)
+    if n_cycles > numerics.window:
+        numerics = replace(numerics, window=n_cycles)
+        found = run.solve_fine(numerics)
     if not estimated or found.outcome is Outcome.NOT_CONVERGED:
         return found, numerics, add_errors(found.values, size=size) | curve_measures(found.extra)
 
-    def solve(variant):
-        """Return the Solution of a Variant; for a curve, only around its peak if that suffices."""
-        meant = (
-            replace(model, rig=model.rig.structure.richer_rig) if variant.numerics.richer else model
+    def estimate(coarser_runs: list) -> tuple:
+        """Return the errors by measure of each kind of coarse run, and the CPU seconds spent."""
+        return estimate_errors(
+            lambda variant: run.solve_variant(variant, found),
+            found.values,
+            coarser_runs,
+            run.solutions,
         )
-        # the decay curve and some measures need the histories of the whole run
-        how = replace(variant.numerics, whole=model.rig.drive.kind == "free" or bool(NEEDS_RUN))
-        near = _rerun_around_peak(meant, found, lambda narrow: go(narrow, how, variant.patch))
-        return near or go(meant, how, variant.patch)
 
-    meshed = [
-        *engine.in_space(model, numerics, patch, coarse, found),
-        *engine.in_modes(model, numerics, patch),
+    in_space = [
+        *engine.coarser_in_space(model, numerics, patch, coarse, found),
+        *engine.richer_in_modes(model, numerics, patch),
     ]
-    space, spent = estimate_errors(solve, found.values, meshed, made)
-    bars = []  # errors of the displacement [m] after each doubling of the steps
+    space_errors, spent = estimate(in_space)
+    displacement_errors = []  # [m] after each doubling of the steps
     while True:
-        ways = engine.in_time(model, numerics, patch)
-        time, more = estimate_errors(solve, found.values, ways, made)
-        spent += more
-        measures = add_errors(found.values, *time, *space, least=engine.least, size=size)
+        in_time = engine.coarser_in_time(model, numerics, patch)
+        time_errors, spent_in_time = estimate(in_time)
+        spent += spent_in_time
+        measures = add_errors(
+            found.values,
+            *time_errors,
+            *space_errors,
+            min_relative_error=engine.min_relative_error,
+            size=size,
+        )
         if numerics.pairs and not errors_met(measures, model.accuracy.tolerance):
             return _solve(model, numerics.finer(), patch, coarse, seconds, say, progress, estimated)
         if found.levels or model.rig.drive.kind == "free":
-            # otherwise the levels have errors of their own
-            apart = [one for one in (*ways, *meshed) if one.runs or found.errors is None]
-            of_levels = levels.levels_with_errors(found.levels, apart, made) if found.levels else ()
-            # a list of bonds has a bound of its error instead of a coarse run
-            found = replace(
-                found,
-                levels=of_levels,
-                coarser=tuple(
-                    (made[one.runs[0]], one.beside and made[one.beside])
-                    for one in apart
-                    if one.runs and one.runs[0].numerics.choice is None
-                ),
-            )
-        bars.append(measures["relative_displacement_amplitude"].error or 0.0)
-        if _enough(model, numerics, found, measures, bars) or not time:
+            found = _with_level_errors(found, [*in_time, *in_space], run.solutions)
+        displacement_errors.append(measures["relative_displacement_amplitude"].error or 0.0)
+        if _enough(model, numerics, found, measures, displacement_errors) or not time_errors:
             if spent:
                 seconds["error"] = spent
-            runs = [
-                found.values,
-                *(made[one].values for one in _halved_variants(engine, model, numerics, patch)),
+            halved = [
+                run.solutions[one] for one in _halved_variants(engine, model, numerics, patch)
             ]
             late = [one for one in (found.extra.get("late"),) if one]
-            kinds = [*(one.of for one in (*ways, *meshed)), *["end"] * len(late)]
-            left = find_open_kinds(kinds, [*time, *space, *late], runs)
-            found = replace(found, extra=found.extra | {"left_open": left})
-            return found, numerics, measures | curve_measures(found.extra, made.values())
-        made[Variant(numerics, patch)] = found
+            left_open = find_open_kinds(
+                [*(one.of for one in (*in_time, *in_space)), *["end"] * len(late)],
+                [*time_errors, *space_errors, *late],
+                [one.values for one in (found, *halved)],
+            )
+            found = replace(found, extra=found.extra | {"left_open": left_open})
+            return found, numerics, measures | curve_measures(found.extra, run.solutions.values())
+        run.solutions[Variant(numerics, patch)] = found
         spent += found.seconds
         numerics = numerics.finer()
-        found = go(model, numerics, patch, frames, say)
+        found = run.solve_fine(numerics)
         seconds["march"] = found.seconds
+
+
+class _RefinedRun:
+    """Passes of one engine over one model; `solutions` stores coarse runs by their Variant.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+        Settings of the first pass.
+    patch : Patch or None
+    coarse : Patch or None
+        Patch on the coarser mesh.
+    say : callable or None
+        Receives sentences during the run.
+    progress : callable or None
+        Receives the completed fraction of all passes.
+    estimated : bool
+        Whether coarse runs estimate the errors.
+    """
+
+    def __init__(self, model, numerics, patch, coarse, say, progress, estimated):
+        self.model, self.patch, self.say = model, patch, say
+        self.engine = ENGINES[numerics.engine]
+        self.solutions = {}
+        n_steps = _expected_steps(self.engine, model, numerics, patch, coarse, estimated)
+        self.passes = Passes(progress, n_steps)
+        has_fields = patch is not None and not model.patch.mesh.can_gather_points
+        self.frames = FRAMES if has_fields or model.rig.friction.has_partial_slip else 0
+
+    def solve_fine(self, numerics) -> Solution:
+        """Return the Solution of the model with its fields."""
+        return self._run_pass(self.model, numerics, self.patch, self.frames, self.say)
+
+    def solve_variant(self, variant, found: Solution) -> Solution:
+        """Return the Solution of a Variant.
+
+        That of a curve is computed only around the peak of the fine run `found` if that suffices.
+        """
+        model = self.model
+        if variant.numerics.richer:
+            model = replace(model, rig=model.rig.structure.richer_rig)
+        # the decay curve and some measures need the histories of the whole run
+        needs_whole = self.model.rig.drive.kind == "free" or bool(NEEDS_RUN)
+        numerics = replace(variant.numerics, whole=needs_whole)
+        near_peak = _rerun_around_peak(
+            model, found, lambda narrow: self._run_pass(narrow, numerics, variant.patch)
+        )
+        return near_peak or self._run_pass(model, numerics, variant.patch)
+
+    def _run_pass(self, model, numerics, patch, frames: int = 0, say=None) -> Solution:
+        """Run the engine as one pass, and return the Solution."""
+        return self.passes.run_pass(
+            numerics.steps,
+            lambda progress: self.engine.run(model, numerics, patch, frames, say, progress),
+        )
+
+
+def _with_level_errors(found: Solution, coarser_runs: list, solutions: dict) -> Solution:
+    """Return a run whose levels have errors by coarse runs, with the coarse runs of its decay.
+
+    Parameters
+    ----------
+    found : Solution
+    coarser_runs : list of CoarserRuns
+    solutions : dict
+        Solution of each coarse run by its Variant.
+    """
+    # without coarse runs the levels have errors of their own
+    used = [one for one in coarser_runs if one.runs or found.errors is None]
+    pairs = [
+        (solutions[one.runs[0]], one.beside and solutions[one.beside])
+        for one in used
+        # a list of bonds has a bound of its error instead of a coarse run
+        if one.runs and one.runs[0].numerics.choice is None
+    ]
+    of_levels = ()
+    if found.levels:
+        of_levels = levels.levels_with_errors(found.levels, used, solutions)
+    return replace(found, levels=of_levels, coarser=tuple(pairs))
 
 
 def _rerun_around_peak(model, found: Solution, go) -> Solution | None:
@@ -420,20 +484,23 @@ class Passes:
     def __init__(self, progress, foreseen: float):
         self.progress, self.foreseen, self.done, self.shown = progress, foreseen, 0.0, 0.0
 
-    def told(self, steps: float, go):
-        """Return the result of go(progress) for a pass with this number of steps per cycle.
+    def run_pass(self, steps: float, solve):
+        """Return the result of solve(progress) for a pass with this number of steps per cycle.
 
-        go gets None without a progress callback.
+        solve gets None without a progress callback.
         """
-        found = go(
-            None
-            if self.progress is None
-            else lambda share: self._tell(self.done + share * steps, steps)
-        )
+        report = None
+        if self.progress is not None:
+
+            def report(fraction):
+                """Report the completed fraction of this pass."""
+                self._report(self.done + fraction * steps, steps)
+
+        found = solve(report)
         self.done += steps
         return found
 
-    def _tell(self, done: float, steps: float) -> None:
+    def _report(self, done: float, steps: float) -> None:
         """Report the fraction that `done` steps are of the expected ones."""
         self.shown = max(self.shown, done / max(self.foreseen, self.done + steps))
         self.progress(self.shown)
@@ -446,7 +513,10 @@ def _expected_steps(engine, model, numerics, patch, coarse, estimated: bool) -> 
     """
     if not estimated:
         return numerics.steps
-    ways = [*engine.in_time(model, numerics, patch), *engine.in_modes(model, numerics, patch)]
+    ways = [
+        *engine.coarser_in_time(model, numerics, patch),
+        *engine.richer_in_modes(model, numerics, patch),
+    ]
     each = {numerics: numerics.steps} | {
         run.numerics: run.numerics.steps for way in ways for run in way.runs
     }
@@ -458,7 +528,7 @@ def _expected_steps(engine, model, numerics, patch, coarse, estimated: bool) -> 
 
 def _halved_variants(engine, model, numerics, patch) -> tuple:
     """Return the Variants at half and a quarter of the steps, for `left_open`; () without steps."""
-    ways = engine.in_time(model, numerics, patch)
+    ways = engine.coarser_in_time(model, numerics, patch)
     return ways[0].runs if ways and not numerics.local else ()
 
 

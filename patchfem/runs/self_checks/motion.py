@@ -115,7 +115,10 @@ def check_loop_area(run: Evidence) -> Iterator[Finding]:
     window, area = run.window, run.value("loop_area")
     if window is None or area is None or not run.has_plain_friction:
         return
-    if run.model.rig is not None and engines.ENGINES[run.result.extra["engine"]].closes == np.inf:
+    if (
+        run.model.rig is not None
+        and engines.ENGINES[run.result.extra["engine"]].max_balance_error == np.inf
+    ):
         return
     cycles = round((window.time[-1] - window.time[0]) * run.frequency)
     move, force = np.diff(window.slide), window.force

@@ -94,8 +94,8 @@ class Runs:
     - phasors (n, w): of the output in the last cycle of the last ENDS windows, or of all [m].
     - stuck (n,): whether nothing slipped.
     - lost (n,): whether the case must be run by itself.
-    - errors: (n,) by name, in addition to `least` times the value.
-    - closes: error of the energy balance above which a run has not converged.
+    - errors: (n,) by name, in addition to `min_relative_error` times the value.
+    - max_balance_error: error of the energy balance above which a run has not converged.
     - loads (n,): whether the friction force of a stuck run still increases.
     - steady: amplitude and error (n,) [m] of the motion to which a run is known to settle; NaN if
       unknown.
@@ -116,8 +116,8 @@ class Runs:
     stuck: np.ndarray
     lost: np.ndarray
     errors: dict
-    least: float
-    closes: float
+    min_relative_error: float
+    max_balance_error: float
     loads: np.ndarray | bool = False
     steady: tuple | None = None
     chosen: tuple = ()
@@ -155,7 +155,11 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     nothing = np.zeros(n)
     errors = {
         name: total_error(
-            name, value, [runs.errors.get(name, nothing)], runs.least, values[MAIN_MEASURE]
+            name,
+            value,
+            [runs.errors.get(name, nothing)],
+            runs.min_relative_error,
+            values[MAIN_MEASURE],
         )
         for name, value in values.items()
     }
@@ -174,7 +178,11 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     )
     found = CaseResults.blank(n)
     found.outcome[:] = [str(one) for one in outcome]
-    alone = runs.lost | (values["energy_balance"] > runs.closes) | (values["work_check"] > BOOKS)
+    alone = (
+        runs.lost
+        | (values["energy_balance"] > runs.max_balance_error)
+        | (values["work_check"] > BOOKS)
+    )
     grows = np.array([one is Outcome.GROWS for one in outcome])
     with np.errstate(invalid="ignore"):
         on = is_still_changing(steady, error, values[MAIN_MEASURE], tolerance) & np.array(

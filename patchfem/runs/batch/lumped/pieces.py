@@ -252,8 +252,8 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
         stuck,
         lost,
         errors,
-        PIECES.least,
-        PIECES.closes,
+        PIECES.min_relative_error,
+        PIECES.max_balance_error,
         loads,
         tuple(known),
     )

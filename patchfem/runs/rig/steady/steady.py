@@ -38,7 +38,7 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
     try:
         return _solve_steady(import_function(by.solve)(model, numerics, patch, frames, say), model)
     except NotConverged:
-        if by.like != PIECES.name or len(model.rig.friction.interfaces) > 1:
+        if by.engine != PIECES.name or len(model.rig.friction.interfaces) > 1:
             raise
     return _solve_steady(
         import_function(FINDERS["balance"].solve)(model, numerics, patch, frames, say), model
