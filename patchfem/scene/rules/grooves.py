@@ -13,7 +13,7 @@ from .scene_draft import SceneDraft
 
 
 class GrooveFacts(TableFacts):
-    """Facts for the rules of the grooves at the key `at`, and of the tables used with them."""
+    """Facts for the rules of the grooves with this table key, and of the tables used with them."""
 
     @property
     def law_table(self) -> Any:
