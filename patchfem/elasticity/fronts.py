@@ -23,7 +23,7 @@ from .lapack import cho_inverse
 UNKNOWNS_PER_NODE = 2  # unknowns of a node, which follow one another
 MIN_SLICED_NODES = 40  # updates of fewer nodes are added by one indexed assignment
 # mean length [nodes] of runs of consecutive node numbers, below which an update is added column by column
-MIN_MEAN_RUN = 24
+MIN_MEAN_RUN_LENGTH = 24
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -187,7 +187,7 @@ def _add_update(front, update, nodes, per_node: int) -> None:
         front.T[unknowns[:, None], unknowns] += update.T  # transposed: both are stored by rows
         return
     cuts = np.flatnonzero(np.diff(nodes) > 1) + 1
-    if (cuts.size + 1) * MIN_MEAN_RUN > nodes.size:
+    if (cuts.size + 1) * MIN_MEAN_RUN_LENGTH > nodes.size:
         for column, target in enumerate(unknowns):
             front[unknowns[column:], target] += update[column:, column]
         return

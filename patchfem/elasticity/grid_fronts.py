@@ -25,19 +25,19 @@ from .lapack import dgemm, dpotrf, dtrsm
 
 MAX_LEAF_CELLS = 24  # parts of more cells are halved
 LEAVES_PER_CHUNK = 256  # the index arrays of this number of leaves fit into the cache of a core
-NODE_ENTRIES = 36  # numbers in the stencil of one node: 3 x 3 neighbours, 2 x 2 directions
+ENTRIES_PER_NODE = 36  # numbers in the stencil of one node: 3 x 3 neighbours, 2 x 2 directions
 BYTES_PER_NUMBER = 8
 
 
-class Half(NamedTuple):
+class RegionHalf(NamedTuple):
     """One half of a part: its shape, and the column and row of its corner within the part."""
 
-    shape: "Shape"
+    shape: "RegionShape"
     column: int
     row: int
 
 
-class Shape(NamedTuple):
+class RegionShape(NamedTuple):
     """The shape of a part of the grid.
 
     - ``columns``, ``rows``: numbers of cells
@@ -56,7 +56,7 @@ class Shape(NamedTuple):
         """Number of rows of nodes that are not fixed."""
         return self.rows + self.bottom
 
-    def halves(self) -> tuple[Half, ...]:
+    def halves(self) -> tuple[RegionHalf, ...]:
         """Return both halves of a part, cut across its longer side; none for a leaf."""
         if self.columns * self.rows <= MAX_LEAF_CELLS or max(self.columns, self.rows) < 2:
             return ()
@@ -64,15 +64,15 @@ class Shape(NamedTuple):
             cut = self.columns // 2
             first = self._replace(columns=cut, right=True)
             second = self._replace(columns=self.columns - cut, left=True)
-            return Half(first, 0, 0), Half(second, cut, 0)
+            return RegionHalf(first, 0, 0), RegionHalf(second, cut, 0)
         cut = self.rows // 2
         first = self._replace(rows=cut, bottom=True)
         second = self._replace(rows=self.rows - cut)
-        return Half(first, 0, 0), Half(second, 0, cut)
+        return RegionHalf(first, 0, 0), RegionHalf(second, 0, cut)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Numbering:
+class NodeNumbering:
     """Nodes in the matrix of a part, in the order of its rows.
 
     - ``own``: (o, 2) column and row of the nodes that are eliminated with the part
@@ -87,7 +87,7 @@ class Numbering:
 
 
 @lru_cache(maxsize=4096)
-def number_nodes(shape: Shape) -> Numbering:
+def number_nodes(shape: RegionShape) -> NodeNumbering:
     """Number the nodes of a part: first those eliminated with it, then those on its ring."""
     grid = np.arange((shape.columns + 1) * shape.n_free_rows).reshape(
         shape.columns + 1, shape.n_free_rows
@@ -116,10 +116,10 @@ def number_nodes(shape: Shape) -> Numbering:
     number = np.full(grid.size, -1)
     number[np.concatenate([own, ring])] = np.arange(own.size + ring.size)
     own, ring = (np.stack(np.divmod(nodes, shape.n_free_rows), axis=1) for nodes in (own, ring))
-    return Numbering(own, ring, number.reshape(grid.shape))
+    return NodeNumbering(own, ring, number.reshape(grid.shape))
 
 
-class Blocks(NamedTuple):
+class StiffnessBlocks(NamedTuple):
     """Stiffness blocks of g parts of one shape: unknowns to eliminate (own) and of the ring.
 
     ::
@@ -145,18 +145,18 @@ class Blocks(NamedTuple):
 BLOCK_KINDS = ((True, True), (True, False), (False, False))
 
 
-def _zero_blocks(shape: Shape, n_parts: int) -> Blocks:
+def _zero_blocks(shape: RegionShape, n_parts: int) -> StiffnessBlocks:
     numbering = number_nodes(shape)
     own = 2 * len(numbering.own)
     ring = 2 * len(numbering.ring)
-    return Blocks(
+    return StiffnessBlocks(
         np.zeros((n_parts, own, own)),
         np.zeros((n_parts, own, ring)),
         np.zeros((n_parts, ring, ring)),
     )
 
 
-class Couplings(NamedTuple):
+class LeafCouplings(NamedTuple):
     """The entries of the stencil that make one block of the matrix of a leaf.
 
     - ``axes``: (6, k) indices into the stencil of a grid whose first node is the corner of the leaf
@@ -168,7 +168,7 @@ class Couplings(NamedTuple):
 
 
 @lru_cache(maxsize=1024)
-def _leaf_couplings(shape: Shape) -> tuple[Couplings, ...]:
+def _leaf_couplings(shape: RegionShape) -> tuple[LeafCouplings, ...]:
     """Return the couplings of each of the stored blocks of a leaf.
 
     A coupling joins an unknown of a node n with one of a node m, which is n itself or one of its
@@ -214,18 +214,18 @@ def _leaf_couplings(shape: Shape) -> tuple[Couplings, ...]:
         block_row = matrix_row[is_in_block] - (0 if is_own_row else n_own)
         block_column = matrix_column[is_in_block] - (0 if is_own_column else n_own)
         width = n_own if is_own_column else n_ring
-        couplings.append(Couplings(axes[:, is_in_block], block_row * width + block_column))
+        couplings.append(LeafCouplings(axes[:, is_in_block], block_row * width + block_column))
     return tuple(couplings)
 
 
-def _assemble_leaves(stencil, shape: Shape, corners) -> Blocks:
+def _assemble_leaves(stencil, shape: RegionShape, corners) -> StiffnessBlocks:
     """Assemble the matrices of leaves of one shape from the stencil of the grid.
 
     corners: (g, 2) column and row of the first node of every leaf.
     """
     blocks = _zero_blocks(shape, len(corners))
     numbers = stencil.reshape(-1)
-    first_number = NODE_ENTRIES * (corners[:, :1] * stencil.shape[1] + corners[:, 1:])
+    first_number = ENTRIES_PER_NODE * (corners[:, :1] * stencil.shape[1] + corners[:, 1:])
     for block, couplings in zip(blocks, _leaf_couplings(shape)):
         entries = block.reshape(len(corners), block[0].size)
         position = np.ravel_multi_index(tuple(couplings.axes), stencil.shape)
@@ -235,7 +235,7 @@ def _assemble_leaves(stencil, shape: Shape, corners) -> Blocks:
     return blocks
 
 
-class Run(NamedTuple):
+class IndexRun(NamedTuple):
     """Successive nodes on the ring of a half that are also successive in the whole part.
 
     - ``source``: their unknowns in the update of the half
@@ -246,19 +246,19 @@ class Run(NamedTuple):
     target: slice
 
 
-class Runs(NamedTuple):
+class UpdateRuns(NamedTuple):
     """Runs of successive nodes on the ring of a half, by their use in the whole part.
 
     - ``own``: runs of nodes that the whole part eliminates
     - ``ring``: runs of nodes that stay on the ring of the whole part
     """
 
-    own: list[Run]
-    ring: list[Run]
+    own: list[IndexRun]
+    ring: list[IndexRun]
 
 
 @lru_cache(maxsize=4096)
-def _split_ring(shape: Shape, half: Half) -> Runs:
+def _split_ring(shape: RegionShape, half: RegionHalf) -> UpdateRuns:
     """Split the boundary nodes of one half of a part into runs consecutive in the whole part.
 
     The nodes on the boundary of a half form its ring. They are split where their numbers in the whole part are not
@@ -271,18 +271,18 @@ def _split_ring(shape: Shape, half: Half) -> Runs:
     begins_run = (np.diff(number) != 1) | (number[1:] == n_own)
     starts = np.append(0, np.flatnonzero(begins_run) + 1)
     lengths = np.diff(np.append(starts, number.size))
-    runs = Runs([], [])
+    runs = UpdateRuns([], [])
     for start, first, length in zip(starts.tolist(), number[starts].tolist(), lengths.tolist()):
         source = slice(2 * start, 2 * (start + length))
         if first < n_own:
-            runs.own.append(Run(source, slice(2 * first, 2 * (first + length))))
+            runs.own.append(IndexRun(source, slice(2 * first, 2 * (first + length))))
         else:
             first -= n_own
-            runs.ring.append(Run(source, slice(2 * first, 2 * (first + length))))
+            runs.ring.append(IndexRun(source, slice(2 * first, 2 * (first + length))))
     return runs
 
 
-def _add_updates(shape: Shape, updates) -> Blocks:
+def _add_updates(shape: RegionShape, updates) -> StiffnessBlocks:
     """Assemble the matrices of parts of one shape from the updates of their halves.
 
     A part that is cut along a column has the nodes of two rings. Where the rings meet, the updates
@@ -299,7 +299,7 @@ def _add_updates(shape: Shape, updates) -> Blocks:
     The numbers of a ring in the matrix of the whole part form a few runs of successive numbers, so
     an update is added as a few rectangles: one for each pair of runs.
 
-    updates: of each half in the order of `Shape.halves`, (g, 2b, 2b) [N/m per m].
+    updates: of each half in the order of `RegionShape.halves`, (g, 2b, 2b) [N/m per m].
     """
     blocks = _zero_blocks(shape, len(updates[0]))
     halves = shape.halves()
@@ -319,7 +319,7 @@ def _add_updates(shape: Shape, updates) -> Blocks:
     return blocks
 
 
-def _eliminate_inner_unknowns(blocks: Blocks) -> None:
+def _eliminate_inner_unknowns(blocks: StiffnessBlocks) -> None:
     """Eliminate the unknowns `own` of parts in place: Cholesky factorisation own_own = L L^T.
 
     own_own becomes L^T, own_ring becomes L^-1 own_ring and ring_ring becomes the update of each
@@ -423,7 +423,7 @@ class GridFactor:
         return u
 
 
-class Parts(NamedTuple):
+class LevelParts(NamedTuple):
     """All parts of one shape on one level of the dissection.
 
     - ``corners``: (g, 2) column and row of the first node of every part
@@ -435,7 +435,7 @@ class Parts(NamedTuple):
     halves: list
 
 
-def _dissect_levels(root: Shape) -> list[dict[Shape, Parts]]:
+def _dissect_levels(root: RegionShape) -> list[dict[RegionShape, LevelParts]]:
     """Halve a grid until only leaves remain, and return the parts of every level."""
     corners_by_shape = {root: np.zeros((1, 2), np.int64)}
     levels = []
@@ -449,7 +449,7 @@ def _dissect_levels(root: Shape) -> list[dict[Shape, Parts]]:
                 start = sum(map(len, stack))
                 stack.append(np.add(corners, (half.column, half.row)))
                 halves.append((half.shape, slice(start, start + len(corners))))
-            level[shape] = Parts(corners, halves)
+            level[shape] = LevelParts(corners, halves)
         levels.append(level)
         corners_by_shape = {shape: np.concatenate(stack) for shape, stack in below.items()}
     return levels
@@ -478,7 +478,7 @@ def eliminate_inner_nodes(stencil, *, keep_left: bool = False) -> GridFactor:
     columns, rows = stencil.shape[:2]
     stacks = []
     updates_below = {}
-    for level in reversed(_dissect_levels(Shape(columns - 1, rows, keep_left, False, False))):
+    for level in reversed(_dissect_levels(RegionShape(columns - 1, rows, keep_left, False, False))):
         updates = {}
         for shape, (corners, halves) in level.items():
             if halves:
@@ -578,7 +578,7 @@ def predict_work(nx: int, ny: int, is_mirrored: bool) -> WorkEstimate:
     """
     is_halved = is_mirrored and nx > 3
     columns = (nx + 1) // 2 if is_halved else nx
-    level = Counter({Shape(columns - 1, ny - 1, is_halved, False, False): 1})
+    level = Counter({RegionShape(columns - 1, ny - 1, is_halved, False, False): 1})
     shapes = fronts = factor_entries = max_updates = 0
     operations = 0.0
     while level:
@@ -600,13 +600,13 @@ def predict_work(nx: int, ny: int, is_mirrored: bool) -> WorkEstimate:
     kept = 2 * (columns + (ny - 2 if is_halved else 0))
     operations += kinds * (kept**3 / 3 + 2 * (2 * columns) ** 3 / 3)
     factor_entries += kinds * kept**2
-    stencil_entries = kinds * NODE_ENTRIES * nx * (ny - 1)
+    stencil_entries = kinds * ENTRIES_PER_NODE * nx * (ny - 1)
     compliance_entries = 5 * (2 * nx) ** 2
     other_entries = 2 * max_updates + stencil_entries + compliance_entries
     return WorkEstimate(shapes, fronts, factor_entries, operations, other_entries)
 
 
-def _count_unknowns(shape: Shape) -> tuple[int, int]:
+def _count_unknowns(shape: RegionShape) -> tuple[int, int]:
     """Count the unknowns that are eliminated with a part, and the unknowns of its ring."""
     kept_sides = shape.left + shape.right
     kept_lines = 1 + (shape.bottom and shape.n_free_rows > 1)

@@ -99,7 +99,7 @@ def make_effective_law(
         rest_growth, slip_growth = _scale_growth_rates(law, locate_key)
         changes |= {"rest_growth": rest_growth, "slip_growth": slip_growth}
     if law.spread is not None:
-        factor = spread.pad_factor(width, law.spread)
+        factor = spread.carried_fraction(width, law.spread)
         changes["static"] = law.static * factor
         changes["kinetic"] = None if law.kinetic is None else law.kinetic * factor
     return complete_bond_length(law.model_copy(update=changes), load)

@@ -380,7 +380,7 @@ def _law_groups(model: Model) -> dict:
     if model.spread is None:
         return {}
 
-    return {"share_of_the_spread": spread.pad_factor(model.pad, model.spread)}
+    return {"share_of_the_spread": spread.carried_fraction(model.pad, model.spread)}
 
 
 def _groove_words(model: Model) -> list:

@@ -19,7 +19,7 @@ N_ELEMENT_PARTS = 4  # number of parts into which each element but the first is 
 # down to 1/256 of this range then cause slip
 N_HALVINGS = 8
 # relative difference of yield displacements below which nodes at both ends of a contact count as one
-SAME_YIELD_TOL = 1e-6
+EQUAL_YIELD_TOL = 1e-6
 
 
 class SpreadElements(NamedTuple):
@@ -45,7 +45,7 @@ def spread_elements(stiffness, yield_displacement) -> SpreadElements:
     SpreadElements
     """
     k, y = np.asarray(stiffness, float), np.asarray(yield_displacement, float)
-    starts = np.flatnonzero(np.diff(y, prepend=-np.inf) > SAME_YIELD_TOL * y)
+    starts = np.flatnonzero(np.diff(y, prepend=-np.inf) > EQUAL_YIELD_TOL * y)
     total = np.add.reduceat(k, starts)
     y = np.add.reduceat(k * y, starts) / total
     if y.size < 2:

@@ -26,8 +26,8 @@ from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, one_thread
 
 # relative difference of yield displacements below which nodes yield together, as mirrored nodes do; the rounding
 # errors of a patch with 801 nodes are 7e-13
-SAME_YIELD_TOL = 1e-11
-MAX_SORTS = 2  # number of sorts of the nodes before neighbours are exchanged; sorting corrects large errors only
+EQUAL_YIELD_TOL = 1e-11
+MAX_SORTING_PASSES = 2  # number of sorts of the nodes before neighbours are exchanged; sorting corrects large errors only
 # exchanges of neighbours per node, after which nodes are eliminated one by one; patches need at most 1
 MAX_EXCHANGES = 20
 # number of modes with which a reduction starts; without a layer of asperities its error is 1e-6 of the friction limit
@@ -39,13 +39,13 @@ MIN_LANCZOS_POINTS = (
     128  # number of nodes from which it is faster to compute the most compliant modes alone
 )
 # matrix products of Lanczos' method, with two vectors each; it fails to converge only for a soft layer of asperities
-MAX_PRODUCTS = 24
+MAX_LANCZOS_PRODUCTS = 24
 # residual of a mode / largest eigenvalue; the relative error of an eigenvalue is the square of this ratio
 MODE_TOL = 1e-6
-GAUSS_COUNTS = (16, 32, 64)  # numbers of Gauss points that may represent the nodes of a patch
+GAUSS_POINT_COUNTS = (16, 32, 64)  # numbers of Gauss points that may represent the nodes of a patch
 # bond lengths by which a Newton step may move a node back; the law there is exp(2) times as steep as at rest
 MAX_BACKWARD_LENGTHS = 2.0
-N_DISPLACEMENTS = 24  # number of relative displacements at which backbones are compared
+N_BACKBONE_DISPLACEMENTS = 24  # number of relative displacements at which backbones are compared
 # largest relative displacement of a compared backbone [bond lengths], to which twice the displacement of the pieces is
 # added; the force there is within exp(-6) of its limit
 MAX_BACKBONE_LENGTHS = 6
@@ -140,9 +140,11 @@ class Spectrum:
         if self.tangential is None:
             displacement = self.shape @ (self.compliance * (self.shape.T @ self.limit))
         else:
-            displacement = _block(self.tangential, self.points) @ self.limit
+            displacement = _submatrix(self.tangential, self.points) @ self.limit
         largest = MAX_BACKBONE_LENGTHS * self.length + 2 * np.abs(displacement).max()
-        return largest * (np.arange(1, N_DISPLACEMENTS + 1) / N_DISPLACEMENTS) ** 2
+        return (
+            largest * (np.arange(1, N_BACKBONE_DISPLACEMENTS + 1) / N_BACKBONE_DISPLACEMENTS) ** 2
+        )
 
     def modes(self, count: int) -> "ShearModes":
         """Return the first `count` modes."""
@@ -273,12 +275,12 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         )
     # one thread: under load from other processes, waiting for a second one turns 5 ms into 270 ms
     with one_thread():
-        c = _block(tangential, points)
+        c = _submatrix(tangential, points)
         if local_length:
             c = c + np.diag(local_length / force)
         sequence, yield_displacements, n_reluctant = _find_order(c, force)
     starts = np.flatnonzero(
-        np.diff(yield_displacements, prepend=-np.inf) > SAME_YIELD_TOL * yield_displacements
+        np.diff(yield_displacements, prepend=-np.inf) > EQUAL_YIELD_TOL * yield_displacements
     )
     return JenkinsSet(
         frozen_array(np.add.reduceat(sequence.inverse_ones[::-1] ** 2, starts)),
@@ -292,7 +294,7 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
     )
 
 
-class _Sequence(NamedTuple):
+class _YieldSequence(NamedTuple):
     """Yield displacements of n nodes if they yield in a given order.
 
     - order (n,): indices of the nodes in reverse order of yielding
@@ -314,7 +316,7 @@ class _Sequence(NamedTuple):
         The order is then right.
         """
         return bool(
-            (self.displacements[1:] <= self.displacements[:-1] * (1 + SAME_YIELD_TOL)).all()
+            (self.displacements[1:] <= self.displacements[:-1] * (1 + EQUAL_YIELD_TOL)).all()
         )
 
 
@@ -326,7 +328,7 @@ class _YieldOrder(NamedTuple):
     - n_reluctant: number of nodes whose force has the wrong sign before any node yields
     """
 
-    sequence: _Sequence
+    sequence: _YieldSequence
     displacements: np.ndarray
     n_reluctant: int
 
@@ -344,7 +346,7 @@ def _find_order(c: np.ndarray, force: np.ndarray) -> _YieldOrder:
     rate = dpotrs(_factorise(c), np.ones(force.size), lower=1)[0]
     order = np.arange(force.size)
     displacements = _divide_or_inf(force, rate)
-    for _ in range(MAX_SORTS + 1):
+    for _ in range(MAX_SORTING_PASSES + 1):
         order = order[np.argsort(-displacements, kind="stable")]
         sequence = _yield_sequence(c, force, order)
         displacements = sequence.displacements
@@ -365,7 +367,7 @@ def _divide_or_inf(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray
     return np.divide(numerator, denominator, out=infinite, where=denominator > 0)
 
 
-def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _Sequence:
+def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _YieldSequence:
     """Return the yield displacements of nodes that yield in a given order.
 
     c: (n, n) compliance [m/N]; force: (n,) yield forces [N].
@@ -373,7 +375,7 @@ def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _Seq
     cholesky_factor = _factorise(c[np.ix_(order, order)])
     inverse_ones = dtrsm(1.0, cholesky_factor, np.ones((force.size, 1)), lower=1)[:, 0]
     factored_force = force[order] @ cholesky_factor
-    return _Sequence(
+    return _YieldSequence(
         order,
         cholesky_factor,
         inverse_ones,
@@ -382,7 +384,7 @@ def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _Seq
     )
 
 
-def _exchange_neighbours(sequence: _Sequence) -> _Sequence | None:
+def _exchange_neighbours(sequence: _YieldSequence) -> _YieldSequence | None:
     """Exchange neighbours until the yield displacements are sorted; None after MAX_EXCHANGES per node.
 
     An exchange changes the yields of these two nodes alone. L with two rows exchanged becomes lower triangular again by
@@ -398,7 +400,7 @@ def _exchange_neighbours(sequence: _Sequence) -> _Sequence | None:
     while pending:
         k = pending.pop()
         is_neighbour = 0 <= k < len(order) - 1
-        if not (is_neighbour and displacements[k + 1] > displacements[k] * (1 + SAME_YIELD_TOL)):
+        if not (is_neighbour and displacements[k + 1] > displacements[k] * (1 + EQUAL_YIELD_TOL)):
             continue
         remaining -= 1
         if remaining < 0:
@@ -420,7 +422,7 @@ def _exchange_neighbours(sequence: _Sequence) -> _Sequence | None:
             displacements[i] = factored_force[i] / inverse_ones[i] if is_positive else np.inf
         pending += [k + 1, k - 1]
     lists = (order, factor, inverse_ones, factored_force, displacements)
-    return _Sequence(*map(np.array, lists))
+    return _YieldSequence(*map(np.array, lists))
 
 
 def _factorise(c: np.ndarray) -> np.ndarray:
@@ -533,7 +535,7 @@ def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
     together.
     """
     root = np.sqrt(limit)[:, None]
-    c = _block(tangential, index)
+    c = _submatrix(tangential, index)
 
     def product(vectors: np.ndarray) -> np.ndarray:
         """Multiply by D^1/2 C D^1/2."""
@@ -541,7 +543,7 @@ def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
 
     with one_thread():
         values, vectors, residual = largest_eigenpairs(
-            product, root[:, 0], N_REFERENCE_MODES, MAX_PRODUCTS
+            product, root[:, 0], N_REFERENCE_MODES, MAX_LANCZOS_PRODUCTS
         )
     if not residual <= MODE_TOL * values[0]:
         return None
@@ -549,7 +551,7 @@ def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
     return Spectrum(points, limit, vectors / root, values, length, tangential)
 
 
-def _block(tangential, index) -> np.ndarray:
+def _submatrix(tangential, index) -> np.ndarray:
     """Return the compliance (a, a) between the nodes `index` (a,), a view if they are adjacent."""
     if index[-1] - index[0] >= index.size:
         return tangential[np.ix_(index, index)]
@@ -716,7 +718,7 @@ def fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float) -> G
     -------
     GaussModes
     """
-    for count in GAUSS_COUNTS:
+    for count in GAUSS_POINT_COUNTS:
         if 2 * count > x.size:
             break
         on_gauss = modes_on_gauss(modes, x, count)

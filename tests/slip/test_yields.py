@@ -36,14 +36,18 @@ def half_plane(count: int):
 # the order of no yields alone is put right by exchanges, or by points that are taken out one by one
 @pytest.mark.parametrize(
     ("tries", "swaps"),
-    [(shear_modes.MAX_SORTS, shear_modes.MAX_EXCHANGES), (0, shear_modes.MAX_EXCHANGES), (0, -1)],
+    [
+        (shear_modes.MAX_SORTING_PASSES, shear_modes.MAX_EXCHANGES),
+        (0, shear_modes.MAX_EXCHANGES),
+        (0, -1),
+    ],
 )
 @pytest.mark.parametrize("count", [1, 2, 7, 60])
 @pytest.mark.parametrize("local", [0.0, 0.05])
 def test_exact_the_order_is_that_of_a_system_solved_anew_after_every_yield(
     count, local, tries, swaps, monkeypatch
 ):
-    monkeypatch.setattr(shear_modes, "MAX_SORTS", tries)
+    monkeypatch.setattr(shear_modes, "MAX_SORTING_PASSES", tries)
     monkeypatch.setattr(shear_modes, "MAX_EXCHANGES", swaps)
     r = np.random.default_rng(count)
     limit, c = r.uniform(0.5, 2, count), half_plane(count)

@@ -18,9 +18,11 @@ from ..unilateral import RESIDUAL_TOL
 from .arrays import Cases, NestedStretches, make_cases
 
 kernels = compiled.load("contact.batch.interval_kernels")
-N_TRIES = 12  # left ends that are tried if the stretch is known; beyond them all others are tried
+MAX_LEFT_ENDS = (
+    12  # left ends that are tried if the stretch is known; beyond them all others are tried
+)
 MIN_COARSE_NODES = 40  # nodes above which the contacts are first located on a coarser interface
-COARSENING = 4  # the coarse interface has every fourth node
+COARSENING_FACTOR = 4  # the coarse interface has every fourth node
 BATCH_SIZE = 256  # cases that are solved together, so that their forces stay in the cache
 MIN_PARABOLA_NODES = 3  # nodes in contact from which a stiffness is interpolated between sets
 
@@ -119,7 +121,7 @@ class Intervals:
         first_try = np.broadcast_to(first, n_cases).astype(int)
         is_known = first_try.any()
         cases = make_cases(first_try, np.broadcast_to(stop, n_cases).astype(int), gap, loads)
-        n_tries = N_TRIES if is_known else m
+        n_tries = MAX_LEFT_ENDS if is_known else m
         self._solve_all(cases, int(first_try.min()) - 1, 0, n_tries, is_free=is_free)
         displacement = cases.solutions.force @ self.c
         opening = self._opening(gap, displacement, cases.solutions.motion)
@@ -150,11 +152,13 @@ class Intervals:
 
         The brackets follow from the contacts on a coarse interface.
         """
-        coarse = Intervals(self.c[::COARSENING, ::COARSENING], self.x[::COARSENING])
-        contacts = coarse._press(gap[:, ::COARSENING], loads, None, is_free=is_free)
+        coarse = Intervals(
+            self.c[::COARSENING_FACTOR, ::COARSENING_FACTOR], self.x[::COARSENING_FACTOR]
+        )
+        contacts = coarse._press(gap[:, ::COARSENING_FACTOR], loads, None, is_free=is_free)
         has_end = contacts.stop > 0
-        first = np.where(has_end, COARSENING * (contacts.first - 1), 0)
-        stop = np.where(has_end, COARSENING * contacts.stop + 2, self.x.size)
+        first = np.where(has_end, COARSENING_FACTOR * (contacts.first - 1), 0)
+        stop = np.where(has_end, COARSENING_FACTOR * contacts.stop + 2, self.x.size)
         return first, stop
 
     def fill_sums(self, first: np.ndarray) -> None:

@@ -29,7 +29,7 @@ from .list_forms_kernels import (
     MAX_STRIP_LENGTH,
 )
 from .list_math_kernels import bond_gammainc, fast_exp, fast_log
-from .list_merge_kernels import merge
+from .list_merge_kernels import merge_strips
 from .list_rows_kernels import (
     CLOCK,
     GROWING_ROW,
@@ -41,7 +41,7 @@ from .list_rows_kernels import (
     STRIP,
 )
 from .list_sum_kernels import (
-    MIN_LENGTH,
+    MIN_LENGTH_RATIO,
     BondSum,
     MatureBonds,
     StripRange,
@@ -118,7 +118,7 @@ class MeanForce(NamedTuple):
     slope: float
 
 
-class MomentsOfStrip(NamedTuple):
+class StripMoments(NamedTuple):
     """Moments of the bonds of a strip in bond lengths: weight, distance of the centre from the end, variance."""
 
     weight: float
@@ -127,7 +127,7 @@ class MomentsOfStrip(NamedTuple):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _advance(increment, clocks, growth, v0, v1, dt):
+def _advance_clocks(increment, clocks, growth, v0, v1, dt):
     """Return the clocks after an increment at velocities from v0 to v1."""
     path = abs(increment)
     before = clocks[CLOCK.length]
@@ -183,7 +183,7 @@ def _formed_growing_force(path, before, after, law):
     for piece in range(int(pieces.kept)):
         for point in range(2):
             fraction = (piece + (GAUSS_POINT_1 if point == 0 else GAUSS_POINT_2)) / pieces.count
-            length = max(-target * expm1(-fraction * growth), MIN_LENGTH * after.length)
+            length = max(-target * expm1(-fraction * growth), MIN_LENGTH_RATIO * after.length)
             x = fraction * path / length
             total += fast_exp(law[LAW.order] * fast_log(x) - x)
     return total * law[LAW.inverse_gamma] * path / (2 * pieces.count * law[LAW.length])
@@ -206,7 +206,7 @@ def sum_list(increment, bond_list, v0, dt):
     BondSum
         Force [1] and energy [m] per friction limit.
     """
-    after = _advance(increment, bond_list.now, bond_list.growth, v0, v0, dt)
+    after = _advance_clocks(increment, bond_list.now, bond_list.growth, v0, v0, dt)
     initial = sum_initial(after.displacement, after.path, after.damage, bond_list.law)
     formed = _sum_strips(increment, bond_list, v0, dt)
     pressure = bond_list.status[STATUS.initial_pressure]
@@ -223,7 +223,7 @@ def _sum_strips(increment, bond_list, v0, dt):
     clocks = bond_list.now
     law = bond_list.law
     form = law[LAW.form]
-    after = _advance(increment, clocks, bond_list.growth, v0, v0, dt)
+    after = _advance_clocks(increment, clocks, bond_list.growth, v0, v0, dt)
     head = int(status[STATUS.head])
     strips = StripRange(head, head + int(status[STATUS.n_spread]), int(status[STATUS.end]))
     eps0 = law[LAW.length]
@@ -294,7 +294,7 @@ def list_energy(increment, bond_list, v0, dt):
     float
     """
     law = bond_list.law
-    eps = _advance(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
+    eps = _advance_clocks(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
     formed = eps * eps / law[LAW.length] * bond_gammainc(law[LAW.order] + 1, abs(increment) / eps)
     return (
         bond_list.status[STATUS.pressure] * formed + sum_list(increment, bond_list, v0, dt).energy
@@ -404,7 +404,7 @@ def _mean_from_energy(is_short, increment, bond_list, v0, dt):
     """Return the path-mean force from the energy balance: loss by damage plus gain in stored energy."""
     last = list_energy(increment, bond_list, v0, dt)
     gain = last - bond_list.status[STATUS.energy]
-    eps = _advance(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
+    eps = _advance_clocks(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
     if is_short:
         stored = _average_by_simpson(True, last, increment, bond_list, v0, dt)
     else:
@@ -532,26 +532,26 @@ def list_step(increment, bond_list, v0, v1, dt):
         clocks[CLOCK.length],
         0.0,
     )
-    after = _advance(increment, clocks, bond_list.growth, v0, v1, dt)
+    after = _advance_clocks(increment, clocks, bond_list.growth, v0, v1, dt)
     clocks[CLOCK.displacement] = after.displacement
     clocks[CLOCK.path] = after.path
     clocks[CLOCK.damage] = after.damage
     clocks[CLOCK.growth] = after.growth
     clocks[CLOCK.length] = after.length
-    _rescale(bonds, status, clocks, law)
+    _move_reference(bonds, status, clocks, law)
     has_room = True
     if increment != 0 and status[STATUS.pressure] > 0:
         formation = Formation(
             increment, before, after, status[STATUS.pressure], clocks[CLOCK.reference]
         )
-        has_room = _append(formation, bond_list)
+        has_room = _append_strip(formation, bond_list)
     if increment != 0:
         _drop_old_strips(bonds, status, clocks, law)
         n_strips = status[STATUS.end] - status[STATUS.head]
         # a merge visits the whole list, so it waits until the list has grown by a fifth
         has_grown = n_strips > 1.2 * status[STATUS.n_after_merge] + MIN_STRIPS_BETWEEN_MERGES
         if law[LAW.merge_width] > 0 and has_grown:
-            merge(bonds, status, clocks, law)
+            merge_strips(bonds, status, clocks, law)
     total = sum_list(0.0, bond_list, 0.0, 0.0)
     status[STATUS.force] = total.force
     status[STATUS.energy] = total.energy
@@ -561,7 +561,7 @@ def list_step(increment, bond_list, v0, v1, dt):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _rescale(bonds, status, clocks, law):
+def _move_reference(bonds, status, clocks, law):
     """Move the reference of the scaled numbers to the present clock before the numbers overflow."""
     form = law[LAW.form]
     if form == FORM_REPORT:
@@ -583,7 +583,7 @@ def _rescale(bonds, status, clocks, law):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _append(formation, bond_list):
+def _append_strip(formation, bond_list):
     """Append the strips of an increment, the oldest first; return False if the list is full."""
     increment, before, after, pressure, _ = formation
     bonds = bond_list.bondlist
@@ -601,7 +601,7 @@ def _append(formation, bond_list):
     end = int(status[STATUS.end])
     capacity = min(int(status[STATUS.room_end]), bonds.shape[1])
     if end + pieces.kept > capacity:
-        end = _pack(bonds, status)
+        end = _pack_strips(bonds, status)
         if end + pieces.kept > capacity:
             return False
     for piece in range(int(pieces.kept) - 1, -1, -1):
@@ -703,14 +703,14 @@ def _write_moments(formation, bonds, k):
 def _surviving_moments(x):
     """Return the moments of the bonds that form on a path of x bond lengths and survive it."""
     if x < MAX_SERIES_PATH:
-        return MomentsOfStrip(
+        return StripMoments(
             x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5)))),
             x * (1 / 2 - x / 12 * (1 - x * x / 60)),
             x * x / 12 * (1 - x * x / 20),
         )
     decay = exp(-x)
     weight = -expm1(-x)
-    return MomentsOfStrip(
+    return StripMoments(
         weight, 1 - x * decay / weight, max(1 - x * x * decay / (weight * weight), 0.0)
     )
 
@@ -737,7 +737,7 @@ def _drop_old_strips(bonds, status, clocks, law):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _pack(bonds, status):
+def _pack_strips(bonds, status):
     """Move the list to the start of the array; return the index after its last strip."""
     head = int(status[STATUS.head])
     end = int(status[STATUS.end])

@@ -39,7 +39,7 @@ MAX_AGE = 200.0  # age in bond lengths beyond which the permitted width no longe
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def merge(bonds, status, clocks, law):
+def merge_strips(bonds, status, clocks, law):
     """Merge neighbouring strips that together are narrow for their age.
 
     The largest width is merge_width eps_0 exp(R/(3 eps_0)) at the path R since the bonds formed. Two strips of one pass

@@ -26,7 +26,7 @@ from .list_rows_kernels import GROWING_ROW, LAW, MOMENT, POWER_ROW, REPORT_ROW, 
 MIN_GROWING_RATIO = 0.05
 UNSTRESSED_TOL = 1e-14  # displacement / path; below it, the initial bonds count as unstressed
 # smallest length of a growing bond / that of mature bonds, which keeps R/length finite
-MIN_LENGTH = 1e-9
+MIN_LENGTH_RATIO = 1e-9
 MIN_PATH = 1e-300  # smallest path [m] since a bond formed, which keeps its logarithm finite
 # width / distance; below it, a spread strip acts as if concentrated at one position
 MIN_SPREAD_RATIO = 1e-4
@@ -442,7 +442,7 @@ def _gauss_path_ratios(path, mature, bonds, k):
     """Return the path / bond length R/eps of growing bonds at both Gauss points of a strip."""
     near = path - bonds[STRIP.clock, k]
     width = bonds[STRIP.clock_width, k]
-    min_length = MIN_LENGTH * mature.length
+    min_length = MIN_LENGTH_RATIO * mature.length
     length_1 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length)
     length_2 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length)
     path_1 = max(near + GAUSS_POINT_1 * width, MIN_PATH)
@@ -501,7 +501,7 @@ def _bond_length(fraction, mature, bonds, k):
     start = interpolate_start_length(
         fraction, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k]
     )
-    return max(mature.length - mature.scale * start, MIN_LENGTH * mature.length)
+    return max(mature.length - mature.scale * start, MIN_LENGTH_RATIO * mature.length)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

@@ -8,7 +8,7 @@ With the distance t = |y - y1| the double integral is int_0^b 2 (b - t) W(t/rho)
 from math import erf, expm1, pi, sqrt
 
 
-def pad_factor(width: float, spread: float) -> float:
+def carried_fraction(width: float, spread: float) -> float:
     """Return the fraction of the friction force that a pad of finite width carries.
 
     E = erf(x/sqrt 2) - sqrt(2/pi) (1 - exp(-x^2/2))/x [1] with x = b/rho, for a pad of width b [m] and a spread rho [m] of

@@ -30,7 +30,7 @@ from scipy.special import gammainc, gammaln, roots_jacobi
 
 from .parameters import Bonds, grown_fraction
 
-N_POINTS = 8  # number of Gauss points of a piece
+N_GAUSS_POINTS = 8  # number of Gauss points of a piece
 MAX_PIECE_LENGTH = 0.25  # longest piece in bond lengths
 MAX_GROWTH_PIECES = 16  # largest number of pieces of a strip due to growth, one per unit of J
 FULL_GROWTH = 36.0  # growth J after which the starting length of a bond does not matter
@@ -39,7 +39,7 @@ UNSTRESSED_TOL = 1e-14
 REVERSAL_TOL = (
     1e-9  # distance of u = 0 from a cut / length of the strip; below it, u = 0 lies at the cut
 )
-MIN_CUT = 1e-15  # length of the shortest piece / length of the part that is cut
+MIN_PIECE_FRACTION = 1e-15  # length of the shortest piece / length of the part that is cut
 MIN_POSITIVE = 1e-300  # smallest argument of a logarithm and smallest divisor
 
 
@@ -111,14 +111,14 @@ class Strips:
     play: float = 0.0
 
 
-class _Stretch(NamedTuple):
+class _StretchComponents(NamedTuple):
     """Stretch at the end of strips (k,) [m]: component along the strip, distance from its line."""
 
     along: np.ndarray
     across: np.ndarray
 
 
-class _Parts(NamedTuple):
+class _StripParts(NamedTuple):
     """Parts of strips on which u does not change its sign, each (n,).
 
     - strip: index of the strip
@@ -133,7 +133,7 @@ class _Parts(NamedTuple):
     is_zero_at_end: np.ndarray
 
 
-class _Distances(NamedTuple):
+class _SingularityDistances(NamedTuple):
     """Distances (n,) [m] of parts from points where the integrand is not smooth, inf without them.
 
     - nearest: distance of the part from the nearest point of any kind
@@ -144,7 +144,7 @@ class _Distances(NamedTuple):
     origin: np.ndarray
 
 
-class _Pieces(NamedTuple):
+class _IntegrationPieces(NamedTuple):
     """Pieces of strips, each with one Gauss rule (n,).
 
     - strip: index of the strip
@@ -207,18 +207,18 @@ def strip_weights(state: Strips, law: Bonds) -> np.ndarray:
     return weights
 
 
-def _norm(vectors) -> np.ndarray:
+def _vector_norms(vectors) -> np.ndarray:
     """Return the lengths (...) of vectors (..., d)."""
     if vectors.shape[-1] == 1:
         return np.abs(vectors[..., 0])
     return np.sqrt((vectors * vectors).sum(axis=-1))
 
 
-def _resolve_stretch(strips: Strip, now: PathState) -> _Stretch:
+def _resolve_stretch(strips: Strip, now: PathState) -> _StretchComponents:
     """Resolve the stretch of bonds at the end of strips into the components along and across them."""
     stretch = now.displacement - strips.end.displacement
     along = (stretch * strips.direction).sum(axis=1)
-    return _Stretch(along, _norm(stretch - strips.direction * along[:, None]))
+    return _StretchComponents(along, _vector_norms(stretch - strips.direction * along[:, None]))
 
 
 def _weight_function(law: Bonds, x, damage) -> np.ndarray:
@@ -235,7 +235,7 @@ def _energy_divisor(law: Bonds) -> float:
 def _cohort_weights(cohorts: Strip, now: PathState, law: Bonds) -> np.ndarray:
     """Return force and energy of cohorts: (|u|/eps_0)^p exp(-D) or phi(R/eps_0), along u."""
     stretch = now.displacement - cohorts.end.displacement
-    size = _norm(stretch)
+    size = _vector_norms(stretch)
     path = now.path - cohorts.end.path
     if law.reading == "stretch":
         force = _weight_function(law, size / law.length, now.damage - cohorts.end.damage)
@@ -306,7 +306,7 @@ def _sum_points(strips: Strip, now: PathState, distance, weight, law: Bonds) -> 
     """
     at_end = (now.displacement - strips.end.displacement)[:, None]
     stretch = at_end + distance[..., None] * strips.direction[:, None]
-    size = _norm(stretch)
+    size = _vector_norms(stretch)
     if law.reading == "stretch":
         eps = strips.bond_length[:, None]
         x = size / eps
@@ -334,11 +334,11 @@ def _bond_lengths(strips: Strip, now: PathState, distance, law: Bonds):
     return np.maximum(now.mature_length - mature_at_start * np.exp(-age), MIN_POSITIVE)
 
 
-def _divide_strips(strips: Strip, now: PathState, law: Bonds) -> _Pieces:
+def _divide_strips(strips: Strip, now: PathState, law: Bonds) -> _IntegrationPieces:
     """Divide strips into pieces on which a Gauss rule is accurate, by the rules of the module."""
     stretch = _resolve_stretch(strips, now)
     parts = _split_at_zero_stretch(strips, stretch)
-    distances = _distances(strips, now, law, stretch, parts)
+    distances = _singularity_distances(strips, now, law, stretch, parts)
     eps = strips.bond_length[parts.strip]
     growth = _active_growth(strips, now, law, parts)
     # for reading="report" the integrand only changes its sign at u = 0
@@ -379,10 +379,10 @@ def _divide_strips(strips: Strip, now: PathState, law: Bonds) -> _Pieces:
         for column, values in zip(columns, new):
             column.append(values)
     part, start, length, steep_end = (np.concatenate(column) for column in columns)
-    return _Pieces(parts.strip[part], start, length, steep_end)
+    return _IntegrationPieces(parts.strip[part], start, length, steep_end)
 
 
-def _split_at_zero_stretch(strips: Strip, stretch: _Stretch) -> _Parts:
+def _split_at_zero_stretch(strips: Strip, stretch: _StretchComponents) -> _StripParts:
     """Split strips where u = 0; strips whose line does not pass through u = 0 stay whole."""
     is_straight = stretch.across == 0
     cut = np.where(is_straight, np.clip(-stretch.along, 0.0, strips.length), 0.0)
@@ -393,7 +393,7 @@ def _split_at_zero_stretch(strips: Strip, stretch: _Stretch) -> _Parts:
     strip, start, length = strip[has_length], start[has_length], length[has_length]
     # u = 0 lies at this cut, which may also be an end of the strip
     has_zero = is_straight & (np.abs(cut + stretch.along) <= REVERSAL_TOL * strips.length)
-    return _Parts(
+    return _StripParts(
         strip,
         start,
         length,
@@ -402,7 +402,7 @@ def _split_at_zero_stretch(strips: Strip, stretch: _Stretch) -> _Parts:
     )
 
 
-def _active_growth(strips: Strip, now: PathState, law: Bonds, parts: _Parts) -> np.ndarray:
+def _active_growth(strips: Strip, now: PathState, law: Bonds, parts: _StripParts) -> np.ndarray:
     """Return the growth J (n,) over parts, without that of bonds that are fully grown."""
     if law.reading != "report":
         return np.zeros(parts.strip.size)
@@ -411,9 +411,9 @@ def _active_growth(strips: Strip, now: PathState, law: Bonds, parts: _Parts) -> 
     return np.minimum(growth, np.maximum(remaining, 0.0))
 
 
-def _distances(
-    strips: Strip, now: PathState, law: Bonds, stretch: _Stretch, parts: _Parts
-) -> _Distances:
+def _singularity_distances(
+    strips: Strip, now: PathState, law: Bonds, stretch: _StretchComponents, parts: _StripParts
+) -> _SingularityDistances:
     """Return the distances of parts from points where the integrand is not smooth.
 
     The point u = 0 at an end of a part does not count.
@@ -427,26 +427,26 @@ def _distances(
     origin = np.full(parts.strip.size, np.inf)
     if law.reading == "report" and is_fractional:
         origin = now.path - strips.end.path[parts.strip]
-    return _Distances(np.minimum(nearest, origin + parts.start), origin)
+    return _SingularityDistances(np.minimum(nearest, origin + parts.start), origin)
 
 
 @cache
 def _legendre_rule() -> _GaussRule:
     """Return the Gauss-Legendre rule on (0, 1)."""
-    x, weights = np.polynomial.legendre.leggauss(N_POINTS)
+    x, weights = np.polynomial.legendre.leggauss(N_GAUSS_POINTS)
     return _GaussRule((1 + x) / 2, weights / 2)
 
 
 @cache
 def _jacobi_rule(order: float) -> _GaussRule:
     """Return the Gauss-Jacobi rule on (0, 1) for the weight t^order, with weights / t^order."""
-    x, weights = roots_jacobi(N_POINTS, 0.0, order)
+    x, weights = roots_jacobi(N_GAUSS_POINTS, 0.0, order)
     t = (1 + x) / 2
     return _GaussRule(t, weights / (2 ** (order + 1) * t**order))
 
 
 def _rules_of_pieces(steep_end, order: float) -> _GaussRule:
-    """Return Gauss rules (n, N_POINTS) of pieces; from a steep end the integrand grows as t^order."""
+    """Return Gauss rules (n, N_GAUSS_POINTS) of pieces; from a steep end the integrand grows as t^order."""
     legendre, jacobi = _legendre_rule(), _jacobi_rule(order)
     steep_end = steep_end[:, None]
     points = np.where(steep_end == -1, 1 - jacobi.points, legendre.points)
@@ -471,7 +471,9 @@ def _subdivide_near_singularities(
             abs(complex(max(low - point.real, point.real - high, 0.0), point.imag))
             for point in singular_points
         )
-        if high - low > max(min(max_length, min(gaps, default=np.inf)), MIN_CUT * length):
+        if high - low > max(
+            min(max_length, min(gaps, default=np.inf)), MIN_PIECE_FRACTION * length
+        ):
             middle = (low + high) / 2
             intervals += [(middle, high), (low, middle)]
         else:

@@ -16,12 +16,12 @@ import numpy as np
 
 from ..protocol import Element, SteadyLoop
 
-N_POINTS = 20  # number of Gauss points of a piece
-N_PIECES = 10  # number of pieces for the integrals over a half-loop
+N_GAUSS_POINTS = 20  # number of Gauss points of a piece
+N_INTEGRATION_PIECES = 10  # number of pieces for the integrals over a half-loop
 MAX_W = (
     30.0  # value of w = -ln(1 - y) beyond which 1 - y is below 1e-13 and dw/dx is n to round-off
 )
-MAX_NEWTON = 200  # iterations of Newton's method for the tip of a loop
+MAX_NEWTON_STEPS = 200  # iterations of Newton's method for the tip of a loop
 NEWTON_TOL = 1e-14  # change of w / (1 + w) at which Newton's method has converged
 
 
@@ -97,8 +97,8 @@ class BoucWen:
 @cache
 def _gauss_rule() -> tuple:
     """Return points and weights on (0, 1), in the fourth root, where fractional powers are smooth."""
-    points, weights = np.polynomial.legendre.leggauss(N_POINTS)
-    edges = np.linspace(0.0, 1.0, N_PIECES + 1)
+    points, weights = np.polynomial.legendre.leggauss(N_GAUSS_POINTS)
+    edges = np.linspace(0.0, 1.0, N_INTEGRATION_PIECES + 1)
     half = np.diff(edges)[:, None] / 2
     root = (edges[:-1, None] + half * (1 + points)).ravel()
     return root**4, (half * weights).ravel() * 4 * root**3
@@ -127,7 +127,7 @@ def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
     limit = friction.static * load
     target = 2 * np.asarray(amplitude, float) / law.length
     w = np.minimum(target / 2, 1.0)
-    for _ in range(MAX_NEWTON):
+    for _ in range(MAX_NEWTON_STEPS):
         half_loop = law._half_loop(w)
         step = (half_loop.displacement - target) / half_loop.displacement_by_w
         if np.all(np.abs(step) <= NEWTON_TOL * (1 + w)):

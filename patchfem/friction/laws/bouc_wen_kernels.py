@@ -30,13 +30,13 @@ IS_RATE_INDEPENDENT = True  # z depends on the path alone
 
 GAUSS_POINTS = np.polynomial.legendre.leggauss(8)[0]  # Gauss points in (-1, 1) of a piece
 GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)[1]  # weights of these points
-MAX_PIECE = 0.25  # longest interval of the Gauss rule in |y| or w
-FIRST_PIECE = 0.05  # longest interval at zero, where a fractional power is not smooth
+MAX_PIECE_LENGTH = 0.25  # longest interval of the Gauss rule in |y| or w
+FIRST_PIECE_LENGTH = 0.05  # longest interval at zero, where a fractional power is not smooth
 MAX_W = 36.0  # value of w beyond which y rounds to 1
 NEWTON_TOL = (
     1e-8  # residual / path at which Newton's method stops; the error is then the square of it
 )
-MAX_NEWTON = 40  # iterations of Newton's method
+MAX_NEWTON_STEPS = 40  # iterations of Newton's method
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -104,8 +104,8 @@ def _integrate_path(low, high, n, unloading, is_loading):
         area += flat
         high = min(high, MAX_W)
     is_whole = n % 1 == 0
-    if high > 2 * low and low < FIRST_PIECE and not is_whole:
-        end = min(high, FIRST_PIECE)
+    if high > 2 * low and low < FIRST_PIECE_LENGTH and not is_whole:
+        end = min(high, FIRST_PIECE_LENGTH)
         part, part_area = _integrate_from_zero(end, n, unloading, is_loading)
         path += part
         area += part_area
@@ -115,7 +115,9 @@ def _integrate_path(low, high, n, unloading, is_loading):
             area -= part_area
         low = end
     while low < high:
-        longest = MAX_PIECE if is_whole else min(MAX_PIECE, max(low, FIRST_PIECE))
+        longest = (
+            MAX_PIECE_LENGTH if is_whole else min(MAX_PIECE_LENGTH, max(low, FIRST_PIECE_LENGTH))
+        )
         size = min(longest, high - low)
         part, part_area = _integrate_piece(low, size, n, unloading, is_loading)
         path += part
@@ -140,7 +142,7 @@ def _unload(y, x, n, unloading):
     if path_to_zero <= x:
         return 0.0, x - path_to_zero, -area
     u = max(-y - x * (1 - unloading * (-y) ** n), 0.0)
-    for _ in range(MAX_NEWTON):
+    for _ in range(MAX_NEWTON_STEPS):
         residual = _integrate_path(u, -y, n, unloading, False)[0] - x
         u = min(max(u + residual * (1 - unloading * u**n), 0.0), -y)
         if abs(residual) <= NEWTON_TOL * x:
@@ -159,7 +161,7 @@ def _follow_path(y, x, n, s):
             return y, area
     start = -log1p(-y) if y < 1 - 1e-15 else MAX_W  # at the limit w has no bound
     w = start + x * _loading_rate(start, n)
-    for _ in range(MAX_NEWTON):
+    for _ in range(MAX_NEWTON_STEPS):
         residual = _integrate_path(start, w, n, 0.0, True)[0] - x
         w = max(w - residual * _loading_rate(w, n), start)
         if abs(residual) <= NEWTON_TOL * x:

@@ -19,7 +19,7 @@ from ...core import frozen_array
 from ..protocol import Element, SteadyLoop
 from .elastic_plastic import parallel_element
 
-N_CELLS = (
+N_SLIDER_CELLS = (
     768  # number of cells of the power law, each a Jenkins element; forces are exact to 1e-6 of F_S
 )
 MIN_CELL_RATIO = (
@@ -97,10 +97,10 @@ def _unit_sliders(chi: float, beta: float) -> Sliders:
     """Return the `slider_cells` of unit stiffness and unit phi_max."""
     power_law_fraction = 1 / (1 + beta)
     log_min = np.log(MIN_CELL_RATIO)
-    x = np.concatenate([[0.0], np.exp(np.linspace(log_min, 0.0, 20 * N_CELLS + 1))])
+    x = np.concatenate([[0.0], np.exp(np.linspace(log_min, 0.0, 20 * N_SLIDER_CELLS + 1))])
     log_part = np.clip(1 - np.log(np.maximum(x, MIN_CELL_RATIO)) / log_min, 0.0, 1.0)
     cell_fraction = (1 - LOG_CELL_FRACTION) * x ** (1 + chi / 2) + LOG_CELL_FRACTION * log_part
-    edges = np.interp(np.linspace(0.0, 1.0, N_CELLS + 1), cell_fraction, x)
+    edges = np.interp(np.linspace(0.0, 1.0, N_SLIDER_CELLS + 1), cell_fraction, x)
     stiffness = power_law_fraction * np.diff(edges ** (chi + 1))
     force = power_law_fraction * (chi + 1) / (chi + 2) * np.diff(edges ** (chi + 2))
     yield_displacement = force / stiffness

@@ -6,7 +6,7 @@ from ..bonds.parameters import Bonds
 from ..protocol import Element
 
 N_HEADER_NUMBERS = 9  # number of values of an element before those of its points
-CONSTANT_LENGTH = -1.0  # value of a_s that marks a constant bond length
+CONSTANT_LENGTH_FLAG = -1.0  # value of a_s that marks a constant bond length
 
 
 def growth_numbers(law: Bonds) -> np.ndarray:
@@ -16,7 +16,7 @@ def growth_numbers(law: Bonds) -> np.ndarray:
     the bond length that stretches without damage.
     """
     if not law.has_growth:
-        return np.array([CONSTANT_LENGTH, 1.0, 1.0, law.length, law.length, law.breakaway])
+        return np.array([CONSTANT_LENGTH_FLAG, 1.0, 1.0, law.length, law.length, law.breakaway])
     return np.array(
         [
             law.rest_growth,

@@ -20,7 +20,7 @@ from ..protocol_kernels import (
 
 NUMBER_UNITS = "N s/m"  # units of `numbers`, for batches that scale time and force
 HAS_SPEED_LAYER = True  # the force changes at speeds of the order of v_0
-MAX_ARGUMENT = 15.0  # argument beyond which tanh is 1 to within 2e-13
+MAX_TANH_ARGUMENT = 15.0  # argument beyond which tanh is 1 to within 2e-13
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -30,7 +30,7 @@ def tanh_fit(y):
     The value is y times a ratio of polynomials of y^2 with the smallest maximum error (Remez). Their terms are added
     in pairs, so that few operations wait for each other. It takes half the time of an exponential.
     """
-    w = min(max(y, -MAX_ARGUMENT), MAX_ARGUMENT)
+    w = min(max(y, -MAX_TANH_ARGUMENT), MAX_TANH_ARGUMENT)
     t = w * w
     t2 = t * t
     t4 = t2 * t2

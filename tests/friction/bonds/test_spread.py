@@ -6,7 +6,7 @@ from scene_texts import NONLOCAL, POINT, SHEAR, SHORT, SMALL_PATCH, TRIANGLE
 from scipy.integrate import dblquad
 
 from patchfem import SceneError, build, plan
-from patchfem.friction.bonds.spread import pad_factor
+from patchfem.friction.bonds.spread import carried_fraction
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -27,13 +27,13 @@ def test_exact_factor_is_the_double_integral_of_the_weight(width):
         epsabs=1e-13,
         epsrel=1e-12,
     )
-    assert pad_factor(width, 1.0) == pytest.approx(2 * total / width, rel=1e-11)
+    assert carried_fraction(width, 1.0) == pytest.approx(2 * total / width, rel=1e-11)
 
 
 @pytest.mark.parametrize("law", ["", 'reading = "report"\n', "order = 2\n"])
 def test_exact_every_force_of_a_bench_shrinks_by_the_factor(law):
     """12.7 mm of contact.width and the same normal.width give the same factor; kinetic keeps its ratio."""
-    share = pad_factor(12.7e-3, 4e-3)
+    share = carried_fraction(12.7e-3, 4e-3)
     point = POINT.replace("[normal]\n", '[normal]\nwidth = "12.7 mm"\n')
     for text in (point, SMALL_PATCH):
         whole, less = (
@@ -63,12 +63,14 @@ def test_exact_strips_share_the_whole_width():
         build(loads(SMALL_PATCH + LONGER + TRIANGLE, sets=SPREAD + more)).friction
         for more in ([], sets)
     )
-    assert one.static == four.static == pytest.approx(0.3 * pad_factor(12.7e-3, 4e-3), rel=1e-15)
+    assert (
+        one.static == four.static == pytest.approx(0.3 * carried_fraction(12.7e-3, 4e-3), rel=1e-15)
+    )
 
 
 @pytest.mark.parametrize("more", ["", SHEAR])
 def test_exact_a_rig_with_spread_is_a_rig_of_less_friction(more):
-    share = pad_factor(12.7e-3, 4e-3)
+    share = carried_fraction(12.7e-3, 4e-3)
     text = SMALL_PATCH + more + LONGER + SHORT
     one, two = (
         run(
