@@ -297,7 +297,7 @@ def write_tables(
     page : bool
         Whether report.html is written.
     every : bool
-        Whether sweep.csv and sweep.nc are written for more than TABLED cases.
+        Whether sweep.csv and sweep.nc are written for more than MAX_CASES_WITH_TABLES cases.
     sign : str
         From `sign_of` if every case has a result that is stored; else "".
     """

@@ -41,7 +41,7 @@ class Followed:
 
     @property
     def ledger(self) -> np.ndarray:
-        """Energy balance of the pass (4, k) [J], as of `ledger_of`."""
+        """Energy balance of the pass (4, k) [J], as of `make_ledger`."""
         work = np.concatenate([[0.0], np.cumsum(self.mean[:-1] * np.diff(self.slide))])
         losses = np.zeros((self.slide.size, 2))
         losses[1:, 0], losses[1:, 1] = -np.minimum(self.lost, 0.0), np.maximum(self.lost, 0.0)

@@ -137,7 +137,7 @@ class _LawHistories(NamedTuple):
     """Histories of k samples in d directions.
 
     - force (k, d), load (k,): [N].
-    - ledger (4, k): energies of `ledger_of` [J].
+    - ledger (4, k): energies of `make_ledger` [J].
     - tau (f, d, m): tractions in the frames [Pa].
     """
 

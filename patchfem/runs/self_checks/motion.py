@@ -30,7 +30,7 @@ MAX_SLIP_CORRECTION = 0.05
 def check_friction_harmonic(run: Evidence) -> Iterator[Finding]:
     """Compare the first harmonic of the friction force by two methods.
 
-    They are the equation of motion and the samples; see `balance_of` for both and for the
+    They are the equation of motion and the samples; see `energy_balance` for both and for the
     threshold. `equivalent_stiffness` is Re(F1/q1) by definition.
     """
     balance = run.balance
