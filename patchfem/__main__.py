@@ -79,8 +79,8 @@ from cyclopts import App, CycloptsError, Parameter
 
 from . import __version__
 from .commands import compare, import_, profile, run, scene, start, study, sweep, view_export
-from .commands.shared import Ended, Refused, say
-from .commands.streams import plain, ready
+from .commands.shared import Ended, Refused, print_message
+from .commands.streams import make_printable, prepare_streams
 from .formatting import rewrite_powers_of_ten
 
 # group -> verb -> (module of its function, which is loaded when the verb is used; what it does; arguments of an example)
@@ -214,7 +214,7 @@ def main(argv: list | None = None) -> None:
     """
     if argv is not None:
         sys.exit(run_command(argv))
-    code = run_command(sys.argv[1:], ready)
+    code = run_command(sys.argv[1:], prepare_streams)
     _exit_quickly(code)
     sys.exit(code)
 
@@ -264,7 +264,7 @@ def run_command(arguments: list, before=lambda: None) -> int:
     if atomic_write := sys.modules.get(f"{__package__}.disk.atomic_write"):
         atomic_write.forget_placed_paths()
     if arguments[:1] == ["help"]:
-        say(
+        print_message(
             "patchfem: `help` is not a verb; `patchfem --help` lists the verbs, `patchfem run --help` explains the "
             "verb `run`"
         )
@@ -289,15 +289,15 @@ def run_command(arguments: list, before=lambda: None) -> int:
         message = str(error)
         if unused:
             message = _describe_unexpected_arguments(arguments[0], unused)
-        say(plain(f"patchfem: {' '.join(message.split())}"))
+        print_message(make_printable(f"patchfem: {' '.join(message.split())}"))
         return 2
     except Ended as end:
         return end.code
     except KeyboardInterrupt:
-        say(_describe_interrupt())
+        print_message(_describe_interrupt())
         return 130
     except MemoryError:
-        say(OUT_OF_MEMORY)
+        print_message(OUT_OF_MEMORY)
         return 4
     except SystemExit as end:  # the help ends in this way if its reader closes the pipe
         if isinstance(end.__context__, BrokenPipeError):
@@ -307,7 +307,7 @@ def run_command(arguments: list, before=lambda: None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        say(plain(_describe_os_error(error)))
+        print_message(make_printable(_describe_os_error(error)))
         return 4
     except Exception as error:
         code = _report_error(error)
@@ -329,20 +329,20 @@ def _report_error(error: Exception) -> int:
     """Print the message of an error to stderr and return the exit code; 1 for an internal fault."""
     # a shared library does not fit into memory
     if isinstance(error, ImportError) and "failed to map" in str(error):
-        say(OUT_OF_MEMORY)
+        print_message(OUT_OF_MEMORY)
         return 4
     # this is a SceneError; importing the class would import pydantic, which takes 20 ms
     if hasattr(error, "mistakes"):
         for line in error.mistakes:
-            say(plain(rewrite_powers_of_ten(line)))
+            print_message(make_printable(rewrite_powers_of_ten(line)))
         return 2
     code = getattr(error, "code", None)
     if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
-        say(plain(rewrite_powers_of_ten(str(error))))
+        print_message(make_printable(rewrite_powers_of_ten(str(error))))
         return code
     message = " ".join(f"{type(error).__name__}: {error}".split())
-    say(plain(f"patchfem: internal fault{_locate_fault(error)}: {message}"))
-    say(
+    print_message(make_printable(f"patchfem: internal fault{_locate_fault(error)}: {message}"))
+    print_message(
         "patchfem: please report it: send these lines, the command, the scene with its files and what `patchfem "
         "doctor` says to the project's issue tracker; PATCHFEM_DEBUG=1 before the command shows the traceback"
     )

@@ -434,7 +434,7 @@ def cost(
     model = build(scene, **sets)
     tolerance = model.accuracy.tolerance
     setting = _require_text(over, "cost: over") or cost_curves.TOLERANCE
-    curve = cost_curves.curve(model, setting, _print_to_stderr if say is None else say)
+    curve = cost_curves.setting_curve(model, setting, _print_to_stderr if say is None else say)
     if out is not None:
         cost_files.write(Path(out), {setting: curve})
         cost_files.write_picture(Path(out), setting, curve, tolerance)
@@ -500,7 +500,7 @@ def backbone(
     if amplitudes is not None:
         values = axes.read_lengths(_format_lengths(amplitudes), "amplitudes")
     curves = backbones.backbone(model, _require_text(mode, "backbone: mode"), values, methods)
-    return backbone_files.contents(curves, model.source.title).to_xarray()
+    return backbone_files.backbone_contents(curves, model.source.title).to_xarray()
 
 
 @_name_keys_only
@@ -585,11 +585,11 @@ def sweep(
     else:
         place = sweep_run.SweepTarget(Path(out), resume)
         results = sweep_run.sweep_into(asked, cases, place, pool, _print_to_stderr)
-        names = [] if place.kept(len(cases)) == "none" else cases.names(asked)
-    keys = [folder.key_of(name) for name in names]
-    table = page.table_of(asked, cases, results, (), Path(out or ""))
+        names = [] if place.kept_files(len(cases)) == "none" else cases.names(asked)
+    keys = [folder.case_folder_name(name) for name in names]
+    table = page.sweep_table(asked, cases, results, (), Path(out or ""))
     answer = headline.summarise_sweep(table).answer()
-    return tables.contents(asked, cases, results, keys, answer).to_xarray()
+    return tables.table_contents(asked, cases, results, keys, answer).to_xarray()
 
 
 def _is_empty(values: Any) -> bool:
@@ -685,7 +685,7 @@ class SweepPlots:
                 "plot.backbone: a Dataset returned by pf.backbone is needed, with at least one curve"
                 + (f"; {reason}" if reason else "")
             )
-        figure = pictures.draw_charts.figure(backbone_files.drawn(curves), onto=ax)
+        figure = pictures.draw_charts.figure(backbone_files.backbone_charts(curves), onto=ax)
         return figure.axes[0] if ax is None else ax
 
 
@@ -924,7 +924,7 @@ def profile(
         surface = surfaces.read_surface(_require_path(file, "profile"), units)
         reports.append(roughness_report.make_report(surface, cutoff=length, window=ends))
     return {
-        "profiles": [roughness.data_of(trace_report) for trace_report in reports],
+        "profiles": [roughness.roughness_data(trace_report) for trace_report in reports],
         "means": roughness.means_data(reports),
     }
 
@@ -958,7 +958,7 @@ def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None
     'both.html'
     """
     target = None if out is None else _require_path(out, "report: out")
-    return Path(page_of_several.report_of(_require_paths(folders, "report"), target))
+    return Path(page_of_several.write_report(_require_paths(folders, "report"), target))
 
 
 def export(
@@ -1007,7 +1007,7 @@ def export(
     folder = _require_path(folder, "export")
     out = _require_path(out, "export: out")
     if folder.suffix != ".toml":
-        convert.export(folder, out, frame, histories, of)
+        convert.export_results(folder, out, frame, histories, of)
     elif frame is not None or histories or of:
         raise PatchfemError(
             "the options `frame`, `histories` and `of` can be used only with a results folder; from a "
@@ -1016,7 +1016,7 @@ def export(
     else:
         from .export.lab import structures
 
-        structures.export(build_without_sweep(load(folder)), out)
+        structures.export_structure(build_without_sweep(load(folder)), out)
     return out
 
 
@@ -1053,7 +1053,7 @@ def view(
     >>> pf.view(folder, "patch.html")
     """
     target = None if out is None else _require_path(out, "view: out")
-    convert.view(_require_path(folder, "view"), target, frame, magnify)
+    convert.view_results(_require_path(folder, "view"), target, frame, magnify)
 
 
 def import_(
@@ -1226,13 +1226,13 @@ def compare(
                 "compare: give two results folders alone, without other files or settings of traces"
             )
         wear = worn_runs.compare_runs(*files)
-        return worn.data_of(wear, worn.verdict(wear))
+        return worn.wear_data(wear, worn.wear_verdict(wear))
     if pairs is None:
-        return compared_data.data_of(*verdict.judge_files(files, direction, **settings))
+        return compared_data.comparison_data(*verdict.judge_files(files, direction, **settings))
     if files:
         raise PatchfemError("compare: give either files or a table of pairs, not both")
     table = pairs_tables.read_pairs(_require_path(pairs, "compare: pairs"))
-    return pairs_data.data_of(pairs_data.answers(table, direction, **settings))
+    return pairs_data.pairs_data(pairs_data.compare_pairs(table, direction, **settings))
 
 
 def _read_scene_text(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
@@ -1346,7 +1346,7 @@ class Measures(Mapping):
 
     def __repr__(self) -> str:
         return "\n".join(
-            sentences.table_of(
+            sentences.format_measures(
                 {
                     name: summaries.measure_object(measure)
                     for name, measure in self._measures.items()
@@ -1430,7 +1430,7 @@ class Plots:
             raise PatchfemError(
                 f"plot.{names[0]}: matplotlib Axes are needed as ax, not {ax!r:.60}"
             )
-        drawn = run_page.axes(self._result, names, ax, bodies)
+        drawn = run_page.draw_axes(self._result, names, ax, bodies)
         if drawn is None:
             raise PatchfemError(f"plot.{names[0]}: nothing to draw: {reason}")
         return drawn
@@ -1454,11 +1454,11 @@ class Result(run_result.Result):
 
     def _repr_html_(self) -> str:
         """Return the answer for a notebook: outcome, headline, measures in their groups, warnings."""
-        summary = summaries.summary_of(self)
+        summary = summaries.summarise_run(self)
         return sentences.notebook_html(
             summary,
-            sentences.verdict(summary),
-            summaries.cycles_of(self),
+            sentences.verdict_sentence(summary),
+            summaries.count_cycles(self),
             released.describe_release(self),
         )
 
@@ -1497,7 +1497,7 @@ class Result(run_result.Result):
 
     def to_xarray(self) -> Dataset:
         """Return the Dataset of result.nc: histories and fields with units, and the scene."""
-        return histories.contents(self).to_xarray()
+        return histories.result_contents(self).to_xarray()
 
     def save(self, folder: str | Path) -> Path:
         """Write the results folder, as `patchfem run -o` does. An older results folder is replaced.
@@ -1524,5 +1524,5 @@ class Result(run_result.Result):
         True
         """
         folder = _require_path(folder, "save")
-        results_folder.save(self, folder)
+        results_folder.save_run(self, folder)
         return folder

@@ -24,7 +24,7 @@ from command_line import (
 from scene_texts import BENCH, COATED, COULOMB, PLASTIC, POINT, SHEAR, STRUCTURE, TRIANGLE
 
 import patchfem as pf
-from patchfem.export.summary import PACKAGES, versions
+from patchfem.export.summary import PACKAGES, package_versions
 
 RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
 PATCH = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
@@ -291,7 +291,7 @@ def test_always_an_answer_before_pyplot_is_imported(scene, words):
 
 def test_exact_versions_are_those_of_the_installed_packages():
     """Also where importlib.metadata is loaded only when it is asked for."""
-    found = versions()
+    found = package_versions()
     assert set(found) == {"python", *PACKAGES}
     assert all(found[name] == version(name) for name in PACKAGES)
     for use in (

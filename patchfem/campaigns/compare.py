@@ -119,7 +119,7 @@ def run_both_surfaces(
     sides, failed = [], []
     for name, model in (("before", before), ("after", after)):
         try:
-            sides.append(_side(model, say))
+            sides.append(_run_side(model, say))
         except (PatchfemError, NotConverged) as error:
             sides.append(None)
             failed.append(f"the surface {name}: {error}")
@@ -138,7 +138,7 @@ def run_both_surfaces(
     return SurfaceRuns(title, *sides, tuple(failed), lacking)
 
 
-def _side(model: Model, say) -> SurfaceResult:
+def _run_side(model: Model, say) -> SurfaceResult:
     """Run a model and return its results."""
     result = run(plan(model), say)
     outcome, surface = result.outcome, patch_surface(result.patch, result.fields)
@@ -152,7 +152,7 @@ def _side(model: Model, say) -> SurfaceResult:
     )
 
 
-def data_of(found: SurfaceRuns) -> dict:
+def surface_runs_data(found: SurfaceRuns) -> dict:
     """Return the runs as plain data in SI."""
 
     def side(one: Measure | None):

@@ -4,7 +4,7 @@ In: a model, and the setting that varies. Out: a list of `Cost`, one per run, an
 cheapest setting that meets a tolerance.
 
 Read `tolerance_curve` first: it runs the scene at several tolerances, and if a run misses its
-tolerance, it tries the setting that the warnings of this run propose. `curve` varies one setting
+tolerance, it tries the setting that the warnings of this run propose. `setting_curve` varies one setting
 alone.
 
 Times are CPU seconds of this process and its children, because other work on the machine does not
@@ -31,7 +31,7 @@ from .numerical_settings import (
     NUMERICAL_SETTINGS,
     Setting,
     applicable_settings,
-    settings,
+    list_settings,
     with_setting,
     with_tolerance,
 )
@@ -42,10 +42,10 @@ __all__ = [
     "Cost",
     "applicable_settings",
     "changed_measures",
-    "curve",
+    "cost_sentence",
     "fastest_by_measure",
     "fastest_run",
-    "sentence",
+    "setting_curve",
     "tolerance_curve",
 ]
 TOLERANCE = "tolerance"  # name of the curve over tolerances, which is accepted in addition to NUMERICAL_SETTINGS
@@ -57,8 +57,8 @@ MIN_SECONDS_TIMED_ONCE = 0.3
 MAX_TRIAL_SECONDS = 10.0
 # A warning of a run ends with its tolerance and what to do; this second part may name a setting
 # that can be tried here.
-_REMEDY = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
-_PROPOSED = re.compile(r"set accuracy\.(steps_per_cycle|shear_modes|harmonics) = (\d+)")
+_REMEDY_TEXT = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
+_PROPOSED_SETTING = re.compile(r"set accuracy\.(steps_per_cycle|shear_modes|harmonics) = (\d+)")
 MIN_ELAPSED_RATIO = 1.5  # elapsed time / CPU time above which both times are reported
 EQUAL_COST_RATIO = 1.1  # ratio of CPU seconds up to which two runs count as equally expensive
 TIMING_SCATTER = 2e-3  # CPU seconds by which timings of the same short run differ
@@ -124,7 +124,7 @@ class Cost:
             for name, error in self.errors.items()
         )
 
-    def off(self, name: str) -> float | None:
+    def known_error(self, name: str) -> float | None:
         """Return the error of a measure; None if it is not known.
 
         It is the larger of the error that the run states and its distance to the best run.
@@ -132,20 +132,20 @@ class Cost:
         known = [part[name] for part in (self.errors, self.distances) if name in part]
         return max(known, default=None)
 
-    def waited(self) -> bool:
+    def has_waited(self) -> bool:
         """Return whether the elapsed time exceeds the CPU time so much that both are reported."""
         return self.wall_seconds > MIN_ELAPSED_RATIO * self.seconds
 
-    def same_as(self, other) -> bool:
+    def is_same_run(self, other) -> bool:
         """Return whether two settings that are numbers gave the same run bit for bit."""
         return None not in (self.value, other.value) and (self.values, self.errors) == (
             other.values,
             other.errors,
         )
 
-    def within(self, name: str, tolerance: float) -> bool:
+    def is_within(self, name: str, tolerance: float) -> bool:
         """Return whether the error of a measure is at most tolerance * |value| + floor."""
-        off = self.off(name)
+        off = self.known_error(name)
         return off is not None and off <= compute_allowed_error(
             tolerance, self.values[name], self.floors[name]
         )
@@ -180,7 +180,7 @@ def tolerance_curve(model: Model, say=None) -> list:
             one = _time_setting(setting, True, say)
             while one is not None:
                 # The runs are identical, so the faster timing holds for both.
-                if runs and one.same_as(runs[-1]):
+                if runs and one.is_same_run(runs[-1]):
                     quick = min(runs[-1], one, key=lambda each: each.seconds)
                     runs[-1], one = (
                         replace(each, seconds=quick.seconds, wall_seconds=quick.wall_seconds)
@@ -217,7 +217,7 @@ def _proposed_setting(setting: Setting, one: Cost, seconds: float) -> Setting | 
         CPU seconds that the next run may take.
     """
     for remedy in one.remedies:
-        if found := _PROPOSED.match(remedy):
+        if found := _PROPOSED_SETTING.match(remedy):
             key, count = found[1], int(found[2])
             before = (
                 getattr(setting.model.accuracy, key)
@@ -236,7 +236,7 @@ def _proposed_setting(setting: Setting, one: Cost, seconds: float) -> Setting | 
     return None
 
 
-def curve(model: Model, knob: str, say=None) -> list:
+def setting_curve(model: Model, knob: str, say=None) -> list:
     """Run a model with several values of a numerical setting, from coarse to fine.
 
     Parameters
@@ -268,7 +268,7 @@ def curve(model: Model, knob: str, say=None) -> list:
                 f"possible settings: {', '.join(mine) or 'none'}",
                 "",
             )
-        wanted = settings(model, knob)
+        wanted = list_settings(model, knob)
         # The first run includes imports and compilation, which the timings must not contain.
         _run_setting(wanted[0], "first run, not timed", None)
         runs, done = [], 0
@@ -278,7 +278,7 @@ def curve(model: Model, knob: str, say=None) -> list:
                 done += 1
                 runs[-1:] = (
                     [_merge_identical_runs(runs[-1], found)]
-                    if runs and found.same_as(runs[-1])
+                    if runs and found.is_same_run(runs[-1])
                     else [*runs[-1:], found]
                 )
         if done < 3:
@@ -286,11 +286,14 @@ def curve(model: Model, knob: str, say=None) -> list:
                 f"cost --over {knob}: runs with fewer than three values of this setting succeeded",
                 "",
             )
-    best = _best(runs)
-    return [one if one is best else replace(one, distances=_distances(one, best)) for one in runs]
+    best = _best_run(runs)
+    return [
+        one if one is best else replace(one, distances=_distances_to_best(one, best))
+        for one in runs
+    ]
 
 
-def _best(runs: list) -> Cost:
+def _best_run(runs: list) -> Cost:
     """Return the run that serves as reference: the finest value, or what the tolerance chooses.
 
     Of these two it is the run whose stated errors are the smaller ones for most measures.
@@ -307,7 +310,7 @@ def _best(runs: list) -> Cost:
     )
 
 
-def _distances(one: Cost, best: Cost) -> dict:
+def _distances_to_best(one: Cost, best: Cost) -> dict:
     """Return the distances of the values of a run from those of the best run, by measure."""
     return {
         name: abs(value - best.values[name])
@@ -351,13 +354,13 @@ def _time_setting(setting: Setting, coarse: bool, say, before=()) -> Cost | None
     """
     timings, one = [], None
     while one is None or (
-        len(timings) < TIMINGS and not any(one.same_as(other) for other in before)
+        len(timings) < TIMINGS and not any(one.is_same_run(other) for other in before)
     ):
-        kept, begin = _count_compiled(), (_cpu(), perf_counter())
+        kept, begin = _count_compiled(), (_measure_cpu(), perf_counter())
         found = _run_setting(setting, setting.label, say, coarse)
         if found is None:
             return None
-        timings.append((_cpu() - begin[0], perf_counter() - begin[1]))
+        timings.append((_measure_cpu() - begin[0], perf_counter() - begin[1]))
         measured, warnings, steps = found
         known = {name: m for name, m in measured.items() if m.value is not None}
         one = Cost(
@@ -371,24 +374,24 @@ def _time_setting(setting: Setting, coarse: bool, say, before=()) -> Cost | None
             {name: m.floor for name, m in known.items()},
             {},
             setting.model.accuracy.tolerance,
-            tuple(remedy[1] for text in warnings if (remedy := _REMEDY.search(text))),
+            tuple(remedy[1] for text in warnings if (remedy := _REMEDY_TEXT.search(text))),
             steps,
         )
         if one.seconds >= MIN_SECONDS_TIMED_ONCE and _count_compiled() == kept:
             break
     again = "".join(
-        f", the same run as with {other.words}" for other in before if one.same_as(other)
+        f", the same run as with {other.words}" for other in before if one.is_same_run(other)
     )
     if say is not None:
         say(
             f"{one.words}: {one.seconds:.2f} CPU s"
-            + f" ({one.wall_seconds:.2f} s elapsed)" * one.waited()
+            + f" ({one.wall_seconds:.2f} s elapsed)" * one.has_waited()
             + (again or ", timed once" * (one.timings == 1))
         )
     return one
 
 
-def _cpu() -> float:
+def _measure_cpu() -> float:
     """Return the CPU seconds of all threads of this process and of its children that have ended."""
     children = os.times()
     return process_time() + children.children_user + children.children_system
@@ -453,12 +456,12 @@ def fastest_by_measure(runs: list, tolerance: float) -> dict:
     """
     out = {}
     for name in changed_measures(runs):
-        good = _confirmed(runs, lambda one, name=name: one.within(name, tolerance))
+        good = _select_confirmed_runs(runs, lambda one, name=name: one.is_within(name, tolerance))
         out[name] = min(good, key=lambda one: one.seconds).label if good else None
     return out
 
 
-def _confirmed(runs: list, good) -> list:
+def _select_confirmed_runs(runs: list, good) -> list:
     """Return the runs that fulfil a condition, as do all finer runs whose error is known.
 
     What the tolerance chooses is judged on its own.
@@ -485,8 +488,9 @@ def fastest_run(runs: list, tolerance: float) -> Cost | None:
     None if there is no such run.
     """
     names = measures_with_error(runs)
-    good = _confirmed(
-        runs, lambda one: all(one.within(name, tolerance) for name in names if name in one.values)
+    good = _select_confirmed_runs(
+        runs,
+        lambda one: all(one.is_within(name, tolerance) for name in names if name in one.values),
     )
     least = min((one.seconds for one in good), default=inf)
     return next(
@@ -499,13 +503,13 @@ def fastest_run(runs: list, tolerance: float) -> Cost | None:
     )
 
 
-def sentence(runs: list, tolerance: float) -> str:
+def cost_sentence(runs: list, tolerance: float) -> str:
     """Return which setting meets a tolerance in the least time, or which measure misses it."""
     names = measures_with_error(runs)
     if one := fastest_run(runs, tolerance):
         return (
-            f"{one.words}: {_seconds(one)} per run, with every measure within the tolerance {tolerance:g}"
-            + _effect(runs, tolerance)
+            f"{one.words}: {_format_seconds(one)} per run, with every measure within the tolerance {tolerance:g}"
+            + _effect_sentence(runs, tolerance)
         )
     known = [one for one in runs if one.errors or one.distances]
     worst, least = min(
@@ -521,11 +525,11 @@ def sentence(runs: list, tolerance: float) -> str:
         )
     return (
         f"no setting meets the tolerance {tolerance:g}: the best run, with {least.words}, has an error of "
-        f"{share} in {worst.name} and takes {_seconds(least)}"
+        f"{share} in {worst.name} and takes {_format_seconds(least)}"
     )
 
 
-def _effect(runs: list, tolerance: float) -> str:
+def _effect_sentence(runs: list, tolerance: float) -> str:
     """Return a clause on settings that change nothing relevant; "" if they change something."""
     turned = changed_measures(runs)
     if len(runs) < 2 or any(
@@ -541,7 +545,7 @@ def _effect(runs: list, tolerance: float) -> str:
     )
 
 
-def _seconds(one: Cost) -> str:
+def _format_seconds(one: Cost) -> str:
     """Format CPU seconds with two digits."""
     return f"{format_number(one.seconds, 2)} CPU s"
 
@@ -562,10 +566,13 @@ def worst_error(one: Cost, names: list, tolerance: float) -> WorstError:
     sizes = {
         name: abs(one.values[name]) + one.floors[name] / tolerance
         for name in names
-        if one.off(name)
+        if one.known_error(name)
     }
     return max(
-        (WorstError(one.off(name) / size if size else inf, name) for name, size in sizes.items()),
+        (
+            WorstError(one.known_error(name) / size if size else inf, name)
+            for name, size in sizes.items()
+        ),
         default=WorstError(0.0, ""),
     )
 

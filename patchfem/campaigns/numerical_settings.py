@@ -70,7 +70,7 @@ def applicable_settings(model: Model) -> list:
     return out
 
 
-def settings(model: Model, knob: str) -> list:
+def list_settings(model: Model, knob: str) -> list:
     """Return the values of a setting from coarse to fine, including that of the scene.
 
     A value that the tolerance chooses comes last if the others are numbers.
@@ -150,7 +150,7 @@ def _integer_values(model: Model, knob: str) -> list:
     A small value of the scene has fewer coarser values: a quarter and a half of 1 are no numbers of
     shear modes.
     """
-    pinned, middle = _scene_value(model, knob), _middle(model, knob)
+    pinned, middle = _scene_value(model, knob), _middle_value(model, knob)
     words, models = "{} " + knob.replace("_", " "), {}
     for power in range(-2, N_VALUES - 2):
         value = max(1, round(middle * 2.0**power))
@@ -172,7 +172,7 @@ def _scene_value(model: Model, knob: str) -> int | None:
     return model.wear.jumps if knob == "jumps" else getattr(model.accuracy, knob)
 
 
-def _middle(model: Model, knob: str) -> int:
+def _middle_value(model: Model, knob: str) -> int:
     """Return the middle of the values of a setting."""
     if knob != "steps_per_cycle":
         return _scene_value(model, knob) or DEFAULT_MIDDLES[knob]

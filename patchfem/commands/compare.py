@@ -23,18 +23,18 @@ from .shared import (
     Refused,
     Sets,
     Units,
+    choose_folder,
     flag,
-    model_of,
+    load_model,
+    load_scene,
     note,
     pair,
-    placed,
+    print_message,
     progress_bar,
     quantity,
-    say,
-    scene_of,
     word,
 )
-from .streams import plain
+from .streams import make_printable
 
 
 def compare(
@@ -108,7 +108,7 @@ def compare(
                 f"compare --pairs {pairs}: give the table alone, without "
                 f"{'other files' if files else '--scene'}"
             )
-        _table(pairs, direction, how, placed(out, pairs.stem), json_, quiet)
+        _compare_table(pairs, direction, how, choose_folder(out, pairs.stem), json_, quiet)
         return
     if len(files) < 2:
         raise Refused("compare: give two files BEFORE and AFTER, or a table of pairs with --pairs")
@@ -116,7 +116,7 @@ def compare(
     if any(folders) and len(files) == 2 and not all(folders):
         worn_runs.compare_runs(before, after)  # this raises the error for a file next to a folder
     if any(folders):
-        _no_traces(
+        _refuse_surface_options(
             {
                 "a third file": other,
                 "--direction": direction,
@@ -128,14 +128,16 @@ def compare(
                 "--set": set_,
             }
         )
-        return _runs(before, after, out, json_)
+        return _compare_runs(before, after, out, json_)
     parts, found, directions = verdict.judge_files(tuple(files), direction, **how)
-    target = placed(out, f"{before.stem}-{after.stem}")
+    target = choose_folder(out, f"{before.stem}-{after.stem}")
     with results.Folder(target) as folder:
         pressing = (
-            _pressed(scene, set_, parts[0], folder.path, quiet) if scene is not None else None
+            _press_surfaces(scene, set_, parts[0], folder.path, quiet)
+            if scene is not None
+            else None
         )
-        data = paper.data_of(parts, found, directions, pressing)
+        data = paper.comparison_data(parts, found, directions, pressing)
         summary.write_json(data, folder.path / "compare.json")
         paper.write_page(folder.path / "report.html", parts, found, directions, pressing)
         paper.write_difference(folder.path, parts[0])
@@ -144,11 +146,13 @@ def compare(
     if json_:
         print(json.dumps(data, ensure_ascii=False, allow_nan=False))
     else:
-        print("\n".join(paper.lines_of(parts, found, pressing)))
+        print("\n".join(paper.format_comparison(parts, found, pressing)))
         print(f"results: {target}")
 
 
-def _table(path: Path, direction: str, how: dict, target: Path, json_: bool, quiet: bool) -> None:
+def _compare_table(
+    path: Path, direction: str, how: dict, target: Path, json_: bool, quiet: bool
+) -> None:
     """Compare all pairs of a table; exit code 3 if some fail, 2 if all of them do.
 
     Parameters
@@ -166,8 +170,8 @@ def _table(path: Path, direction: str, how: dict, target: Path, json_: bool, qui
     asked = tables.read_pairs(path)
     with results.Folder(target) as folder:
         with progress_bar(quiet) as done:
-            rows = pairs_paper.answers(asked, direction, done, **how)
-        data = pairs_paper.data_of(rows)
+            rows = pairs_paper.compare_pairs(asked, direction, done, **how)
+        data = pairs_paper.pairs_data(rows)
         summary.write_json(data, folder.path / "pairs.json")
         pairs_paper.write_csv(rows, folder.path / "pairs.csv")
         pairs_paper.write_page(folder.path / "report.html", rows, path.name)
@@ -176,18 +180,18 @@ def _table(path: Path, direction: str, how: dict, target: Path, json_: bool, qui
     print(
         json.dumps(rows, ensure_ascii=False, allow_nan=False)
         if json_
-        else "\n".join([*pairs_paper.lines_of(rows), f"results: {target}"])
+        else "\n".join([*pairs_paper.format_pairs(rows), f"results: {target}"])
     )
     failed = [row for row in rows if row["outcome"] == "failed"]
     for row in failed:
-        say(plain(f"{path}:{row['line']}: {row['message']}"))
+        print_message(make_printable(f"{path}:{row['line']}: {row['message']}"))
     if len(failed) == len(rows):
         raise Ended(2)
     if failed:
         raise NotReached
 
 
-def _no_traces(asked: dict):
+def _refuse_surface_options(asked: dict):
     """Refuse options for measured surfaces if results folders are compared."""
     for name, value in asked.items():
         if value:
@@ -197,13 +201,13 @@ def _no_traces(asked: dict):
             )
 
 
-def _runs(before: Path, after: Path, out, json_: bool):
+def _compare_runs(before: Path, after: Path, out, json_: bool):
     """Compare the wear between the runs in two results folders."""
     lost = worn_runs.compare_runs(before, after)
-    found = worn.verdict(lost)
+    found = worn.wear_verdict(lost)
     data, target = (
-        worn.data_of(lost, found),
-        placed(out, f"{before.resolve().name}-{after.resolve().name}"),
+        worn.wear_data(lost, found),
+        choose_folder(out, f"{before.resolve().name}-{after.resolve().name}"),
     )
     with results.Folder(target) as folder:
         summary.write_json(data, folder.path / "compare.json")
@@ -213,27 +217,27 @@ def _runs(before: Path, after: Path, out, json_: bool):
     print(
         json.dumps(data, ensure_ascii=False, allow_nan=False)
         if json_
-        else "\n".join([*worn.lines_of(lost, found), f"results: {target}"])
+        else "\n".join([*worn.format_wear(lost, found), f"results: {target}"])
     )
 
 
-def _pressed(scene: Path, sets, part, target: Path, quiet: bool):
+def _press_surfaces(scene: Path, sets, part, target: Path, quiet: bool):
     """Run a scene with each surface as its profile; the traces are written into the folder."""
     if not isinstance(part.before, profile.Profile):
         raise Refused(
             "compare --scene: the contact can be computed only for traces; write one line of heights of "
             "each scan to a file of its own"
         )
-    if scene_of(scene, sets).contact is None:
+    if load_scene(scene, sets).contact is None:
         raise Refused(
             f"compare --scene {scene}: the scene has no [contact], so it has no patch to press"
         )
     models = []
-    for name, trace in zip(("before", "after"), paper.surfaces(part)):
+    for name, trace in zip(("before", "after"), paper.pressed_traces(part)):
         path = paper.write_trace(target / f"surface_{name}.csv", trace).resolve()
         models.append(
-            model_of(
+            load_model(
                 scene, (*sets, f"contact.profile.file={path}", "contact.profile.heights=surface")
             )
         )
-    return pressing.run_both_surfaces(*models, scene.name, None if quiet else say)
+    return pressing.run_both_surfaces(*models, scene.name, None if quiet else print_message)

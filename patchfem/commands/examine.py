@@ -17,9 +17,9 @@ plotter = pyvista.Plotter(off_screen=True, window_size=(32, 32))
 plotter.add_mesh(pyvista.Sphere())
 assert plotter.screenshot(None, return_img=True).std() > 0
 """
-SECONDS = 60  # [s] for a first picture from a slow disk
+MAX_PICTURE_SECONDS = 60  # [s] for a first picture from a slow disk
 # Packages that pyproject.toml requires; an older installation does not know of new ones.
-NEEDED = (
+REQUIRED_PACKAGES = (
     "numpy",
     "scipy",
     "scikit-fem",
@@ -36,7 +36,7 @@ NEEDED = (
     "threadpoolctl",
     "contourpy",
 )
-EXTRAS = {
+OPTIONAL_PACKAGES = {
     "pyuff": ("lab", "universal files"),
     "nbclient": ("notebook", "the notebooks of studies/notebooks"),
     "SurfaceTopography": ("profiles", "files of more instruments"),
@@ -54,7 +54,7 @@ class Finding(NamedTuple):
     cure: str
 
 
-def examined() -> list[Finding]:
+def check_installation() -> list[Finding]:
     """Check everything that a run may need; a picture is drawn in a separate process."""
     return [*_packages(), _cache(), _threads(), _window(), _film(), *_extras()]
 
@@ -63,7 +63,7 @@ def _packages() -> Iterator[Finding]:
     """Check the required packages."""
     yield Finding("python", sys.version_info >= (3, 11), sys.version.split()[0], "")
     yield Finding("patchfem", True, __version__, "")
-    for name in NEEDED:
+    for name in REQUIRED_PACKAGES:
         found = _version(name)
         yield Finding(
             name, bool(found), found or "not installed", "" if found else f"pip install {name}"
@@ -108,7 +108,10 @@ def _window() -> Finding:
     """Check whether the window of patchfem view can be drawn."""
     try:
         done = subprocess.run(
-            [sys.executable, "-P", "-c", PICTURE], capture_output=True, text=True, timeout=SECONDS
+            [sys.executable, "-P", "-c", PICTURE],
+            capture_output=True,
+            text=True,
+            timeout=MAX_PICTURE_SECONDS,
         )
         said = (done.stderr.strip().splitlines() or ["it crashed"])[-1]
         why = re.sub(r"^.*\b(?:WARN|ERR)\| ", "", said)[:100]  # VTK begins the line with its time
@@ -146,7 +149,7 @@ def _film() -> Finding:
 
 def _extras() -> Iterator[Finding]:
     """Check the optional packages."""
-    for name, (extra, what) in EXTRAS.items():
+    for name, (extra, what) in OPTIONAL_PACKAGES.items():
         found = _version(name)
         yield Finding(
             f"{name} ({what})",

@@ -9,7 +9,7 @@ from ..export.surfaces import roughness
 from ..surface.files import read
 from ..surface.roughness import form as forms
 from ..surface.roughness import report as roughness_report
-from .shared import Json, Refused, Units, flag, note, out_in, pair, quantity, word
+from .shared import Json, Refused, Units, flag, note, out_option, pair, quantity, word
 
 
 def profile(
@@ -31,7 +31,7 @@ def profile(
         "positions, first the two in x, then the two in y"
     ) = "",
     units: Units = "",
-    out: out_in(
+    out: out_option(
         "folder for a page, a table of the parameters and the levelled heights, such as out/trace"
     ) = None,
     json_: Json = False,
@@ -54,14 +54,14 @@ def profile(
     ]
     for report in reports:
         if not json_:
-            print("\n".join(roughness.lines_of(report, verbose=verbose)))
+            print("\n".join(roughness.format_roughness(report, verbose=verbose)))
         for text in report.notes:
             note(text)
     if not json_ and len(reports) > 1:
         print("\n".join(roughness.means_lines(reports)))
     answer = {
         "patchfem": __version__,
-        "profiles": [roughness.data_of(one) for one in reports],
+        "profiles": [roughness.roughness_data(one) for one in reports],
         "means": roughness.means_data(reports),
     }
     if out is not None:

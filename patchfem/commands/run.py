@@ -18,12 +18,12 @@ from .shared import (
     Quiet,
     Refused,
     Sets,
+    choose_folder,
     flag,
+    load_scene,
     note,
-    placed,
+    print_message,
     progress_bar,
-    say,
-    scene_of,
 )
 
 
@@ -50,8 +50,8 @@ def run(
 
     Example: patchfem run rig.toml --set "drive.acceleration=6 g" -o out/six
     """
-    talk = (lambda text: None) if quiet else say
-    what = plan.plan(scene_of(scene, set_))
+    talk = (lambda text: None) if quiet else print_message
+    what = plan.plan(load_scene(scene, set_))
     if resume and not folder.saves_state(what):
         raise Refused(
             "run --resume: only a run with [wear] on a patch or a run that is integrated in time saves its "
@@ -62,7 +62,7 @@ def run(
         talk(
             f"about {what.seconds:.1f} s of computing time{compiles}, {what.steps} steps, engine {what.engine}"
         )
-    target = placed(out, what.model.source.path.stem)
+    target = choose_folder(out, what.model.source.path.stem)
     if resume and folder.is_complete(what, target):
         talk(
             f"{target}: this run is already complete, nothing is left to resume; to run it again, leave out --resume"
@@ -88,27 +88,27 @@ def run(
         if not no_page:
             _draw(written, target)
     except KeyboardInterrupt:
-        say(
+        print_message(
             f"interrupted while the page was drawn; the results in {target} are complete except for report.html"
         )
         raise Ended(130) from None
     if answer["outcome"] == "not_converged":
         for text in answer["warnings"] if quiet else ():  # a quiet run prints only these warnings
-            say(f"warning: {text}")
+            print_message(f"warning: {text}")
         raise NotReached
 
 
 def _draw(written, target: Path) -> None:
     """Write the page at the end, so that an error in it does not lose results or messages."""
     try:
-        folder.write_page(written, target)
+        folder.write_run_page(written, target)
     except (OSError, MemoryError, atomic_write.WriteError) as error:
         why = (
             str(error)
             if isinstance(error, atomic_write.WriteError)
             else f"{target / 'report.html'}: {getattr(error, 'strerror', None) or 'out of memory'}"
         )
-        say(f"{why}; the results are complete except for the page")
+        print_message(f"{why}; the results are complete except for the page")
         raise Ended(4) from None
 
 
@@ -118,10 +118,10 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     if answer["title"]:
         sets = written.result.plan.model.source.sets
         print(f"{answer['title']}{f'; changed: {driven.list_changed_keys(sets)}' if sets else ''}")
-    print(f"{answer['outcome']}: {sentences.verdict(answer)}")
-    if text := sentences.headline(
+    print(f"{answer['outcome']}: {sentences.verdict_sentence(answer)}")
+    if text := sentences.headline_sentence(
         answer,
-        summary.cycles_of(written.result),
+        summary.count_cycles(written.result),
         released=released.describe_release(written.result),
     ):
         print(text)
@@ -129,15 +129,17 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     if text := sentences.tolerance_sentence(written.result):
         print(text, flush=True)
     for text in answer["warnings"]:
-        say(f"warning: {text}")
+        print_message(f"warning: {text}")
     print(
-        "\n".join(sentences.table_of(answer["measures"], answer["numerics"].get("engine", ""))),
+        "\n".join(
+            sentences.format_measures(answer["measures"], answer["numerics"].get("engine", ""))
+        ),
         flush=True,
     )
     for text in answer["notes"]:
         note(text)
     if verbose:
-        say(
+        print_message(
             "wall-clock seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in answer["seconds"].items())
         )
     print(f"results: {target}{page}")

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from .. import cost_model
 from ..campaigns.sweeps import estimate, parse_request
 from ..effects import law_has_trait, list_displayed_absent_effects
-from ..export.written import shorten
+from ..export.written import shorten_number
 from ..formatting import format_quantity, rewrite_powers_of_ten
 from ..mesh import files as mesh_files
 from ..model import files as model_files
@@ -17,7 +17,7 @@ from ..response import rows
 from ..runs import plan as plans
 from ..runs.patch import faces, result
 from ..scene.files import list_named_files
-from .shared import Json, Refused, Sets, flag, model_of, note, say, scene_of
+from .shared import Json, Refused, Sets, flag, load_model, load_scene, note, print_message
 from .sweep import Over
 
 
@@ -28,13 +28,13 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
     Example: patchfem check rig.toml
     """
     notes = []
-    found = scene_of(
-        scene, set_, lambda tables, folder, whole: _faults(tables, folder, whole, notes)
+    found = load_scene(
+        scene, set_, lambda tables, folder, whole: _find_file_mistakes(tables, folder, whole, notes)
     )
     notes = [rewrite_powers_of_ten(text) for text in dict.fromkeys([*found.notes, *notes])]
-    cases = len(_swept(scene, set_, Over())[1]) if found.sweep else None
+    cases = len(_read_sweep(scene, set_, Over())[1]) if found.sweep else None
     for remark in found.remarks:
-        say(f"{scene}: {remark}")
+        print_message(f"{scene}: {remark}")
     for text in notes:
         note(text)
     if json_:
@@ -56,12 +56,12 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
         )
 
 
-def _swept(scene: Path, sets, what: Over) -> tuple:
+def _read_sweep(scene: Path, sets, what: Over) -> tuple:
     """Return what the cases of a sweep share, and the cases."""
     return parse_request.read_sweep(scene, sets, what.request())
 
 
-def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
+def _find_file_mistakes(tables, folder: Path, whole: bool, notes: list) -> list:
     """Return the mistakes of the files that a scene names, and add notes of a run to `notes`.
 
     Without such files nothing is imported.
@@ -88,8 +88,8 @@ def plan(
 
     Example: patchfem plan rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9"
     """
-    over = what if what is not None and what.given() else None
-    read = scene_of(scene, set_) if over is None else None
+    over = what if what is not None and what.selects_cases() else None
+    read = load_scene(scene, set_) if over is None else None
     if over is not None or read.sweep:
         if probe:
             raise Refused(
@@ -118,8 +118,8 @@ def plan(
 
 def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> None:
     """Print the plan of a sweep."""
-    asked, cases = _swept(scene, sets, what)
-    answer = estimate.estimate(asked, cases)
+    asked, cases = _read_sweep(scene, sets, what)
+    answer = estimate.estimate_sweep(asked, cases)
     if wrong := parse_request.contradictions(asked, cases):
         note(wrong)
     if json_:
@@ -127,7 +127,7 @@ def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> No
         return
     print(
         "case     "
-        + ", ".join(f"{key} {shorten(text)}" for key, text in answer["case"].items())
+        + ", ".join(f"{key} {shorten_number(text)}" for key, text in answer["case"].items())
         + " (the first case); the lines below describe this case, except that `cost` and `sweep` are for the whole "
         "sweep"
     )
@@ -151,7 +151,7 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
         f"cost     about {answer['seconds']:.1f} s of computing time{compiles}, "
         f"{answer['bytes'] / 1e6:.0f} MB of memory"
     )
-    sizes = [f"{count} {_words(name)}" for name, count in answer["unknowns"].items()]
+    sizes = [f"{count} {_format_size_name(name)}" for name, count in answer["unknowns"].items()]
     print("sizes    " + ", ".join([*sizes, f"{answer['steps']} steps in all"]))
     for effect in answer["effects"]:
         print(f"  runs   {effect['effect']:<28} {effect['equations']}")
@@ -161,7 +161,7 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
         law_has_trait(one["effect"].partition("law=")[2], "bonds") for one in answer["effects"]
     )
     links = [
-        f"{_link(name, bonded)} {link if isinstance(link, str) else format_quantity(link, 'N m-1', 4)}"
+        f"{_format_link(name, bonded)} {link if isinstance(link, str) else format_quantity(link, 'N m-1', 4)}"
         for name, link in answer["stiffness_chain"].items()
     ]
     print("chain    " + " -> ".join(links))
@@ -182,22 +182,22 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
         )
         print(f"mode     {one['name']} {one['free_frequency']:.5g} Hz without contact{held}")
     for name, value in answer["groups"].items():
-        print(f"group    {_group(value, name)}")
+        print(f"group    {_format_group(value, name)}")
     if verbose:
         print(
             f"absent   {', '.join(list_displayed_absent_effects(answer['not_in_scene'], answer['engine']))}"
         )
 
 
-def _link(name: str, bonded: bool) -> str:
+def _format_link(name: str, bonded: bool) -> str:
     """Return the name of a link of the stiffness chain as words.
 
     It is "bonds" only for a law that has bonds.
     """
-    return _words(name if bonded else name.replace("bonds", "friction"))
+    return _format_size_name(name if bonded else name.replace("bonds", "friction"))
 
 
-def _words(name: str) -> str:
+def _format_size_name(name: str) -> str:
     """Return the name of a size or of a link as words, with "(about)" for predicted ones."""
     return (
         f"{name.removesuffix('_about')} (about)".replace("_", " ")
@@ -206,9 +206,9 @@ def _words(name: str) -> str:
     )
 
 
-def _group(value: float, name: str) -> str:
+def _format_group(value: float, name: str) -> str:
     """Return a dimensionless group of the plan with its value as text."""
-    text, unit = plans.GROUPS.get(name, (_words(name), "1"))
+    text, unit = plans.GROUPS.get(name, (_format_size_name(name), "1"))
     return f"{format_quantity(value, unit, 4):<10} {text}"
 
 
@@ -223,7 +223,7 @@ def mesh(
 
     Example: patchfem mesh rig.toml -o pieces.vtu
     """
-    found = model_of(scene, set_)
+    found = load_model(scene, set_)
     if found.patch is None:
         raise Refused(
             f"{scene}: missing [contact]: only a scene with a patch has a mesh; write the patch of an "

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from ..model import model
 from ..scene import scene
 from ..scene.keys import quantities
-from .streams import plain
+from .streams import make_printable
 
 
 def flag(text: str, *names: str) -> type:
@@ -37,14 +37,14 @@ def word(text: str, name: str | None = None) -> type:
     ]
 
 
-def out_in(text: str) -> type:
+def out_option(text: str) -> type:
     """Return the type of the option -o of a command; text: its help."""
     return Annotated[Path | None, Parameter(name=["-o", "--out"], help=text)]
 
 
 Sets = texts('change a value of the scene, such as "contact.load=30 lbf"; may be repeated', "--set")
 Json = flag("print the answer as one JSON object", "--json")
-Out = out_in("folder of the results, such as out/mine")
+Out = out_option("folder of the results, such as out/mine")
 Quiet = flag("print only errors", "-q", "--quiet")
 Units = word(
     'units of x and z if a file gives none or wrong ones, such as "mm,um"; for a matrix of heights: pixel '
@@ -53,7 +53,7 @@ Units = word(
 NoPage = flag("leave out report.html", "--no-page")
 
 
-def placed(out: Path | None, name: str) -> Path:
+def choose_folder(out: Path | None, name: str) -> Path:
     """Return the folder of the results: the given one, or else out/<name>."""
     return out if out is not None else Path("out") / name
 
@@ -105,7 +105,7 @@ class Refused(Exception):
     """Raised for a request that the command line itself refuses: exit code 2."""
 
 
-def say(text: str) -> None:
+def print_message(text: str) -> None:
     """Print a line on stderr; a stream that cannot be written is ignored."""
     try:
         print(text, file=sys.stderr, flush=True)
@@ -115,10 +115,10 @@ def say(text: str) -> None:
 
 def note(text: str) -> None:
     """Print a note on stderr, without characters from files that would move the cursor."""
-    say(plain(f"note: {text}"))
+    print_message(make_printable(f"note: {text}"))
 
 
-def scene_of(path: Path, sets, faults=None):
+def load_scene(path: Path, sets, faults=None):
     """Load the scene in a file with --set strings; SceneError names every mistake.
 
     Parameters
@@ -132,14 +132,14 @@ def scene_of(path: Path, sets, faults=None):
     return scene.load(path, sets, faults)
 
 
-def model_of(path: Path, sets):
+def load_model(path: Path, sets):
     """Build the model of the scene in a file; SceneError names every mistake."""
-    return model.build(scene_of(path, sets))
+    return model.build(load_scene(path, sets))
 
 
-def unswept_of(path: Path, sets):
+def load_model_without_sweep(path: Path, sets):
     """Build the model of a scene without its table [sweep], which a note states."""
-    found = scene_of(path, sets)
+    found = load_scene(path, sets)
     if found.sweep:
         note(
             f"[sweep] is left out: {', '.join(axis.key for axis in found.sweep)} as the scene gives "
@@ -200,4 +200,4 @@ class Lines:
             if share > before
             else ""
         )
-        say(f"{share:.0%} done{left}")
+        print_message(f"{share:.0%} done{left}")

@@ -42,7 +42,7 @@ def _article(
     return "article", key, fields | ({"doi": doi} if doi else {})
 
 
-APPLIED = "Journal of Applied Mechanics"
+APPLIED_MECHANICS = "Journal of Applied Mechanics"
 # Effects, as in `effects.EFFECTS`, and their source; "friction.law=iwan" also counts for
 # interfaces.
 SOURCES = (
@@ -101,7 +101,7 @@ SOURCES = (
             "mindlin1949",
             "Mindlin, R. D.",
             "Compliance of elastic bodies in contact",
-            APPLIED,
+            APPLIED_MECHANICS,
             "16:259--268",
             1949,
         ),
@@ -113,7 +113,7 @@ SOURCES = (
             "Oden, J. T. and Pires, E. B.",
             "Nonlocal and nonlinear friction laws and variational principles "
             "for contact problems in elasticity",
-            APPLIED,
+            APPLIED_MECHANICS,
             "50:67--76",
             1983,
             "10.1115/1.3167019",
@@ -125,7 +125,7 @@ SOURCES = (
             "segalman2005",
             "Segalman, D. J.",
             "A four-parameter {Iwan} model for lap-type joints",
-            APPLIED,
+            APPLIED_MECHANICS,
             "72:752--760",
             2005,
             "10.1115/1.1989354",
@@ -161,7 +161,7 @@ SOURCES = (
             "Cameron, T. M. and Griffin, J. H.",
             "An alternating frequency/time domain method for "
             "calculating the steady-state response of nonlinear dynamic systems",
-            APPLIED,
+            APPLIED_MECHANICS,
             "56:149--154",
             1989,
             "10.1115/1.3176036",

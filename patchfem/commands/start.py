@@ -9,14 +9,14 @@ from ..scene import schema as schemas
 from ..scene import starting
 from . import examine, sources
 from .run import run
-from .shared import Json, NoPage, Out, Refused, out_in, placed, say
+from .shared import Json, NoPage, Out, Refused, choose_folder, out_option, print_message
 
 
 def new(
     kind: str = "",
     /,
     *,
-    out: out_in("file to write, such as mine.toml; default: the screen") = None,
+    out: out_option("file to write, such as mine.toml; default: the screen") = None,
 ):
     """Print a template scene of this KIND; without KIND, list the kinds.
 
@@ -47,11 +47,11 @@ def demo(*, out: Out = None, no_page: NoPage = False):
     Example: patchfem demo
     """
     scene = starting.find_shipped_scene()
-    say(f"scene: {scene}; for another template run: patchfem new")
-    run(scene, out=placed(out, "demo"), no_page=no_page)
+    print_message(f"scene: {scene}; for another template run: patchfem new")
+    run(scene, out=choose_folder(out, "demo"), no_page=no_page)
 
 
-def schema(*, out: out_in("file to write, such as scene.json; default: the screen") = None):
+def schema(*, out: out_option("file to write, such as scene.json; default: the screen") = None):
     """Print the JSON schema of a scene, for editors that complete keys and check units. In VS Code with Even Better
     TOML, begin a scene with the line #:schema scene.json.
 
@@ -71,7 +71,7 @@ def doctor(*, json_: Json = False):
 
     Example: patchfem doctor
     """
-    found = examine.examined()
+    found = examine.check_installation()
     if json_:
         print(json.dumps([one._asdict() for one in found]))
         return

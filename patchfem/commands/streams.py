@@ -9,7 +9,7 @@ import warnings
 LONG = re.compile(r"\S{401,}")
 
 
-def ready() -> None:
+def prepare_streams() -> None:
     """Prepare the standard streams of the process.
 
     A closed stream is connected to the null device, because a file that is opened while 0, 1 or 2
@@ -35,7 +35,7 @@ def ready() -> None:
         os.environ["PYTHONWARNINGS"] = "ignore"  # for processes that a sweep starts
 
 
-def plain(text: str) -> str:
+def make_printable(text: str) -> str:
     """Return a text as one line in which no character moves the cursor.
 
     Characters that cannot be printed become question marks; of a word with more than 400 characters

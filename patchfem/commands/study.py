@@ -23,12 +23,12 @@ from .shared import (
     Quiet,
     Refused,
     Sets,
+    choose_folder,
     flag,
-    model_of,
-    placed,
+    load_model,
+    load_scene,
+    print_message,
     progress_bar,
-    say,
-    scene_of,
     texts,
     word,
 )
@@ -52,7 +52,7 @@ def cost(
 
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
-    found = model_of(scene, set_)
+    found = load_model(scene, set_)
     if over and over not in cost_curves.NUMERICAL_SETTINGS:
         raise Refused(
             f"cost --over {over}: unknown key; use one of {', '.join(cost_curves.NUMERICAL_SETTINGS)}"
@@ -62,15 +62,17 @@ def cost(
         if over
         else [cost_curves.TOLERANCE, *(cost_curves.applicable_settings(found) if verbose else ())]
     )
-    target, curves, answer = placed(out, f"{found.source.path.stem}-cost"), {}, {}
+    target, curves, answer = choose_folder(out, f"{found.source.path.stem}-cost"), {}, {}
     for knob in knobs:
-        runs = curves[knob] = cost_curves.curve(found, knob, None if quiet else say)
+        runs = curves[knob] = cost_curves.setting_curve(
+            found, knob, None if quiet else print_message
+        )
         table = cost_files.write(target, curves)
         picture = cost_files.write_picture(target, knob, runs, found.accuracy.tolerance)
         answer[knob] = cost_files.cost_data(knob, runs, found.accuracy.tolerance)
         if not json_:
             tabled = verbose and knob != cost_curves.TOLERANCE
-            lines = cost_files.details_of if tabled else cost_files.lines_of
+            lines = cost_files.format_details if tabled else cost_files.format_cost
             print("\n".join(lines(knob, runs, found.accuracy.tolerance)))
             print(f"results: {table} {picture}")
     if json_:
@@ -109,21 +111,25 @@ def backbone(
 
     Example: patchfem backbone rig.toml --mode axial --amplitudes "0.1 um..1 mm:25"
     """
-    found = joint.remove_joint(model_of(scene, set_))
+    found = joint.remove_joint(load_model(scene, set_))
     ways = backbones.METHODS if method == ALL else (method,)
     lengths = axes.read_lengths(amplitudes, "--amplitudes") if amplitudes else None
-    target = placed(out, f"{found.source.path.stem}-backbone")
+    target = choose_folder(out, f"{found.source.path.stem}-backbone")
     with results.Folder(target) as folder:
         one = backbones.backbone(
-            found, mode, lengths, ways, None if quiet or json_ else lambda way: say(f"{way} ...")
+            found,
+            mode,
+            lengths,
+            ways,
+            None if quiet or json_ else lambda way: print_message(f"{way} ..."),
         )
-        answer = backbone_files.write_into(
+        answer = backbone_files.write_backbone(
             one, found.source.title, found.source.resolved, folder, not no_page
         )
     if json_:
         print(json.dumps(answer, ensure_ascii=False))
     else:
-        print("\n".join(backbone_files.lines_of(one)))
+        print("\n".join(backbone_files.format_backbone(one)))
         for text in one.notes:
             print(f"note: {text}")
         print(f"results: {target}")
@@ -207,7 +213,7 @@ def fit(
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
-    found, target = scene_of(scene, set_), placed(out, f"{scene.stem}-fit")
+    found, target = load_scene(scene, set_), choose_folder(out, f"{scene.stem}-fit")
     options = fits.Options(
         hold, offset, warm_up, from_patch=from_patch, amplitudes=amplitudes, **vars(rows)
     )
@@ -215,7 +221,7 @@ def fit(
         quiet or json_ or from_patch or fits.choose_kind(found, to) in ("loop", "curve")
     ) as progress:
         listener = fits.Listener(
-            None if quiet else say, progress, lambda name: f"--{name.replace('_', '-')}"
+            None if quiet else print_message, progress, lambda name: f"--{name.replace('_', '-')}"
         )
         files = fits.fit_into(found, to, free, options, target, listener)
     if json_:
@@ -223,7 +229,7 @@ def fit(
     else:
         print("\n".join(files.lines))
         for text in files.answer["warnings"]:
-            say(f"warning: {text}")
+            print_message(f"warning: {text}")
         print(f"page: {target / 'report.html'}")
         print(f"results: {target}")
     if files.answer["outcome"] == "not_converged":

@@ -25,10 +25,10 @@ from .shared import (
     Quiet,
     Refused,
     Sets,
+    choose_folder,
     flag,
     note,
-    placed,
-    say,
+    print_message,
     texts,
     word,
 )
@@ -79,7 +79,7 @@ class Over:
         "--of",
     ) = ""
 
-    def given(self) -> bool:
+    def selects_cases(self) -> bool:
         """Return whether any option selects cases."""
         return bool(self.over or self.cases or self.random or self.sobol)
 
@@ -175,7 +175,7 @@ def sweep(
     by = by or By()
     begin, part = perf_counter(), by.part()
     target, tells = (
-        placed(out, f"{scene.stem}-sweep"),
+        choose_folder(out, f"{scene.stem}-sweep"),
         "json" if json_ else "faults" if quiet else "words",
     )
     told = Told(target, not no_page, tells, begin)
@@ -186,12 +186,12 @@ def sweep(
             scene, (what or Over()).words(*set_, f"page={not no_page}"), what and what.cases
         )
     )
-    if resume and (written := manifest.read(target, signed)):  # all of it is there
-        _answer(written["cases"]["count"], {}, written, told)
+    if resume and (written := manifest.read_manifest(target, signed)):  # all of it is there
+        _print_results(written["cases"]["count"], {}, written, told)
         return
     asked, cases = parse_request.read_sweep(scene, set_, (what or Over()).request())
     if by.collect:
-        _answered(run.collect(asked, cases, target, not no_page), told)
+        _print_stored_results(run.collect_shards(asked, cases, target, not no_page), told)
         return
     for text in () if quiet else axes.describe_ranges(what.over if what else ()):
         note(text)
@@ -205,14 +205,14 @@ def sweep(
             cases,
             place,
             executors.make_executor(by.executor, by.jobs),
-            None if quiet else say,
+            None if quiet else print_message,
             line,
         )
     except (KeyboardInterrupt, core.Missing) as why:
         line.end()
         if isinstance(why, core.Missing) and not line.done:
             raise
-        say(
+        print_message(
             f"{str(why) or 'interrupted'}; {line.done} of {len(cases)} cases are kept; continue with: patchfem "
             f"{shlex.join([word for word in sys.argv[1:] if word != '--resume'])} --resume"
         )
@@ -228,9 +228,9 @@ def sweep(
                 "--collect"
             )
         return
-    if signed and not found.messages and place.kept(len(cases)) == "none":
-        manifest.write(target, signed)
-    _answered(found, told)
+    if signed and not found.messages and place.kept_files(len(cases)) == "none":
+        manifest.write_manifest(target, signed)
+    _print_stored_results(found, told)
 
 
 class Told(NamedTuple):
@@ -268,7 +268,7 @@ class Progress:
 
     def __call__(self, done: int, total: int, left: float | None) -> None:
         if not self.text and not self.silent:
-            Thread(target=self._waits, daemon=True).start()
+            Thread(target=self._show_waiting_time, daemon=True).start()
         self.text, self.done = f"{done}/{total} cases", done
         if not self.silent and perf_counter() - self.said >= (0.2 if self.open else self.WAIT):
             self._show(
@@ -277,7 +277,7 @@ class Progress:
                 else self.text
             )
 
-    def _waits(self) -> None:
+    def _show_waiting_time(self) -> None:
         """Show the elapsed time while no case is complete."""
         wait = self.WAIT
         while not self.over.wait(wait):
@@ -304,12 +304,14 @@ class Progress:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
-def _answered(found, told: Told) -> None:
+def _print_stored_results(found, told: Told) -> None:
     """Print the results of a sweep from its folder."""
-    _answer(len(found), found.messages, json.loads((told.target / "sweep.json").read_bytes()), told)
+    _print_results(
+        len(found), found.messages, json.loads((told.target / "sweep.json").read_bytes()), told
+    )
 
 
-def _answer(number: int, messages: dict, written: dict, told: Told) -> None:
+def _print_results(number: int, messages: dict, written: dict, told: Told) -> None:
     """Print the results of a sweep, with its answer first.
 
     Parameters
@@ -359,9 +361,11 @@ def _answer(number: int, messages: dict, written: dict, told: Told) -> None:
     for case in failed:
         alike.setdefault(messages[case], []).append(case + 1)
     for text, numbers in list(alike.items())[:FIRST]:
-        say(f"case {numbers[0]}{f' and {len(numbers) - 1} more' * (len(numbers) > 1)}: {text}")
+        print_message(
+            f"case {numbers[0]}{f' and {len(numbers) - 1} more' * (len(numbers) > 1)}: {text}"
+        )
     if len(alike) > FIRST:
-        say("the messages of all failed cases are in sweep.csv")
+        print_message("the messages of all failed cases are in sweep.csv")
     if len(failed) == number:
         raise Refused("sweep: no case could be run")
     if failed or "not_converged" in counts:

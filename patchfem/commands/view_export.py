@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from ..export import convert, reports
 from ..export.lab import structures
-from .shared import Refused, Sets, flag, out_in, unswept_of, word
+from .shared import Refused, Sets, flag, load_model_without_sweep, out_option, word
 
 Frame = Annotated[
     int | None,
@@ -48,21 +48,21 @@ def export(
     if folder.suffix != ".toml":
         if sets:
             raise Refused("--set can be used only with a scene, not with a results folder")
-        print(convert.export(folder, out, frame, histories, of))
+        print(convert.export_results(folder, out, frame, histories, of))
         return
     if frame is not None or histories or of:
         raise Refused(
             "--frame, --histories and --of can be used only with a results folder; from a scene only the "
             "structure is exported"
         )
-    print(structures.export(unswept_of(folder, sets), out))
+    print(structures.export_structure(load_model_without_sweep(folder, sets), out))
 
 
 def view(
     folder: Path,
     /,
     *,
-    out: out_in(
+    out: out_option(
         "file to write instead of opening a window: picture.png for one frame; .gif, "
         ".mp4 or .html for the last cycle"
     ) = None,
@@ -75,16 +75,17 @@ def view(
 
     Example: patchfem view out/rig -o cycle.gif
     """
-    if told := convert.view(folder, out, frame, magnify):
+    if told := convert.view_results(folder, out, frame, magnify):
         print(told)
 
 
 def report(
-    *folders: Path, out: out_in("page to write; default: report.html in the current folder") = None
+    *folders: Path,
+    out: out_option("page to write; default: report.html in the current folder") = None,
 ):
     """Show the results folders of several runs, or of several sweeps over the same keys, side by side on one page. For
     a single sweep, rebuild its page.
 
     Example: patchfem report out/rig out/six -o both.html
     """
-    print(reports.report_of(list(folders), out))
+    print(reports.write_report(list(folders), out))

@@ -9,8 +9,8 @@ from .. import __version__, formatting
 from ..campaigns.backbone.records import Backbone, Curve
 from ..disk.atomic_write import write_rows, write_text
 from .drawing import charts, pictures
-from .netcdf import Contents, write
-from .pages.document import Section, document, sentence_html, table
+from .netcdf import Contents, write_netcdf
+from .pages.document import Section, document_html, sentence_html, table_html
 from .results import Folder
 from .summary import write_json
 
@@ -48,7 +48,7 @@ N_SHOWN = 9  # Number of amplitudes of a longer curve that the screen shows.
 FLOOR_FACTOR = 0.1  # Lower end of a bar on a logarithmic axis / smallest value.
 
 
-def answer_of(found: Backbone) -> dict:
+def backbone_data(found: Backbone) -> dict:
     """Return the object that `patchfem backbone --json` prints, in SI units."""
     frequencies, exponents = found.frequencies, found.exponents
     curves = {
@@ -72,7 +72,7 @@ def answer_of(found: Backbone) -> dict:
     }
 
 
-def contents(found: Backbone, title: str = "") -> Contents:
+def backbone_contents(found: Backbone, title: str = "") -> Contents:
     """Return backbone.nc: each curve under the name of its method, over its amplitudes."""
     variables, coordinates = {}, {}
     for method, curve in found.curves.items():
@@ -99,7 +99,7 @@ def contents(found: Backbone, title: str = "") -> Contents:
     return Contents(variables, coordinates, attributes)
 
 
-def write_into(
+def write_backbone(
     found: Backbone, title: str, resolved: str, folder: Folder, with_page: bool = True
 ) -> dict:
     """Write a backbone into an open results folder and return its answer.
@@ -114,53 +114,57 @@ def write_into(
     folder : Folder
     with_page : bool
     """
-    answer = answer_of(found)
+    answer = backbone_data(found)
     rows: list = [HEAD]
     for method, curve in found.curves.items():
         columns = np.column_stack([getattr(curve, name) for name in COLUMNS])
         rows += [[method, *map(repr, row)] for row in columns.tolist()]
     write_rows(folder.path / "backbone.csv", rows)
-    write(contents(found, title), folder.path / "backbone.nc")
+    write_netcdf(backbone_contents(found, title), folder.path / "backbone.nc")
     write_json(answer, folder.path / "backbone.json")
     write_text(folder.path / "scene.resolved.toml", resolved)
     if found.curves:
-        write_text(folder.path / "backbone.svg", pictures.draw_charts(drawn(found.curves)))
+        write_text(
+            folder.path / "backbone.svg", pictures.draw_charts(backbone_charts(found.curves))
+        )
     if with_page:
-        write_text(folder.path / "report.html", page(found, title))
+        write_text(folder.path / "report.html", page_html(found, title))
     return answer
 
 
-def drawn(curves: dict) -> list:
+def backbone_charts(curves: dict) -> list:
     """Return the charts of frequency and damping ratio against amplitude, with errors.
 
     A frequency whose error is larger than itself would stretch the axis, so it is left out.
     """
     amplitudes = np.concatenate([curve.amplitude for curve in curves.values()])
     unit, scale = formatting.choose_axis_unit(amplitudes, "m")
-    along = charts.axis("amplitude at the output", unit, True)
+    along = charts.make_axis("amplitude at the output", unit, True)
     is_log = all((curve.damping > 0).all() for curve in curves.values())
     frequency = []
     damping = []
     for method, curve in curves.items():
         x = curve.amplitude * scale
         shown = _has_small_error(curve)
-        frequency += _marks(
+        frequency += _curve_marks(
             method, x[shown], curve.frequency[shown], curve.frequency_error[shown], False
         )
-        damping += _marks(method, x, curve.damping, curve.damping_error, is_log)
+        damping += _curve_marks(method, x, curve.damping, curve.damping_error, is_log)
     return [
-        charts.chart("Frequency", along, charts.axis("frequency", "Hz"), frequency),
-        charts.chart("Damping ratio", along, charts.axis("damping ratio", "", is_log), damping),
+        charts.make_chart("Frequency", along, charts.make_axis("frequency", "Hz"), frequency),
+        charts.make_chart(
+            "Damping ratio", along, charts.make_axis("damping ratio", "", is_log), damping
+        ),
     ]
 
 
-def _marks(method: str, x, y, errors, is_log: bool) -> list:
+def _curve_marks(method: str, x, y, errors, is_log: bool) -> list:
     """Return a line through the points of a method, and their error bars."""
     style = {"shape": "circle", "errors": errors}
     if is_log:
         style["floor"] = FLOOR_FACTOR * float(y.min(initial=1.0))
     colour = COLOURS[method]
-    return [charts.line(x, y, colour, method), charts.dots(x, y, colour, **style)]
+    return [charts.make_line(x, y, colour, method), charts.make_dots(x, y, colour, **style)]
 
 
 def _has_small_error(curve: Curve) -> np.ndarray:
@@ -169,17 +173,19 @@ def _has_small_error(curve: Curve) -> np.ndarray:
     return found | (not found.any())
 
 
-def page(found: Backbone, title: str) -> str:
+def page_html(found: Backbone, title: str) -> str:
     """Return the HTML page of a backbone."""
     made = []
     if found.curves:
-        made = [one | {"anchor": f"chart{k}"} for k, one in enumerate(drawn(found.curves))]
-    first, *more = sentences(found)
+        made = [
+            one | {"anchor": f"chart{k}"} for k, one in enumerate(backbone_charts(found.curves))
+        ]
+    first, *more = summarise_backbone(found)
     paragraphs = "".join(f"<p>{sentence_html(text)}</p>" for text in more)
     lead = f"<div class=verdict><b>{sentence_html(first)}</b>{paragraphs}</div>"
     sections = [
-        Section("curves", "Frequency and damping against amplitude", _figure(found, made)),
-        Section("ways", "How the curves were computed", _methods(found)),
+        Section("curves", "Frequency and damping against amplitude", _charts_html(found, made)),
+        Section("ways", "How the curves were computed", _methods_html(found)),
         Section("values", "Values", _values_table(found)),
     ]
     heading = f"Mode {found.mode}: frequency and damping against amplitude"
@@ -187,10 +193,10 @@ def page(found: Backbone, title: str) -> str:
         heading = f"{heading}: {title}"
     data = {"charts": made} if made else None
     scripts = ("figures.js", "curves.js") if made else ()
-    return document(heading, lead, sections, data, scripts)
+    return document_html(heading, lead, sections, data, scripts)
 
 
-def _figure(found: Backbone, made: list) -> str:
+def _charts_html(found: Backbone, made: list) -> str:
     """Return the containers of the charts on the page, with a caption."""
     if not made:
         return "<p>No curve was found.</p>"
@@ -204,7 +210,7 @@ def _figure(found: Backbone, made: list) -> str:
     return f"<figure><div class=row>{cells}</div><figcaption>{caption}</figcaption></figure>"
 
 
-def _methods(found: Backbone) -> str:
+def _methods_html(found: Backbone) -> str:
     """Return the description of each method, or why it has no curve, and the notes."""
     rows = []
     for method, text in DESCRIPTIONS.items():
@@ -213,7 +219,7 @@ def _methods(found: Backbone) -> str:
         elif method in found.missing:
             rows.append([escape(method), sentence_html(f"not known: {found.missing[method]}")])
     notes = "".join(f"<p>{sentence_html(text[0].upper() + text[1:])}.</p>" for text in found.notes)
-    return table(("", ""), rows) + notes
+    return table_html(("", ""), rows) + notes
 
 
 def _values_table(found: Backbone) -> str:
@@ -222,7 +228,7 @@ def _values_table(found: Backbone) -> str:
     for method, curve in found.curves.items():
         for k in range(curve.amplitude.size):
             rows.append([method, *(escape(text) for text in _format_point(curve, k))])
-    return table(("method", ">amplitude", ">frequency", ">damping ratio"), rows)
+    return table_html(("method", ">amplitude", ">frequency", ">damping ratio"), rows)
 
 
 class FormattedPoint(NamedTuple):
@@ -250,7 +256,7 @@ def _format_stuck(found: Backbone) -> str:
     return formatting.format_quantity(stuck, "Hz", 5)
 
 
-def sentences(found: Backbone) -> list:
+def summarise_backbone(found: Backbone) -> list:
     """Return the results in sentences; the first one is on both ends of the best curve."""
     free = formatting.format_quantity(found.frequencies.free, "Hz", 5)
     stuck = ""
@@ -304,10 +310,10 @@ def _describe_largest_damping(curve: Curve) -> list:
     ]
 
 
-def lines_of(found: Backbone) -> list:
+def format_backbone(found: Backbone) -> list:
     """Return the results in lines for the screen: sentences, a table, missing curves."""
     head = f"{'method':<13}{'amplitude':>12}{'frequency':>26}{'damping ratio':>26}"
-    out = [*sentences(found), head]
+    out = [*summarise_backbone(found), head]
     for method, curve in found.curves.items():
         count = curve.amplitude.size
         n_shown = count if count <= MAX_WHOLE else N_SHOWN

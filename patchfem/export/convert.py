@@ -14,7 +14,7 @@ from .lab import write
 from .pages import player
 
 
-def export(
+def export_results(
     folder: Path, out: Path, frame: int | None = None, histories: bool = False, of: str = ""
 ) -> str:
     """Write the fields, or the histories and loops, of a results folder in another format.
@@ -49,8 +49,8 @@ def export(
                 "--frame can be used only with fields (.vtu, .csv); a file of histories contains all "
                 "times"
             )
-        with _beside(out):
-            return write.export(folder, out)
+        with _create_parent_folder(out):
+            return write.export_histories(folder, out)
     if histories:
         raise PatchfemError(
             f"--histories: histories are written as {', '.join(lab.ENDINGS)}, not as "
@@ -66,13 +66,13 @@ def export(
             raise PatchfemError(
                 "--frame: cannot be used with a script, which plays the whole last cycle"
             )
-        with _beside(out):
+        with _create_parent_folder(out):
             return paraview.write_script(folder, out, of or "von_mises")
-    with _beside(out):
-        return vtu.export(folder, out, frame)
+    with _create_parent_folder(out):
+        return vtu.export_fields(folder, out, frame)
 
 
-def view(
+def view_results(
     folder: Path, out: Path | None, frame: int | None = None, magnify: float | None = None
 ) -> str:
     """Show the pieces of a results folder in a window, or draw them into a file.
@@ -93,7 +93,7 @@ def view(
         A line about the page; "" for anything else.
     """
     if out is None or out.suffix != ".html":
-        with _beside(out):
+        with _create_parent_folder(out):
             viewer.view(folder, out, frame, magnify)
         return ""
     if frame is not None or magnify is not None:
@@ -101,12 +101,12 @@ def view(
             "--frame, --magnify: cannot be used with a page, which shows the last cycle and has "
             "sliders for frame and magnification"
         )
-    with _beside(out):
+    with _create_parent_folder(out):
         return player.write_page(folder, out)
 
 
 @contextmanager
-def _beside(out: Path | None) -> Iterator[None]:
+def _create_parent_folder(out: Path | None) -> Iterator[None]:
     """Create the folder of an output file; remove it again if nothing was written into it.
 
     Missing if it cannot be created.
@@ -114,7 +114,7 @@ def _beside(out: Path | None) -> Iterator[None]:
     places = [] if out is None else [one for one in out.parents if not one.exists()]
     try:
         if places:
-            _made(places[0], out)
+            _make_folder(places[0], out)
         yield
     finally:
         with suppress(OSError):  # the folder contains what was written
@@ -122,7 +122,7 @@ def _beside(out: Path | None) -> Iterator[None]:
                 one.rmdir()
 
 
-def _made(place: Path, out: Path) -> None:
+def _make_folder(place: Path, out: Path) -> None:
     """Create a folder; Missing if this is not possible."""
     try:
         place.mkdir(parents=True)

@@ -9,9 +9,9 @@ from ..campaigns.cost import (
     TOLERANCE,
     Cost,
     changed_measures,
+    cost_sentence,
     fastest_by_measure,
     measures_with_error,
-    sentence,
     worst_error,
     worst_of_run,
 )
@@ -54,7 +54,7 @@ MIN_SECONDS_RATIO = 2.0
 MIN_ERROR_RATIO = 10.0  # smallest ratio of the ends of the error axis, for equal errors
 
 
-def lines_of(knob: str, runs: list, tolerance: float) -> list[str]:
+def format_cost(knob: str, runs: list, tolerance: float) -> list[str]:
     """Format the runs of a curve as lines, one per tolerance or per value of a setting.
 
     Parameters
@@ -72,10 +72,10 @@ def lines_of(knob: str, runs: list, tolerance: float) -> list[str]:
     if knob != TOLERANCE:
         names = measures_with_error(runs)
         rows = [(one, worst_error(one, names, tolerance), "") for one in runs]
-        last = [sentence(runs, tolerance)]
+        last = [cost_sentence(runs, tolerance)]
     else:
         groups = _by_tolerance(runs)
-        rows = [(group[0], worst_of_run(group[0]), _outcome(group)) for group in groups]
+        rows = [(group[0], worst_of_run(group[0]), _format_outcome(group)) for group in groups]
         missed = [group[-1] for group in groups if not group[-1].meets_tolerance()][-1:]
         last = [
             f"tolerance {one.tolerance:g}: {remedy}" for one in missed for remedy in one.remedies
@@ -100,7 +100,7 @@ def _by_tolerance(runs: list) -> list[list]:
     return out
 
 
-def _outcome(group: list) -> str:
+def _format_outcome(group: list) -> str:
     """State whether a tolerance is met, by the run itself or by settings that were tried next."""
     first, last = group[0], group[-1]
     if first.meets_tolerance():
@@ -117,7 +117,7 @@ def _outcome(group: list) -> str:
     return f"{missed}, nor with {seconds}: {format_number(worst.share, 2)} in {worst.name}"
 
 
-def details_of(knob: str, runs: list, tolerance: float) -> list[str]:
+def format_details(knob: str, runs: list, tolerance: float) -> list[str]:
     """Format a table of several measures with stated errors and distances to the best run.
 
     Parameters
@@ -134,7 +134,7 @@ def details_of(knob: str, runs: list, tolerance: float) -> list[str]:
     """
     names = detailed_measures(runs, tolerance)
     waited, width = (
-        any(one.waited() for one in runs),
+        any(one.has_waited() for one in runs),
         max(len(knob), *(len(one.label) for one in runs)),
     )
     head = [
@@ -157,12 +157,14 @@ def details_of(knob: str, runs: list, tolerance: float) -> list[str]:
             *[f"{one.wall_seconds:7.3f}"] * waited,
         ]
         out.append(
-            "  ".join(cells + [_shares(one, name).rjust(max(17, len(name))) for name in names])
+            "  ".join(
+                cells + [_format_shares(one, name).rjust(max(17, len(name))) for name in names]
+            )
         )
-    return [*out, sentence(runs, tolerance)]
+    return [*out, cost_sentence(runs, tolerance)]
 
 
-def _shares(one: Cost, name: str) -> str:
+def _format_shares(one: Cost, name: str) -> str:
     """Format the stated error of a measure and, in brackets, its distance to the best run.
 
     Both are relative to the value.
@@ -285,7 +287,7 @@ def cost_data(knob: str, runs: list, tolerance: float) -> dict:
     return {
         "runs": out,
         "cheapest": fastest_by_measure(runs, tolerance) if alone else None,
-        "sentence": sentence(runs, tolerance) if alone else None,
+        "sentence": cost_sentence(runs, tolerance) if alone else None,
     }
 
 
@@ -314,7 +316,7 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
         if found.share > ROUND_OFF
     ]
     marks = [
-        charts.line(
+        charts.make_line(
             [one.seconds for one, _ in points], [share for _, share in points], "accent", width=1.0
         )
     ]
@@ -322,16 +324,18 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
         alike = [one for one in points if (one.share <= (one.run.tolerance or tolerance)) == is_met]
         if alike:
             x, y = [one.run.seconds for one in alike], [one.share for one in alike]
-            marks.append(charts.dots(x, y, "accent", text, size=6, hollow=not is_met))
-    ends = _padded([one.seconds for one in runs], MIN_SECONDS_RATIO)
+            marks.append(charts.make_dots(x, y, "accent", text, size=6, hollow=not is_met))
+    ends = _axis_range([one.seconds for one in runs], MIN_SECONDS_RATIO)
     limit = f"tolerance of the scene, {tolerance:g}"
-    marks.append(charts.line(ends, [tolerance, tolerance], "soft", limit, dash="dashed", width=1.0))
-    x_axis = charts.axis("CPU seconds of a run", "", True) | {"range": ends}
-    y_axis = charts.axis("error of the worst measure", "", True)
-    y_axis["range"] = _padded([tolerance, *(one.share for one in points)], MIN_ERROR_RATIO)
+    marks.append(
+        charts.make_line(ends, [tolerance, tolerance], "soft", limit, dash="dashed", width=1.0)
+    )
+    x_axis = charts.make_axis("CPU seconds of a run", "", True) | {"range": ends}
+    y_axis = charts.make_axis("error of the worst measure", "", True)
+    y_axis["range"] = _axis_range([tolerance, *(one.share for one in points)], MIN_ERROR_RATIO)
     title = f"What accuracy costs, by {AXES[knob]}"
-    labels = _labels(points, x_axis["range"], y_axis["range"])
-    return charts.chart(title, x_axis, y_axis, marks) | {"labels": labels}
+    labels = _place_labels(points, x_axis["range"], y_axis["range"])
+    return charts.make_chart(title, x_axis, y_axis, marks) | {"labels": labels}
 
 
 class Point(NamedTuple):
@@ -341,13 +345,13 @@ class Point(NamedTuple):
     share: float
 
 
-def _padded(values: list, min_ratio: float) -> list:
+def _axis_range(values: list, min_ratio: float) -> list:
     """Return the ends of a logarithmic axis with room for labels around its values."""
     room = max(max(values) / min(values), min_ratio) ** AXIS_MARGIN
     return [min(values) / room, max(values) * room]
 
 
-def _labels(points: list, x_range: list, y_range: list) -> list:
+def _place_labels(points: list, x_range: list, y_range: list) -> list:
     """Return the labels of the points, which move up if they would overlap.
 
     A label stands above its point and lists the settings of all equal runs.

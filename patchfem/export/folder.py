@@ -13,10 +13,10 @@ from ..runs.results.result import Result, shorten_file_names
 from ..runs.run import StateFile, marches, run
 from . import netcdf, report
 from .fields import bodies as body_fields
-from .histories import contents
+from .histories import result_contents
 from .pages import player
 from .results import INTERFACES_FOLDER, MAX_INTERFACES, PAGE, STATE, Folder, is_state
-from .summary import read_summary, summary_of, write_json
+from .summary import read_summary, summarise_run, write_json
 
 SCENE = "scene.resolved.toml"
 
@@ -37,7 +37,7 @@ class WrittenRun(NamedTuple):
 def run_into(
     what, target: Path, say=None, progress=None, fresh: bool = False, resume: bool = False
 ) -> WrittenRun:
-    """Run a plan into a results folder; `write_page` writes the page afterwards.
+    """Run a plan into a results folder; `write_run_page` writes the page afterwards.
 
     The folder is locked first. An older results folder is replaced only when the new one is
     complete, and a folder with other files is refused before anything runs. A run with [wear] and a
@@ -79,7 +79,7 @@ def run_into(
                     f"{error}; the run stopped before any result, so there is no results folder"
                 ) from None
             result = _partial_result(error)
-        return write(result, folder.path)
+        return write_results(result, folder.path)
 
 
 def _partial_result(error: NotConverged) -> Result:
@@ -119,12 +119,12 @@ def is_complete(what, target: Path) -> bool:
     )
 
 
-def write(result: Result, path: Path) -> WrittenRun:
+def write_results(result: Result, path: Path) -> WrittenRun:
     """Write all files of a run except its page into the folder `path`."""
     begin, bodies = perf_counter(), {}
     text = result.plan.model.source.resolved
     write_text(path / SCENE, text)
-    netcdf.write(contents(result), path / "result.nc")
+    netcdf.write_netcdf(result_contents(result), path / "result.nc")
     if result.patch is not None:
         bodies = body_fields.write_fields(result, path / "fields.vtkhdf")
     for face in result.extra.get("faces", ())[:MAX_INTERFACES]:
@@ -140,18 +140,18 @@ def write(result: Result, path: Path) -> WrittenRun:
         body_fields.write_fields(own, place / "fields.vtkhdf")
         result.extra["notes"] += [f"interface {face.name}: {text}" for text in own.extra["notes"]]
     result.seconds["files"] = perf_counter() - begin
-    answer = summary_of(result)
+    answer = summarise_run(result)
     write_json(answer, path / "summary.json")
     return WrittenRun(answer, result, bodies, _folder_identity(path))
 
 
-def write_page(written: WrittenRun, folder: Path) -> Path:
+def write_run_page(written: WrittenRun, folder: Path) -> Path:
     """Write the page of a run into its complete results folder, and return the path of the page.
 
     Missing if another run has replaced the folder in the meantime.
     """
     text, path = (
-        report.page_of(written.result, written.bodies, player.player_data(folder)),
+        report.run_page(written.result, written.bodies, player.player_data(folder)),
         Path(folder) / PAGE,
     )
     if not path.parent.is_dir() or _folder_identity(path.parent) != written.place:
@@ -166,12 +166,12 @@ def _folder_identity(folder: Path) -> tuple:
     return found.st_dev, found.st_ino
 
 
-def save(result: Result, folder: Path, page: bool = True) -> None:
+def save_run(result: Result, folder: Path, page: bool = True) -> None:
     """Write the results folder of a finished run, by default with its page.
 
     An older results folder is replaced.
     """
     with Folder(folder) as claimed:
-        written = write(result, claimed.path)
+        written = write_results(result, claimed.path)
     if page:
-        write_page(written, claimed.target)
+        write_run_page(written, claimed.target)

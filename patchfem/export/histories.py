@@ -8,17 +8,17 @@ from ..response.levels import LEVEL_MEASURES
 from ..response.rows import TABLE
 from ..runs.results.result import Result, patch_surface
 from . import netcdf
-from .summary import summary_of, versions
+from .summary import package_versions, summarise_run
 
 LEDGER = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
 
 
-def contents(result: Result) -> netcdf.Contents:
+def result_contents(result: Result) -> netcdf.Contents:
     """Return the content of result.nc in SI.
 
     It consists of histories, interface frames, levels, events, curve and provenance.
     """
-    found, modal = histories(result)
+    found, modal = collect_histories(result)
     patch, extra = result.patch, result.extra
     surface = patch_surface(patch, result.fields)
     x, weight = (surface.x, surface.weight) if surface is not None else (None, None)
@@ -28,37 +28,37 @@ def contents(result: Result) -> netcdf.Contents:
         if patch is None or patch.strips is None
         else (patch.strips.offsets, patch.strips.pressure)
     )
-    levels = _levels(extra["levels"]) if "levels" in extra else None
+    levels = _level_columns(extra["levels"]) if "levels" in extra else None
     rig = result.plan.model.rig
     names = list(rig.friction.names) if found and rig is not None else []
     data = netcdf.run_contents(
-        found, modal, fields, x, weight, strips, levels, names, _coordinate(rig)
+        found, modal, fields, x, weight, strips, levels, names, _coordinate_description(rig)
     )
     if patch is not None:
-        data = netcdf.with_surfaces(data, surface.unloaded_gap)
+        data = netcdf.add_surfaces(data, surface.unloaded_gap)
     if "faces" in extra:
-        data = netcdf.with_faces(data, extra["faces"])
+        data = netcdf.add_faces(data, extra["faces"])
     if "events" in extra:
         e = extra["events"]
-        data = netcdf.with_events(
+        data = netcdf.add_events(
             data, e.time, e.interface, e.kind, e.slide, e.count, KIND_NAMES, e.source
         )
     if "curve" in extra:
-        data = netcdf.with_curve(data, extra["curve"])
+        data = netcdf.add_curve(data, extra["curve"])
     if "decay" in extra:
-        data = netcdf.with_decay(data, extra["decay"])
+        data = netcdf.add_decay(data, extra["decay"])
     if "spectra" in extra:
-        data = netcdf.with_spectra(data, extra["spectra"])
+        data = netcdf.add_spectra(data, extra["spectra"])
     if "wear" in extra:
-        data = netcdf.with_wear(
+        data = netcdf.add_wear(
             data, extra["wear"], {name: m.unit for name, m in result.measures.items()}
         )
     if "regime" in extra:
         data = data.also(
             attributes={"regime": extra["regime"], "largest_multiplier": largest_multiplier(extra)}
         )
-    return netcdf.with_provenance(
-        data, summary_of(result), result.plan.model.source.resolved, versions()
+    return netcdf.add_provenance(
+        data, summarise_run(result), result.plan.model.source.resolved, package_versions()
     )
 
 
@@ -67,7 +67,7 @@ def largest_multiplier(extra: dict) -> float:
     return float(np.abs(np.asarray(extra["multipliers"])).max(initial=0.0))
 
 
-def histories(result: Result) -> tuple:
+def collect_histories(result: Result) -> tuple:
     """Return the histories of a run and its modal coordinates.
 
     Returns
@@ -105,7 +105,7 @@ def histories(result: Result) -> tuple:
         out |= dict(zip(LEDGER, r.extra["ledger"]))
     rig = result.plan.model.rig
     if rig.friction.names:
-        out |= _between(result)
+        out |= _interface_histories(result)
     elif kind == "rig":
         still = np.full(r.time.size, result.measures["normal_load"].value)
         out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
@@ -116,7 +116,7 @@ def histories(result: Result) -> tuple:
     return out, (list(rig.modes.names), structure.compute_named_motions(rig.modes, r.modal))
 
 
-def _between(result: Result) -> dict:
+def _interface_histories(result: Result) -> dict:
     """Return the histories (i, k) of the interfaces of a rig of masses, and those of its output."""
     r = result.response
     columns = {
@@ -146,7 +146,7 @@ def _between(result: Result) -> dict:
     }
 
 
-def _coordinate(rig) -> str:
+def _coordinate_description(rig) -> str:
     """Return the description of `modal_coordinate` if the coordinates are not modes; else ""."""
     if rig is None or rig.structure.lists_modes or rig.modes.shapes is None:
         return ""
@@ -155,7 +155,7 @@ def _coordinate(rig) -> str:
     return "displacement of the mass or coordinate of the structure that `mode` names"
 
 
-def _levels(levels) -> dict:
+def _level_columns(levels) -> dict:
     """Return the columns of a run in levels: drive, sticking, outcome, measures and errors."""
     out = {
         "level_drive": (levels[0].unit, np.array([one.drive for one in levels])),

@@ -16,7 +16,7 @@ import numpy as np
 from ..disk.atomic_write import open_lossy, write_atomically, write_bytes
 
 MAX_VALUES_IN_MEMORY = 10_000_000  # number of values above which a file is written to disk directly
-CACHE = 1 << 18  # bytes of each variable that stay in memory until its file is closed
+CACHE_BYTES = 1 << 18  # bytes of each variable that stay in memory until its file is closed
 
 VARIABLES = {
     "relative_displacement": ("m", "displacement of the output relative to the base"),
@@ -112,13 +112,13 @@ class Contents:
         import xarray as xr
 
         variables, coordinates = (
-            {name: _variable(xr, *one) for name, one in part.items()}
+            {name: _xarray_variable(xr, *one) for name, one in part.items()}
             for part in (self.variables, self.coordinates)
         )
         return xr.Dataset(variables, coordinates, self.attributes)
 
 
-def _variable(xr, dimensions, values, attributes=None):
+def _xarray_variable(xr, dimensions, values, attributes=None):
     """Return an xarray variable of numbers or strings without conversion.
 
     To look for arrays of other packages, xarray would import all of Dask, which takes a quarter of
@@ -174,7 +174,7 @@ def run_contents(
                 data[name] = (
                     ("interface", "time")[-np.ndim(values) :],
                     values,
-                    _attributes(name, np.ndim(values)),
+                    _variable_attributes(name, np.ndim(values)),
                 )
     if interfaces:
         coords["interface"] = (
@@ -187,7 +187,8 @@ def run_contents(
         data["modal_coordinate"] = (
             ("time", "mode"),
             modal[1],
-            _attributes("modal_coordinate") | ({"long_name": coordinate} if coordinate else {}),
+            _variable_attributes("modal_coordinate")
+            | ({"long_name": coordinate} if coordinate else {}),
         )
     if x is not None:
         coords["x"] = (
@@ -195,7 +196,7 @@ def run_contents(
             np.asarray(x),
             {"units": "m", "long_name": "position along the sliding direction"},
         )
-        data["weight"] = ("x", np.asarray(weight), _attributes("weight"))
+        data["weight"] = ("x", np.asarray(weight), _variable_attributes("weight"))
         coords["frame_time"] = (
             "frame",
             fields["time"],
@@ -211,7 +212,7 @@ def run_contents(
                 data[name] = (("frame", "x"), values, flags)
             elif np.ndim(values) >= 2:
                 over = ("frame", "x") if np.ndim(values) == 2 else ("frame", "strip", "x")
-                data[name] = (over, values, _attributes(name))
+                data[name] = (over, values, _variable_attributes(name))
     if strips is not None:
         coords["strip_offset"] = (
             "strip",
@@ -221,7 +222,7 @@ def run_contents(
         data["strip_normal_stress"] = (
             ("strip", "x"),
             strips[1],
-            _attributes("strip_normal_stress"),
+            _variable_attributes("strip_normal_stress"),
         )
     for name, (unit, values) in (levels or {}).items():
         drive = "force" if unit == "N" else "acceleration of the base"
@@ -239,7 +240,7 @@ def run_contents(
     return Contents(data, coords)
 
 
-def with_events(
+def add_events(
     data: Contents, time, interface, kind, slide, count: int, meanings, source: str
 ) -> Contents:
     """Return the content with the table of events (e,).
@@ -305,7 +306,7 @@ CURVE_COLUMNS = {
 }
 
 
-def with_curve(data: Contents, curve: dict) -> Contents:
+def add_curve(data: Contents, curve: dict) -> Contents:
     """Return the content with a curve of steady motions (c,).
 
     curve: frequency [Hz], level, amplitude [m], regime, multiplier, folds, and if they exist the
@@ -372,7 +373,7 @@ DECAY = {
 }
 
 
-def with_decay(data: Contents, decay) -> Contents:
+def add_decay(data: Contents, decay) -> Contents:
     """Return the content with a `response.decay_curve.DecayCurve` over decay_time."""
     over, out = "decay_time", {}
     for name, (unit, text) in DECAY.items():
@@ -395,7 +396,7 @@ def with_decay(data: Contents, decay) -> Contents:
     )
 
 
-def with_spectra(data: Contents, found) -> Contents:
+def add_spectra(data: Contents, found) -> Contents:
     """Return the content with `response.stationary.Spectra` over frequency."""
     columns = {
         "base_acceleration_spectrum": (
@@ -430,7 +431,7 @@ def with_spectra(data: Contents, found) -> Contents:
     )
 
 
-def with_surfaces(data: Contents, gap) -> Contents:
+def add_surfaces(data: Contents, gap) -> Contents:
     """Return the content with the gap (m,) [m] of the unloaded surfaces, wear included.
 
     With strips the gap is (s, m).
@@ -440,13 +441,13 @@ def with_surfaces(data: Contents, gap) -> Contents:
             "unloaded_gap": (
                 ("strip", "x")[-np.ndim(gap) :],
                 np.asarray(gap),
-                _attributes("unloaded_gap"),
+                _variable_attributes("unloaded_gap"),
             )
         }
     )
 
 
-def with_faces(data: Contents, faces) -> Contents:
+def add_faces(data: Contents, faces) -> Contents:
     """Return the content with the patches of interfaces, each on separate nodes, frame by frame.
 
     faces: list of `runs.patch.faces.Face`. The number at the end of a name is that of the
@@ -475,7 +476,7 @@ EDGE_PEAK = (
 )
 
 
-def with_wear(data: Contents, history: dict, units: dict) -> Contents:
+def add_wear(data: Contents, history: dict, units: dict) -> Contents:
     """Return the content with measures over the cycles of wear.
 
     Parameters
@@ -505,7 +506,7 @@ def with_wear(data: Contents, history: dict, units: dict) -> Contents:
     return data.also(out, {"wear_cycle": ("wear_cycle", history["cycle"], count)})
 
 
-def _attributes(name: str, dimensions: int = 1) -> dict:
+def _variable_attributes(name: str, dimensions: int = 1) -> dict:
     """Return unit and description of a variable."""
     unit, text = VARIABLES[name]
     if dimensions == 2 and name in INTERFACE_DESCRIPTIONS:
@@ -513,7 +514,7 @@ def _attributes(name: str, dimensions: int = 1) -> dict:
     return {"units": unit, "long_name": text}
 
 
-def with_provenance(data: Contents, summary: dict, scene_text: str, versions: dict) -> Contents:
+def add_provenance(data: Contents, summary: dict, scene_text: str, versions: dict) -> Contents:
     """Return the content with its origin: program, scene, outcome, measures and versions.
 
     It names neither host nor path.
@@ -544,7 +545,7 @@ def with_provenance(data: Contents, summary: dict, scene_text: str, versions: di
     )
 
 
-def write(data: Contents, path: Path) -> None:
+def write_netcdf(data: Contents, path: Path) -> None:
     """Write the content as netCDF4 to `path`.
 
     A file is created in memory, so that a full disk gives one OSError and leaves nothing open. A
@@ -557,20 +558,20 @@ def write(data: Contents, path: Path) -> None:
         with (
             write_atomically(path) as partial,
             open_lossy(partial) as kept,
-            _CachingFile(kept, "w", track_order=True, rdcc_nbytes=CACHE) as file,
+            _CachingFile(kept, "w", track_order=True, rdcc_nbytes=CACHE_BYTES) as file,
         ):
-            _write(file, data)
+            _write_file(file, data)
         return
     with _CachingFile(
         path.name, "w", driver="core", backing_store=False, track_order=True
     ) as memory:
-        _write(memory, data)
+        _write_file(memory, data)
         memory.flush()
         image = memory.id.get_file_image()
     write_bytes(path, image)
 
 
-def _write(opened: h5py.File, data: Contents) -> None:
+def _write_file(opened: h5py.File, data: Contents) -> None:
     """Write the content into an open HDF5 file."""
     with h5netcdf.File(opened, "w") as file:
         file.attrs.update(data.attributes)

@@ -14,8 +14,8 @@ from ..structure.drive_sizes import find_max_acceleration
 from .histories import largest_multiplier
 from .pages.driven import describe_drive, run_command
 from .pages.released import describe_release
-from .pages.sentences import verdict
-from .summary import cycles_of, summary_of, versions
+from .pages.sentences import verdict_sentence
+from .summary import count_cycles, package_versions, summarise_run
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -198,7 +198,7 @@ class RunData:
     measured: Measured | None = None
 
 
-def data_of(result: Result) -> RunData:
+def collect_run_data(result: Result) -> RunData:
     """Collect the data of the page of a run."""
     source = result.plan.model.source
     tables = tomllib.loads(source.resolved)
@@ -217,24 +217,24 @@ def data_of(result: Result) -> RunData:
             run_command(source.path, source.sets),
         ),
         verdict=_verdict(result),
-        versions=versions(),
+        versions=package_versions(),
         patch=_patch(result),
         motion=motion,
         evaluations=_evaluations(result),
-        measured=_measured(result),
+        measured=_measured_responses(result),
     )
 
 
 def _verdict(result: Result) -> Verdict:
     """Return how the run ended."""
-    summary = summary_of(result)
+    summary = summarise_run(result)
     steady = None
     if "regime" in result.extra:
         steady = {"regime": result.extra["regime"], "multiplier": largest_multiplier(result.extra)}
     return Verdict(
         summary=summary,
-        sentence=verdict(summary),
-        cycles=cycles_of(result),
+        sentence=verdict_sentence(summary),
+        cycles=count_cycles(result),
         released=describe_release(result),
         steady=steady,
         engine=result.extra.get("engine", ""),
@@ -282,7 +282,7 @@ def _bench_motion(result: Result, tables: dict) -> Motion:
     history = {"time": response.time, "displacement": response.slide, "force": response.force}
     loop = {"slide": window.slide, "force": window.force, "time": window.time}
     recorded = None
-    read = _recorded(result.plan.model.source.path.parent, tables["slide"], response)
+    read = _read_recorded_loop(result.plan.model.source.path.parent, tables["slide"], response)
     if read is not None:
         time, slide, force = read
         history["measured"] = time, force
@@ -290,7 +290,7 @@ def _bench_motion(result: Result, tables: dict) -> Motion:
     return Motion(history, loop, recorded=recorded)
 
 
-def _recorded(folder: Path, slide: dict, response) -> tuple | None:
+def _read_recorded_loop(folder: Path, slide: dict, response) -> tuple | None:
     """Read times [s], slides [m] and forces [N] from the file of a slide; None without forces."""
     if slide["kind"] != "file":
         return None
@@ -337,7 +337,7 @@ def _rig_motion(result: Result) -> Motion:
     )
 
 
-def _measured(result: Result) -> Measured | None:
+def _measured_responses(result: Result) -> Measured | None:
     """Return the measured responses of the scene; None if there are none."""
     model = result.plan.model
     if model.measured is None:

@@ -48,7 +48,7 @@ def reading_errors(path: Path, form: str) -> Iterator[None]:
         ) from None
 
 
-def variables(path: Path, names: set | None = None) -> tuple:
+def read_variables(path: Path, names: set | None = None) -> tuple:
     """Read a netCDF file and check its variables.
 
     Parameters
@@ -113,7 +113,7 @@ def is_real(values) -> bool:
     return values.dtype.kind in "iuf"
 
 
-def require(fine: bool, text: str) -> None:
+def require_valid(fine: bool, text: str) -> None:
     """Raise ValueError with a message unless a condition is true."""
     if not fine:
         raise ValueError(text)

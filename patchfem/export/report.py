@@ -11,30 +11,30 @@ from .. import formatting
 from ..effects import list_displayed_absent_effects
 from ..runs.results.result import Result
 from .drawing import charts, pictures
-from .page_data import RunData, data_of
+from .page_data import RunData, collect_run_data
 from .pages import player
-from .pages.document import Section, document, sentence_html, table, warning_box
+from .pages.document import Section, document_html, sentence_html, table_html, warning_box
 from .pages.driven import list_changed_keys
 from .pages.sentences import (
     EXACT_NOTE,
     G,
+    display_units,
     format_imperial,
     format_value_and_error,
     format_with_error,
-    headline,
+    headline_sentence,
     measure_link,
     order_measures,
     record_interval,
-    units,
 )
 from .results import MAX_INTERFACES
 
-SETTLED = ("steady", "stuck", "done")
-DASH = "&ndash;"
+SETTLED_OUTCOMES = ("steady", "stuck", "done")
+EN_DASH = "&ndash;"
 # Characters that the numbers of all charts may take; with library and player the page stays below 3
 # MB.
-ROOM = 700_000
-FILES = (
+MAX_CHART_CHARACTERS = 700_000
+RESULT_FILES = (
     (
         "fields.vtkhdf",
         "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)",
@@ -46,20 +46,20 @@ FILES = (
 )
 
 
-def verdict(data: RunData) -> str:
+def verdict_html(data: RunData) -> str:
     """Return the results of a run in a few sentences of HTML, with the error of each number."""
     known = data.verdict
     answer = f"<b>{escape(known.summary['outcome'])}</b>: {sentence_html(known.sentence)}"
-    text = headline(
+    text = headline_sentence(
         known.summary,
         known.cycles,
         lambda number, name: measure_link(number, name, " class=v"),
         known.released,
     )
-    return f"{answer}{escape(charts.regime(known.steady))} {text}".strip()
+    return f"{answer}{escape(charts.regime_sentence(known.steady))} {text}".strip()
 
 
-def page(data: RunData) -> str:
+def page_html(data: RunData) -> str:
     """Return the HTML page of a run."""
     summary = data.verdict.summary
     title = summary["title"] or data.source.name or "patchfem run"
@@ -71,28 +71,28 @@ def page(data: RunData) -> str:
         f"<p class=soft>{of}patchfem {escape(summary['patchfem'])} &middot; {escape(summary['kind'])}{motion} "
         f"&middot; engine {escape(data.verdict.engine or 'static')} &middot; "
         f"computed in {summary['seconds'].get('total', 0):.2f} s</p>",
-        f"<p class=verdict>{verdict(data)}</p>",
+        f"<p class=verdict>{verdict_html(data)}</p>",
     ]
     warnings = [w for w in summary["warnings"] if w != data.verdict.sentence]
     lead.append(warning_box(warnings, "Warnings"))
     lead += [f"<p class=soft>Note: {sentence_html(text)}</p>" for text in summary["notes"]]
-    drawn, shown = figures(data)
-    drawn = charts.limit_characters(drawn, ROOM)
+    drawn, shown = draw_figures(data)
+    drawn = charts.limit_characters(drawn, MAX_CHART_CHARACTERS)
     sections = [Section("pictures", "Pictures", shown)] if drawn else []
     film = data.patch.film if data.patch.touches() else None
     if film is not None:
-        sections.append(player.section(film))
+        sections.append(player.player_section(film))
     if data.measured is not None:
-        sections += _table_one(data)
+        sections += _measured_section(data)
     if data.evaluations.levels is not None:
-        sections.append(_table_of_levels(data.evaluations.levels))
-    sections += [_measures(data), _cost(data), _origin(data)]
+        sections.append(_levels_section(data.evaluations.levels))
+    sections += [_measures_section(data), _cost_section(data), _origin_section(data)]
     scripts = (
         "figures.js",
         *(("curves.js",) if drawn else ()),
         *(("stage.js", "player.js") if film else ()),
     )
-    return document(
+    return document_html(
         title,
         "".join(lead),
         sections,
@@ -101,10 +101,10 @@ def page(data: RunData) -> str:
     )
 
 
-def figures(data: RunData) -> tuple:
+def draw_figures(data: RunData) -> tuple:
     """Return the charts of a run, each with its anchor, and the HTML of their containers."""
     drawn, places = [], []
-    for found in (picture(name, data) for name in PICTURES):
+    for found in (find_picture(name, data) for name in PICTURES):
         if found is None:
             continue
         made = [
@@ -130,26 +130,26 @@ class Picture(NamedTuple):
     caption: str
 
 
-def picture(name: str, data: RunData) -> Picture | None:
+def find_picture(name: str, data: RunData) -> Picture | None:
     """Return the picture of this name (a key of PICTURES); None if the run has no data for it."""
     return PICTURES[name](data)
 
 
-def _curve(data: RunData) -> Picture | None:
+def _curve_picture(data: RunData) -> Picture | None:
     """Return the picture of a curve of steady motions."""
     found, text = data.evaluations.curve, data.source.driven
     return (
         None
         if found is None
         else Picture(
-            charts.curve,
+            charts.curve_charts,
             (found,),
-            charts.caption(found) + (f" {text[0].upper()}{text[1:]}." if text else ""),
+            charts.curve_caption(found) + (f" {text[0].upper()}{text[1:]}." if text else ""),
         )
     )
 
 
-def _spectra(data: RunData) -> Picture | None:
+def _spectra_picture(data: RunData) -> Picture | None:
     """Return the picture of the spectra of a random drive."""
     if data.evaluations.spectra is None:
         return None
@@ -167,7 +167,7 @@ def _spectra(data: RunData) -> Picture | None:
         )
     )
     return Picture(
-        charts.spectra,
+        charts.spectra_charts,
         (data.evaluations.spectra, at),
         "One-sided spectral densities of output and drive, and the "
         "frequency response H1 (displacement of the output divided "
@@ -176,12 +176,12 @@ def _spectra(data: RunData) -> Picture | None:
     )
 
 
-def _decay(data: RunData) -> Picture | None:
+def _decay_picture(data: RunData) -> Picture | None:
     """Return the picture of frequency and damping of a decay."""
     if data.evaluations.decay is None:
         return None
     return Picture(
-        charts.decay,
+        charts.decay_charts,
         (data.evaluations.decay,),
         "Frequency and damping ratio (structure and friction together) of "
         "the released output against half its peak-to-peak motion; bars "
@@ -189,20 +189,20 @@ def _decay(data: RunData) -> Picture | None:
     )
 
 
-def _levels(data: RunData) -> Picture | None:
+def _levels_picture(data: RunData) -> Picture | None:
     """Return the picture of the amplitude at the end of each level of a drive with levels."""
     if data.evaluations.levels is None:
         return None
     return Picture(
-        charts.levels,
+        charts.levels_chart,
         (data.evaluations.levels,),
         "Amplitude at the end of every level; each level starts from the "
         "final state of the previous level; arrows show the order of the "
-        f"test.{_under(data)}",
+        f"test.{_drive_sentence(data)}",
     )
 
 
-def _wear(data: RunData) -> Picture | None:
+def _wear_picture(data: RunData) -> Picture | None:
     """Return the picture of the wear of a patch."""
     wear = data.evaluations.wear
     if wear is None:
@@ -212,17 +212,17 @@ def _wear(data: RunData) -> Picture | None:
     mean = depth.mean(axis=1) if depth.ndim == 3 else depth
     profiles = (states["time"] / wear.period, states["normal_stress"], mean)
     return Picture(
-        charts.wear,
+        charts.wear_charts,
         (data.patch.x, *profiles, history),
         f"Wear of the patch over {formatting.format_number(history['cycle'][-1], 4)} cycles: pressure and worn depth "
         f"of both pieces together{', means over the width' if depth.ndim == 3 else ''}, and measures of "
         "patch and motion divided by their values on the unworn patch. All other pictures show the worn "
         "patch."
-        f"{_edge_peaks(history)}",
+        f"{_edge_peaks_sentence(history)}",
     )
 
 
-def _edge_peaks(history: dict) -> str:
+def _edge_peaks_sentence(history: dict) -> str:
     """State after which cycles the peak pressure is that of a node at the edge of the contact."""
     above = np.asarray(history.get("pressure_peak_at_edge", ()))
     if not (above > 0).any():
@@ -237,7 +237,7 @@ def _edge_peaks(history: dict) -> str:
     )
 
 
-def _worn_map(data: RunData) -> Picture | None:
+def _worn_map_picture(data: RunData) -> Picture | None:
     """Return the map of the worn depth over strips."""
     wear = data.evaluations.wear
     if wear is None:
@@ -246,14 +246,14 @@ def _worn_map(data: RunData) -> Picture | None:
     if depth.ndim < 2 or not depth.any():
         return None
     return Picture(
-        charts.worn_map,
+        charts.worn_map_chart,
         (data.patch.x, data.patch.width, depth),
         "Worn depth of both pieces together after "
         f"{formatting.format_number(wear.history['cycle'][-1], 4)} cycles, in every strip over the width.",
     )
 
 
-def _interface(data: RunData) -> Picture | None:
+def _interface_picture(data: RunData) -> Picture | None:
     """Return the picture of the stresses on the interface."""
     if not data.patch.touches():
         return None
@@ -265,19 +265,19 @@ def _interface(data: RunData) -> Picture | None:
             f"; shear stress at {len(fields['time']) - 1} instants of {span}; the instant with the largest "
             "resultant force is in colour"
         )
-    if charts.part_in_contact(data.patch.x, fields["normal_stress"][0]):
+    if charts.contact_range(data.patch.x, fields["normal_stress"][0]):
         length, scale = formatting.choose_axis_unit(data.patch.x, "m")
         caption += (
             ". Only the part in contact is drawn; the whole length is "
             f"{(data.patch.x[-1] - data.patch.x[0]) * scale:.4g} {length}"
         )
-    return Picture(charts.interface, (data.patch.x, fields), caption + ".")
+    return Picture(charts.interface_charts, (data.patch.x, fields), caption + ".")
 
 
-def _faces(data: RunData) -> Picture | None:
+def _faces_picture(data: RunData) -> Picture | None:
     """Return the picture of the stresses on interfaces that have a patch."""
     found = [one for one in data.patch.faces if np.any(one[1]["normal_stress"][0] > 0)]
-    part = any(charts.part_in_contact(x, fields["normal_stress"][0]) for x, fields, _ in found)
+    part = any(charts.contact_range(x, fields["normal_stress"][0]) for x, fields, _ in found)
     shear = any(np.any(fields.get("shear_stress", 0.0)) for _, fields, _ in found)
     moved = (
         "; shear stress at several instants of the last cycle; the instant with the largest resultant force is "
@@ -287,17 +287,17 @@ def _faces(data: RunData) -> Picture | None:
     )
     return (
         Picture(
-            charts.faces,
+            charts.faces_charts,
             (found[:MAX_INTERFACES],),
             f"Normal stress of the pressed patch of each interface{moved}."
-            f"{' Only the part in contact is drawn.' * part}{_first(found)}",
+            f"{' Only the part in contact is drawn.' * part}{_omitted_charts_sentence(found)}",
         )
         if found
         else None
     )
 
 
-def _first(found: list) -> str:
+def _omitted_charts_sentence(found: list) -> str:
     """Return the sentence, for the end of a caption, on charts that are left out."""
     return (
         f" Only the first {MAX_INTERFACES} of {len(found)} interfaces are shown."
@@ -306,7 +306,7 @@ def _first(found: list) -> str:
     )
 
 
-def _bodies(data: RunData) -> Picture | None:
+def _stress_picture(data: RunData) -> Picture | None:
     """Return the picture of the von Mises stress in both pieces."""
     if data.patch.bodies is None or not data.patch.touches():
         return None
@@ -320,14 +320,14 @@ def _bodies(data: RunData) -> Picture | None:
     unit, scale = formatting.choose_axis_unit([largest], "Pa")
     values = (bodies["x"], bodies["depth"], mises, bodies["pressure"])
     return Picture(
-        charts.bodies,
+        charts.stress_charts,
         values,
         f"Both pieces {coated}{cause}{alone}. The largest stress in a cell is {largest * scale:.3g} "
-        f"{unit}{_at_corner(bodies)}.{_of_mesh(data)}",
+        f"{unit}{_corner_sentence(bodies)}.{_mesh_sentence(data)}",
     )
 
 
-def _of_mesh(data: RunData) -> str:
+def _mesh_sentence(data: RunData) -> str:
     """Return the sentence on pressure peaks that the stress in the pieces misses; else ""."""
     sigma, mine = data.patch.fields["normal_stress"][0], data.patch.bodies["pressure"]
     if sigma.size == mine.size:
@@ -340,7 +340,7 @@ def _of_mesh(data: RunData) -> str:
     )
 
 
-def _at_corner(bodies: dict) -> str:
+def _corner_sentence(bodies: dict) -> str:
     """Describe the corner in which the largest stress of both pieces is unbounded; else ""."""
     parts = zip(bodies["depth"], bodies["coating"], bodies["mises"])
     depth, coating, part = max(parts, key=lambda one: one[2].max())
@@ -366,7 +366,7 @@ def _at_corner(bodies: dict) -> str:
     )
 
 
-def _loop(data: RunData) -> Picture | None:
+def _loop_picture(data: RunData) -> Picture | None:
     """Return the picture of the friction loop."""
     motion = data.motion
     if motion is None or not np.any(motion.loop["force"]) or np.ptp(motion.loop["slide"]) == 0:
@@ -387,19 +387,19 @@ def _loop(data: RunData) -> Picture | None:
     beside = f" Grey: the force measured in {name}." if read else ""
     if each := own.get("each"):
         return Picture(
-            charts.loops,
+            charts.loop_charts,
             (each[:MAX_INTERFACES],),
             f"Friction force against the slide of each interface, over {span}."
-            f"{_under(data)}{_first(each)}",
+            f"{_drive_sentence(data)}{_omitted_charts_sentence(each)}",
         )
     return Picture(
-        charts.loop,
+        charts.loop_chart,
         (own["slide"], own["force"], title, tuple(read) or None),
-        f"Resultant friction force against the slide of the interface, over {span}.{_under(data)}{beside}",
+        f"Resultant friction force against the slide of the interface, over {span}.{_drive_sentence(data)}{beside}",
     )
 
 
-def _histories(data: RunData) -> Picture | None:
+def _histories_picture(data: RunData) -> Picture | None:
     """Return the picture of the histories."""
     motion = data.motion
     if motion is None:
@@ -408,9 +408,9 @@ def _histories(data: RunData) -> Picture | None:
     if motion.window is None:
         force = " and friction force" if np.any(history["force"]) else ""
         return Picture(
-            charts.histories,
+            charts.history_charts,
             (history, None, None),
-            f"Slide{force} over the whole run.{_under(data)}"
+            f"Slide{force} over the whole run.{_drive_sentence(data)}"
             + (" Grey: the measured force." if "measured" in history else ""),
         )
     w = motion.window
@@ -426,7 +426,7 @@ def _histories(data: RunData) -> Picture | None:
     bodies = "output and base" if np.any(window["base"]) else "the output"
     caption = (
         "Displacement over the whole run. At the end of the run: displacement, and acceleration of "
-        f"{bodies}.{_under(data)}"
+        f"{bodies}.{_drive_sentence(data)}"
     )
     begin, swings = (
         charts.first_complete_time(history["time"], period, w["time"][0]),
@@ -444,10 +444,10 @@ def _histories(data: RunData) -> Picture | None:
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
     # A decaying swing has no band per cycle: its reversals are stored, and the line through them
     # shows it.
-    return Picture(charts.histories, (history, window, period, title, swings), caption)
+    return Picture(charts.history_charts, (history, window, period, title, swings), caption)
 
 
-def _under(data: RunData) -> str:
+def _drive_sentence(data: RunData) -> str:
     """Return the sentence, for the end of a caption, on what drives the run.
 
     With a curve, it gives the frequency of the motion that is shown.
@@ -463,7 +463,7 @@ def _under(data: RunData) -> str:
     return f" {text[0].upper()}{text[1:]}." if text else ""
 
 
-def _measured(data: RunData) -> Picture | None:
+def _measured_picture(data: RunData) -> Picture | None:
     """Return the picture of computed and measured responses."""
     m, found = data.measured, data.verdict.summary["measures"]
     if m is None or not m.is_comparable():
@@ -486,35 +486,35 @@ def _measured(data: RunData) -> Picture | None:
     if m.reading != "peak":
         factor += f" (readings are taken as {m.reading}, which is {m.share:.4g} of the peak)"
     return Picture(
-        charts.measured,
+        charts.measured_charts,
         (m.rows, m.frequency, m.input, *points),
-        f"Responses measured at the drive frequency, and the computed response{factor}.{_unsettled(data)}",
+        f"Responses measured at the drive frequency, and the computed response{factor}.{_unsettled_sentence(data)}",
     )
 
 
 # The keys are in the order of the page.
 PICTURES = {
-    "wear": _wear,
-    "worn": _worn_map,
-    "curve": _curve,
-    "spectra": _spectra,
-    "decay": _decay,
-    "levels": _levels,
-    "pressure": _interface,
-    "faces": _faces,
-    "bodies": _bodies,
-    "loop": _loop,
-    "history": _histories,
-    "measured": _measured,
+    "wear": _wear_picture,
+    "worn": _worn_map_picture,
+    "curve": _curve_picture,
+    "spectra": _spectra_picture,
+    "decay": _decay_picture,
+    "levels": _levels_picture,
+    "pressure": _interface_picture,
+    "faces": _faces_picture,
+    "bodies": _stress_picture,
+    "loop": _loop_picture,
+    "history": _histories_picture,
+    "measured": _measured_picture,
 }
 
 
-def _unsettled(data: RunData) -> str:
+def _unsettled_sentence(data: RunData) -> str:
     """Return the sentence on a motion that is not steady; "" if it is."""
     outcome = data.verdict.summary["outcome"]
     return (
         ""
-        if outcome in SETTLED
+        if outcome in SETTLED_OUTCOMES
         else (
             f" The run ended with the outcome '{outcome}': the computed values are not "
             "those of a steady motion."
@@ -522,7 +522,7 @@ def _unsettled(data: RunData) -> str:
     )
 
 
-def _table_one(data: RunData) -> list:
+def _measured_section(data: RunData) -> list:
     """Return the section with computed and measured values; [] if they cannot be compared."""
     m, found = data.measured, data.verdict.summary["measures"]
     if not m.is_comparable():
@@ -555,13 +555,13 @@ def _table_one(data: RunData) -> list:
     text = "<p class=soft>No measured row has this frequency and input.</p>"
     if rows:
         text = (
-            table(("reading", ">measured", ">computed", ">ratio"), rows)
-            + f"<p class=soft>{escape(_unsettled(data).strip())}</p>"
+            table_html(("reading", ">measured", ">computed", ">ratio"), rows)
+            + f"<p class=soft>{escape(_unsettled_sentence(data).strip())}</p>"
         )
     return [Section("measured", "Against the measurement", text)]
 
 
-OF_LEVELS = (
+LEVEL_COLUMNS = (
     ("relative_displacement_amplitude", "m"),
     ("absolute_acceleration_peak", "m s-2"),
     ("absolute_acceleration_fundamental", "m s-2"),
@@ -569,7 +569,7 @@ OF_LEVELS = (
 )
 
 
-def _table_of_levels(levels: list) -> Section:
+def _levels_section(levels: list) -> Section:
     """Return the section on all levels.
 
     A row has drive, amplitude, acceleration, distortion, the outcome if it is known, and whether
@@ -578,10 +578,12 @@ def _table_of_levels(levels: list) -> Section:
     rows, judged = [], any(one.get("outcome") for one in levels)
     for number, one in enumerate(levels, 1):
         cells = []
-        for name, unit in OF_LEVELS:
+        for name, unit in LEVEL_COLUMNS:
             value, error = one["values"].get(name), one["errors"].get(name)
             there = value is not None and np.isfinite(value)
-            cells.append(format_with_error(name, measure(value, unit, error)) if there else DASH)
+            cells.append(
+                format_with_error(name, measure_entry(value, unit, error)) if there else EN_DASH
+            )
         drive = f"{one['drive']:.4g} N" if one.get("unit") == "N" else f"{one['drive'] / G:.4g} g"
         rows.append(
             [
@@ -602,19 +604,19 @@ def _table_of_levels(levels: list) -> Section:
     heads = [
         ">level",
         f">{sized}",
-        *(f">{measure_link(text, name)}" for text, (name, _) in zip(texts, OF_LEVELS)),
+        *(f">{measure_link(text, name)}" for text, (name, _) in zip(texts, LEVEL_COLUMNS)),
         *(["outcome"] if judged else []),
         "interface",
     ]
-    return Section("levels", "Levels", table(heads, rows))
+    return Section("levels", "Levels", table_html(heads, rows))
 
 
-def measure(value: float, unit: str, error: float | None) -> dict:
+def measure_entry(value: float, unit: str, error: float | None) -> dict:
     """Return a measure as an object of the summary, from a value and an error in SI."""
     return {"value": value, "unit": unit, "error": error, "floor": 0.0}
 
 
-def _measures(data: RunData) -> Section:
+def _measures_section(data: RunData) -> Section:
     """Return the section on all measures with errors, in other units, and with definitions."""
     rows, means = [], data.verdict.means
     found = data.verdict.summary["measures"]
@@ -624,8 +626,8 @@ def _measures(data: RunData) -> Section:
         if m["value"] is None:
             cells.append(f"<td class=soft colspan=3>{sentence_html(m.get('reason', ''))}</td>")
         else:
-            unit = units(name, m["value"], m["unit"], m["error"])[0][0]
-            error = error or ("unknown" if m["error"] is None else DASH)
+            unit = display_units(name, m["value"], m["unit"], m["error"])[0][0]
+            error = error or ("unknown" if m["error"] is None else EN_DASH)
             cells += [error, f"<td class=v>{escape(unit)}</td>", escape(format_imperial(name, m))]
         others_lie = record_interval(name, found)[1]
         text = means.get(name, "") + (
@@ -645,13 +647,13 @@ def _measures(data: RunData) -> Section:
     return Section(
         "measures",
         "Measures",
-        table(heads, rows, "across many")
+        table_html(heads, rows, "across many")
         + f"<p class=soft>Value and error have the same unit; {EXACT_NOTE.replace('±', 'error')}. summary.json "
         f"has all digits in SI.</p>{note}",
     )
 
 
-def _cost(data: RunData) -> Section:
+def _cost_section(data: RunData) -> Section:
     """Return the section on what was computed, by which equations, and how long it took."""
     summary = data.verdict.summary
     rows = [
@@ -669,7 +671,7 @@ def _cost(data: RunData) -> Section:
         summary["not_in_scene"], summary.get("numerics", {}).get("engine")
     )
     text = (
-        table(("effect", "equations", ">seconds"), rows)
+        table_html(("effect", "equations", ">seconds"), rows)
         + f"<p class=soft>Wall-clock seconds: {escape(parts)}.{shared}</p>"
         "<details><summary>Effects not in the scene, which are neither imported nor computed</summary>"
         f"<p class=soft>{escape(', '.join(absent))}.</p></details>"
@@ -677,11 +679,11 @@ def _cost(data: RunData) -> Section:
     return Section("cost", "What was computed, and the computing time", text)
 
 
-def _origin(data: RunData) -> Section:
+def _origin_section(data: RunData) -> Section:
     """Return the section on the scene as written and as understood, the files and the versions."""
     versions = ", ".join(f"{k} {v}" for k, v in data.versions.items())
     lacks = ["fields.vtkhdf"] * (data.patch.x is None) + ["interfaces"] * (not data.patch.faces)
-    there = [one for one in FILES if one[0] not in lacks]
+    there = [one for one in RESULT_FILES if one[0] not in lacks]
     files = "".join(f"<li><a href={name}>{name}</a>: {what}</li>" for name, what in there)
     again = (
         ""
@@ -699,7 +701,7 @@ def _origin(data: RunData) -> Section:
     )
 
 
-def page_of(result: Result, bodies: dict | None = None, film: dict | None = None) -> str:
+def run_page(result: Result, bodies: dict | None = None, film: dict | None = None) -> str:
     """Return the HTML page of a run.
 
     Parameters
@@ -710,10 +712,10 @@ def page_of(result: Result, bodies: dict | None = None, film: dict | None = None
     film : dict or None
         From `pages.player.player_data`.
     """
-    return page(_with_pieces(data_of(result), bodies, film))
+    return page_html(_add_pieces(collect_run_data(result), bodies, film))
 
 
-def axes(result: Result, names: tuple, onto=None, bodies: dict | None = None):
+def draw_axes(result: Result, names: tuple, onto=None, bodies: dict | None = None):
     """Draw the first of the named pictures for which a run has data, as matplotlib Axes.
 
     Parameters
@@ -731,8 +733,10 @@ def axes(result: Result, names: tuple, onto=None, bodies: dict | None = None):
     Axes or None
         None if the run has nothing to show.
     """
-    data = _with_pieces(data_of(result), bodies)
-    shown = next((one for one in (picture(name, data) for name in names) if one is not None), None)
+    data = _add_pieces(collect_run_data(result), bodies)
+    shown = next(
+        (one for one in (find_picture(name, data) for name in names) if one is not None), None
+    )
     if shown is None:
         return None
     if onto is None:
@@ -741,6 +745,6 @@ def axes(result: Result, names: tuple, onto=None, bodies: dict | None = None):
     return onto
 
 
-def _with_pieces(data: RunData, bodies: dict | None, film: dict | None = None) -> RunData:
+def _add_pieces(data: RunData, bodies: dict | None, film: dict | None = None) -> RunData:
     """Return the data with the pressed pieces and their film."""
     return replace(data, patch=replace(data.patch, bodies=bodies or None, film=film or None))

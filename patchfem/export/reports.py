@@ -10,7 +10,7 @@ from .sweeps import page as sweeps
 PAGE = "report.html"
 
 
-def report_of(folders: list, out: Path | None = None) -> Path:
+def write_report(folders: list, out: Path | None = None) -> Path:
     """Write the page of results folders and return its path.
 
     Several runs, or several sweeps over the same keys, are shown side by side; the page of a single
@@ -44,17 +44,17 @@ def report_of(folders: list, out: Path | None = None) -> Path:
         else (folders[0] / PAGE if many[0] and len(folders) == 1 else Path(PAGE))
     )
     if not many[0]:
-        return _written(
-            several_runs.page([several_runs.read_run(folder) for folder in folders]), out
+        return _write_page(
+            several_runs.page_html([several_runs.read_run(folder) for folder in folders]), out
         )
     tables = [sweeps.relink_cases(sweeps.read_table(folder), folder, out) for folder in folders]
     names = several_runs.number_duplicates([folder.resolve().name for folder in folders])
-    return _written(
-        sweep.page(tables[0] if len(tables) == 1 else sweeps.join_tables(tables, names)), out
+    return _write_page(
+        sweep.page_html(tables[0] if len(tables) == 1 else sweeps.join_tables(tables, names)), out
     )
 
 
-def _written(text: str, out: Path) -> Path:
+def _write_page(text: str, out: Path) -> Path:
     """Write a page and create its folder."""
     try:
         out.parent.mkdir(parents=True, exist_ok=True)

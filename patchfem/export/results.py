@@ -108,7 +108,7 @@ class Folder:
             restore_folder(self.target)
             self._refuse_others()
             if self.path.exists() and not self.resume:
-                self.dropped = self._told()
+                self.dropped = self._dropped_note()
                 shutil.rmtree(self.path)
             self.path.mkdir(exist_ok=True)
         except BaseException as error:
@@ -143,7 +143,7 @@ class Folder:
         for place in (self.target, self.path, make_old_folder_path(self.target)):
             refuse_others(place, self.shown, (*FILES, LOCK), "patchfem results")
 
-    def _told(self) -> str:
+    def _dropped_note(self) -> str:
         """Return the note that saved states are deleted; "" if there are none."""
         if not any(is_state(part.name) for part in self.path.iterdir()):
             return ""

@@ -41,7 +41,7 @@ def measure_object(measure) -> dict:
     return {**out, "reason": measure.reason} if measure.reason else out
 
 
-def summary(
+def make_summary(
     version: str,
     title: str,
     kind: str,
@@ -94,7 +94,7 @@ def write_json(value: dict, path: Path) -> None:
 def read_summary(path: Path) -> dict:
     """Read summary.json.
 
-    OSError if it cannot be read, ValueError if `summary` cannot have made it.
+    OSError if it cannot be read, ValueError if `make_summary` cannot have made it.
     """
     text = path.read_text(encoding="utf-8")
     try:
@@ -143,16 +143,16 @@ def _summary_model() -> type:
     return Summary
 
 
-def summary_of(result: Result) -> dict:
+def summarise_run(result: Result) -> dict:
     """Return the content of summary.json for a run."""
     what = result.plan
-    answer = summary(
+    answer = make_summary(
         __version__,
         what.model.source.title,
         what.kind,
         str(result.outcome),
         result.measures,
-        effects_of(result),
+        effect_entries(result),
         list(what.not_in_scene),
         (result.warnings, result.extra.get("notes", [])),
         result.seconds,
@@ -161,9 +161,9 @@ def summary_of(result: Result) -> dict:
     return (
         answer
         | {"numerics": numerics}
-        | contact_of(result)
+        | contact_entry(result)
         | runaway_data(result)
-        | loop_of(result)
+        | loop_entry(result)
     )
 
 
@@ -181,7 +181,7 @@ def runaway_data(result: Result) -> dict:
     return {"run_away": found} if found and found["drive"] > found["knee"] else {}
 
 
-def loop_of(result: Result) -> dict:
+def loop_entry(result: Result) -> dict:
     """Return the slide amplitude [m] and the loss factor of a bench; {} if the slide does not repeat.
 
     It is {"loop": {"slide_amplitude", "loss_factor", "error"}}. The loss factor is the work of a
@@ -208,7 +208,7 @@ def loop_of(result: Result) -> dict:
     return {"loop": {"slide_amplitude": amplitude, "loss_factor": factor, "error": error}}
 
 
-def contact_of(result: Result) -> dict:
+def contact_entry(result: Result) -> dict:
     """Return where a pressed patch is in contact, x in m; {} for strips and if nothing touches.
 
     It is {"contact": {"from", "to": ends of the interface, "stretches": [[begin, end] of each part
@@ -229,7 +229,7 @@ def contact_of(result: Result) -> dict:
     }
 
 
-def cycles_of(result: Result) -> float | None:
+def count_cycles(result: Result) -> float | None:
     """Return the number of cycles of the drive, or of the slide; None if the run has none."""
     r, period = result.response, result.extra.get("period")
     if r is not None and period and result.plan.kind != "bench":
@@ -237,7 +237,7 @@ def cycles_of(result: Result) -> float | None:
     return tomllib.loads(result.plan.model.source.resolved).get("slide", {}).get("cycles")
 
 
-def effects_of(result: Result) -> list:
+def effect_entries(result: Result) -> list:
     """Return the effects of a run as [{"effect", "equations", "seconds"}].
 
     The law and the modes share one loop, whose time is assigned to the law.
@@ -266,7 +266,7 @@ def effects_of(result: Result) -> list:
     return out
 
 
-def versions() -> dict:
+def package_versions() -> dict:
     """Return the versions, by name, of the interpreter and of the packages that compute."""
     found = list_installed_versions()
     return {"python": ".".join(map(str, sys.version_info[:3]))} | {

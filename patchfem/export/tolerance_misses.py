@@ -4,7 +4,7 @@ import numpy as np
 
 from ..core import compute_allowed_error
 from ..formatting import format_number, format_quantity
-from .written import label
+from .written import measure_label
 
 # Main measures, which are named before others that miss the tolerance by more.
 FIRST = (
@@ -57,7 +57,7 @@ def is_within_by_floor(one: dict, tolerance) -> np.ndarray:
         )
 
 
-def floor_of(one: dict, cases: np.ndarray) -> str:
+def format_floor(one: dict, cases: np.ndarray) -> str:
     """Return the largest floor of a measure in some cases (n,) as text."""
     floors = np.broadcast_to(np.asarray(one.get("floors", 0.0), float), cases.shape)
     return format_quantity(float(floors[cases].max()), one.get("unit", "1"), 2)
@@ -85,7 +85,7 @@ def count_over_tolerance(measures: dict, tolerance) -> dict:
     return out
 
 
-def sentence(measures: dict, tolerance, where, first: str = "") -> str:
+def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str:
     """State how many cases miss the tolerance in the worst main measure.
 
     It also states the worst case, and how many other measures miss the tolerance.
@@ -131,7 +131,8 @@ def sentence(measures: dict, tolerance, where, first: str = "") -> str:
         floor = (
             ""
             if some is None
-            else f" or the floor of their measure, such as {floor_of(measures[some[0]], some[1])} of {label(some[0])}"
+            else f" or the floor of their measure, such as {format_floor(measures[some[0]], some[1])} "
+            f"of {measure_label(some[0])}"
         )
         return (
             f"All {number} cases meet {asked}{floor}."
@@ -139,7 +140,7 @@ def sentence(measures: dict, tolerance, where, first: str = "") -> str:
             else f"{ran} of {number} cases have an answer; {'it meets' if ran == 1 else 'all of these meet'} {asked}{floor}."
         )
     if first in measures and first not in lost:
-        return f"In {label(first)} all {number} cases meet {asked}; {_others(len(lost))}."
+        return f"In {measure_label(first)} all {number} cases meet {asked}; {_others_sentence(len(lost))}."
     beyond = {
         name: float(np.max(_error_ratio(measures[name], tolerance), initial=0.0, where=missed))
         for name, missed in lost.items()
@@ -156,15 +157,15 @@ def sentence(measures: dict, tolerance, where, first: str = "") -> str:
         if share[case] <= ZERO_ERROR_RATIO
         else "larger than the value"
     )
-    called = LONG_NAMES.get(name) or label(name)
-    more = f"; {_others(others)}" if others else ""
+    called = LONG_NAMES.get(name) or measure_label(name)
+    more = f"; {_others_sentence(others)}" if others else ""
     return (
         f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {called}; the largest error, at "
         f"{where(case)}, is {known}{more}."
     )
 
 
-def _others(count: int) -> str:
+def _others_sentence(count: int) -> str:
     """State how many other measures miss the tolerance."""
     return f"{count} other measure{'s' * (count > 1)} miss{'es' * (count == 1)} the tolerance in some cases"
 

@@ -12,17 +12,17 @@ MAX_DIGITS = 6  # largest number of digits of a shortened number
 MAX_ERROR_FRACTION = 0.05
 
 
-def label(name: str) -> str:
+def measure_label(name: str) -> str:
     """Return the name of a measure or outcome as words."""
     return name.replace("_", " ")
 
 
-def shorten(text: str) -> str:
+def shorten_number(text: str) -> str:
     """Return a value as written, with at most six digits.
 
     For example, 3.16227766016838e-06 rad becomes 3.16228e-06 rad.
     """
-    return _short(text, MAX_DIGITS)
+    return _round_long_number(text, MAX_DIGITS)
 
 
 def shorten_to_spacing(text: str, value: float, apart: float) -> str:
@@ -40,22 +40,22 @@ def shorten_to_spacing(text: str, value: float, apart: float) -> str:
         Distance to the nearest other value [SI].
     """
     for digits in range(2, MAX_DIGITS):
-        short = _short(text, digits)
+        short = _round_long_number(text, digits)
         if short == text:
             break
         number, near = (float(NUMBER.match(one)[1]) for one in (text, short))
         if abs((near - number) * value) <= abs(MAX_ERROR_FRACTION * apart * number):
             return short
-    return shorten(text)
+    return shorten_number(text)
 
 
-def without_unit(text: str, beside: str) -> str:
+def drop_repeated_unit(text: str, beside: str) -> str:
     """Return a value without its unit if the next value has the same: 0.1 before 0.2 mrad."""
     number, _, unit = text.partition(" ")
     return number if unit and unit == beside.partition(" ")[2] else text
 
 
-def _short(text: str, digits: int) -> str:
+def _round_long_number(text: str, digits: int) -> str:
     """Shorten a number with many digits."""
     found = NUMBER.match(text)
     if found is None or len(found[1]) < MIN_LONG_NUMBER:

@@ -121,7 +121,7 @@ def series(
             ),
             estimate=False,
         )
-        netcdf.write(histories.contents(found), place / f"{number}.nc")
+        netcdf.write_netcdf(histories.result_contents(found), place / f"{number}.nc")
         start = [f"wear.start={number}.nc"]
         area = float(found.patch.pieces.interface.weight.sum())
         before, depth = (

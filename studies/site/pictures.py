@@ -24,8 +24,8 @@ sys.path.insert(0, str(ROOT))
 
 import patchfem as pf  # noqa: E402
 from patchfem.export.drawing.film import make_film  # noqa: E402
-from patchfem.export.drawing.panels import borders  # noqa: E402
-from patchfem.export.drawing.paraview import stress_of  # noqa: E402
+from patchfem.export.drawing.panels import outer_edges  # noqa: E402
+from patchfem.export.drawing.paraview import get_stress  # noqa: E402
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE, STYLE  # noqa: E402
 from patchfem.export.fields.series import Frame, Series  # noqa: E402
 
@@ -126,7 +126,7 @@ def draw_cells(axis, frame: Frame, panel, values, limits: tuple, colours: str):
         )
         drawn.set_clim(*limits)
         axis.add_collection(drawn)
-    for edges, colour in zip(borders(frame, panel.cells), ("black", "white")):
+    for edges, colour in zip(outer_edges(frame, panel.cells), ("black", "white")):
         axis.add_collection(LineCollection(panel.places[edges], colors=colour, linewidths=1))
     left, right, bottom, top = panel.window
     axis.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", ylabel="y [mm]")
@@ -138,11 +138,11 @@ def draw_pieces(series: Series, film) -> Figure:
     """Draw normal and shear stress inside both pieces at the largest shear stress."""
     figure, axes = new_figure(4.9, 2, sharex=True)
     frames = [series.frame(number) for number in film.numbers]
-    frame = max(frames, key=lambda frame: np.abs(stress_of(frame.cell_data, "tau_xy")).max())
+    frame = max(frames, key=lambda frame: np.abs(get_stress(frame.cell_data, "tau_xy")).max())
     panel = film.panels(frame)[1]
     stresses = {
-        "normal stress −σyy": -stress_of(frame.cell_data, "sigma_yy") * MPA,
-        "shear stress τxy": stress_of(frame.cell_data, "tau_xy") * MPA,
+        "normal stress −σyy": -get_stress(frame.cell_data, "sigma_yy") * MPA,
+        "shear stress τxy": get_stress(frame.cell_data, "tau_xy") * MPA,
     }
     for axis, (name, values), colours in zip(axes, stresses.items(), ("Blues", "RdBu_r")):
         top = np.quantile(np.abs(values[panel.cells]), 0.995)

@@ -43,7 +43,7 @@ class Derived(FitRequest):
         super().__init__(scene, wanted, measured)
         self.derive = derive
 
-    def asked(self, conditions, *sets: str) -> ConditionModels:
+    def condition_models(self, conditions, *sets: str) -> ConditionModels:
         return DerivedAsked(self.scene, conditions, self.wanted, self.measured, self.derive)
 
 

@@ -43,7 +43,7 @@ def training(cells, protocol: str) -> np.ndarray:
     if protocol == "all":
         return np.ones(cells.row.size, bool)
     held = HELD if protocol == "143" else f"frequency={protocol.split()[1]} Hz"
-    return ~cells.chosen(held)
+    return ~cells.select(held)
 
 
 def stuck_gain(cells, seen) -> float:
@@ -71,7 +71,7 @@ def computed_for(rung: str, reading: str, cells, seen, placebo: str = "") -> Mod
     more = [f"measured.acceleration_gain={stuck_gain(cells, seen)!r}"] if reading == STUCK else []
     one = RUNGS[rung]
     question = one.question(reading, *more, *([placebo] if placebo else []))
-    return (Worn if one.worn else ModelReadings)(question.asked(cells.conditions))
+    return (Worn if one.worn else ModelReadings)(question.condition_models(cells.conditions))
 
 
 def fitted(

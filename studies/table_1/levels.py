@@ -53,7 +53,9 @@ def measured(scene, frequency: float, level: float, name: str) -> float | None:
 
 def runaway(question, values, frequency: float) -> float | None:
     """Lowest level [g] on the grid at which a model runs away; None where it does not up to 12 g."""
-    computed = ModelReadings(question.asked([(frequency, level * G_N) for level in RUNAWAYS]))
+    computed = ModelReadings(
+        question.condition_models([(frequency, level * G_N) for level in RUNAWAYS])
+    )
     for k, level in enumerate(RUNAWAYS):
         computed.forget()
         if computed(values, [k])[1][k] > AWAY:
@@ -64,7 +66,7 @@ def runaway(question, values, frequency: float) -> float | None:
 def row(rung: str, reading: str, values, frequency: float) -> dict:
     """{"rung", "frequency", "onset" [g], "runaway" [g], "slip_phase" [degrees]} of a rung with fitted values."""
     question = RUNGS[rung].question(reading)
-    asked = question.asked([(frequency, 5 * G_N)])
+    asked = question.condition_models([(frequency, 5 * G_N)])
     scene = asked.base.override(
         [one.format_assignment(value) for one, value in zip(asked.wanted, values)]
     )

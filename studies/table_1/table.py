@@ -17,7 +17,7 @@ from fitting import NULLS as RIVALS
 from rungs import EACH, HERE, ROOT2, RUNGS, STUCK, TABLE, variants
 
 from patchfem.campaigns.rows.cells import read_readings, scores
-from patchfem.campaigns.rows.null_models import NULLS, fit_null_model
+from patchfem.campaigns.rows.null_models import NULL_MODELS, fit_null_model
 
 UNITS = {
     "static": "",
@@ -182,7 +182,7 @@ def nulls() -> list:
     """Rows (name, numbers of the accelerations, fitted to 143 Hz, held out, left out, all) of scores."""
     cells, out = read_readings(TABLE), []
     seen, every = training(cells, "143"), np.ones(cells.row.size, bool)
-    for name in NULLS:
+    for name in NULL_MODELS:
         logs, (whole, made) = (
             fit_null_model(cells, name, seen)[0],
             fit_null_model(cells, name, every),

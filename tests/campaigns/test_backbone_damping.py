@@ -51,10 +51,10 @@ cycles = 20
 def written(found) -> str:
     """The page of a backbone, after its picture, its table and its netCDF contents have been made."""
     if found.curves:
-        pictures.draw_charts(backbone_files.drawn(found.curves))
-    backbone_files.contents(found)
-    backbone_files.lines_of(found)
-    return backbone_files.page(found, "title")
+        pictures.draw_charts(backbone_files.backbone_charts(found.curves))
+    backbone_files.backbone_contents(found)
+    backbone_files.format_backbone(found)
+    return backbone_files.page_html(found, "title")
 
 
 def check_ends_well(law: str, damping: float, way: str, other_mode: str) -> None:

@@ -15,13 +15,13 @@ from patchfem.campaigns import cost, numerical_settings
 from patchfem.campaigns.cost import (
     TOLERANCE,
     Cost,
-    curve,
+    cost_sentence,
     fastest_by_measure,
     fastest_run,
-    sentence,
+    setting_curve,
 )
 from patchfem.core import NotConverged, PatchfemError
-from patchfem.export.cost import lines_of
+from patchfem.export.cost import format_cost
 from patchfem.runs.run import run
 
 LENGTH = 12.7e-3
@@ -86,7 +86,7 @@ def test_exact_the_error_at_the_setting_of_the_scene_is_that_of_its_run(keys, ow
     monkeypatch.setattr(numerical_settings, "TOLERANCES", (1e-1, 1e-2))
     mine = model(keys, 0.03)
     # of equal runs one names them all
-    found = next(one for one in curve(mine, "element_size") if own in one.label)
+    found = next(one for one in setting_curve(mine, "element_size") if own in one.label)
     stated = run(mine, fresh=True).measures
     assert found.errors == pytest.approx({name: m.error for name, m in stated.items()}, rel=1e-9)
     assert found.values == pytest.approx({name: m.value for name, m in stated.items()}, rel=1e-9)
@@ -136,34 +136,34 @@ def test_exact_the_cheapest_run_is_confirmed_by_finer_ones():
 def test_exact_the_sentence_names_the_cheapest_run_or_the_worst_measure():
     runs = [made("2", 1, 4e-2, 3e-2), made("4", 2, 8e-3, 6e-3), made("8", 5, 2e-3)]
     within = "a knob at 4: 2 CPU s per run, with every measure within the tolerance 0.01"
-    assert sentence(runs, 1e-2) == within
-    assert sentence(runs, 1e-3) == (
+    assert cost_sentence(runs, 1e-2) == within
+    assert cost_sentence(runs, 1e-3) == (
         "no setting meets the tolerance 0.001: the best run, with a knob at 8, has an error of 0.002 in a and takes 5 "
         "CPU s"
     )
     still = [made("2", 1, 2.2), made("4", 2, 2.2), made("8", 5, 2.2)]
     assert (
-        sentence(still, 1e-2)
+        cost_sentence(still, 1e-2)
         == "no setting meets the tolerance 0.01: with every setting the error of a is 2.2"
     )
     bold = [made("2", 1, 1e-3, 3e-2), *runs[1:]]  # states less than its distance to the best
-    assert sentence(bold, 1e-2) == within
+    assert cost_sentence(bold, 1e-2) == within
 
 
 def test_exact_of_settings_of_equal_cost_the_smallest_is_named():
     """1600 steps per cycle at 0.042 CPU s were named where 100 at 0.040 s met the tolerance, with the same results."""
     seconds = {"100": 0.0402, "200": 0.0401, "400": 0.0404, "800": 0.0415, "1600": 0.0423}
     still = [made(label, each, 1e-3, 0.0) for label, each in seconds.items()]
-    assert fastest_run(still, 1e-2).label == "100" and sentence(still, 1e-2) == (
+    assert fastest_run(still, 1e-2).label == "100" and cost_sentence(still, 1e-2) == (
         "a knob at 100: 0.04 CPU s per run, with every measure within the tolerance 0.01; the other settings change no "
         "result of this scene"
     )
     slow = [made("2", 1.0, 8e-3, 6e-3), made("4", 0.96, 2e-3, 1e-3), made("8", 1.2, 1e-3)]
     assert fastest_run(slow, 1e-2).label == "2" and fastest_run(slow, 5e-3).label == "4"
-    assert sentence(slow, 1e-2).endswith(
+    assert cost_sentence(slow, 1e-2).endswith(
         "; the other settings change no result by more than the tolerance"
     )
-    assert sentence(slow, 5e-3).endswith("within the tolerance 0.005")
+    assert cost_sentence(slow, 5e-3).endswith("within the tolerance 0.005")
 
 
 def test_exact_a_line_says_which_tolerance_is_missed_and_with_which_steps_it_is_met():
@@ -187,12 +187,12 @@ def test_exact_a_line_says_which_tolerance_is_missed_and_with_which_steps_it_is_
     stays = replace(
         run_at(1e-4, 2e-4, 6400, ("use the value",)), label="0.0001, 6400 steps per cycle"
     )
-    assert lines_of(TOLERANCE, [met, missed, cured], 1e-2) == [
+    assert format_cost(TOLERANCE, [met, missed, cured], 1e-2) == [
         "tolerance   CPU s     error  worst measure",
         "0.01            1     0.002  a",
         "0.0001          1    0.0004  a; not with 800 steps per cycle, but with 3200 steps per cycle (4 CPU s)",
     ]
-    assert lines_of(TOLERANCE, [met, missed, stays], 1e-2)[2:] == [
+    assert format_cost(TOLERANCE, [met, missed, stays], 1e-2)[2:] == [
         "0.0001          1    0.0004  a; not with 800 steps per cycle, nor with 6400 steps per cycle (8 CPU s): 0.0002 "
         "in a",
         "tolerance 0.0001: use the value",
@@ -242,15 +242,15 @@ def test_exact_a_bench_without_pieces_has_the_steps_as_its_knob():
     for text in (BENCH, BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')):
         found = build(text)
         assert numerical_settings.applicable_settings(found) == ["steps_per_cycle"]
-    assert len(curve(found, "steps_per_cycle")) > 2
+    assert len(setting_curve(found, "steps_per_cycle")) > 2
 
 
 def test_always_a_setting_of_one_has_each_value_once(monkeypatch):
     """A quarter and a half of one jump are one jump: it is run once, and one value that runs is no curve."""
     worn = build(WORN)
-    labels = [one.label for one in numerical_settings.settings(worn, "jumps")]
+    labels = [one.label for one in numerical_settings.list_settings(worn, "jumps")]
     assert labels == ["1", "2", "4"]
-    assert [one.label for one in curve(worn, "jumps")] == labels
+    assert [one.label for one in setting_curve(worn, "jumps")] == labels
     run_plan = cost.run
 
     def run_one_jump(planned, **options):
@@ -260,4 +260,4 @@ def test_always_a_setting_of_one_has_each_value_once(monkeypatch):
 
     monkeypatch.setattr(cost, "run", run_one_jump)
     with pytest.raises(PatchfemError, match="fewer than three values"):
-        curve(worn, "jumps")
+        setting_curve(worn, "jumps")

@@ -11,7 +11,7 @@ from scene_texts import IWAN, shaken
 from patchfem import formatting
 from patchfem.__main__ import main
 from patchfem.campaigns.backbone.records import Backbone, Curve, LossExponents, ModeFrequencies
-from patchfem.export.backbone import drawn, page
+from patchfem.export.backbone import backbone_charts, page_html
 
 COLUMNS = [
     "method",
@@ -128,9 +128,9 @@ def test_exact_a_frequency_that_its_error_exceeds_is_in_the_table_alone():
     found = Backbone(
         "first", ModeFrequencies(50.0, 100.0), {"decay": one}, {}, LossExponents(), None, ()
     )
-    frequency, damping = drawn(found.curves)
+    frequency, damping = backbone_charts(found.curves)
     assert [list(each["x"]) for each in frequency["marks"]] == [[1.0, 2.0]] * 2
     assert [list(each["x"]) for each in damping["marks"]] == [[1.0, 2.0, 3.0]] * 2
-    assert "9.8 kHz" in page(found, "") and "left out of the picture" in page(found, "")
-    sure = page(found._replace(curves={"decay": one.at(slice(2))}), "")
+    assert "9.8 kHz" in page_html(found, "") and "left out of the picture" in page_html(found, "")
+    sure = page_html(found._replace(curves={"decay": one.at(slice(2))}), "")
     assert "left out of the picture" not in sure

@@ -138,7 +138,7 @@ def test_exact_the_verb_says_what_python_says_and_writes_a_page(runs, tmp_path):
     page = (tmp_path / "out" / "report.html").read_text()
     assert found["verdict"][1:] in page and "Friction loop before" in page and "<script" not in page
     lost = compare_runs(runs / "half", runs / "worn")
-    table = "\n".join(worn.lines_of(lost, worn.verdict(lost)))
+    table = "\n".join(worn.format_wear(lost, worn.wear_verdict(lost)))
     assert found["verdict"] in table and "worn volume" in table and "pressure peak" in table
 
 

@@ -17,15 +17,15 @@ from patchfem.core import Measure, Outcome
 from patchfem.export.pages.sentences import (
     EXACT_NOTE,
     GROUPS,
+    format_measures,
     format_with_error,
-    group_of,
-    headline,
-    table_of,
+    format_zero,
+    headline_sentence,
+    measure_group,
     tolerance_sentence,
-    verdict,
-    zero_below,
+    verdict_sentence,
 )
-from patchfem.export.summary import loop_of
+from patchfem.export.summary import loop_entry
 from patchfem.response.outcome import OPEN_LOOP
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
@@ -84,7 +84,7 @@ def test_exact_the_numbers_are_those_of_the_summary(tmp_path):
             assert text == f"- ({one['reason']})"
             continue
         assert in_si(text) == pytest.approx(
-            one["value"], rel=1e-5, abs=max((one["error"] or 0) / 10, zero_below(name))
+            one["value"], rel=1e-5, abs=max((one["error"] or 0) / 10, format_zero(name))
         )
     assert [line for line in lines if line in GROUPS] == ["motion", "friction", "energy"]
 
@@ -92,16 +92,20 @@ def test_exact_the_numbers_are_those_of_the_summary(tmp_path):
 def test_always_every_measure_has_its_group():
     assert {row.group for row in (*MOTION, *STATIC)} == set(GROUPS)
     assert (
-        group_of("normal_load") == "patch" and group_of("normal_load", pressed=False) == "friction"
+        measure_group("normal_load") == "patch"
+        and measure_group("normal_load", pressed=False) == "friction"
     )
-    assert group_of("pressure_peak") == "patch" and group_of("slip_amplitude_2") == "friction"
     assert (
-        group_of("worn_volume") == "wear"
-        and group_of("loop_area") == "energy"
-        and group_of("level_9") == "motion"
+        measure_group("pressure_peak") == "patch"
+        and measure_group("slip_amplitude_2") == "friction"
+    )
+    assert (
+        measure_group("worn_volume") == "wear"
+        and measure_group("loop_area") == "energy"
+        and measure_group("level_9") == "motion"
     )
     found = {"value": 1.0, "unit": "1", "error": None}
-    assert table_of({"loop_area": found | {"reason": "stuck"}, "pressure_peak": found}) == [
+    assert format_measures({"loop_area": found | {"reason": "stuck"}, "pressure_peak": found}) == [
         "energy",
         "  loop_area      - (stuck)",
         "patch",
@@ -182,7 +186,10 @@ def test_exact_a_headline(cycles, text):
         "friction_ratio_peak": {"value": 0.3, "unit": "1", "error": None},
         "loop_area": {"value": 2e-3, "unit": "J", "error": 1e-4},
     }
-    assert headline({"kind": "bench", "outcome": "done", "measures": measures}, cycles) == text
+    assert (
+        headline_sentence({"kind": "bench", "outcome": "done", "measures": measures}, cycles)
+        == text
+    )
 
 
 @pytest.mark.parametrize(
@@ -204,7 +211,9 @@ def test_exact_a_worn_run_answers_with_what_was_worn(worn, text):
         name: {"value": value, "unit": unit, "error": error}
         for name, (value, error, unit) in found.items()
     }
-    assert headline({"kind": "bench", "outcome": "done", "measures": measures}, 2.0) == text
+    assert (
+        headline_sentence({"kind": "bench", "outcome": "done", "measures": measures}, 2.0) == text
+    )
 
 
 def tolerance_said(tolerance=1e-2, **measures):
@@ -281,7 +290,7 @@ def test_always_what_slips_while_the_interface_holds_is_said(more, part):
             "relative_displacement_amplitude": (4e-7, 0.0, "m"),
             **more,
         }
-        return verdict(
+        return verdict_sentence(
             {
                 "outcome": "stuck",
                 "kind": "rig",
@@ -338,7 +347,7 @@ def test_always_a_bench_says_whether_it_slipped():
     """By its mean slip, beyond what the run leaves open and the last digits of a slide."""
 
     def said(value, error):
-        return verdict(
+        return verdict_sentence(
             {
                 "outcome": "done",
                 "kind": "bench",
@@ -354,7 +363,7 @@ def test_always_a_bench_says_whether_it_slipped():
     }
 
     def looped(factor, error):
-        return verdict(
+        return verdict_sentence(
             {
                 "outcome": "done",
                 "kind": "bench",
@@ -376,7 +385,7 @@ def test_always_a_bench_says_whether_it_slipped():
     )
     for holds in ((1e-12, 2e-12), (1e-23, 1e-33), (1e-11, None)):
         assert said(*holds) == f"{done} The interface sticks: no slip in the last cycle."
-    assert verdict({"outcome": "done", "kind": "bench", "measures": {}}) == done
+    assert verdict_sentence({"outcome": "done", "kind": "bench", "measures": {}}) == done
 
 
 def test_exact_the_loss_factor_of_an_elastic_plastic_bench():
@@ -392,13 +401,13 @@ def test_exact_the_loss_factor_of_an_elastic_plastic_bench():
     pull, k = result.plan.model.friction.static * result.measures["normal_load"].value, 1e7
     a = np.arccos(1 - 2 * pull / (k * slide))
     work, stiffness = 4 * pull * (slide - pull / k), k * (a - np.sin(a) * np.cos(a)) / np.pi
-    found = loop_of(result)["loop"]
+    found = loop_entry(result)["loop"]
     truth = work / (np.pi * stiffness * slide**2)
     assert (
         abs(found["loss_factor"] - truth) <= found["error"] + 1e-9 * truth
         and found["error"] < 1e-2 * truth
     )
-    assert loop_of(pf.run(BENCH)) == {}  # rigid: no stiffness to refer to
+    assert loop_entry(pf.run(BENCH)) == {}  # rigid: no stiffness to refer to
 
 
 def test_always_a_ratio_written_as_per_cent_is_remarked(tmp_path):
@@ -450,7 +459,7 @@ def test_exact_the_work_of_a_loop_that_changes_is_told_with_its_cycles(
         "warnings": warnings,
         "effects": [],
     }
-    assert headline(summary, 10.0) == text
+    assert headline_sentence(summary, 10.0) == text
 
 
 @pytest.mark.parametrize(
@@ -481,4 +490,6 @@ def test_exact_a_release_is_not_told_of_a_drive():
         "measures": {},
         "effects": [{"effect": "drive.kind=free"}],
     }
-    assert "drive is periodic" not in verdict(summary) and "came to rest" in verdict(summary)
+    assert "drive is periodic" not in verdict_sentence(
+        summary
+    ) and "came to rest" in verdict_sentence(summary)

@@ -111,7 +111,10 @@ def broken_opengl(tmp_path, monkeypatch):
 
 
 def test_always_the_doctor_tells_what_is_missing(monkeypatch, broken_opengl):
-    packages = {"imageio-ffmpeg"} | {*examine.NEEDED, *examine.EXTRAS} - {"scipy", "trame"}
+    packages = {"imageio-ffmpeg"} | {*examine.REQUIRED_PACKAGES, *examine.OPTIONAL_PACKAGES} - {
+        "scipy",
+        "trame",
+    }
     found = examine_with(monkeypatch, only(*packages))
     assert found["numpy"]["fine"] and not found["scipy"]["fine"]
     assert found["scipy"]["cure"] == "pip install scipy"

@@ -8,7 +8,7 @@ import pytest
 from command_line import cli
 from scene_texts import COULOMB, PIECE, POINT, STRUCTURE
 
-from patchfem.commands.streams import plain
+from patchfem.commands.streams import make_printable
 from patchfem.runs.results.result import shorten_file_names
 
 PATCH = PIECE + 'load = "26 lbf"\nelement_size = "0.1 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
@@ -71,7 +71,7 @@ def test_exact_a_name_is_shown_on_one_line_without_moving_the_cursor(tmp_path):
     answer = cli("check", str(tmp_path / "a\x1b[31m\nb.toml"))
     assert answer.code == 2 and answer.err.count("\n") == 1
     assert "a?[31m?b.toml: cannot be read" in answer.err
-    assert plain("a\udcffü") == "a?ü"
+    assert make_printable("a\udcffü") == "a?ü"
 
 
 def test_exact_results_name_no_folder_of_this_machine(tmp_path):

@@ -21,7 +21,7 @@ from scene_texts import COULOMB, POINT, SHORT
 import patchfem as pf
 from patchfem.campaigns.sweeps import sweep
 from patchfem.commands.sweep import Progress
-from patchfem.export.summary import summary_of
+from patchfem.export.summary import summarise_run
 from patchfem.export.sweeps.folder import TABLES, Folder
 from patchfem.export.sweeps.page import read_table
 
@@ -73,7 +73,7 @@ def test_exact_every_case_is_a_single_run(swept, scene):
         kept = json.loads((out / "cases" / row["case"] / "summary.json").read_text())
         assert kept["case"] == sets and kept["kind"] == "rig" and kept["outcome"] == single.outcome
         assert kept["warnings"] == single.warnings and kept["notes"] == single.notes
-        whole = summary_of(single)
+        whole = summarise_run(single)
         del whole["numerics"][
             "measures"
         ]  # a case of a batch does not name what computed each measure

@@ -21,9 +21,9 @@ def test_exact_a_large_file_is_made_on_the_disk_with_the_same_contents(tmp_path)
         {"case": ("case", np.arange(2), {})},
         {"title": "a"},
     )
-    netcdf.write(data, tmp_path / "large.nc")
+    netcdf.write_netcdf(data, tmp_path / "large.nc")
     with xr.open_dataset(tmp_path / "large.nc") as large:
         assert large.identical(data.to_xarray())
     with limited(5000), pytest.raises(Missing):
-        netcdf.write(data, tmp_path / "none.nc")
+        netcdf.write_netcdf(data, tmp_path / "none.nc")
     assert [path.name for path in tmp_path.iterdir()] == ["large.nc"]

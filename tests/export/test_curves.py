@@ -83,7 +83,7 @@ def test_exact_spans_of_a_curve():
 
 
 def test_exact_a_picture_of_a_folded_curve():
-    text = pictures.draw_charts(charts.curve(FOLDED))
+    text = pictures.draw_charts(charts.curve_charts(FOLDED))
     for word in (
         "stable",
         "unstable",
@@ -92,8 +92,8 @@ def test_exact_a_picture_of_a_folded_curve():
         "half the peak-to-peak motion [um]",
     ):
         assert f">{word}<" in text, word
-    assert "stroke-dasharray" in text and pictures.draw_charts(charts.curve(FOLDED)) == text
-    said = charts.caption(FOLDED)
+    assert "stroke-dasharray" in text and pictures.draw_charts(charts.curve_charts(FOLDED)) == text
+    said = charts.curve_caption(FOLDED)
     assert (
         "9 points" in said
         and "stable, unstable" in said
@@ -113,23 +113,23 @@ def test_exact_a_curve_over_the_level_with_no_bounded_motion_at_its_end():
     assert charts.curve_axis(found)[0] == pytest.approx([1, 2, 3, 4]) and charts.curve_axis(found)[
         1:
     ] == ("drive level", "g")
-    assert "no bounded motion" in charts.caption(found) and ">unbounded<" in pictures.draw_charts(
-        charts.curve(found)
-    )
+    assert "no bounded motion" in charts.curve_caption(
+        found
+    ) and ">unbounded<" in pictures.draw_charts(charts.curve_charts(found))
 
 
 def test_exact_the_regime_in_words():
-    assert charts.regime(None) == ""
-    assert "decays" in charts.regime({"regime": "2 stops", "multiplier": 0.2})
-    assert "grows or persists" in charts.regime({"regime": "unstable", "multiplier": 1.2})
+    assert charts.regime_sentence(None) == ""
+    assert "decays" in charts.regime_sentence({"regime": "2 stops", "multiplier": 0.2})
+    assert "grows or persists" in charts.regime_sentence({"regime": "unstable", "multiplier": 1.2})
     assert (
-        charts.regime({"regime": "stuck", "multiplier": 0.0})
+        charts.regime_sentence({"regime": "stuck", "multiplier": 0.0})
         == " Regime: stuck; largest Floquet multiplier 0."
     )
 
 
 def test_exact_a_curve_in_the_file():
-    data = netcdf.with_curve(netcdf.Contents(), FOLDED).to_xarray()
+    data = netcdf.add_curve(netcdf.Contents(), FOLDED).to_xarray()
     names = data.curve_regime.attrs["flag_meanings"].split()
     assert [names[k] for k in data.curve_regime.values] == FOLDED["regime"].tolist()
     for name in ("frequency", "level", "amplitude", "multiplier"):
@@ -219,7 +219,7 @@ def test_exact_the_arrows_of_the_levels_point_along_the_test():
         for d, a in ((1.0, 0.0), (2.0, 1e-6), (3.0, 4e-6), (2.0, 2e-6))
     ]
     axes = Figure().subplots()
-    pictures.draw_charts(charts.levels(rows), onto=axes)
+    pictures.draw_charts(charts.levels_chart(rows), onto=axes)
     arrows = [text for text in axes.texts if isinstance(text, Annotation) and text.arrow_patch]
     upwards = [(arrow.xyann[0] < arrow.xy[0], arrow.xyann[1] < arrow.xy[1]) for arrow in arrows]
     assert upwards == [(True, True), (True, True), (False, False)]
@@ -239,9 +239,9 @@ def test_exact_a_page_without_curve_or_levels_has_neither():
         "seconds": {},
     }
     data = RunData(SceneText("a", "", ""), Verdict(summary, Outcome.DONE.sentence), {})
-    assert "Floquet" not in report.page(data) and "<h2>Levels" not in report.page(data)
+    assert "Floquet" not in report.page_html(data) and "<h2>Levels" not in report.page_html(data)
     summary["seconds"] = {"total": 0.434, "files": 0.1}
-    text = report.page(data)
+    text = report.page_html(data)
     assert (
         "computed in 0.43 s" in text and "Wall-clock seconds: total 0.434 s, files 0.100 s" in text
     )
@@ -259,7 +259,7 @@ def test_exact_levels_over_more_than_three_decades_are_drawn_over_their_logarith
         }
         for d, a in ((1.0, 0.0), (2.0, 2e-9), (3.0, 4e-5), (2.0, 1e-8))
     ]
-    (found,) = charts.levels(rows)
+    (found,) = charts.levels_chart(rows)
     dots = [one for one in found["marks"] if one["kind"] == "dots"]
     arrows = [one["y"] for one in found["marks"] if one["kind"] == "arrow"]
     assert found["y"]["log"] and [list(one["x"]) for one in dots] == [[2.0, 3.0, 2.0]]
@@ -267,8 +267,8 @@ def test_exact_levels_over_more_than_three_decades_are_drawn_over_their_logarith
         "floor"
     ] == pytest.approx(2e-4)
     few = [row for row in rows if row["values"]["relative_displacement_amplitude"] in (0.0, 4e-5)]
-    assert not charts.levels(few)[0]["y"]["log"]
+    assert not charts.levels_chart(few)[0]["y"]["log"]
     for some, scale in ((rows, "log"), (few, "linear")):
         axes = Figure().subplots()
-        pictures.draw_charts(charts.levels(some), onto=axes)
+        pictures.draw_charts(charts.levels_chart(some), onto=axes)
         assert axes.get_yscale() == scale

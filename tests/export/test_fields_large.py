@@ -25,7 +25,7 @@ from patchfem.elasticity.recovery import get_cells, make_points
 from patchfem.export.fields import bodies, vtkhdf
 from patchfem.export.fields.series import Series
 from patchfem.export.fields.vtkhdf import NAME, round_to_bits, round_to_step
-from patchfem.export.fields.vtu import export
+from patchfem.export.fields.vtu import export_fields
 
 KILLED = """\
 import os, sys
@@ -33,7 +33,7 @@ from pathlib import Path
 from patchfem.export.fields import vtkhdf
 sys.path[:0] = {paths!r}
 from exported import write_small, write_waves
-calls, inner, vtkhdf.MIN_FRAMEWISE_BYTES = [0], vtkhdf._nearest, 0
+calls, inner, vtkhdf.MIN_FRAMEWISE_BYTES = [0], vtkhdf._rounding_function, 0
 def counted(nearest):
     def one(values):
         calls[0] += 1
@@ -41,7 +41,7 @@ def counted(nearest):
             os.kill(os.getpid(), 9)
         return nearest(values)
     return one
-vtkhdf._nearest = lambda *of: counted(inner(*of))
+vtkhdf._rounding_function = lambda *of: counted(inner(*of))
 {write}
 """
 
@@ -224,7 +224,7 @@ def test_always_an_exported_series_is_about_as_small_as_the_fields(tmp_path):
     vtkhdf.write_series(
         tmp_path / NAME, blocks, np.arange(12) * 1e-4, UNITS, dict.fromkeys(blocks, steps)
     )
-    export(tmp_path, tmp_path / "out.pvd")
+    export_fields(tmp_path, tmp_path / "out.pvd")
     size = sum(one.stat().st_size for one in (tmp_path / "out_frames").iterdir())
     assert size < 1.15 * (tmp_path / NAME).stat().st_size, (size, (tmp_path / NAME).stat().st_size)
     with Series(tmp_path) as series:

@@ -26,7 +26,7 @@ from patchfem.core import Missing, PatchfemError
 from patchfem.export.fields.blocks import CODES, NAMES
 from patchfem.export.fields.series import Series
 from patchfem.export.fields.vtkhdf import NAME
-from patchfem.export.fields.vtu import export
+from patchfem.export.fields.vtu import export_fields
 from patchfem.export.results import FILES
 
 ON_THE_INTERFACE = {"normal_stress", "gap", "status", "normal_bond_lower", "normal_bond_upper"}
@@ -295,17 +295,17 @@ def test_always_the_folder_of_an_export_is_made(tmp_path, name, made):
 
 def test_refuses_folders_without_fields_and_spoilt_files(tmp_path):
     with pytest.raises(Missing, match="no such results folder"):
-        export(tmp_path / "nowhere", tmp_path / "a.vtu")
+        export_fields(tmp_path / "nowhere", tmp_path / "a.vtu")
     with pytest.raises(Missing, match=r"only a run with \[contact\]"):
-        export(tmp_path, tmp_path / "a.vtu")
+        export_fields(tmp_path, tmp_path / "a.vtu")
     (tmp_path / NAME).write_bytes(b"\x89HDF\r\n\x1a\n spoilt")
     with pytest.raises(PatchfemError, match="not a readable HDF5 file"):
-        export(tmp_path, tmp_path / "a.vtu")
+        export_fields(tmp_path, tmp_path / "a.vtu")
     write_small(tmp_path / "out")
     (tmp_path / "a_frames").mkdir()
     (tmp_path / "a_frames" / "mine.txt").write_text("kept")
     with pytest.raises(PatchfemError, match=r"mine\.txt"):
-        export(tmp_path / "out", tmp_path / "a.pvd")
+        export_fields(tmp_path / "out", tmp_path / "a.pvd")
     assert (tmp_path / "a_frames" / "mine.txt").read_text() == "kept"
 
 

@@ -13,8 +13,8 @@ from exported import write_small
 from PIL import Image
 
 from patchfem.export.drawing.film import DPI, FRAME_SIZE, make_film
-from patchfem.export.drawing.flat import LOOK, Picture
-from patchfem.export.drawing.panels import slide_of, upper_points
+from patchfem.export.drawing.flat import STYLE, Picture
+from patchfem.export.drawing.panels import upper_piece_slide, upper_points
 from patchfem.export.fields.series import MIN_STEP_RATIO, Series, last_consecutive_frames
 
 WIDE, HIGH = 1200, 680
@@ -42,7 +42,7 @@ def pixels(series, film, number) -> np.ndarray:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     frame = series.frame(number)
-    with matplotlib.rc_context(LOOK):
+    with matplotlib.rc_context(STYLE):
         picture = Picture(
             frame, f"out, {frame.time:.6g} s", film.panels(frame), FRAME_SIZE, film.reach
         )
@@ -113,7 +113,7 @@ def test_exact_the_slide_is_taken_out_before_the_rest_is_magnified(bench):
     with Series(bench) as series:
         film = make_film(series)
         frames = [series.frame(number) for number in film.numbers]
-    slides = np.array([slide_of(one) for one in frames])
+    slides = np.array([upper_piece_slide(one) for one in frames])
     length = 12.7e-3
     assert 0.01 < film.aside * np.abs(slides).max() / length < 0.035
     for one, slide in zip(frames, slides):

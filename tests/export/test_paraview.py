@@ -17,7 +17,7 @@ from exported import write_small
 from paraview_stand_in import Simple, blocks_at, times_and_files
 
 from patchfem.export.drawing.film import make_film
-from patchfem.export.drawing.panels import slide_of
+from patchfem.export.drawing.panels import upper_piece_slide
 from patchfem.export.fields.blocks import NAMES
 from patchfem.export.fields.series import Series
 
@@ -73,7 +73,8 @@ def test_exact_paraview_warps_to_the_places_that_pictures_draw(bench, written, m
                 assert np.array_equal(point_data["displacement"], block.point_data["displacement"])
                 upper = block is frame.blocks["upper"]
                 assert np.array_equal(
-                    np.unique(point_data["slide"][:, 0]), np.float32([upper * slide_of(frame)])
+                    np.unique(point_data["slide"][:, 0]),
+                    np.float32([upper * upper_piece_slide(frame)]),
                 )
                 for name, values in block.cell_data.items():
                     assert np.array_equal(cell_data[name], values)

@@ -155,7 +155,7 @@ PAGES = {
 
 @pytest.fixture(scope="module")
 def pages():
-    return {name: (data := make(), report.page(data)) for name, make in PAGES.items()}
+    return {name: (data := make(), report.page_html(data)) for name, make in PAGES.items()}
 
 
 class Parsed(HTMLParser):
@@ -199,7 +199,7 @@ def test_always_one_file_that_fetches_nothing(pages, name):
     words = own_part(text)
     seen = Parsed(words)
     assert not {"link", "iframe", "img", "object", "metadata"} & set(seen.tags)
-    assert all(link.startswith("#") or link in dict(report.FILES) for link in seen.links)
+    assert all(link.startswith("#") or link in dict(report.RESULT_FILES) for link in seen.links)
     assert "http" not in words and "@import" not in words and "url(" not in words
     assert not re.search(r"<script[^>]* src", text) and len(text.encode()) < 3e6
 
@@ -272,7 +272,7 @@ def test_always_no_sentence_of_a_page_shows_back_quotes(pages):
         [f"lower {key}"],
     )
     data.verdict.means["stick_fraction"] = stick
-    text = report.page(data)
+    text = report.page_html(data)
     assert (
         text.count("<code>structure.travel</code>") == 2
         and "as in <code>slip_amplitude</code>" in text
@@ -293,7 +293,7 @@ def test_always_captions_speak_of_what_the_run_has(pages):
     assert "over the last 3 cycles" in words["rig"] and "only reversals were kept" in words["rig"]
     assert "instants of the run" in words["short"] and "last cycle" not in words["short"]
     assert "whole run" in words["bench"] and "cycle" not in words["bench"]
-    coated = captions(report.page(patch(effects=("contact", "contact.coating"))))
+    coated = captions(report.page_html(patch(effects=("contact", "contact.coating"))))
     assert "with their coatings under the load." in coated
 
 
@@ -301,7 +301,7 @@ def test_always_no_picture_where_nothing_touches(pages):
     data, text = deepcopy(pages["no contact"])
     assert "<script" not in text and spoken(text) == f"no_contact: {data.verdict.sentence}"
     data.verdict.summary["warnings"] = [data.verdict.sentence, "another one"]
-    assert report.page(data).count(data.verdict.sentence) == 1
+    assert report.page_html(data).count(data.verdict.sentence) == 1
 
 
 def test_always_a_part_of_a_cycle_claims_nothing_per_cycle(pages):
@@ -313,10 +313,10 @@ def test_always_a_part_of_a_cycle_claims_nothing_per_cycle(pages):
 
 def test_always_the_heading_is_the_title_or_the_file():
     data = rig(title="")
-    assert "<h1>scene-file</h1>" in report.page(data)
+    assert "<h1>scene-file</h1>" in report.page_html(data)
     data = replace(data, source=replace(data.source, name=""))
-    assert "<h1>patchfem run</h1>" in report.page(data)
-    assert "&lt;b&gt;" in report.page(data)
+    assert "<h1>patchfem run</h1>" in report.page_html(data)
+    assert "&lt;b&gt;" in report.page_html(data)
 
 
 @pytest.mark.parametrize("name", ["rig", "bench"])
@@ -324,16 +324,16 @@ def test_exact_the_same_data_give_the_same_bytes(tmp_path, name):
     data = PAGES[name]()
     (tmp_path / "data").write_bytes(pickle.dumps(data))
     code = (
-        "import pickle, sys; from patchfem.export.report import page; "
-        "open(sys.argv[2], 'w', encoding='utf-8').write(page(pickle.load(open(sys.argv[1], 'rb'))))"
+        "import pickle, sys; from patchfem.export.report import page_html; "
+        "open(sys.argv[2], 'w', encoding='utf-8').write(page_html(pickle.load(open(sys.argv[1], 'rb'))))"
     )
     subprocess.run(
         [sys.executable, "-c", code, tmp_path / "data", tmp_path / "page.html"],
         check=True,
         env={"PYTHONHASHSEED": "7", "PATH": "", "MPLCONFIGDIR": str(tmp_path)},
     )
-    text = report.page(deepcopy(data))
-    assert text == report.page(data) == (tmp_path / "page.html").read_text("utf-8")
+    text = report.page_html(deepcopy(data))
+    assert text == report.page_html(data) == (tmp_path / "page.html").read_text("utf-8")
 
 
 @pytest.mark.parametrize(
@@ -361,7 +361,7 @@ def test_exact_the_band_joins_the_reversals_of_each_cycle():
     number = np.arange(20)
     time, high = (number / 2 + 0.25) * PERIOD, 1 + number // 2
     gone = (number // 2 != 3) & (number // 2 != 4)
-    middle, low, top = charts.envelope(time[gone], ((-1.0) ** number * high)[gone], PERIOD)
+    middle, low, top = charts.cycle_envelope(time[gone], ((-1.0) ** number * high)[gone], PERIOD)
     assert middle == pytest.approx((np.arange(10) + 0.5) * PERIOD)
     assert np.isnan(low[3:5]).all() and np.isnan(top[3:5]).all()
     kept = np.array([0, 1, 2, 5, 6, 7, 8, 9])
@@ -411,7 +411,7 @@ def test_exact_a_stress_without_bound_is_named_where_it_is_the_largest(cell, sai
     """Beside a coating a corner showed 6.7 to 8.3 MPa on finer meshes of one pressed pair, without a word."""
     data = patch()
     data.patch.bodies["mises"][1][cell] = 1e9
-    caption = report.picture("bodies", data).caption
+    caption = report.find_picture("bodies", data).caption
     assert "largest stress in a cell is 1 GPa" in caption and (
         said in caption if said else "bound" not in caption
     )

@@ -57,7 +57,7 @@ def some_contents() -> netcdf.Contents:
 
 def test_exact_the_file_is_the_one_that_xarray_writes(tmp_path):
     data = some_contents()
-    netcdf.write(data, tmp_path / "ours.nc")
+    netcdf.write_netcdf(data, tmp_path / "ours.nc")
     data.to_xarray().to_netcdf(tmp_path / "theirs.nc", engine="h5netcdf")
     with (
         xr.open_dataset(tmp_path / "ours.nc", engine="h5netcdf") as ours,
@@ -146,7 +146,7 @@ def test_always_a_page_for_which_memory_is_short_leaves_complete_results(
     def exhaust_memory(*_):
         raise MemoryError
 
-    monkeypatch.setattr(report, "page_of", exhaust_memory)
+    monkeypatch.setattr(report, "run_page", exhaust_memory)
     answer = cli("run", scene, "-o", tmp_path / "out")
     assert answer.code == 4 and "out of memory" in answer.err
     assert "results: " in answer.out and "are complete except for" in answer.err
@@ -181,9 +181,9 @@ def test_refuses_a_page_for_a_folder_that_is_gone(scene, tmp_path):
     written = results_folder.run_into(plan(scene), out)
     os.replace(out, tmp_path / "moved")
     with pytest.raises(Missing, match="replaced by another run"):
-        results_folder.write_page(written, out)
+        results_folder.write_run_page(written, out)
     # The page follows the folder, not its name.
-    results_folder.write_page(written, tmp_path / "moved")
+    results_folder.write_run_page(written, tmp_path / "moved")
     assert (tmp_path / "moved" / "report.html").is_file()
 
 

@@ -9,7 +9,7 @@ from command_line import cli
 import patchfem as pf
 from patchfem.export import page_data
 from patchfem.export.drawing import charts
-from patchfem.export.report import picture
+from patchfem.export.report import find_picture
 
 SCENE = """\
 [structure]
@@ -67,7 +67,9 @@ def test_exact_the_first_row_is_the_rms_with_the_interval_of_records(found, tmp_
 def test_exact_the_spectra_of_an_oscillator(found):
     """White noise of G: G |H|^2 of the place, H = 1/(w0^2 - w^2 + 2 i zeta w0 w); each line of the record scatters by
     some 18 %, the middle of the band by less."""
-    made = picture("spectra", page_data.data_of(found)).charts(found.extra["spectra"], 100.0)
+    made = find_picture("spectra", page_data.collect_run_data(found)).charts(
+        found.extra["spectra"], 100.0
+    )
     assert [one["title"].split()[0] for one in made] == ["Displacement", "Acceleration", "H1:"]
     (density,), (_, base), (_, gain, peak) = (one["marks"] for one in made)
     assert all(20 <= one["x"].min() and one["x"].max() <= 400 for one in (density, base, gain))
@@ -86,7 +88,7 @@ def test_exact_the_spectra_of_an_oscillator(found):
 
 def test_always_h1_is_faint_where_it_is_not_coherent(found):
     spectra = found.extra["spectra"]
-    _, clear = charts.spectra(
+    _, clear = charts.spectra_charts(
         spectra._replace(coherence=np.where(spectra.frequency < 200, spectra.coherence, 0.1)), None
     )[2]["marks"]
     assert clear["x"].max() < 200

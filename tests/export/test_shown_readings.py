@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem import SceneError, run
-from patchfem.export.page_data import data_of
-from patchfem.export.report import page_of
+from patchfem.export.page_data import collect_run_data
+from patchfem.export.report import run_page
 from patchfem.scene.scene import load
 
 LINEAR = """
@@ -41,20 +41,21 @@ def test_exact_a_sine_reads_as_its_effective_value(tmp_path):
         read.measures["absolute_acceleration_peak"].value
         == plain.measures["absolute_acceleration_peak"].value
     )
-    data = data_of(read).measured
+    data = collect_run_data(read).measured
     assert (
-        data.share == pytest.approx(np.sqrt(0.5), rel=1e-5) and data_of(plain).measured.share == 1
+        data.share == pytest.approx(np.sqrt(0.5), rel=1e-5)
+        and collect_run_data(plain).measured.share == 1
     )
     peak = plain.measures["absolute_acceleration_peak"].value / 9.80665
-    assert f"{1.5 * np.sqrt(0.5) * peak:.3g} g" in page_of(read, {})
-    assert f"{1.5 * peak:.3g} g" in page_of(plain, {})
+    assert f"{1.5 * np.sqrt(0.5) * peak:.3g} g" in run_page(read, {})
+    assert f"{1.5 * peak:.3g} g" in run_page(plain, {})
 
 
 def test_exact_the_gauge_has_a_factor_of_its_own(tmp_path):
     found = run(scene_of(tmp_path, "measured.displacement_gain=0.8"))
     seen = found.measures["relative_displacement_amplitude"].value / 25.4e-6
-    assert f"<td>{0.8 * seen:.3g} mil</td>" in page_of(found, {}).replace(" class=n", "")
-    assert "(computed displacement multiplied by the reading factor 0.8)" in page_of(found, {})
+    assert f"<td>{0.8 * seen:.3g} mil</td>" in run_page(found, {}).replace(" class=n", "")
+    assert "(computed displacement multiplied by the reading factor 0.8)" in run_page(found, {})
 
 
 def test_a_reading_is_an_effect_beside_its_rows(tmp_path):

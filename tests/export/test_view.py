@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 from patchfem.export.drawing import view
 from patchfem.export.drawing.flat import Picture
 from patchfem.export.drawing.panels import (
-    areas,
-    borders,
-    curves,
+    cell_areas,
     drawn_displacement,
-    panels,
-    round_factor,
-    slide_of,
+    interface_curves,
+    make_panels,
+    outer_edges,
+    round_down_factor,
+    upper_piece_slide,
 )
 from patchfem.export.fields.series import Series
 
@@ -42,14 +42,14 @@ def test_exact_the_drawn_gap_is_the_gap_times_the_factor(bench, magnify):
     line = frame.interface()
     upper = np.unique(np.concatenate([block.ravel() for block in frame.cells(1)]))
     face = upper[frame.points[upper, 1] == 0]
-    for panel in panels(frame, magnify):
+    for panel in make_panels(frame, magnify):
         assert magnify is None or panel.factor == magnify
         drawn = panel.places[face, 1] - panel.places[line, 1]
         wanted = panel.factor * 1e3 * frame.point_data["gap"][line]
         assert np.abs(drawn - wanted).max() <= 1e-6 * (wanted.max() + 1e-3 * panel.factor)
         far = frame.points[:, 1] == frame.points[:, 1].max()
         move = frame.point_data["displacement"][far, :2]
-        slide = np.array([slide_of(frame), 0.0])  # as it is, the rest magnified
+        slide = np.array([upper_piece_slide(frame), 0.0])  # as it is, the rest magnified
         drawn = (
             frame.points[far, :2] + min(panel.factor, 1.0) * slide + panel.factor * (move - slide)
         )
@@ -66,8 +66,8 @@ def test_exact_a_slide_is_found_and_not_magnified(bench, slide):
     move[upper, 0] += slide - 1e-5 * still.points[upper, 1]
     move[upper, 1] += 1e-5 * still.points[upper, 0]
     frame = replace(still, point_data=still.point_data | {"displacement": move})
-    assert slide_of(frame) == pytest.approx(slide + slide_of(still), abs=1e-12)
-    for panel in panels(frame):
+    assert upper_piece_slide(frame) == pytest.approx(slide + upper_piece_slide(still), abs=1e-12)
+    for panel in make_panels(frame):
         assert panel.factor > 10
         aside = panel.places[upper, 0] - 1e3 * frame.points[upper, 0]
         bent = panel.factor * 1e3 * np.abs(drawn_displacement(frame)[upper, 0] - slide).max()
@@ -78,19 +78,19 @@ def test_exact_a_slide_is_found_and_not_magnified(bench, slide):
 
 def test_exact_panels_show_the_pieces_and_scale_to_their_stress(bench):
     frame = frame_of(bench)
-    whole, close = panels(frame)
+    whole, close = make_panels(frame)
     mises = frame.cell_data["von_mises"]
     assert (
         whole.cells.sum() == (frame.cell_data["part"] < 2).sum()
         and close.cells.sum() < whole.cells.sum()
     )
     assert close.top == whole.top >= mises[close.cells].max() and not close.over
-    size = areas(frame)
+    size = cell_areas(frame)
     assert size.sum() == pytest.approx(2 * 12.7e-3 * 6.35e-3, rel=1e-9)
     assert whole.top == np.nanmax(mises) and not whole.over
     sharp = mises.copy()
     sharp[np.argmax(np.nan_to_num(mises))] *= 30  # one small cell that would darken all the rest
-    spiky, beside = panels(replace(frame, cell_data=frame.cell_data | {"von_mises": sharp}))
+    spiky, beside = make_panels(replace(frame, cell_data=frame.cell_data | {"von_mises": sharp}))
     # one scale: 4.8 MPa once stood for the colour that was 8.85 MPa beside it
     assert beside.top == spiky.top
     above = size[whole.cells & (sharp > spiky.top)].sum()
@@ -99,14 +99,14 @@ def test_exact_panels_show_the_pieces_and_scale_to_their_stress(bench):
     drawn = Picture(frame, "a", (spiky, beside), (18, 10))
     assert sum("von Mises" in axes.get_ylabel() for axes in drawn.figure.axes) == 1
     assert len({cells.get_clim() for bodies in drawn.bodies for _, _, cells in bodies.cells}) == 1
-    outer, inner = borders(frame, whole.cells)
+    outer, inner = outer_edges(frame, whole.cells)
     reach = np.linalg.norm(np.diff(frame.points[outer], axis=1), axis=2).sum()
     assert reach == pytest.approx(4 * (12.7e-3 + 6.35e-3), rel=1e-9)
     assert np.abs(np.abs(frame.points[inner][..., 1]) - 152.4e-6).max() <= 1e-12
     assert np.linalg.norm(np.diff(frame.points[inner], axis=1), axis=2).sum() == pytest.approx(
         2 * 12.7e-3, rel=1e-9
     )
-    x, shown, unit = curves(frame)
+    x, shown, unit = interface_curves(frame)
     assert unit == "MPa" and [label for label, _ in shown] == ["normal stress", "shear stress"]
     share = np.convolve(np.diff(x), [0.5, 0.5])
     # MPa mm mm = N
@@ -116,8 +116,8 @@ def test_exact_panels_show_the_pieces_and_scale_to_their_stress(bench):
 def test_exact_any_cells_are_drawn_whole(tmp_path):
     given_ = write_small(tmp_path / "out")
     frame = frame_of(tmp_path / "out")
-    assert areas(frame).sum() == pytest.approx(2 * 2e-3 * 1e-3, rel=1e-9)
-    outer, _ = borders(frame, panels(frame)[0].cells)
+    assert cell_areas(frame).sum() == pytest.approx(2 * 2e-3 * 1e-3, rel=1e-9)
+    outer, _ = outer_edges(frame, make_panels(frame)[0].cells)
     assert np.linalg.norm(np.diff(frame.points[outer], axis=1), axis=2).sum() == pytest.approx(
         4 * 3e-3, rel=1e-9
     )
@@ -127,18 +127,18 @@ def test_exact_any_cells_are_drawn_whole(tmp_path):
 
 @given(st.floats(1e-3, 1e12))
 def test_always_the_factor_is_round_and_just_below(factor):
-    found = round_factor(factor, 0.0)
+    found = round_down_factor(factor, 0.0)
     assert factor / 2.5 * (1 - 1e-9) <= found <= factor * (1 + 1e-9)
     lead = found / 10.0 ** np.floor(np.log10(found * (1 + 1e-9)))
     assert min(abs(lead - step) for step in (1, 2, 5)) <= 1e-9
-    assert round_factor(factor) == max(1.0, round_factor(factor))
+    assert round_down_factor(factor) == max(1.0, round_down_factor(factor))
 
 
 @pytest.mark.slow
 def test_exact_the_window_shows_the_pieces_where_opengl_draws(bench):
-    if why := view.no_opengl():
+    if why := view.explain_missing_opengl():
         pytest.skip(why)
-    drawn = view.plotter(frame_of(bench), "a", None, off_screen=True).screenshot(
+    drawn = view.make_plotter(frame_of(bench), "a", None, off_screen=True).screenshot(
         None, return_img=True
     )
     assert (

@@ -3,7 +3,7 @@
 import pytest
 
 import patchfem as pf
-from patchfem.export.summary import summary_of
+from patchfem.export.summary import summarise_run
 
 HEAD = '[normal]\nload = "100 N"\n[friction]\nlaw = "{}"\nstatic = 0.3\n'
 RIG = (
@@ -19,7 +19,7 @@ RIG = (
 def test_exact_names_the_engine_and_its_steps(law, method, engine):
     speed = 'reference_speed = "1 mm/s"\n' if law == "tanh" else ""
     text = RIG.format(law).replace("static = 0.3\n", f"static = 0.3\n{speed}")
-    found = summary_of(pf.run(text + f'[accuracy]\nmethod = "{method}"\n'))["numerics"]
+    found = summarise_run(pf.run(text + f'[accuracy]\nmethod = "{method}"\n'))["numerics"]
     assert found["engine"] == engine and found["window_cycles"] == 2
     assert ("steps_per_cycle" in found) == (engine != "exact")
 
@@ -30,4 +30,4 @@ def test_exact_a_pinned_step_count_is_named():
         + 'bond_length = "1 um"\n[slide]\nkind = "sine"\namplitude = "5 um"\n'
         'frequency = "10 Hz"\ncycles = 1\n[accuracy]\nsteps_per_cycle = 300\n'
     )
-    assert summary_of(pf.run(text))["numerics"]["steps_per_cycle"] == 300
+    assert summarise_run(pf.run(text))["numerics"]["steps_per_cycle"] == 300

@@ -1,7 +1,7 @@
 """summary.json names what computed each measure."""
 
 from patchfem import run
-from patchfem.export.summary import summary_of
+from patchfem.export.summary import summarise_run
 from patchfem.runs.patch.values import values
 from patchfem.runs.results import patch_rows
 
@@ -22,7 +22,7 @@ tolerance = {}
 def test_always_a_value_of_another_engine_is_not_that_of_the_mesh():
     """A measure has the value of the finest mesh where that is named, and another one where another engine is."""
     result = run(PATCH.format(1e-3))
-    on_mesh, named = values(result.patch), summary_of(result)["numerics"]["measures"]
+    on_mesh, named = values(result.patch), summarise_run(result)["numerics"]["measures"]
     assert named.keys() == {name for name, one in result.measures.items() if one.value is not None}
     assert patch_rows.EXTRAPOLATED_SOURCE in named.values()
     for name, words in named.items():
@@ -47,6 +47,6 @@ amplitude = "5 um"
 frequency = "143 Hz"
 """
     )
-    numerics = summary_of(run(bench))["numerics"]
+    numerics = summarise_run(run(bench))["numerics"]
     assert numerics["measures"]["secant_stiffness"] == numerics["engine"]
     assert numerics["measures"]["normal_stiffness"].startswith("finite elements")

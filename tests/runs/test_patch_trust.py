@@ -6,7 +6,7 @@ import pytest
 from scene_texts import COATING, PIECE
 
 import patchfem as pf
-from patchfem.export.folder import summary_of
+from patchfem.export.summary import summarise_run
 
 RIG = PIECE + 'load = "26 lbf"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
 STEP = RIG + '[contact.step]\nheight = "0.1 um"\nat = "2 mm"\n'
@@ -28,7 +28,7 @@ def test_always_null_beside_a_step_that_bears():
         and "edge of the step" in peak.reason
         and found.measures["normal_stiffness"].value > 0
     )
-    written = summary_of(found)["measures"]["pressure_peak"]
+    written = summarise_run(found)["measures"]["pressure_peak"]
     assert written["value"] is None and "edge of the step" in written["reason"]
 
 

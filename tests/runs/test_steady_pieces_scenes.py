@@ -16,7 +16,7 @@ from support.scene_texts import (
 )
 
 import patchfem as pf
-from patchfem.export.summary import summary_of
+from patchfem.export.summary import summarise_run
 
 RIG = POINT + PLASTIC + MODE + DRIVE
 STEADY = {"accuracy.method": "harmonic"}
@@ -58,8 +58,8 @@ def test_exact_a_long_run_ends_in_the_steady_motion(text, cycles):
 
 def test_exact_the_balance_of_named_harmonics_is_within_its_bars():
     exact, balance = pf.run(RIG, **STEADY), pf.run(RIG, **STEADY, **{"accuracy.harmonics": "31"})
-    assert "map" not in summary_of(balance)["numerics"] and balance.extra["harmonics"] == 31
-    assert summary_of(exact)["numerics"]["map"] == "yields"
+    assert "map" not in summarise_run(balance)["numerics"] and balance.extra["harmonics"] == 31
+    assert summarise_run(exact)["numerics"]["map"] == "yields"
     for name in (
         "relative_displacement_amplitude",
         "slip_amplitude",

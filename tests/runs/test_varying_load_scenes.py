@@ -6,7 +6,7 @@ from scene_texts import BENCH, RIG, STRUCTURE, only
 
 from patchfem.contact.unilateral import solve_forces
 from patchfem.dynamics.march.varying_load import contact_sets_of
-from patchfem.export.histories import histories
+from patchfem.export.histories import collect_histories
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -49,7 +49,7 @@ def test_exact_a_pitching_mode_closes_its_energy_and_balances_its_fields(law):
     assert load.min() - 1e-9 <= sums.min() and sums.max() <= load.max() + 1e-9
     assert (fields["gap"] >= 0).all() and not (fields["gap"] * fields["normal_stress"]).any()
     assert (np.abs(fields["shear_stress"]) <= 0.3 * fields["normal_stress"] + 1e-6).all()
-    kept, _ = histories(found)
+    kept, _ = collect_histories(found)
     assert kept["normal_load"] is load and np.ptp(load) > 1e-3 * load[0]
 
 

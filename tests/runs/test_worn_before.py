@@ -123,7 +123,7 @@ def test_refuses_a_trace_that_was_not_worn(place):
 
 
 def test_exact_without_an_error_before_the_error_is_not_known(place):
-    folder.save(run(loads(SCENE, place / "a.toml", [HALF]), estimate=False), place / "rough")
+    folder.save_run(run(loads(SCENE, place / "a.toml", [HALF]), estimate=False), place / "rough")
     assert ran(place, HALF, "wear.start=rough/result.nc").measures["worn_volume"].error is None
 
 

@@ -22,7 +22,7 @@ def test_always_every_rung_can_be_asked_under_every_reading(fitting):
     cells = read_readings(fitting.TABLE)
     for rung in fitting.RUNGS.values():
         for reading in rung.readings:
-            asked = rung.question(reading).asked(cells.conditions)
+            asked = rung.question(reading).condition_models(cells.conditions)
             assert len(asked.rigs) == 20 and asked.read.reading == (
                 "fundamental" if "fund" in reading else "peak"
             )
@@ -53,7 +53,7 @@ def test_always_a_motion_found_by_harmonics_is_no_start_for_the_map_of_yields(fi
     """Where the map finds no motion, the balance answers, and the next numbers nearby are asked as from rest."""
     from patchfem.dynamics.events import steady
 
-    asked = fitting.RUNGS["second path"].question("peak").asked([(143.0, 49.03)])
+    asked = fitting.RUNGS["second path"].question("peak").condition_models([(143.0, 49.03)])
     values = np.array([0.4, 3.5e6, 1400.0, 0.09])
     find_steady = steady.solve_steady
     failures = [NotConverged("lost")]

@@ -8,7 +8,7 @@ import numpy as np
 from scene_texts import COATED, COULOMB
 
 from patchfem.export.fields import vtkhdf
-from patchfem.export.fields.blocks import Block, blocks_of
+from patchfem.export.fields.blocks import Block, build_blocks
 
 UNITS = {
     "displacement": "m",
@@ -72,7 +72,7 @@ def write_small(folder, frames: int = 3, seed: int = 0, times=None):
         "status": rng.integers(0, 3, (frames, 4)),
     }
     pair = body(-1.0, frames, rng), body(1.0, frames, rng)
-    blocks = blocks_of(*pair, np.array([-1e-3, -0.2e-3, 0.3e-3, 1e-3]), interface)
+    blocks = build_blocks(*pair, np.array([-1e-3, -0.2e-3, 0.3e-3, 1e-3]), interface)
     times = np.cumsum(rng.random(frames)) if times is None else np.array(times)
     folder.mkdir(exist_ok=True)
     vtkhdf.write_series(folder / vtkhdf.NAME, blocks, times, UNITS)

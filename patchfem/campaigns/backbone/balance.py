@@ -27,8 +27,10 @@ HARMONICS = (
 )
 MAX_SAMPLES = 65536  # Samples per cycle: more take too long, and 39 harmonics need fewer.
 N_SAMPLES = 4096  # Samples of a cycle from which the largest motion is read.
-ROUND = 1e-9  # Relative error of a value by round-off.
-AMPLITUDE_TOL = 1e-7  # Relative tolerance of an amplitude, if the steps do not reach ROUND.
+ROUND_OFF_ERROR = 1e-9  # Relative error of a value by round-off.
+AMPLITUDE_TOL = (
+    1e-7  # Relative tolerance of an amplitude, if the steps do not reach ROUND_OFF_ERROR.
+)
 MAX_STEPS = 8  # Secant steps to the motion that has the requested amplitude at the output.
 # Least slope of the logarithms of both amplitudes with which a secant step is taken.
 MIN_SLOPE = 0.1
@@ -59,7 +61,7 @@ def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
         if not count:
             raise NotConverged("no free motion of these amplitudes was found")
         better = _read_motions(laws, joint, amplitudes, harmonics, count)
-        error = error_of_change(better - found) + ROUND * np.abs(better)
+        error = error_of_change(better - found) + ROUND_OFF_ERROR * np.abs(better)
         found = better
         known = np.isfinite(error[0])
         if (error[:2] <= tolerance * np.abs(found[:2]))[:, known].all():
@@ -139,9 +141,11 @@ def find_free_motions(group: LawGroup, joint: Joint, amplitudes, harmonics: int)
     for k, amplitude in enumerate(amplitudes):
         before = out[k - 1] if k else None
         is_first = not any(out)
-        out[k] = search.continue_from(before, amplitude) or search.begin(amplitude, is_first)
+        out[k] = search.continue_motion(before, amplitude) or search.start_motion(
+            amplitude, is_first
+        )
     for k in range(len(amplitudes) - 2, -1, -1):
-        out[k] = out[k] or search.continue_from(out[k + 1], amplitudes[k])
+        out[k] = out[k] or search.continue_motion(out[k + 1], amplitudes[k])
     return [motion and motion.free for motion in out]
 
 
@@ -174,7 +178,7 @@ class _FreeMotionSearch:
         self.first = np.append(pack_harmonics(faces), [1.0, 0.0])
         self.small = MIN_AMPLITUDE_FACTOR * float(joint.slip_amplitude) / self.reach
 
-    def continue_from(self, near: FreeMotion | None, amplitude: float) -> FreeMotion | None:
+    def continue_motion(self, near: FreeMotion | None, amplitude: float) -> FreeMotion | None:
         """Return the motion at an amplitude [m], starting from another motion; None if it fails."""
         if near is None:
             return None
@@ -185,7 +189,7 @@ class _FreeMotionSearch:
         except NotConverged:
             return None
 
-    def begin(self, amplitude: float, is_first: bool) -> FreeMotion | None:
+    def start_motion(self, amplitude: float, is_first: bool) -> FreeMotion | None:
         """Return the motion at an amplitude [m], starting from the sticking mode; None if it fails.
 
         is_first: whether a search via a small amplitude is tried as well.
@@ -206,7 +210,7 @@ def _reach_amplitude(
 ) -> FreeMotion:
     """Find the motion that has an amplitude [m] at the output, by secant steps.
 
-    The steps end at ROUND, or at AMPLITUDE_TOL if they lead no further.
+    The steps end at ROUND_OFF_ERROR, or at AMPLITUDE_TOL if they lead no further.
 
     Parameters
     ----------
@@ -242,7 +246,7 @@ def _reach_amplitude(
         if abs(distance) < AMPLITUDE_TOL:
             best_distance = abs(distance)
             best = FreeMotion(free, x, amplitude / here)
-        if abs(distance) < ROUND:
+        if abs(distance) < ROUND_OFF_ERROR:
             break
         if before is not None:
             last_here, last_distance = before
@@ -315,8 +319,8 @@ def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:
     return Curve(
         amplitude=amplitude,
         frequency=frequency,
-        frequency_error=(relative_error + ROUND) * frequency,
+        frequency_error=(relative_error + ROUND_OFF_ERROR) * frequency,
         damping=damping,
-        damping_error=relative_error * np.abs(friction_damping) + ROUND * np.abs(damping),
+        damping_error=relative_error * np.abs(friction_damping) + ROUND_OFF_ERROR * np.abs(damping),
         loss=loss,
     )

@@ -20,7 +20,7 @@ from .linear import compute_level_curve
 from .quasi_static import compute_static_curve
 from .records import METHODS, Backbone, Curve, LossExponents, ModeFrequencies
 
-ROUND = 1e-9  # Relative error of a value by round-off.
+ROUND_OFF_ERROR = 1e-9  # Relative error of a value by round-off.
 AMPLITUDE_TOL = 1e-7  # Relative tolerance of the first and last amplitudes of two curves.
 # Amplitude / amplitude at which the whole contact begins to slip; above this ratio a point counts as gross slip.
 GROSS_SLIP_BEGIN = 3.0
@@ -91,7 +91,7 @@ def backbone(
                 curves[method] = curve
             except (NotConverged, PatchfemError) as reason:
                 missing[method] = str(reason).removeprefix("backbone: ")
-    return _summarise(joint, wanted, curves, missing)
+    return _make_backbone(joint, wanted, curves, missing)
 
 
 def compute_curve(joint: Joint, amplitudes, method: str, progress=None) -> Curve:
@@ -145,7 +145,7 @@ def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
     )
 
 
-def _summarise(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone:
+def _make_backbone(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone:
     """Return the backbone of the curves at the requested amplitudes (k,) [m]."""
     exponents = LossExponents()
     first = curves.get("quasi-static", curves.get("balance"))
@@ -166,7 +166,7 @@ def _summarise(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone:
         if flutter is None:
             flutter = _flutter_amplitude(joint, method, curve)
     return Backbone(
-        mode=_mode_name(joint),
+        mode=_main_mode_name(joint),
         frequencies=_mode_frequencies(joint),
         curves=curves,
         missing=missing,
@@ -176,7 +176,7 @@ def _summarise(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone:
     )
 
 
-def _mode_name(joint: Joint) -> str:
+def _main_mode_name(joint: Joint) -> str:
     """Return the name of the mode that moves most in the coordinate."""
     modes = joint.modes
     if not joint.model.rig.structure.lists_modes:
@@ -230,7 +230,7 @@ def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
     speed = 2 * np.pi * curve.frequency * amplitude / joint.reach
     energy = joint.modes.mass * speed**2
     relative_error = notes.MIN_LOSS_RATIO * 2 * np.pi * curve.damping_error
-    known = loss > np.maximum(ROUND, relative_error) * energy
+    known = loss > np.maximum(ROUND_OFF_ERROR, relative_error) * energy
     slip = joint.slip_amplitude
     micro = np.flatnonzero(known & (amplitude < notes.MICRO_SLIP_END * slip))
     gross = np.flatnonzero(known & (amplitude > GROSS_SLIP_BEGIN * slip))[-2:]

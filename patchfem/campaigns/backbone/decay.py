@@ -29,7 +29,7 @@ from .balance import HARMONICS, find_free_motions
 from .joint import MIN_AMPLITUDE_FACTOR, RELEASE_FACTOR, Joint
 from .records import Curve
 
-ROUND = 1e-9  # Relative error of a value by round-off.
+ROUND_OFF_ERROR = 1e-9  # Relative error of a value by round-off.
 N_SAMPLES = 4096  # Samples of a cycle of a free motion.
 # Cycles of the first decay; longer ones follow until the amplitude is small enough.
 FIRST_CYCLES = 50
@@ -72,7 +72,7 @@ class DecayReading(NamedTuple):
     reading_error: np.ndarray
     run_error: np.ndarray
 
-    def known(self) -> np.ndarray:
+    def known_amplitudes(self) -> np.ndarray:
         """Return the amplitudes (k,) bool at which values and errors are known."""
         return np.isfinite(self.value + self.run_error).all(axis=0)
 
@@ -93,8 +93,8 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
         Takes a sentence on the time that a long decay takes.
     """
     n_decaying, release = _release_from_largest_decaying(joint, amplitudes, progress)
-    release, reading = _refine(joint, release, amplitudes)
-    known = reading.known()
+    release, reading = _refine_release(joint, release, amplitudes)
+    known = reading.known_amplitudes()
     if not known.any():
         raise NotConverged("the free decay gave no frequency and damping at these amplitudes")
     motion = _measure_other_modes(joint, release.solution, np.where(known, amplitudes, np.nan))
@@ -180,14 +180,14 @@ class RefinedRelease(NamedTuple):
     reading: DecayReading
 
 
-def _refine(joint: Joint, release: Release, amplitudes) -> RefinedRelease:
+def _refine_release(joint: Joint, release: Release, amplitudes) -> RefinedRelease:
     """Halve the time steps until the errors from coarser runs meet the tolerance."""
     model, how, _ = release
     engine = ENGINES[how.engine]
     tolerance = joint.model.accuracy.tolerance
     for doublings in range(MAX_DOUBLINGS + 1):
         reading = _read_with_errors(joint, release, amplitudes)
-        known = reading.known()
+        known = reading.known_amplitudes()
         limit = np.maximum(tolerance * np.abs(reading.value), reading.reading_error)
         is_small = (reading.run_error <= limit).all(axis=0)
         is_met = known.any() and is_small[known].all()
@@ -206,13 +206,13 @@ def _read_with_errors(joint: Joint, release: Release, amplitudes) -> DecayReadin
     """Read a release at amplitudes (k,) [m], with errors from coarser runs."""
     model, how, found = release
     engine = ENGINES[how.engine]
-    read = _read(joint, found)
+    read = _read_decay(joint, found)
     if how.engine == SMOOTH.name:
-        read = read.add_sampling_error(_read(joint, found, find_turning_points_outside))
+        read = read.add_sampling_error(_read_decay(joint, found, find_turning_points_outside))
     read = read.over(amplitudes)
     value = np.array([read.frequency, read.damping])
     reading_error = np.array([read.frequency_error, read.damping_error])
-    error = ROUND * np.abs(value)
+    error = ROUND_OFF_ERROR * np.abs(value)
     known: dict = {}
 
     def curve(variant) -> np.ndarray:
@@ -220,7 +220,7 @@ def _read_with_errors(joint: Joint, release: Release, amplitudes) -> DecayReadin
         if variant not in known:
             whole = replace(variant.numerics, whole=True)
             run = engine.run(model, whole, variant.patch, 0, None, None)
-            other = _read(joint, run).over(amplitudes)
+            other = _read_decay(joint, run).over(amplitudes)
             known[variant] = np.array([other.frequency, other.damping])
         return known[variant]
 
@@ -258,12 +258,12 @@ def _measure_other_modes(joint: Joint, found, amplitudes) -> np.ndarray:
     except (NotConverged, PatchfemError):
         return out
     stuck = [
-        np.where(_sticks(group, one), np.abs(one.slides[:, 1]), 0.0)
+        np.where(_is_stuck(group, one), np.abs(one.slides[:, 1]), 0.0)
         for one in free
         if one is not None
     ]
     max_stuck = np.max(stuck or [np.zeros(len(group.rows))], axis=0)
-    read = _read(joint, found)
+    read = _read_decay(joint, found)
     times, _ = find_turning_points(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
     for column, one in zip(asked, free):
         if one is None:
@@ -300,7 +300,7 @@ def _distance_to_free_motion(free, shape, place, rate) -> float:
     )
 
 
-def _sticks(group: LawGroup, free) -> np.ndarray:
+def _is_stuck(group: LawGroup, free) -> np.ndarray:
     """Return whether each interface (i,) of a free motion has its stiffness without slip."""
     force, slide = free.forces[:, 1], free.slides[:, 1]
     stiffness = STUCK_FRACTION * group.stiffness()
@@ -334,7 +334,7 @@ def _release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> t
     )
 
 
-def _grows(joint: Joint, found) -> bool:
+def _is_growing(joint: Joint, found) -> bool:
     """Return whether the swings of a Solution grow along the shape of the sticking mode."""
     motion, shape = found.response, joint.shape
     _, places = find_turning_points(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
@@ -369,9 +369,9 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
         found = ENGINES[how.engine].run(model, how, joint.patch, 0, None, None)
         release = Release(model, how, found)
         seconds_per_cycle = found.seconds / cycles
-        if _grows(joint, found):
+        if _is_growing(joint, found):
             raise _GrowingRelease("the release grows")
-        read = _read(joint, found)
+        read = _read_decay(joint, found)
         end = found.response.time[-1]
         if not read.time.size:
             if cycles >= max_cycles or end >= free_swings:
@@ -421,7 +421,7 @@ def _raise_release(joint: Joint, begin: float, high: float, largest: float) -> f
         Amplitude [m] that the first reading must exceed.
     """
     # Friction reduces the amplitude by two static deflections per half swing.
-    rest = joint.amplitude_at(joint.deflection) if joint.friction_limit else 0.0
+    rest = joint.output_amplitude(joint.deflection) if joint.friction_limit else 0.0
     limit = max(MAX_RAISE_FACTOR * begin, RELEASE_FACTOR * (begin + 2 * rest))
     raised = begin * RELEASE_FACTOR * largest / high
     return min(raised, limit, joint.model.rig.springs.travel)
@@ -439,11 +439,11 @@ def release_model(joint: Joint, amplitude: float) -> Model:
         force=None,
         levels=DriveLevels(),
     )
-    rig = replace(rig, start=_start(joint, amplitude))
+    rig = replace(rig, start=_start_release(joint, amplitude))
     return replace(model, rig=rig)
 
 
-def _start(joint: Joint, amplitude: float) -> InitialState:
+def _start_release(joint: Joint, amplitude: float) -> InitialState:
     """Return the initial state of a release at an amplitude [m] of the output.
 
     It is the free motion by harmonic balance, in which no other mode is excited. If this is not
@@ -455,7 +455,7 @@ def _start(joint: Joint, amplitude: float) -> InitialState:
     if at_rest.size > 1:
         try:
             joint.require_steady_loops("balance")
-            first = float(joint.amplitude_at(MIN_AMPLITUDE_FACTOR * joint.slip_displacement))
+            first = float(joint.output_amplitude(MIN_AMPLITUDE_FACTOR * joint.slip_displacement))
             first = min(first or amplitude, amplitude)
             path = np.unique(np.geomspace(first, amplitude, N_START_STEPS))
             free = find_free_motions(joint.steady_laws(), joint, path, HARMONICS[0])[-1]
@@ -472,7 +472,7 @@ def _start(joint: Joint, amplitude: float) -> InitialState:
     return InitialState(joint.shape * amplitude / joint.reach, at_rest)
 
 
-def _read(joint: Joint, found, turns=find_turning_points) -> DecayCurve:
+def _read_decay(joint: Joint, found, turns=find_turning_points) -> DecayCurve:
     """Read a Solution from reversal to reversal.
 
     With several modes, the reversals are those of the motion along the shape of the sticking mode, in
@@ -502,7 +502,7 @@ def _read(joint: Joint, found, turns=find_turning_points) -> DecayCurve:
     at_output = compute_swing_curve(half_swings_between(times, places, sizes))
     own = joint.reach / (shape @ shape) * np.abs(np.diff(places))
     curve = compute_swing_curve(half_swings_between(times, places, np.where(sticks, own, sizes)))
-    change = _coupling(joint) * np.abs(curve.damping - at_output.damping)
+    change = _mode_coupling(joint) * np.abs(curve.damping - at_output.damping)
     if change.size:
         padded = np.pad(change, N_BEAT_SWINGS)
         change = sliding_window_view(padded, 2 * N_BEAT_SWINGS + 1).max(axis=1)
@@ -512,7 +512,7 @@ def _read(joint: Joint, found, turns=find_turning_points) -> DecayCurve:
     )
 
 
-def _coupling(joint: Joint) -> float:
+def _mode_coupling(joint: Joint) -> float:
     """Return the coupling of other modes along the shape of the sticking mode, at most 1.
 
     It is the effect of other modes along this shape / their effect at the output. Dampers couple

@@ -157,14 +157,14 @@ class Joint(NamedTuple):
         stiffness = float(self.stiffness[self.face])
         return self.friction_limit / stiffness if stiffness else self.deflection
 
-    def amplitude_at(self, slide):
+    def output_amplitude(self, slide):
         """Return the amplitude at the output [m] at which the interface moves by `slide` [m]."""
         return self.reach / (abs(self.face_slide) or 1.0) * slide
 
     @property
     def slip_amplitude(self) -> float:
         """Amplitude at the output [m] at which all of the contact slips."""
-        return self.amplitude_at(self.slip_displacement)
+        return self.output_amplitude(self.slip_displacement)
 
     def default_amplitudes(self) -> np.ndarray:
         """Return amplitudes (k,) [m] from a sticking contact to a mode that moves as if free."""
@@ -173,7 +173,7 @@ class Joint(NamedTuple):
             return np.geomspace(*LINEAR_AMPLITUDES) * min(
                 1.0, rig.springs.travel / LINEAR_AMPLITUDES[1]
             )
-        low, high = self.amplitude_at(np.array(self._default_slides()))
+        low, high = self.output_amplitude(np.array(self._default_slides()))
         high = min(high, self._max_amplitude())
         low = min(low, MIN_AMPLITUDE_FACTOR * high)
         count = 1 + int(np.ceil(AMPLITUDES_PER_DECADE * np.log10(high / low)))

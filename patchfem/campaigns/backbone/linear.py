@@ -6,7 +6,7 @@ from ...core import NotConverged
 from .joint import Joint
 from .records import Curve
 
-ROUND = 1e-9  # Relative error of a value by round-off.
+ROUND_OFF_ERROR = 1e-9  # Relative error of a value by round-off.
 # Fixed-point steps to the negative damping that maintains the motion; they converge fast.
 N_STEPS = 8
 
@@ -42,9 +42,9 @@ def compute_level_curve(joint: Joint, amplitudes, method: str) -> Curve:
     return Curve(
         amplitude=amplitudes,
         frequency=frequency,
-        frequency_error=ROUND * frequency,
+        frequency_error=ROUND_OFF_ERROR * frequency,
         damping=damping,
-        damping_error=ROUND * np.abs(damping),
+        damping_error=ROUND_OFF_ERROR * np.abs(damping),
         loss=np.full(amplitudes.size, np.nan),
     )
 

@@ -12,7 +12,7 @@ from .bench_loops import LOOP_MEASURES, settle_loop
 from .joint import Joint
 from .records import Curve
 
-ROUND = 1e-9  # Relative error of a value by round-off.
+ROUND_OFF_ERROR = 1e-9  # Relative error of a value by round-off.
 AMPLITUDE_TOL = 1e-7  # Relative tolerance of an amplitude.
 N_SAMPLES = 4096  # Samples of a cycle of a loop; half as many give the error.
 MAX_STEPS = 60  # Corrections of the displacement until the amplitude is the requested one.
@@ -47,7 +47,7 @@ def compute_static_curve(joint: Joint, amplitudes) -> Curve:
     best = read(laws, N_SAMPLES)
     is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
     best[0] = np.where(is_wanted, amplitudes, best[0])
-    error = np.abs(best - read(laws, N_SAMPLES // 2)) + ROUND * np.abs(best)
+    error = np.abs(best - read(laws, N_SAMPLES // 2)) + ROUND_OFF_ERROR * np.abs(best)
     error += joint.space_errors(lambda group: read(group, N_SAMPLES))
     return _rising_part(best, error)
 
@@ -104,7 +104,7 @@ def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
     is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
     best = np.where(is_wanted, best, np.nan)
     best[0] = amplitudes
-    relative = ROUND + (AMPLITUDE_TOL if modes.omega.size > 1 else 0.0)
+    relative = ROUND_OFF_ERROR + (AMPLITUDE_TOL if modes.omega.size > 1 else 0.0)
     return _rising_part(best, relative * np.abs(best))
 
 
@@ -137,7 +137,7 @@ def _by_bench_loops(joint: Joint, amplitudes) -> Curve:
         loops.append(quasi_static.StaticLoops(stiffness * slide, area))
         errors.append(quasi_static.StaticLoops(stiffness_error * slide, area_error))
     best = _read_loops(joint, slides, loops)
-    error = ROUND * np.abs(best)
+    error = ROUND_OFF_ERROR * np.abs(best)
     pairs = list(zip(loops, errors))
     moved_tips = [loop._replace(tip=loop.tip + off.tip) for loop, off in pairs]
     moved_areas = [loop._replace(area=loop.area + off.area) for loop, off in pairs]

@@ -171,7 +171,7 @@ class CurveModel:
         self.methods = list(METHODS)
         self._cached = lru_cache(N_KEPT_CURVES)(self._compute)
 
-    def by(self, method: str, values) -> np.ndarray:
+    def curve_by(self, method: str, values) -> np.ndarray:
         """Return the curve by a method, NaN at amplitudes at which the mode does not oscillate."""
         return self._cached(tuple(map(float, values)), method)
 
@@ -181,7 +181,7 @@ class CurveModel:
             self.base, [bound.format_assignment(value) for bound, value in zip(self.wanted, values)]
         )
 
-    def curve_of(self, model, method: str) -> np.ndarray:
+    def compute_model_curve(self, model, method: str) -> np.ndarray:
         """Compute the curve of any model at the measured amplitudes."""
         return _compute_curve(model, self.distinct, method)[:, self.rows]
 
@@ -191,7 +191,7 @@ class CurveModel:
             elapsed = self.last_said - self.begin
             self.say(f"{self.count} curves of the model computed in {elapsed:.0f} s")
         self.count += 1
-        return self.curve_of(self.model(values), method)
+        return self.compute_model_curve(self.model(values), method)
 
     def choose_methods(self, trials: list) -> None:
         """Keep the METHODS that have a curve at the first values at which most of them have one."""
@@ -201,7 +201,7 @@ class CurveModel:
             known = []
             for method in METHODS:
                 try:
-                    self.by(method, values)
+                    self.curve_by(method, values)
                     known.append(method)
                 except PatchfemError as reason:
                     reasons.append(f"{method}: {reason}")
@@ -218,11 +218,11 @@ class CurveModel:
 
     def reference(self, values) -> np.ndarray:
         """Return the curve by the reference method, NaN if the mode does not oscillate."""
-        return self.by(self.methods[0], values)
+        return self.curve_by(self.methods[0], values)
 
     def quick(self, values) -> np.ndarray:
         """Return the curve by the fast method; PatchfemError if the mode does not oscillate."""
-        curve = self.by(self.methods[-1], values)
+        curve = self.curve_by(self.methods[-1], values)
         lost = self.amplitude[np.isnan(curve[0])]
         if lost.size:
             raise PatchfemError(
@@ -231,14 +231,14 @@ class CurveModel:
             )
         return curve
 
-    def balanced(self, values) -> np.ndarray:
+    def complete_reference(self, values) -> np.ndarray:
         """Return the curve by the reference method, without gaps.
 
         In rows in which only this method has no value, the fast method's value is multiplied by the
         ratio of both methods in the row that is nearest in amplitude.
         """
         curve = self.reference(values)
-        quick = self.by(self.methods[-1], values)
+        quick = self.curve_by(self.methods[-1], values)
         known = np.flatnonzero(~np.isnan(curve[0]))
         nearest = known[_nearest_rows(self.amplitude[known], self.amplitude)]
         return np.where(np.isnan(curve), quick * (curve / quick)[:, nearest], curve)
@@ -298,9 +298,9 @@ def fit_curve(
         say(f"{count} amplitudes computed by {' and '.join(curves.methods)}")
     model = curves.quick
     if len(curves.methods) > 1:
-        models = TwoModels(curves.quick, curves.balanced, misfit, box)
+        models = TwoModels(curves.quick, curves.complete_reference, misfit, box)
         model, start = _search_two_models(models, start, starts, measured.amplitude)
-        model = model or curves.balanced
+        model = model or curves.complete_reference
         starts = 1
     problem = replace(problem, residual=lambda values: misfit(model(values)))
     found = problem.solve(start, starts)
@@ -377,7 +377,9 @@ def _include_missing_modes(
     if model.rig.structure.richer_rig is None:
         return WidenedFit(found, ())
     try:
-        richer = curves.curve_of(replace(model, rig=model.rig.structure.richer_rig), method)
+        richer = curves.compute_model_curve(
+            replace(model, rig=model.rig.structure.richer_rig), method
+        )
     except PatchfemError as reason:
         return WidenedFit(
             found,

@@ -157,7 +157,7 @@ def fit_loop(
     keys = problem.conclude(refined.fit, begin)
     fitted = FittedLoop(keys, loop, offsets, held, model, refined.step_error, bench.pieces)
     has_lead_in = bool(offsets) or options.warm
-    warnings = [*keys.warnings, *_doubts(fitted, scene, has_lead_in)]
+    warnings = [*keys.warnings, *_doubt_warnings(fitted, scene, has_lead_in)]
     return replace(fitted, keys=replace(keys, warnings=warnings))
 
 
@@ -200,7 +200,7 @@ def _add_counts(found: Fit, before: Fit) -> Fit:
     return replace(found, counts=counts)
 
 
-def _doubts(fitted: FittedLoop, scene: Scene, has_lead_in: bool) -> list:
+def _doubt_warnings(fitted: FittedLoop, scene: Scene, has_lead_in: bool) -> list:
     """Return warnings if the rows are no sample of the model with independent noise.
 
     `has_lead_in`: the model does not start without stress in the first row.

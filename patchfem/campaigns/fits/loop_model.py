@@ -103,7 +103,7 @@ class BenchModel:
         """Return the reading (k,) at the rows; PatchfemError for values that make no scene."""
         count = len(self.wanted)
         offsets = dict(zip(self.offsets, values[count:]))
-        model = self._model(self.scene_at(values[:count]))
+        model = self._model(self.build_scene(values[:count]))
         self.made += 1
         with locate_errors(model.source):
             reading = self._reading(model, offsets.get("displacement", 0.0))
@@ -143,7 +143,7 @@ class BenchModel:
         out = out[driven.n_before :]
         return out / run.load[0] if self.loop.quantity == "friction_ratio" else out
 
-    def scene_at(self, values) -> Scene:
+    def build_scene(self, values) -> Scene:
         """Return the scene with values of the free keys."""
         assigned = [bound.format_assignment(value) for bound, value in zip(self.wanted, values)]
         try:
@@ -177,7 +177,7 @@ class BenchModel:
             for k, value in zip(moved, values):
                 point[k] = value
             try:
-                models.append(build(self.scene_at(point)))
+                models.append(build(self.build_scene(point)))
             except PatchfemError:
                 continue  # The search meets the same error and counts it as a failed evaluation.
         self.refused = refused

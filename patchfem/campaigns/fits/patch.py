@@ -92,7 +92,7 @@ class Curves(NamedTuple):
     force: np.ndarray
     loss: np.ndarray
 
-    def deviate_from(self, own: "Curves", slides) -> np.ndarray:
+    def relative_deviations(self, own: "Curves", slides) -> np.ndarray:
         """Return the relative differences (2, k) from the curves of the patch at slides (k,) [m]."""
         scale = np.maximum(own.loss, MIN_LOSS * 4 * slides * own.force)
         return np.array([self.force / own.force - 1, (self.loss - own.loss) / scale])
@@ -133,7 +133,7 @@ class Elements(NamedTuple):
         """Stiffness while no element slips [N/m]."""
         return float(self.stiffness.sum())
 
-    def curves_at(self, slides) -> Curves:
+    def compute_curves(self, slides) -> Curves:
         """Return the curves at amplitudes (k,) [m] of the slide."""
         return Curves(*masing_loop(self.stiffness, self.yield_displacement, slides))
 
@@ -208,19 +208,21 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
     model = build(scene)
     tolerance = model.accuracy.tolerance
     with locate_errors(scene):
-        _refuse(model)
+        _check_model(model)
         while True:
             patch, *others = ladder.solve_all(model.patch, tolerance)
             if not patch.pressure.load > 0:
                 raise PatchfemError("the normal load is 0 or less; raise the load", "contact.load")
-            parts = _elements(model, patch)
+            parts = _patch_elements(model, patch)
             at = _default_slides(parts) if slides is None else np.asarray(slides, float)
-            own = parts.curves_at(at)
+            own = parts.compute_curves(at)
             coarse = next((other for other in others if other is not None), None)
             mesh_change = None
             loss_change = 0.0
             if coarse is not None:
-                mesh_change = _elements(model, coarse).curves_at(at).deviate_from(own, at)
+                mesh_change = (
+                    _patch_elements(model, coarse).compute_curves(at).relative_deviations(own, at)
+                )
                 loss_change = float(np.sqrt(np.mean(mesh_change[1] ** 2)))
             can_refine = model.patch.mesh.is_automatic and tolerance >= MIN_TOLERANCE
             if loss_change <= MAX_LOSS_CHANGE or not can_refine:
@@ -252,7 +254,7 @@ def _default_slides(parts: Elements) -> np.ndarray:
     low = MIN_AMPLITUDE_FACTOR * stuck
     high = MAX_AMPLITUDE_FACTOR * float(parts.yield_displacement.max())
     near = np.geomspace(low, high, 1024)
-    curves = parts.curves_at(near)
+    curves = parts.compute_curves(near)
     slips = near[np.argmax(curves.loss > MIN_LOSS * 4 * near * curves.force)]
     yields = np.sort(parts.yield_displacement)
     first = yields[yields.size // MESH_ELEMENTS]
@@ -308,25 +310,25 @@ def fit_law(
     asked = FITTED_LAWS[law]
     weights = np.array([[1.0], [LOSS_WEIGHT]])
 
-    def keys_at(values) -> dict:
+    def law_keys(values) -> dict:
         """Return the keys of [friction] at values (n,) of the fit."""
         return asked.keys(values[0] * stiffness, static * load, *values[1:])
 
-    def curves_at(values) -> Curves:
+    def law_curves(values) -> Curves:
         """Return the curves of the law at values (n,) of the fit."""
-        return Curves(*steady_loop(_FrictionKeys(law, static, keys_at(values)), load, slides))
+        return Curves(*steady_loop(_FrictionKeys(law, static, law_keys(values)), load, slides))
 
     def residual(values) -> np.ndarray:
         """Return the weighted relative differences at values (n,) of the fit."""
-        return (weights * curves_at(values).deviate_from(own, slides)).ravel()
+        return (weights * law_curves(values).relative_deviations(own, slides)).ravel()
 
     low = (1 / STIFFNESS_RANGE, *asked.low)
     high = (STIFFNESS_RANGE, *asked.high)
     middle = [(a + b) / 2 for a, b in zip(asked.low, asked.high)]
     found = fit(residual, low, high, start=(1.0, *middle), max_descents=2, interval_kind="bounds")
-    curves = curves_at(found.values)
-    keys = keys_at(found.values.tolist())
-    return FittedLaw(keys, curves, curves.deviate_from(own, slides), found)
+    curves = law_curves(found.values)
+    keys = law_keys(found.values.tolist())
+    return FittedLaw(keys, curves, curves.relative_deviations(own, slides), found)
 
 
 class _FrictionKeys:
@@ -339,7 +341,7 @@ class _FrictionKeys:
         self.__dict__.update(values, law=law, static=static)
 
 
-def _elements(model: Model, patch) -> Elements:
+def _patch_elements(model: Model, patch) -> Elements:
     """Return the elements of a pressed patch."""
     friction = model.friction
     load = patch.pressure.load
@@ -353,7 +355,7 @@ def _elements(model: Model, patch) -> Elements:
     return Elements(found.stiffness, found.yield_displacement)
 
 
-def _refuse(model: Model) -> None:
+def _check_model(model: Model) -> None:
     """Raise PatchfemError if a patch cannot be described by elastic-plastic elements."""
     friction, rig = model.friction, model.rig
     if model.patch is None or friction is None:

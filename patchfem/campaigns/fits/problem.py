@@ -97,7 +97,7 @@ class Problem:
 
     def own_values(self) -> list:
         """Return starting values: those of the scene, else the middle of each range."""
-        return [_own_value(self.scene, bound) for bound in self.bounds]
+        return [_initial_value(self.scene, bound) for bound in self.bounds]
 
     def solve(self, start: Sequence, starts: int = 3, bars: str = "series") -> Fit:
         """Minimise the sum of squares of the residual.
@@ -179,14 +179,14 @@ def press_patch(model: Model):
     return patch
 
 
-def _own_value(scene: Scene, bound: Range) -> float:
+def _initial_value(scene: Scene, bound: Range) -> float:
     """Return the value of a key in a scene, limited to its range.
 
     If the scene does not set it, it is the middle of the range.
     """
     value = scene
     for part in split_key(bound.key):
-        value = _item(value, part) if isinstance(value, tuple) else getattr(value, part, None)
+        value = _find_item(value, part) if isinstance(value, tuple) else getattr(value, part, None)
     if not isinstance(value, float):
         value = (bound.low + bound.high) / 2
         if bound.low > 0 and bound.high > LOG_RATIO * bound.low:
@@ -194,7 +194,7 @@ def _own_value(scene: Scene, bound: Range) -> float:
     return float(np.clip(value, bound.low, bound.high))
 
 
-def _item(items: tuple, word: str):
+def _find_item(items: tuple, word: str):
     """Return a table of an array by its name or its number from 0; None if there is none."""
     named = [item for item in items if getattr(item, "name", None) == word]
     if named:

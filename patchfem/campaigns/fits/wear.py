@@ -136,7 +136,7 @@ def _read_file(path: Path) -> MeasuredDepth:
     measures = content.get("measures", content) if isinstance(content, dict) else {}
     for name in QUANTITIES:
         measure = measures.get(name) if isinstance(measures, dict) else None
-        numbers = _numbers_of(measure)
+        numbers = _measure_interval(measure)
         if numbers is not None and numbers[0] > 0:
             value, low, high = numbers
             return MeasuredDepth(name, value, max(low, 0.0), high, str(path))
@@ -146,7 +146,7 @@ def _read_file(path: Path) -> MeasuredDepth:
     )
 
 
-def _numbers_of(measure) -> list | None:
+def _measure_interval(measure) -> list | None:
     """Return value, low and high of a measure of compare; None if one of them is no number."""
     if not isinstance(measure, dict):
         return None

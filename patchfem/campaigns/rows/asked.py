@@ -21,7 +21,7 @@ class FitRequest:
     def __init__(self, scene: Scene, wanted, measured):
         self.scene, self.wanted, self.measured = scene, wanted, measured
 
-    def asked(self, conditions, *sets: str) -> ConditionModels:
+    def condition_models(self, conditions, *sets: str) -> ConditionModels:
         """Return the models of the scene at conditions (c, 2), with additional --set strings."""
         scene = (
             loads(self.scene.text, self.scene.path, [*self.scene.sets, *sets])

@@ -72,7 +72,7 @@ class Readings:
             )
         return [getattr(self.rows[k], name) for k in self.row]
 
-    def chosen(self, one: str) -> np.ndarray:
+    def select(self, one: str) -> np.ndarray:
         """Return which readings (n,) a selector such as "column=value" selects.
 
         The text is like "frequency=135 Hz,150 Hz" or "run=143 Hz repeat". PatchfemError for a value
@@ -87,7 +87,7 @@ class Readings:
         for text in (part.strip() for part in values.split(",")):
             named = np.array([self._is(name, value, text) for value in here])
             if not named.any():
-                known = ", ".join(dict.fromkeys(_shown(name, value) for value in here))
+                known = ", ".join(dict.fromkeys(_format_cell(name, value) for value in here))
                 raise PatchfemError(
                     f"--hold {name}={text}: none of the rows of {self.path.name} that hold a reading "
                     f"has {text} in the column {name}; the values of this column are {known}"
@@ -114,7 +114,7 @@ class Readings:
         here = self.column(name)
         found = dict.fromkeys(value for value, there in zip(here, among) if there)
         return [
-            (_shown(name, value), np.array([other == value for other in here]) & among)
+            (_format_cell(name, value), np.array([other == value for other in here]) & among)
             for value in found
         ]
 
@@ -136,7 +136,7 @@ class Readings:
         return np.clip(ratio, -MAX_LOG, MAX_LOG)
 
 
-def _shown(name: str, value) -> str:
+def _format_cell(name: str, value) -> str:
     """Format a value of a column."""
     unit = {"frequency": " Hz", "input": " m/s^2"}.get(name)
     return f"{value:.6g}{unit}" if unit else str(value) or "(none)"

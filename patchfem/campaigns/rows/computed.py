@@ -58,7 +58,7 @@ class ModelReadings:
         """Return, by condition, the acceleration reading without its gain and the displacement."""
         model, found = self.asked.model(values), {}
         with locate_errors(model.source):
-            patch = self._pressed(model)
+            patch = self._get_patch(model)
             whole = self.reading[0] not in ("peak", "fundamental")
             watcher = self.watcher = MotionObserver(model, patch, self.say, whole, self.watcher)
             for k in conditions:
@@ -71,16 +71,16 @@ class ModelReadings:
                     found[k] = np.inf, np.inf
                     continue
                 self.near[k] = seen.near
-                found[k] = self._shown(seen, self.asked.sine(k)), seen.displacement
+                found[k] = self._read_accelerometer(seen, self.asked.sine(k)), seen.displacement
         return found
 
-    def _shown(self, seen, drive) -> float:
+    def _read_accelerometer(self, seen, drive) -> float:
         """Return the reading of the accelerometer [m s-2] without its gain."""
         if self.reading[0] == "fundamental" and seen.fundamental is not None:
             return abs(seen.fundamental)
         return read_instrument(seen.window, drive, seen.acceleration, *self.reading)
 
-    def _pressed(self, model):
+    def _get_patch(self, model):
         """Return the pressed patch of a model; None for a [normal] contact.
 
         It is pressed only once if no free key changes it.

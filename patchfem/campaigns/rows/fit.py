@@ -21,7 +21,7 @@ from ..fits.problem import FittedKeys, Problem
 from .asked import ConditionModels, FitRequest
 from .cells import MAX_LOG, Readings, read_readings, scores
 from .computed import ModelReadings
-from .null_models import NULLS, fit_null_model
+from .null_models import NULL_MODELS, fit_null_model
 from .search import BestFit, SearchSettings, fit_readings, make_residual
 
 SAME_SCORE = 1.01  # Ratio of two scores, below which two searches found the same fit.
@@ -182,9 +182,9 @@ def fit_rows(
     cells = read_readings(question.measured)
     held = np.zeros(cells.row.size, bool)
     for text in options.hold:
-        held |= cells.chosen(text)
+        held |= cells.select(text)
     _require_enough_readings(cells, ~held, count, how)
-    asked = question.asked(cells.conditions)
+    asked = question.condition_models(cells.conditions)
     computed = ModelReadings(asked, say)
     parts = cells.parts(options.leave_out, ~held) if options.leave_out else []
     if len(parts) == 1:
@@ -197,7 +197,7 @@ def fit_rows(
         _require_enough_readings(cells, ~held & ~part, count, how)
     # The strings of placebos are checked before the search, which can take hours.
     texts = [text for given in options.placebos for text in _split_placebo(given, question.wanted)]
-    placebos = [(text, question.asked(cells.conditions, text)) for text in texts]
+    placebos = [(text, question.condition_models(cells.conditions, text)) for text in texts]
     tell = _count_starts(progress, how.starts * (1 + len(parts) + len(placebos)))
     found = fit_readings(cells, computed, ~held, how, name="all", tell=tell)
     answer = _predict_from_rest(computed, found.fit.values, range(len(cells.conditions)))
@@ -217,10 +217,10 @@ def fit_rows(
         refit = fit_readings(cells, model, ~held, how, "", text, tell)
         seen = _predict_from_rest(model, refit.fit.values, range(len(cells.conditions)))
         tried.append(Placebo(text, refit, cells.logs(*seen)))
-    nulls = {name: _predict_null(cells, name, held, parts) for name in NULLS}
+    nulls = {name: _predict_null(cells, name, held, parts) for name in NULL_MODELS}
     residual = make_residual(cells, computed, ~held, how.unstable)
     problem = Problem(asked.scene, asked.wanted, residual, sets=asked.sets, notes=asked.notes)
-    keys = problem.conclude(found.fit, begin, _doubts(cells, found, logs, how))
+    keys = problem.conclude(found.fit, begin, _doubt_warnings(cells, found, logs, how))
     return FittedRows(
         keys=keys,
         asked=asked,
@@ -300,7 +300,7 @@ def _predict_null(cells: Readings, name: str, held, parts) -> NullPrediction:
     return NullPrediction(logs, left, numbers)
 
 
-def _doubts(cells: Readings, found: BestFit, logs, how: SearchSettings) -> list:
+def _doubt_warnings(cells: Readings, found: BestFit, logs, how: SearchSettings) -> list:
     """Return warnings on the rows and on the search."""
     out = []
     if cells.empty:

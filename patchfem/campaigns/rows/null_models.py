@@ -9,7 +9,7 @@ import numpy as np
 
 from .cells import MIN_DISPLACEMENT, Readings
 
-NULLS = ("constant", "power_input", "power_input_frequency")
+NULL_MODELS = ("constant", "power_input", "power_input_frequency")
 
 
 def fit_null_model(cells: Readings, name: str, training) -> tuple:
@@ -23,7 +23,7 @@ def fit_null_model(cells: Readings, name: str, training) -> tuple:
     ----------
     cells : Readings
     name : str
-        One of NULLS.
+        One of NULL_MODELS.
     training : (n,) bool
         Readings of the fit.
 

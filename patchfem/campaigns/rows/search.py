@@ -52,15 +52,15 @@ class SearchSettings:
         Seed of the random starts.
     unstable : str
         How readings flagged U count, one of UNSTABLE.
-    kept : callable
-        Stores the ends of starts: kept(name) returns a stored list or None, kept(name, list) stores
-        it.
+    access_ends : callable
+        Stores the ends of starts: access_ends(name) returns a stored list or None,
+        access_ends(name, list) stores it.
     """
 
     starts: int = 8
     seed: int = 0
     unstable: str = "bound"
-    kept: Callable = lambda *given: None
+    access_ends: Callable = lambda *given: None
 
 
 def make_residual(cells: Readings, computed: ModelReadings, training, unstable: str) -> Callable:
@@ -132,15 +132,15 @@ def fit_readings(
     quick = CubeResidual(residual, box, is_quick=True)
     begins = np.random.default_rng(how.seed).random((how.starts, n))
 
-    def kept(k, *one):
+    def access_descent(k, *one):
         """Store a Descent as a list that a file can contain, or return the stored one."""
         if one:
             u, cost, done, rows = one[0]
-            how.kept(
+            how.access_ends(
                 f"{name}/{k}", [*u.tolist(), cost if np.isfinite(cost) else None, rows, bool(done)]
             )
             return None
-        known = how.kept(f"{name}/{k}")
+        known = how.access_ends(f"{name}/{k}")
         return known and Descent(
             np.array(known[:n]),
             np.inf if known[n] is None else known[n],
@@ -148,7 +148,9 @@ def fit_readings(
             known[n + 1],
         )
 
-    ends = run_descents(quick, begins, saved=kept, before_descent=computed.forget, report=tell)
+    ends = run_descents(
+        quick, begins, saved=access_descent, before_descent=computed.forget, report=tell
+    )
     rms = np.array([one.rms for one in ends])
     if np.isnan(rms).all():
         raise NotConverged(

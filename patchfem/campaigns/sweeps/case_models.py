@@ -48,7 +48,7 @@ class SweepScene:
 
     def scene(self, sets: Sequence[str]) -> Scene:
         """Return the scene with `table.key=value` strings; SceneError names every mistake."""
-        base = _base(self)
+        base = _parse_base_scene(self)
         return base.override(sets) if base is not None else self._read(sets)
 
     def _read(self, sets: Sequence[str]) -> Scene:
@@ -84,7 +84,7 @@ class SweepScene:
                 f"internal fault, please report it: {type(error).__name__}: {error}"
             ) from error
 
-    def alike(
+    def similar_models(
         self, keys: Sequence[str], values: np.ndarray, sets: Callable, cases: np.ndarray
     ) -> SimilarModels | None:
         """Return models of cases that differ only in the numbers of some keys.
@@ -101,9 +101,9 @@ class SweepScene:
         cases : (n,) array
             Numbers of the cases.
         """
-        keys, known = tuple(keys), _first(self)
+        keys, known = tuple(keys), _model_cache(self)
         if keys not in known:
-            base = _base(self)
+            base = _parse_base_scene(self)
             scene = base and self.scene(sets(int(cases[0])))
             plain = base and base.plain_numbers(scene, keys)
             known[keys] = plain and (plain, build(scene))
@@ -119,7 +119,9 @@ class SweepScene:
         if not values or not all(isinstance(value, float) for value in values):
             return None
         keys = [one.partition("=")[0] for one in sets]
-        found = self.alike(keys, np.array([values]), lambda _: tuple(sets), np.zeros(1, int))
+        found = self.similar_models(
+            keys, np.array([values]), lambda _: tuple(sets), np.zeros(1, int)
+        )
         return found and found[0]
 
     def mistakes(self, sets: Sequence[str]) -> list[str]:
@@ -137,7 +139,7 @@ class SweepScene:
         except SceneError as error:
             return [], error.mistakes
 
-    def place(self, key: str) -> str:
+    def numbered_key(self, key: str) -> str:
         """Return a key in which the name of a mode is replaced by its number."""
         pieces, modes = key.split("."), tomllib.loads(self.text).get("structure", {})
         modes = modes.get("mode") if isinstance(modes, dict) else None
@@ -162,7 +164,7 @@ class SweepScene:
             ).encode()
         ).hexdigest()
 
-    def meshed(self, keys: Sequence[str]) -> bool:
+    def shares_meshes(self, keys: Sequence[str]) -> bool:
         """Return whether the cases have patches whose mesh is chosen for all of them together.
 
         keys: those that change from case to case.
@@ -186,7 +188,7 @@ class SweepScene:
 
 
 @lru_cache(maxsize=2)
-def _base(asked: SweepScene) -> BaseScene | None:
+def _parse_base_scene(asked: SweepScene) -> BaseScene | None:
     """Return the scene from which those of all cases derive.
 
     None if the text is no valid scene without the values of a case.
@@ -198,7 +200,7 @@ def _base(asked: SweepScene) -> BaseScene | None:
 
 
 @lru_cache(maxsize=2)
-def _first(asked: SweepScene) -> dict[tuple, tuple | None]:
+def _model_cache(asked: SweepScene) -> dict[tuple, tuple | None]:
     """Return the cache of what models of similar cases derive from, by the names of their keys.
 
     An entry is None if no models can be derived.

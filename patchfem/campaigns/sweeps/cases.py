@@ -101,7 +101,7 @@ class Cases:
             ]
         ).T
 
-    def spread(self, most: int) -> list[int]:
+    def spread_cases(self, most: int) -> list[int]:
         """Return at most `most` case numbers, spread over all axes and including the ends of each.
 
         All cases, if there are no more than that.
@@ -124,13 +124,13 @@ class Cases:
             numbers = [number * size + place for number in numbers for place in some]
         return numbers
 
-    def looked(self, most: int) -> list[int]:
+    def representative_cases(self, most: int) -> list[int]:
         """Return at most `most` case numbers that represent all cases.
 
         For random cases these are the first ones, because every 8th point of a Sobol sequence may
-        lie in the same half of a range; otherwise those of `spread`.
+        lie in the same half of a range; otherwise those of `spread_cases`.
         """
-        return list(range(min(most, len(self)))) if self.drawn else self.spread(most)
+        return list(range(min(most, len(self)))) if self.drawn else self.spread_cases(most)
 
     def neighbours(self, numbers: Sequence[int]) -> list[int]:
         """Return cases in an order in which those with the same pieces follow one another.
@@ -184,7 +184,7 @@ class Cases:
             )
 
         shared = asked.digest()
-        if asked.meshed([axis.key for axis in self.axes]):
+        if asked.shares_meshes([axis.key for axis in self.axes]):
             shared = sha256(np.sort(signs(shared, range(len(self)))).tobytes()).hexdigest()
         return signs(shared, range(len(self)) if numbers is None else numbers)
 
@@ -196,7 +196,7 @@ def _value_json(key: str, value: float | str, asked: SweepScene) -> str:
     return f"[{key}, {json.dumps(value)}, {json.dumps(asked.content(value) if isinstance(value, str) else '')}]"
 
 
-def product(parts: Sequence[Cases]) -> Cases:
+def combine_cases(parts: Sequence[Cases]) -> Cases:
     """Return all combinations of the cases of several parts, the last part fastest.
 
     The result has rows if one of the parts has rows.

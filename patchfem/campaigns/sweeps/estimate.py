@@ -14,7 +14,9 @@ from ...scene.axes import Axis
 from .case_models import SweepScene
 from .cases import Cases
 
-LOOKED = 9  # number of cases, spread over the sweep, whose plans estimate the cost of all
+MAX_PLANNED_CASES = (
+    9  # number of cases, spread over the sweep, whose plans estimate the cost of all
+)
 SWEEP_SECONDS = (
     0.75  # seconds that a sweep needs in total to start and to write its files and its page
 )
@@ -37,7 +39,7 @@ MAX_CASES_WITH_TABLES = (
 DISK, COLUMNS, BARE = 6000, 1600, 400
 
 
-def estimate(asked: SweepScene, cases: Cases) -> dict:
+def estimate_sweep(asked: SweepScene, cases: Cases) -> dict:
     """Return the plan of a sweep as a dict that can be written as JSON.
 
     It is the plan of the first valid case, which `case` {key: value as written} names, with seconds
@@ -50,7 +52,7 @@ def estimate(asked: SweepScene, cases: Cases) -> dict:
         If none of the planned cases can run.
     """
     plans, numbers, wrong = [], [], None
-    for number in cases.looked(LOOKED):
+    for number in cases.representative_cases(MAX_PLANNED_CASES):
         try:
             plans.append(plan(asked.model(cases.sets(number))))
             numbers.append(number)
@@ -59,7 +61,7 @@ def estimate(asked: SweepScene, cases: Cases) -> dict:
     if not plans:
         raise wrong
     batches = [choose_batch(one.model, len(cases)) for one in plans]
-    once, alone = _alone(plans)
+    once, alone = _split_shared_seconds(plans)
     once += RANKING_SECONDS * (cases.drawn and len(cases.axes) > 1)
     keys = [None if batch is None else batch.group(one.model) for one, batch in zip(plans, batches)]
     each = [
@@ -100,11 +102,11 @@ def estimate(asked: SweepScene, cases: Cases) -> dict:
             else BARE
         )
         * len(cases),
-        "values": {axis.key: _values(axis) for axis in cases.axes},
+        "values": {axis.key: _count_values(axis) for axis in cases.axes},
     }
 
 
-def _alone(plans: list) -> tuple[float, list]:
+def _split_shared_seconds(plans: list) -> tuple[float, list]:
     """Return the seconds that all cases share, and the seconds of each planned case by itself.
 
     A case of a sweep needs no start and no fields. Pieces that are the same in all cases are
@@ -128,6 +130,6 @@ def _alone(plans: list) -> tuple[float, list]:
     return shared, [seconds + CASE_SECONDS for seconds in own]
 
 
-def _values(axis: Axis) -> int:
+def _count_values(axis: Axis) -> int:
     """Return the number of distinct values of a key; numbers are compared in SI, not as strings."""
     return np.unique(axis.values).size if axis.unit else len(set(axis.texts))

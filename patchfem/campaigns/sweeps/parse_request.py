@@ -22,7 +22,7 @@ from ...scene.scene import SceneError
 from ...scene.toml_text import read_text
 from . import samples, table
 from .case_models import SweepScene
-from .cases import Cases, product
+from .cases import Cases, combine_cases
 
 N_CHECKED = 32  # cases that are read before a sweep starts, to find a valid one
 MAX_PRINTED = 12  # number of mistakes that are printed
@@ -81,9 +81,10 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
     """
     asked = SweepScene(Path(path), read_text(path), tuple(sets), request.of)
     cases = read_cases(asked, request)
-    swept = {asked.place(axis.key): axis.key for axis in cases.axes}
+    swept = {asked.numbered_key(axis.key): axis.key for axis in cases.axes}
     both = [
-        (one, swept.get(asked.place(".".join(split_key(one.partition("=")[0]))))) for one in sets
+        (one, swept.get(asked.numbered_key(".".join(split_key(one.partition("=")[0])))))
+        for one in sets
     ]
     if any(key for _, key in both):
         raise SceneError(
@@ -162,7 +163,7 @@ def read_cases(asked: SweepScene, request: Request) -> Cases:
         parts.append(samples.draw_cases(axes, request.count, request.sobol, request.seed))
     elif axes:
         parts.append(Cases(tuple(axes)))
-    cases = product(parts)
+    cases = combine_cases(parts)
     if cases.rows:
         cases = replace(cases, words=_repeat_words(request, asked.path.parent))
     _refuse_all(asked, cases)
@@ -218,7 +219,7 @@ def _find_equal_keys(asked: SweepScene, keys: Sequence[str]) -> list[str]:
     """
     first, wrong = {}, []
     for key in keys:
-        place = asked.place(key)
+        place = asked.numbered_key(key)
         if first.setdefault(place, key) != key:
             wrong.append(
                 f"--over {key}: this key is the same as {first[place]}, which is given already; remove one of "
@@ -230,7 +231,7 @@ def _find_equal_keys(asked: SweepScene, keys: Sequence[str]) -> list[str]:
 def _refuse_all(asked: SweepScene, cases: Cases) -> None:
     """Raise SceneError if none of several cases spread over the sweep is a valid scene."""
     found = {}
-    for number in cases.looked(N_CHECKED):
+    for number in cases.representative_cases(N_CHECKED):
         mistakes = asked.mistakes(cases.sets(number))
         if not mistakes:
             return
@@ -250,15 +251,15 @@ def contradictions(asked: SweepScene, cases: Cases) -> str:
     It says how to avoid this. It is "" if each of the N_CHECKED cases that are checked is a valid
     scene.
     """
-    numbers = cases.looked(N_CHECKED)
+    numbers = cases.representative_cases(N_CHECKED)
     found = [one for one in map(asked.mistakes, map(cases.sets, numbers)) if one]
     if not found:
         return ""
-    first, swept = found[0][0], {asked.place(axis.key) for axis in cases.axes}
+    first, swept = found[0][0], {asked.numbered_key(axis.key) for axis in cases.axes}
     key = re.search(r"(?:^|: )([a-z_]+(?:\.[\w-]+)+): ", first)
     helps = (
         f"sweep {key[1]}, too, remove this key from the scene, or give other values in --over"
-        if key and asked.place(key[1]) not in swept
+        if key and asked.numbered_key(key[1]) not in swept
         else "give other values in --over"
     )
     of = (

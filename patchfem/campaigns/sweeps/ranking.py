@@ -66,7 +66,7 @@ def compute_sobol_indices(keys: Sequence[tuple], measures: dict, shape: tuple | 
     changing = {
         name: np.asarray(values, float)
         for name, (values, errors) in measures.items()
-        if _changes(np.asarray(values, float), np.asarray(errors, float))
+        if _is_varying(np.asarray(values, float), np.asarray(errors, float))
     }
     if len(moving) < 2 or not changing:
         return {}
@@ -100,7 +100,7 @@ def compute_sobol_indices(keys: Sequence[tuple], measures: dict, shape: tuple | 
     return {name: out[name] for name in changing if name in out}
 
 
-def _changes(values: np.ndarray, errors: np.ndarray) -> bool:
+def _is_varying(values: np.ndarray, errors: np.ndarray) -> bool:
     """Return whether a measure of most cases changes by more than its errors and round-off."""
     there = np.isfinite(values)
     if there.mean() < 0.9:
@@ -149,14 +149,20 @@ def _random_indices(levels: np.ndarray, values: np.ndarray) -> list:
     halves = [rng.permutation(len(levels)) for _ in range(N_HALF_SURFACES)]
     half = len(levels) // 2
     smooth = min(
-        SMOOTHINGS, key=lambda one: np.median(_unexplained(levels, scaled, halves[0], half, one))
+        SMOOTHINGS,
+        key=lambda one: np.median(_unexplained_variance(levels, scaled, halves[0], half, one)),
     )
-    left = np.mean([_unexplained(levels, scaled, order, half, smooth) for order in halves], axis=0)
-    first, total = _indices(levels, scaled, smooth)
+    left = np.mean(
+        [_unexplained_variance(levels, scaled, order, half, smooth) for order in halves], axis=0
+    )
+    first, total = _surface_indices(levels, scaled, smooth)
     others = np.stack(
         [
             total,
-            *(_indices(levels[order[:half]], scaled[order[:half]], smooth)[1] for order in halves),
+            *(
+                _surface_indices(levels[order[:half]], scaled[order[:half]], smooth)[1]
+                for order in halves
+            ),
         ]
     )
     low, high = (
@@ -170,29 +176,29 @@ def _random_indices(levels: np.ndarray, values: np.ndarray) -> list:
     ]
 
 
-def _surface(levels: np.ndarray, values: np.ndarray, smooth: float):
+def _fit_surface(levels: np.ndarray, values: np.ndarray, smooth: float):
     """Return a smooth surface through values (n, columns) at levels (n, keys)."""
     from scipy.interpolate import RBFInterpolator
 
     return RBFInterpolator(levels, values, kernel="cubic", smoothing=smooth)
 
 
-def _unexplained(levels, values, order, half: int, smooth: float) -> np.ndarray:
+def _unexplained_variance(levels, values, order, half: int, smooth: float) -> np.ndarray:
     """Return the fraction of the variance (columns,) that a surface does not explain.
 
     The surface goes through the first half of the cases in an order (n,), and is compared with the
     others.
     """
     seen, rest = order[:half], order[half:]
-    off = _surface(levels[seen], values[seen], smooth)(levels[rest]) - values[rest]
+    off = _fit_surface(levels[seen], values[seen], smooth)(levels[rest]) - values[rest]
     return np.mean(off**2, axis=0) / np.maximum(values[rest].var(axis=0), 1e-30)
 
 
-def _indices(levels: np.ndarray, values: np.ndarray, smooth: float) -> tuple:
+def _surface_indices(levels: np.ndarray, values: np.ndarray, smooth: float) -> tuple:
     """Return first-order and total indices, (columns, keys) each, of a surface through cases."""
     from scipy.stats import sobol_indices, uniform
 
-    surface = _surface(levels, values, smooth)
+    surface = _fit_surface(levels, values, smooth)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         found = sobol_indices(

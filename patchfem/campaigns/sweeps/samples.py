@@ -32,7 +32,7 @@ def draw_cases(parts: Sequence[Axis | SampledRange], count: int, sobol: bool, se
     Cases
     """
     shares = (
-        _sobol(len(parts), count, seed)
+        _sobol_points(len(parts), count, seed)
         if sobol
         else np.random.default_rng(seed).random((count, len(parts)))
     )
@@ -43,7 +43,7 @@ def draw_cases(parts: Sequence[Axis | SampledRange], count: int, sobol: bool, se
     )
 
 
-def _sobol(width: int, count: int, seed: int) -> np.ndarray:
+def _sobol_points(width: int, count: int, seed: int) -> np.ndarray:
     """Return `count` points (count, width) of a scrambled Sobol sequence."""
     from scipy.stats import qmc
 

@@ -31,8 +31,8 @@ MAX_DEATHS = (
 # Seconds that a chunk should take: long compared with its transfer to a worker, short compared with
 # a sweep.
 CHUNK_SECONDS = 1.0
-MOST = 4096  # cases of a chunk
-LOOKED = 256  # cases from which the meshes of a sweep are chosen
+MAX_CASES_PER_CHUNK = 4096  # cases of a chunk
+MAX_MESH_CASES = 256  # cases from which the meshes of a sweep are chosen
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class Work:
     estimate : bool
         Whether errors are computed for cases that run one by one.
     meshes : Shared or None
-        Meshes that the cases share, chosen from all of them by `with_meshes`.
+        Meshes that the cases share, chosen from all of them by `choose_meshes`.
     """
 
     asked: SweepScene
@@ -107,7 +107,9 @@ def compute_chunk(
         CaseResults and a list of what `work.tell` returns for each case; None and [] if
         `work.write` has written them.
     """
-    models = _alike(work, numbers) or [_model(work, number) for number in numbers]
+    models = _build_similar_models(work, numbers) or [
+        _build_case_model(work, number) for number in numbers
+    ]
     keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
     found = batches.solve_models(models, keep, say, work.estimate, len(work.cases))
     told = (
@@ -140,7 +142,7 @@ def write_or_return(
     )
 
 
-def _alike(work: Work, numbers: Sequence[int]) -> SimilarModels | None:
+def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels | None:
     """Return models of cases that differ only in plain numbers; None if they differ in more.
 
     None as well for pressed patches in motion, and if `work.keep` needs every single run.
@@ -149,7 +151,7 @@ def _alike(work: Work, numbers: Sequence[int]) -> SimilarModels | None:
     if work.keep is not None or values is None:
         return None
     try:
-        found = work.asked.alike(
+        found = work.asked.similar_models(
             [axis.key for axis in work.cases.axes], values, work.cases.sets, cases
         )
     except PatchfemError:  # the first case has no model
@@ -161,7 +163,7 @@ def _alike(work: Work, numbers: Sequence[int]) -> SimilarModels | None:
     return found if work.meshes is None else replace(found, first=work.meshes.given(found.first))
 
 
-def _model(work: Work, number: int):
+def _build_case_model(work: Work, number: int):
     """Return the model of a case with the shared meshes, or the error of its scene."""
     try:
         model = work.asked.model(work.cases.sets(number), work.cases.values(number))
@@ -170,26 +172,26 @@ def _model(work: Work, number: int):
     return model if work.meshes is None else work.meshes.given(model)
 
 
-def with_meshes(work: Work) -> Work:
+def choose_meshes(work: Work) -> Work:
     """Return the work with the meshes that all its cases share, also those already computed."""
     if work.meshes is not None:
         return work
-    numbers, models = work.cases.spread(LOOKED), []
+    numbers, models = work.cases.spread_cases(MAX_MESH_CASES), []
     for number in numbers:
-        models.append(_model(work, number))
+        models.append(_build_case_model(work, number))
         if isinstance(models[-1], Model) and models[-1].patch is None:
             return work
     return replace(work, meshes=Shared(models, len(numbers) == len(work.cases)))
 
 
-def _least(work: Work) -> int:
+def _min_chunk_size(work: Work) -> int:
     """Return the smallest number of cases of a chunk.
 
     It is the number for which a batch of the first case pays off, because the time of fewer cases
     does not predict that of many.
     """
     try:
-        batch = batches.choose_batch(_model(work, 0), len(work.cases))
+        batch = batches.choose_batch(_build_case_model(work, 0), len(work.cases))
     except Exception:  # The run of the case reports its error.
         return 1
     return batch.together if work.keep is None and batch is not None else 1
@@ -226,14 +228,21 @@ class Chunks:
         # time.
         fair = -(-len(self.left) // (2 * self.workers))
         fair = fair if self.workers > 1 else len(self.left)
-        count = max(1, min(max(int(CHUNK_SECONDS / max(self.each, 1e-9)), self.least), MOST, fair))
+        count = max(
+            1,
+            min(
+                max(int(CHUNK_SECONDS / max(self.each, 1e-9)), self.least),
+                MAX_CASES_PER_CHUNK,
+                fair,
+            ),
+        )
         return [self.left.popleft() for _ in range(min(count, len(self.left)))]
 
-    def done(self, numbers: Sequence[int], seconds: float) -> None:
+    def record_time(self, numbers: Sequence[int], seconds: float) -> None:
         """Record how long a chunk took."""
         self.each = seconds / len(numbers)
 
-    def died(self, numbers: Sequence[int]) -> list:
+    def record_death(self, numbers: Sequence[int]) -> list:
         """Return the cases to abandon; split the other cases of a failed chunk into halves.
 
         A case is abandoned if it was the only one of its chunk and has failed MAX_DEATHS times.
@@ -276,31 +285,31 @@ def iterate_chunks(
     try:
         if hasattr(executor, "begin"):
             executor.begin(work, len(numbers), say)
-        work = with_meshes(work)
+        work = choose_meshes(work)
         # Other executors import what runs a case in their workers.
         chunks = Chunks(
             work.cases.neighbours(numbers),
             executor.workers,
-            _least(work) if executor.workers == 1 else 1,
+            _min_chunk_size(work) if executor.workers == 1 else 1,
         )
-        yield from _handed(chunks, executor.run(work, chunks.take, say))
+        yield from _iterate_executor_results(chunks, executor.run(work, chunks.take, say))
     finally:
         if hasattr(executor, "end"):
             executor.end()
 
 
-def _handed(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
+def _iterate_executor_results(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
     """Yield what `iterate_chunks` yields, for the chunks that an executor has computed."""
     for chunk, seconds, found in done:
         if isinstance(found, Died):
-            lost = chunks.died(chunk)
+            lost = chunks.record_death(chunk)
             if lost:
                 failed = CaseResults.blank(len(lost))
                 for case, number in enumerate(lost):
                     failed.fail(case, f"{found.reason}, {chunks.deaths[number]} times")
                 yield lost, failed, None, seconds
             continue
-        chunks.done(chunk, seconds)
+        chunks.record_time(chunk, seconds)
         yield chunk, *found, seconds
 
 

@@ -71,13 +71,15 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
         return None, wrong
     axes = []
     for place, (key, unit) in enumerate(head.groups() for head in heads):
-        axis, mistakes = _column(key, unit, [(number, row[place]) for number, row in lines[1:]])
+        axis, mistakes = _parse_column(
+            key, unit, [(number, row[place]) for number, row in lines[1:]]
+        )
         axes.append(axis)
         wrong += [f"{path}:{number or lines[0][0]}: {key}: {text}" for number, text in mistakes]
     return (None, wrong) if wrong else (Cases(tuple(axes), True), [])
 
 
-def _column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[tuple]]:
+def _parse_column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[tuple]]:
     """Return the axis of a column of (line, cell), and its mistakes as (line or 0, message)."""
     known, wrong = {}, []
     for number, cell in cells:

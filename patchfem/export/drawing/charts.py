@@ -16,7 +16,7 @@ from ...core import G_N
 from ...formatting import choose_axis_unit, format_number, needs_log_scale
 
 # Points of a line; number of frames of the shear stress that are drawn faintly.
-LINE, FRAMES = 6000, 24
+MAX_LINE_POINTS, MAX_FRAMES = 6000, 24
 FAINT, FEWEST = 400, 200  # points of a faint frame; minimum number of points of a reduced line
 GRID = 6000  # cells of a piece in a picture
 NUMBER = 13  # characters of a number in a page
@@ -29,7 +29,7 @@ MIN_SAMPLES_PER_CYCLE, MAX_ENVELOPE_CYCLES = (
     1500,
 )
 # Measures over the cycles of wear, and their labels.
-WORN = {
+WEAR_LABELS = {
     "pressure_peak": "peak pressure",
     "contact_fraction": "contact fraction",
     "normal_stiffness": "normal stiffness",
@@ -42,34 +42,34 @@ MIN_COHERENCE = 0.5  # coherence above which H1 is drawn as known
 FRAME_HEIGHT, MAX_FRAME_WIDTH = 270, 300
 
 
-def axis(label: str, unit: str = "", log: bool = False) -> dict:
+def make_axis(label: str, unit: str = "", log: bool = False) -> dict:
     """Return an axis of a chart."""
     return {"label": label, "unit": unit, "log": log}
 
 
-def chart(title: str, x: dict, y: dict, marks: list) -> dict:
+def make_chart(title: str, x: dict, y: dict, marks: list) -> dict:
     """Return a chart of marks; None among them is left out."""
     return {"title": title, "x": x, "y": y, "marks": [mark for mark in marks if mark]}
 
 
-def mark(kind: str, colour: str, name: str = "", **numbers) -> dict:
+def make_mark(kind: str, colour: str, name: str = "", **numbers) -> dict:
     """Return a mark; `numbers` contains its arrays and its style."""
     return {"kind": kind, "colour": colour, "name": name, **numbers}
 
 
-def dots(x, y, colour: str, name: str = "", **style) -> dict:
+def make_dots(x, y, colour: str, name: str = "", **style) -> dict:
     """Return points; style: errors (n,), shape, size [points]."""
-    return mark("dots", colour, name, x=x, y=y, **style)
+    return make_mark("dots", colour, name, x=x, y=y, **style)
 
 
-def line(x, y, colour: str, name: str = "", most: int = LINE, **style) -> dict:
-    """Return a line of at most `most` points; a longer line is reduced by `sampled`."""
+def make_line(x, y, colour: str, name: str = "", most: int = MAX_LINE_POINTS, **style) -> dict:
+    """Return a line of at most `most` points; a longer line is reduced by `sample_indices`."""
     x, y = np.asarray(x, float), np.asarray(y, float)
-    keep = sampled(x, y, most)
-    return mark("line", colour, name, x=x[keep], y=y[keep], **style)
+    keep = sample_indices(x, y, most)
+    return make_mark("line", colour, name, x=x[keep], y=y[keep], **style)
 
 
-def sampled(x, y, most: int) -> np.ndarray:
+def sample_indices(x, y, most: int) -> np.ndarray:
     """Return the indices of at most `most` points of a line.
 
     From every stretch of the line these are the lowest and the highest x and y.
@@ -113,11 +113,11 @@ def _reduce_mark(one: dict, share: float) -> dict:
     if rows is None or np.size(one["x"]) <= FEWEST:
         return one
     x, *_, y = (np.asarray(one[name], float) for name in rows)
-    keep = sampled(x, y, max(int(share * x.size), FEWEST))
+    keep = sample_indices(x, y, max(int(share * x.size), FEWEST))
     return one | {name: np.asarray(one[name], float)[keep] for name in rows}
 
 
-def part_in_contact(x, sigma) -> tuple | None:
+def contact_range(x, sigma) -> tuple | None:
     """Return the ends x [m] of the pressed part of a patch; None if the whole patch is shown.
 
     Only this part is shown if less than half of the length is pressed.
@@ -129,7 +129,7 @@ def part_in_contact(x, sigma) -> tuple | None:
     return max(x[0], x[used[0]] - pad), min(x[-1], x[used[-1]] + pad)
 
 
-def interface(x, fields: dict, name: str = "") -> list:
+def interface_charts(x, fields: dict, name: str = "") -> list:
     """Return charts of the pressure, and of the shear stress in several frames.
 
     The frame with the largest resultant force is in colour.
@@ -144,18 +144,18 @@ def interface(x, fields: dict, name: str = "") -> list:
         Name of the interface, if there are several.
     """
     sigma, tau = fields["normal_stress"][0], fields.get("shear_stress")
-    part = part_in_contact(x, sigma) or (x[0], x[-1])
+    part = contact_range(x, sigma) or (x[0], x[-1])
     along, size = choose_axis_unit(part, "m")
-    place = axis("x", along) | {"range": [part[0] * size, part[1] * size]}
+    place = make_axis("x", along) | {"range": [part[0] * size, part[1] * size]}
     unit, scale = choose_axis_unit(sigma, "Pa")
     out = [
-        chart(
+        make_chart(
             f"Pressure on {name or 'the interface'}",
             place,
-            axis("normal stress", unit),
+            make_axis("normal stress", unit),
             [
-                mark("band", "accent", x=x * size, low=0 * x, high=sigma * scale),
-                line(x * size, sigma * scale, "accent"),
+                make_mark("band", "accent", x=x * size, low=0 * x, high=sigma * scale),
+                make_line(x * size, sigma * scale, "accent"),
             ],
         )
     ]
@@ -163,29 +163,30 @@ def interface(x, fields: dict, name: str = "") -> list:
         unit, scale = choose_axis_unit(tau, "Pa")
         frame = int(np.argmax(np.abs(tau @ np.gradient(x))))
         shown = np.unique(
-            np.linspace(1, len(tau) - 1, min(FRAMES, len(tau) - 1)).round().astype(int)
+            np.linspace(1, len(tau) - 1, min(MAX_FRAMES, len(tau) - 1)).round().astype(int)
         )
         frames = [
-            line(x * size, tau[k] * scale, "soft", most=FAINT, width=0.6, alpha=0.6) for k in shown
+            make_line(x * size, tau[k] * scale, "soft", most=FAINT, width=0.6, alpha=0.6)
+            for k in shown
         ]
         title = f"Shear stress{f' on {name}' * bool(name)} at {len(shown)} instants"
         out.append(
-            chart(
+            make_chart(
                 title,
                 place,
-                axis("shear stress", unit),
-                [*frames, line(x * size, tau[frame] * scale, "warm")],
+                make_axis("shear stress", unit),
+                [*frames, make_line(x * size, tau[frame] * scale, "warm")],
             )
         )
     return out
 
 
-def faces(found: list) -> list:
+def faces_charts(found: list) -> list:
     """Return the charts of all interfaces that have a patch.
 
-    Each entry of `found` contains the arguments of `interface`.
+    Each entry of `found` contains the arguments of `interface_charts`.
     """
-    return [one for each in found for one in interface(*each)]
+    return [one for each in found for one in interface_charts(*each)]
 
 
 def contact_window(x, depth, sigma, ratio: float) -> tuple:
@@ -213,7 +214,7 @@ def contact_window(x, depth, sigma, ratio: float) -> tuple:
     return left, left + width, height
 
 
-def bodies(x, depths, mises, sigma) -> list:
+def stress_charts(x, depths, mises, sigma) -> list:
     """Return charts of the von Mises stress in both pieces, whole and around the contact.
 
     Parameters
@@ -251,7 +252,7 @@ def bodies(x, depths, mises, sigma) -> list:
                 means.shape
             )
             marks.append(
-                mark(
+                make_mark(
                     "cells",
                     "",
                     x=along * size,
@@ -266,13 +267,13 @@ def bodies(x, depths, mises, sigma) -> list:
         )
         title = "Von Mises stress" if out else "Von Mises stress at the contact"
         out.append(
-            chart(title, axis("x", name) | across, axis("y", name) | up, marks)
-            | {"frame": _frame((right - left) / (2 * height))}
+            make_chart(title, make_axis("x", name) | across, make_axis("y", name) | up, marks)
+            | {"frame": _frame_size((right - left) / (2 * height))}
         )
     return out[::-1]
 
 
-def worn_map(x, width: float, depth) -> list:
+def worn_map_chart(x, width: float, depth) -> list:
     """Return a map of the worn depth (s, m) [m] of strips over x (m,) [m] and the width [m]."""
     edges = np.linspace(-width / 2, width / 2, len(depth) + 1)
     (unit, scale), (name, size) = (
@@ -282,7 +283,7 @@ def worn_map(x, width: float, depth) -> list:
     along, over, means = reduce_grid(x, edges, (depth[:, 1:] + depth[:, :-1]).T / 2 * scale, GRID)
     values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(means.shape)
     marks = [
-        mark(
+        make_mark(
             "cells",
             "",
             "worn depth",
@@ -297,8 +298,8 @@ def worn_map(x, width: float, depth) -> list:
         {"range": [low * size, high * size]} for low, high in ((x[0], x[-1]), (edges[0], edges[-1]))
     )
     return [
-        chart("Worn depth", axis("x", name) | across, axis("y", name) | up, marks)
-        | {"frame": _frame(float(np.ptp(x)) / width)}
+        make_chart("Worn depth", make_axis("x", name) | across, make_axis("y", name) | up, marks)
+        | {"frame": _frame_size(float(np.ptp(x)) / width)}
     ]
 
 
@@ -331,14 +332,14 @@ def reduce_grid(x, depth, cells, most: int) -> tuple:
     return x[kept[0]], depth[kept[1]], cells
 
 
-def _frame(ratio: float) -> list:
+def _frame_size(ratio: float) -> list:
     """Return width and height [px] of a frame with this ratio of both."""
     if FRAME_HEIGHT * ratio <= MAX_FRAME_WIDTH:
         return [round(FRAME_HEIGHT * ratio), FRAME_HEIGHT]
     return [MAX_FRAME_WIDTH, round(MAX_FRAME_WIDTH / ratio)]
 
 
-def loop(slide, force, title: str, measured: tuple | None = None) -> list:
+def loop_chart(slide, force, title: str, measured: tuple | None = None) -> list:
     """Return the chart of friction force against slide, with the measured loop if there is one.
 
     Parameters
@@ -353,28 +354,30 @@ def loop(slide, force, title: str, measured: tuple | None = None) -> list:
     read = (
         None
         if measured is None
-        else line(measured[0] * size, measured[1] * scale, "soft", "measured", width=3, alpha=0.55)
+        else make_line(
+            measured[0] * size, measured[1] * scale, "soft", "measured", width=3, alpha=0.55
+        )
     )
     return [
-        chart(
+        make_chart(
             title,
-            axis("slide", along),
-            axis("friction force", up),
-            [read, line(slide * size, force * scale, "accent", "computed" if read else "")],
+            make_axis("slide", along),
+            make_axis("friction force", up),
+            [read, make_line(slide * size, force * scale, "accent", "computed" if read else "")],
         )
     ]
 
 
-def loops(found: list) -> list:
+def loop_charts(found: list) -> list:
     """Return the friction loop of every interface; found: (name, slide [m], force [N]) each."""
     return [
         one
         for name, slide, force in found
-        for one in loop(slide, force, f"Friction loop of interface {name}")
+        for one in loop_chart(slide, force, f"Friction loop of interface {name}")
     ]
 
 
-def envelope(time, value, period: float) -> tuple:
+def cycle_envelope(time, value, period: float) -> tuple:
     """Return middle, minimum and maximum of the samples of each cycle; NaN without samples.
 
     Cycles are merged if there are more than a picture can show.
@@ -417,7 +420,7 @@ def first_complete_time(time, period: float, window_start: float) -> float:
     return min((thin[-1] + 1) * period, window_start) if thin.size else float(time[0])
 
 
-def histories(
+def history_charts(
     history: dict,
     window: dict | None,
     period: float | None,
@@ -453,27 +456,29 @@ def histories(
     late, marks = time >= begin, []
     if joined and not late.all():
         early = slice(0, int(np.argmax(late)) + 1)
-        marks.append(line(time[early] * per, value[early] * scale, "accent", width=1.0))
+        marks.append(make_line(time[early] * per, value[early] * scale, "accent", width=1.0))
     elif not late.all():
-        middle, low, high = envelope(time[~late], value[~late], period)
-        marks.append(mark("band", "accent", x=middle * per, low=low * scale, high=high * scale))
-    marks.append(line(time[late] * per, value[late] * scale, "accent", width=1.0))
-    out = [chart("Whole run", axis("time", name), axis("displacement", unit), marks)]
+        middle, low, high = cycle_envelope(time[~late], value[~late], period)
+        marks.append(
+            make_mark("band", "accent", x=middle * per, low=low * scale, high=high * scale)
+        )
+    marks.append(make_line(time[late] * per, value[late] * scale, "accent", width=1.0))
+    out = [make_chart("Whole run", make_axis("time", name), make_axis("displacement", unit), marks)]
     if window is None:
         if np.any(history["force"]):
             up, size = choose_axis_unit(history["force"], "N")
             read = history.get("measured")
-            read = read and line(
+            read = read and make_line(
                 read[0] * per, read[1] * size, "soft", "measured", width=3, alpha=0.55
             )
             out.append(
-                chart(
+                make_chart(
                     "Friction force",
-                    axis("time", name),
-                    axis("friction force", up),
+                    make_axis("time", name),
+                    make_axis("friction force", up),
                     [
                         read,
-                        line(
+                        make_line(
                             time * per, history["force"] * size, "warm", "computed" if read else ""
                         ),
                     ],
@@ -486,22 +491,24 @@ def histories(
         choose_axis_unit(window["displacement"], "m"),
     )
     out.append(
-        chart(
+        make_chart(
             title,
-            axis("time", name),
-            axis("displacement", unit),
-            [line(since * per, window["displacement"] * scale, "accent")],
+            make_axis("time", name),
+            make_axis("displacement", unit),
+            [make_line(since * per, window["displacement"] * scale, "accent")],
         )
     )
     moves = np.any(window["base"])
     out.append(
-        chart(
+        make_chart(
             title,
-            axis("time", name),
-            axis("acceleration", "g"),
+            make_axis("time", name),
+            make_axis("acceleration", "g"),
             [
-                line(since * per, window["acceleration"] / G_N, "warm", "output" if moves else ""),
-                line(since * per, window["base"] / G_N, "soft", "base", dash="dashed")
+                make_line(
+                    since * per, window["acceleration"] / G_N, "warm", "output" if moves else ""
+                ),
+                make_line(since * per, window["base"] / G_N, "soft", "base", dash="dashed")
                 if moves
                 else None,
             ],
@@ -510,7 +517,7 @@ def histories(
     return out
 
 
-def measured(rows: list, frequency: float, level: float, acceleration, displacement) -> list:
+def measured_charts(rows: list, frequency: float, level: float, acceleration, displacement) -> list:
     """Return charts of measured readings against the input, and of the computed point.
 
     Parameters
@@ -531,14 +538,14 @@ def measured(rows: list, frequency: float, level: float, acceleration, displacem
     ):
         read, marks = [r for r in near if getattr(r, name) is not None], []
         marks += [
-            mark("rule", "warm", "unstable in the test", x=place)
+            make_mark("rule", "warm", "unstable in the test", x=place)
             for place in sorted({r.input / G_N for r in near if "U" in r.flag})
         ]
         for repeat, text in ((False, "measured"), (True, "measured, repeat run")):
             pick = [r for r in read if ("R" in r.flag) == repeat]
             if pick:
                 marks.append(
-                    mark(
+                    make_mark(
                         "dots",
                         "soft",
                         text,
@@ -549,7 +556,7 @@ def measured(rows: list, frequency: float, level: float, acceleration, displacem
                 )
         if found is not None:
             marks.append(
-                mark(
+                make_mark(
                     "dots",
                     "accent",
                     "computed",
@@ -560,7 +567,7 @@ def measured(rows: list, frequency: float, level: float, acceleration, displacem
                 )
             )
         title = f"{name.capitalize()} at {frequency:g} Hz" + ("" if read else ", not measured")
-        out.append(chart(title, axis("input", "g"), axis(name, unit), marks))
+        out.append(make_chart(title, make_axis("input", "g"), make_axis(name, unit), marks))
     return out
 
 
@@ -581,7 +588,7 @@ def curve_axis(curve: dict) -> tuple:
     return np.asarray(curve["level"]) / G_N, "drive level", "g"
 
 
-def regime(steady: dict | None) -> str:
+def regime_sentence(steady: dict | None) -> str:
     """Return a sentence on regime and stability of a steady motion; "" if they are not known."""
     if steady is None:
         return ""
@@ -594,7 +601,7 @@ def regime(steady: dict | None) -> str:
     )
 
 
-def caption(found: dict) -> str:
+def curve_caption(found: dict) -> str:
     """Return the caption of a curve of steady motions: content, regimes, folds and gaps."""
     what, parts = curve_axis(found)[1], [regime for regime, _, _ in regime_stretches(found)]
     count, folds = np.asarray(found["amplitude"]).size, len(found.get("folds", ()))
@@ -607,7 +614,7 @@ def caption(found: dict) -> str:
     )
 
 
-def curve(found: dict) -> list:
+def curve_charts(found: dict) -> list:
     """Return charts of a curve of steady motions over frequency or level.
 
     They show the amplitude, with the regime as colour and line style and with the folds, and the
@@ -619,13 +626,15 @@ def curve(found: dict) -> list:
     colours = dict(zip(dict.fromkeys(part[0] for part in parts), COLOURS * 9))
     lost = np.concatenate([[False], ~np.isfinite(value), [False]]).astype(int)
     marks = [
-        mark("span", "soft", left=along[max(first - 1, 0)], right=along[min(last, along.size - 1)])
+        make_mark(
+            "span", "soft", left=along[max(first - 1, 0)], right=along[min(last, along.size - 1)]
+        )
         for first, last in np.flatnonzero(np.diff(lost)).reshape(-1, 2)
     ]
     for regime, first, last in parts:
         stop = min(last + 1, along.size)  # up to the next stretch, so the line has no gap
         marks.append(
-            line(
+            make_line(
                 along[first:stop],
                 value[first:stop],
                 colours[regime],
@@ -634,37 +643,39 @@ def curve(found: dict) -> list:
             )
         )
     marks += [
-        mark("rule", "soft", "fold", x=at if unit == "Hz" else at / G_N)
+        make_mark("rule", "soft", "fold", x=at if unit == "Hz" else at / G_N)
         for at in found.get("folds", ())
     ]
     out = [
-        chart(
+        make_chart(
             "Steady motion at the output",
-            axis(what, unit),
-            axis("half the peak-to-peak motion", name),
+            make_axis(what, unit),
+            make_axis("half the peak-to-peak motion", name),
             marks,
         )
     ]
     if "acceleration_peak" in found:
         lines = [
-            line(along, np.asarray(found[f"acceleration_{key}"]) / G_N, colour, text, dash=dash)
+            make_line(
+                along, np.asarray(found[f"acceleration_{key}"]) / G_N, colour, text, dash=dash
+            )
             for key, colour, text, dash in (
                 ("peak", "accent", "largest", "solid"),
                 ("fundamental", "warm", "first harmonic", "dashed"),
             )
         ]
         out.append(
-            chart(
+            make_chart(
                 "Absolute acceleration at the output",
-                axis(what, unit),
-                axis("acceleration", "g"),
+                make_axis(what, unit),
+                make_axis("acceleration", "g"),
                 lines,
             )
         )
     return out
 
 
-def spectra(found, frequency: float | None) -> list:
+def spectra_charts(found, frequency: float | None) -> list:
     """Return charts of spectral densities of output and drive, and of the magnitude of H1.
 
     Parameters
@@ -678,55 +689,55 @@ def spectra(found, frequency: float | None) -> list:
     found = type(found)(*(column[driven] for column in found))
     hertz = found.frequency
     unit, scale = choose_axis_unit([float(np.sqrt(found.place.max(initial=0.0)))], "m")
-    along = axis("frequency", "Hz", True)
+    along = make_axis("frequency", "Hz", True)
     out.append(
-        chart(
+        make_chart(
             "Displacement of the output",
             along,
-            axis("spectral density", f"{unit}^2/Hz", True),
-            [_above(hertz, found.place * scale**2, "accent")],
+            make_axis("spectral density", f"{unit}^2/Hz", True),
+            [_positive_line(hertz, found.place * scale**2, "accent")],
         )
     )
     out.append(
-        chart(
+        make_chart(
             "Acceleration of output and base",
             along,
-            axis("spectral density", "g^2/Hz", True),
+            make_axis("spectral density", "g^2/Hz", True),
             [
-                _above(hertz, found.acceleration / G_N**2, "accent", "output"),
-                _above(hertz, found.drive / G_N**2, "soft", "base"),
+                _positive_line(hertz, found.acceleration / G_N**2, "accent", "output"),
+                _positive_line(hertz, found.drive / G_N**2, "soft", "base"),
             ],
         )
     )
     gain, told = np.abs(found.gain) * G_N, found.coherence >= MIN_COHERENCE
     unit, scale = choose_axis_unit([gain.max(initial=0.0)], "m")
     marks = [
-        _above(hertz, gain * scale, "soft"),
-        _above(hertz, np.where(told, gain * scale, np.nan), "accent", "H1"),
+        _positive_line(hertz, gain * scale, "soft"),
+        _positive_line(hertz, np.where(told, gain * scale, np.nan), "accent", "H1"),
     ]
     if frequency is not None:
         top = float(np.interp(frequency, hertz, gain)) * scale
         marks.append(
-            mark("dots", "warm", "peak", x=[frequency], y=[top], errors=[0.0], shape="circle")
+            make_mark("dots", "warm", "peak", x=[frequency], y=[top], errors=[0.0], shape="circle")
         )
     out.append(
-        chart(
+        make_chart(
             "H1: displacement of the output divided by base acceleration",
             along,
-            axis("size", f"{unit}/g", True),
+            make_axis("size", f"{unit}/g", True),
             marks,
         )
     )
     return out
 
 
-def _above(x, y, colour: str, name: str = "") -> dict | None:
+def _positive_line(x, y, colour: str, name: str = "") -> dict | None:
     """Return a line through the positive values; None if there are none."""
     there = np.isfinite(y) & (y > 0)
-    return line(x[there], y[there], colour, name) if there.any() else None
+    return make_line(x[there], y[there], colour, name) if there.any() else None
 
 
-def decay(found) -> list:
+def decay_charts(found) -> list:
     """Return charts of frequency and damping ratio of a released output against its amplitude.
 
     found: a `response.decay_curve.DecayCurve`, whose errors become bars.
@@ -738,13 +749,13 @@ def decay(found) -> list:
         known = np.isfinite(error)
         x = found.amplitude[known] * scale
         out.append(
-            chart(
+            make_chart(
                 f"{label.capitalize()} of the decay",
-                axis("half the peak-to-peak motion", unit, True),
-                axis(label, of),
+                make_axis("half the peak-to-peak motion", unit, True),
+                make_axis(label, of),
                 [
-                    line(x, y[known], "accent"),
-                    mark(
+                    make_line(x, y[known], "accent"),
+                    make_mark(
                         "dots", "accent", "", x=x, y=y[known], errors=error[known], shape="circle"
                     ),
                 ]
@@ -754,7 +765,7 @@ def decay(found) -> list:
     return out
 
 
-def levels(rows: list) -> list:
+def levels_chart(rows: list) -> list:
     """Return the chart of the amplitude after every level, with arrows in the order of the test.
 
     The axis is logarithmic for more than three decades; a level without motion is then left out.
@@ -787,7 +798,7 @@ def levels(rows: list) -> list:
         up = b >= a
         if drawn[k] and drawn[k + 1]:
             marks.append(
-                mark(
+                make_mark(
                     "arrow",
                     "accent" if up else "warm",
                     "raised" if up else "lowered",
@@ -803,7 +814,7 @@ def levels(rows: list) -> list:
     ):
         if which.any():
             marks.append(
-                mark(
+                make_mark(
                     "dots",
                     "soft",
                     text,
@@ -814,11 +825,15 @@ def levels(rows: list) -> list:
                     **style,
                 )
             )
-    what = axis("force", "N") if forced else axis("base acceleration", "g")
-    return [chart("Level by level", what, axis("half the peak-to-peak motion", name, log), marks)]
+    what = make_axis("force", "N") if forced else make_axis("base acceleration", "g")
+    return [
+        make_chart(
+            "Level by level", what, make_axis("half the peak-to-peak motion", name, log), marks
+        )
+    ]
 
 
-def wear(x, cycles, pressure, depth, history: dict) -> list:
+def wear_charts(x, cycles, pressure, depth, history: dict) -> list:
     """Return charts of pressure and worn depth over x, and of measures over the cycles of wear.
 
     Parameters
@@ -837,7 +852,7 @@ def wear(x, cycles, pressure, depth, history: dict) -> list:
     for values, unit, title in ((pressure, "Pa", "Pressure"), (depth, "m", "Worn depth")):
         name, scale = choose_axis_unit(values, unit)
         lines = [
-            line(
+            make_line(
                 x * size,
                 values[k] * scale,
                 colour,
@@ -845,17 +860,19 @@ def wear(x, cycles, pressure, depth, history: dict) -> list:
             )
             for k, colour in zip(pick, ("soft", *COLOURS))
         ]
-        out.append(chart(title, axis("x", along), axis(title.lower(), name), lines))
+        out.append(make_chart(title, make_axis("x", along), make_axis(title.lower(), name), lines))
     out[0]["y"]["range"] = [
         0.0,
         1.05 * float(np.max(pressure)) * choose_axis_unit(pressure, "Pa")[1],
     ]
     over = [
-        line(history["cycle"], history[name] / history[name][0], colour, text)
-        for colour, (name, text) in zip(COLOURS, WORN.items())
+        make_line(history["cycle"], history[name] / history[name][0], colour, text)
+        for colour, (name, text) in zip(COLOURS, WEAR_LABELS.items())
         if history.get(name) is not None and history[name][0]
     ]
     return [
         *out,
-        chart("Change with wear", axis("cycles"), axis("value divided by first value"), over),
+        make_chart(
+            "Change with wear", make_axis("cycles"), make_axis("value divided by first value"), over
+        ),
     ]

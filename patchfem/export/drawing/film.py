@@ -18,14 +18,14 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from ..fields.series import Frame, Series, last_consecutive_frames
-from .flat import LOOK, Picture
-from .panels import contact_window, panels, round_factor, slide_of
+from .flat import STYLE, Picture
+from .panels import find_contact_window, make_panels, round_down_factor, upper_piece_slide
 
-ENDINGS = (".gif", ".mp4")
+FILM_EXTENSIONS = (".gif", ".mp4")
 FRAME_SIZE = (12.0, 6.8)  # width and height of a frame [inch]
 DPI = 100  # pixels per inch; with FRAME_SIZE an even number of pixels, which video formats require
 BIT_RATE = 4000  # of a video [kbit/s]
-SLIDE = 0.03  # largest slide as drawn / length of the pieces
+SLIDE_LABEL = 0.03  # largest slide as drawn / length of the pieces
 CYCLE_SECONDS = (
     2.4  # duration of a cycle [s], unless MIN_FRAME_SECONDS or MAX_FRAME_SECONDS limits it
 )
@@ -80,7 +80,7 @@ class Film:
         return tuple(
             replace(one, window=window, top=top, over=over)
             for one, window, top, over in zip(
-                panels(frame, self.factors, self.close, self.aside),
+                make_panels(frame, self.factors, self.close, self.aside),
                 self.windows,
                 self.tops,
                 self.over,
@@ -112,9 +112,9 @@ def make_film(series: Series, magnify: float | None = None) -> Film:
     seen, windows, slides, reach = [], [], [], {"normal_stress": [], "shear_stress": []}
     for number in numbers:
         one = series.frame(number)
-        seen.append(panels(one, magnify))
-        windows.append(contact_window(one))
-        slides.append(abs(slide_of(one)) * 1e3)
+        seen.append(make_panels(one, magnify))
+        windows.append(find_contact_window(one))
+        slides.append(abs(upper_piece_slide(one)) * 1e3)
         line = one.interface()
         for name in reach.keys() & one.point_data.keys():
             reach[name] += [
@@ -122,10 +122,10 @@ def make_film(series: Series, magnify: float | None = None) -> Film:
                 float(one.point_data[name][line].max()),
             ]
     factors = tuple(min(both) for both in zip(*((one.factor for one in pair) for pair in seen)))
-    close = (*_hull(windows)[:2], *windows[0][2:])
+    close = (*_enclosing_window(windows)[:2], *windows[0][2:])
     left, right = np.array([pair[0].window for pair in seen])[:, :2].T
     length = float((right - left).max())
-    aside = round_factor(SLIDE * length / max(slides)) if max(slides) > 0 else 1.0
+    aside = round_down_factor(SLIDE_LABEL * length / max(slides)) if max(slides) > 0 else 1.0
     both = [value for values in reach.values() for value in values]
     film = Film(
         numbers,
@@ -138,16 +138,16 @@ def make_film(series: Series, magnify: float | None = None) -> Film:
         (min(both), max(both)),
         max(reach["normal_stress"]),
     )
-    shown = [panels(series.frame(number), factors, close, aside) for number in numbers]
+    shown = [make_panels(series.frame(number), factors, close, aside) for number in numbers]
     return replace(
         film,
-        windows=tuple(_hull([pair[k].window for pair in shown]) for k in (0, 1)),
+        windows=tuple(_enclosing_window([pair[k].window for pair in shown]) for k in (0, 1)),
         tops=tuple(max(pair[k].top for pair in shown) for k in (0, 1)),
         over=tuple(any(pair[k].over for pair in shown) for k in (0, 1)),
     )
 
 
-def _hull(windows: list) -> tuple:
+def _enclosing_window(windows: list) -> tuple:
     """Return the smallest window that contains several windows."""
     low, high = np.min(windows, axis=0), np.max(windows, axis=0)
     return (float(low[0]), float(high[1]), float(low[2]), float(high[3]))
@@ -164,7 +164,7 @@ def write_film(series: Series, head: str, magnify: float | None, out: Path) -> s
     magnify : float or None
         Magnification of the motion; None for the largest that suits every frame.
     out : Path
-        File with a suffix of `ENDINGS`.
+        File with a suffix of `FILM_EXTENSIONS`.
 
     Returns
     -------
@@ -179,8 +179,8 @@ def write_film(series: Series, head: str, magnify: float | None, out: Path) -> s
         ffmpeg is not installed or cannot write the file.
     """
     film, picture = make_film(series, magnify), None
-    with matplotlib.rc_context(LOOK | {"savefig.bbox": None, "savefig.dpi": "figure"}):
-        writer = _writer_of(out, film.seconds)
+    with matplotlib.rc_context(STYLE | {"savefig.bbox": None, "savefig.dpi": "figure"}):
+        writer = _movie_writer(out, film.seconds)
         for number in film.numbers:
             frame = series.frame(number)
             text, shown = f"{head}, {frame.time:.6g} s", film.panels(frame)
@@ -194,7 +194,7 @@ def write_film(series: Series, head: str, magnify: float | None, out: Path) -> s
                 writer.grab_frame()
             except BrokenPipeError:  # ffmpeg has ended early; `finish` gives the reason
                 break
-        _finish(writer, out)
+        _finish_file(writer, out)
     first, last = series.times[list(film.numbers)][[0, -1]]
     return f"{len(film.numbers)} frames, {first:.6g} s to {last:.6g} s"
 
@@ -202,10 +202,10 @@ def write_film(series: Series, head: str, magnify: float | None, out: Path) -> s
 def check_ffmpeg(out: Path) -> None:
     """Raise Missing if `out` is an .mp4 file and no ffmpeg is installed."""
     if out.suffix == ".mp4":
-        _ffmpeg(out)
+        _find_ffmpeg(out)
 
 
-def _ffmpeg(out: Path) -> str:
+def _find_ffmpeg(out: Path) -> str:
     """Return the path of the program ffmpeg, or that of imageio-ffmpeg if there is no other."""
     program = shutil.which("ffmpeg")
     if program is None and find_spec("imageio_ffmpeg"):
@@ -220,7 +220,7 @@ def _ffmpeg(out: Path) -> str:
     return program
 
 
-def _writer_of(out: Path, seconds: float):
+def _movie_writer(out: Path, seconds: float):
     """Return a matplotlib writer for a .gif or .mp4 file; seconds: duration of a frame."""
     if out.suffix == ".gif":
         from .gif_writer import GifWriter
@@ -228,13 +228,13 @@ def _writer_of(out: Path, seconds: float):
         return GifWriter(fps=1 / seconds)
     from matplotlib import animation
 
-    # `_finish` reports what ffmpeg prints
+    # `_finish_file` reports what ffmpeg prints
     logging.getLogger(animation.__name__).setLevel(logging.ERROR)
-    matplotlib.rcParams["animation.ffmpeg_path"] = _ffmpeg(out)
+    matplotlib.rcParams["animation.ffmpeg_path"] = _find_ffmpeg(out)
     return animation.FFMpegWriter(fps=1 / seconds, codec="h264", bitrate=BIT_RATE)
 
 
-def _finish(writer, out: Path) -> None:
+def _finish_file(writer, out: Path) -> None:
     """Close the file; raise Missing with the last line of ffmpeg if this fails."""
     try:
         writer.finish()

@@ -10,13 +10,13 @@ import numpy as np
 
 from ...formatting import choose_axis_unit
 from ..fields.series import Frame
-from .panels import Panel, borders, curves, panels
+from .panels import Panel, interface_curves, make_panels, outer_edges
 from .pictures import BLUE, ORANGE, STYLE
 
-LOOK = STYLE | {"axes.grid": False}
+STYLE = STYLE | {"axes.grid": False}
 
 
-def draw(frame: Frame, head: str, magnify: float | None, path: Path) -> None:
+def draw_frame(frame: Frame, head: str, magnify: float | None, path: Path) -> None:
     """Draw both pieces, their contact and the stress along the interface into a file.
 
     Parameters
@@ -29,8 +29,10 @@ def draw(frame: Frame, head: str, magnify: float | None, path: Path) -> None:
     path : Path
         File whose suffix chooses the format.
     """
-    with matplotlib.rc_context(LOOK):
-        Picture(frame, head, panels(frame, magnify), (12, 20 / 3)).figure.savefig(path, dpi=150)
+    with matplotlib.rc_context(STYLE):
+        Picture(frame, head, make_panels(frame, magnify), (12, 20 / 3)).figure.savefig(
+            path, dpi=150
+        )
 
 
 class Picture:
@@ -64,7 +66,7 @@ class Picture:
         ]
         axes = self.figure.add_subplot(grid[1, 1])
         self.reach = reach
-        x, stresses, unit = curves(frame, reach)
+        x, stresses, unit = interface_curves(frame, reach)
         self.lines = [
             axes.plot(x, values, color=colour, label=label)[0]
             for (label, values), colour in zip(stresses, (BLUE, ORANGE))
@@ -84,7 +86,7 @@ class Picture:
         """Change the pieces and the curves to those of another frame."""
         for one, panel in zip(self.bodies, shown):
             one.show(frame, panel)
-        for line, (_, values) in zip(self.lines, curves(frame, self.reach)[1]):
+        for line, (_, values) in zip(self.lines, interface_curves(frame, self.reach)[1]):
             line.set_ydata(values)
         self._head(head, shown)
 
@@ -108,7 +110,7 @@ class _Bodies:
         from matplotlib.collections import LineCollection, PolyCollection
 
         self.scale = choose_axis_unit([panel.top], "Pa")[1]
-        self.axes, self.edges = axes, borders(frame, panel.cells)
+        self.axes, self.edges = axes, outer_edges(frame, panel.cells)
         self.cells = []  # (selection, corners, collection) of triangles and of quadrilaterals
         size = np.diff(frame.offsets)
         for count in np.unique(size[panel.cells]):

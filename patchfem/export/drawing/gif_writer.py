@@ -27,7 +27,7 @@ class GifWriter(AbstractMovieWriter):
         super().setup(fig, outfile, dpi=dpi)
         self.frames = []
         self.palette = Image.new("P", (1, 1))
-        self.palette.putpalette(_colours().tobytes())
+        self.palette.putpalette(_make_palette().tobytes())
 
     def grab_frame(self, **savefig):
         """Add the figure in its current state."""
@@ -52,7 +52,7 @@ class GifWriter(AbstractMovieWriter):
         )
 
 
-def _colours() -> np.ndarray:
+def _make_palette() -> np.ndarray:
     """Return the palette (256, 3) uint8: the scale of stresses, greys, and tints of both curves."""
     scale = colormaps["viridis"](np.linspace(0, 1, N_SCALE))[:, :3]
     greys = np.linspace(0, 1, N_GREYS)[:, None] * np.ones(3)

@@ -72,7 +72,7 @@ class Panel:
         )
 
 
-def panels(
+def make_panels(
     frame: Frame,
     magnify: float | tuple | None = None,
     close: tuple | None = None,
@@ -90,7 +90,7 @@ def panels(
         Factor of the motion, for both panels or for each; by default one that makes it visible, for
         each.
     close : tuple, optional
-        Window of the second panel [mm]; by default that of `contact_window`.
+        Window of the second panel [mm]; by default that of `find_contact_window`.
     aside : float
         Factor of the slide of the upper piece as a whole.
 
@@ -98,22 +98,22 @@ def panels(
     -------
     tuple of Panel
     """
-    motion = drawn_displacement(frame), slide_of(frame), aside
+    motion = drawn_displacement(frame), upper_piece_slide(frame), aside
     used = np.unique(
         np.concatenate([block.ravel() for part in (0, 1) for block in frame.cells(part)])
     )
     x, y = frame.points[used, :2].T * 1e3
     whole = (x.min(), x.max(), y.min(), y.max())
     factors = magnify if isinstance(magnify, tuple) else (magnify, magnify)
-    windows = (whole, contact_window(frame) if close is None else close)
-    inside = [_inside(frame, window) for window in windows]
-    mises, area = frame.cell_data["von_mises"], areas(frame)
+    windows = (whole, find_contact_window(frame) if close is None else close)
+    inside = [_stressed_cells(frame, window) for window in windows]
+    mises, area = frame.cell_data["von_mises"], cell_areas(frame)
     # Panels side by side have the same scale.
-    top = max(_limit(mises[cells], area[cells]) for cells in inside)
-    return tuple(_panel(frame, motion, *each, top) for each in zip(windows, inside, factors))
+    top = max(_colour_limit(mises[cells], area[cells]) for cells in inside)
+    return tuple(_make_panel(frame, motion, *each, top) for each in zip(windows, inside, factors))
 
 
-def _inside(frame: Frame, window: tuple) -> np.ndarray:
+def _stressed_cells(frame: Frame, window: tuple) -> np.ndarray:
     """Return which cells (cells,) bool of a window have a stress."""
     left, right, bottom, top = window
     x, y = cell_centres(frame).T
@@ -126,16 +126,19 @@ def _inside(frame: Frame, window: tuple) -> np.ndarray:
     )
 
 
-def _limit(mises, area) -> float:
+def _colour_limit(mises, area) -> float:
     """Return the stress [Pa] at the upper end of the colours of some cells.
 
     It is the largest stress, unless this is a peak in a corner.
     """
-    largest, most = float(mises.max(initial=0.0)), float(_exceeded(mises, area, COLOURED_AREA))
+    largest, most = (
+        float(mises.max(initial=0.0)),
+        float(_weighted_quantile(mises, area, COLOURED_AREA)),
+    )
     return most if most < MIN_PEAK_RATIO * largest else largest
 
 
-def _panel(
+def _make_panel(
     frame: Frame, motion: tuple, window: tuple, here, magnify: float | None, limit: float
 ) -> Panel:
     """Return the panel of a window.
@@ -161,7 +164,9 @@ def _panel(
     if magnify is None:
         largest = np.abs(move[mine, 1]).max(initial=0.0) * 1e3
         magnify = (
-            round_factor(DRAWN_MOTION_FRACTION * (top - bottom) / largest) if largest > 0 else 0.0
+            round_down_factor(DRAWN_MOTION_FRACTION * (top - bottom) / largest)
+            if largest > 0
+            else 0.0
         )
     largest = float(frame.cell_data["von_mises"][here].max(initial=0.0))
     whole = np.zeros_like(move)
@@ -185,7 +190,7 @@ def _panel(
     )
 
 
-def _exceeded(values, weight, share: float) -> float:
+def _weighted_quantile(values, weight, share: float) -> float:
     """Return the value below which the fraction `share` of the weight lies."""
     if not values.size:
         return 0.0
@@ -199,19 +204,21 @@ def upper_points(frame: Frame) -> np.ndarray:
     return np.unique(np.concatenate([block.ravel() for block in frame.cells(1)]))
 
 
-def slide_of(frame: Frame) -> float:
+def upper_piece_slide(frame: Frame) -> float:
     """Return the slide [m] of the upper piece as a whole.
 
     It is the motion of its rigid far face, extrapolated to y = 0.
     """
     upper = upper_points(frame)
     return float(
-        slides(frame.points[upper], frame.point_data["displacement"][None, upper].astype(float))[0]
+        upper_piece_slides(
+            frame.points[upper], frame.point_data["displacement"][None, upper].astype(float)
+        )[0]
     )
 
 
-def slides(points, moves) -> np.ndarray:
-    """Return the slides (f,) [m], as `slide_of`, of an upper piece.
+def upper_piece_slides(points, moves) -> np.ndarray:
+    """Return the slides (f,) [m], as `upper_piece_slide`, of an upper piece.
 
     Parameters
     ----------
@@ -268,7 +275,7 @@ def surface_shape_motion(points, up, x, surface) -> np.ndarray:
     return np.array(added) * (1 - points[:, 1] / height)
 
 
-def round_factor(factor: float, least: float = 1.0) -> float:
+def round_down_factor(factor: float, least: float = 1.0) -> float:
     """Return a factor > 0 rounded down to 1, 2 or 5 times a power of ten, but at least `least`."""
     if factor < least:
         return least
@@ -276,7 +283,7 @@ def round_factor(factor: float, least: float = 1.0) -> float:
     return float(power * max(step for step in (1, 2, 5) if step * power <= factor * (1 + 1e-9)))
 
 
-def contact_window(frame: Frame) -> tuple:
+def find_contact_window(frame: Frame) -> tuple:
     """Return a window [mm] around the contact; for a long contact, around its largest pressure."""
     line = frame.interface()
     x, sigma = frame.points[line, 0] * 1e3, frame.point_data["normal_stress"][line]
@@ -299,25 +306,25 @@ def cell_centres(frame: Frame) -> np.ndarray:
     return sums / np.diff(frame.offsets)[:, None] * 1e3
 
 
-def areas(frame: Frame) -> np.ndarray:
+def cell_areas(frame: Frame) -> np.ndarray:
     """Return the areas (cells,) [m2] of the cells of a frame; 0 for interface segments."""
-    return sizes(frame.points[:, :2], corners(frame.connectivity, frame.offsets))
+    return quadrilateral_areas(frame.points[:, :2], cell_corners(frame.connectivity, frame.offsets))
 
 
-def corners(connectivity, offsets) -> np.ndarray:
+def cell_corners(connectivity, offsets) -> np.ndarray:
     """Return the corners (m, 4) of cells in VTK form; smaller cells repeat their last corner."""
     last = np.diff(offsets)[:, None] - 1
     return connectivity[offsets[:-1, None] + np.minimum(np.arange(4), last)]
 
 
-def sizes(points, cells) -> np.ndarray:
+def quadrilateral_areas(points, cells) -> np.ndarray:
     """Return the areas (m,) of cells with four corners (m, 4) among points (n, 2)."""
     corner = points[cells]
     after = np.roll(corner, -1, axis=1)
     return np.abs((corner[..., 0] * after[..., 1] - corner[..., 1] * after[..., 0]).sum(axis=1)) / 2
 
 
-def curves(frame: Frame, reach: tuple | None = None) -> tuple:
+def interface_curves(frame: Frame, reach: tuple | None = None) -> tuple:
     """Return the stresses along the interface of a frame: x [mm], curves, and their unit.
 
     Parameters
@@ -345,7 +352,7 @@ def curves(frame: Frame, reach: tuple | None = None) -> tuple:
     )
 
 
-def borders(frame: Frame, cells) -> tuple:
+def outer_edges(frame: Frame, cells) -> tuple:
     """Return the outer edges (e, 2) of some cells as point numbers, and those below a coating.
 
     cells: (cells,) bool.

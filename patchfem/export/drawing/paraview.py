@@ -14,14 +14,14 @@ import numpy as np
 from ...core import PatchfemError
 from ...disk.atomic_write import write_text
 from ..fields.series import Frame, Series
-from ..fields.vtu import frames_beside, write_pvd
+from ..fields.vtu import frames_folder, write_pvd
 from .film import Film, make_film
-from .panels import drawn_displacement, slide_of, upper_points
+from .panels import drawn_displacement, upper_piece_slide, upper_points
 
 MPA = 1e-6
 # Fraction of the cells whose stress the colours of a component cover; the others are peaks in
 # corners.
-SHARPEST = 0.998
+MAX_SHARPNESS = 0.998
 # name -> (title, index in the stored stress xx, yy, zz, xy, yz, xz; None for a separate array)
 STRESSES = {
     "von_mises": ("von Mises stress", None),
@@ -169,13 +169,13 @@ def write_script(folder: Path, out: Path, of: str = "von_mises") -> str:
     fields = out.with_suffix(".pvd")
     with Series(folder) as series:
         film = make_film(series)
-        text = script(out, film, of, _ends(series, film, of), status)
-        write_pvd(fields, series, film.numbers, lambda frame: with_motion(frame, of))
+        text = script_text(out, film, of, _colour_range(series, film, of), status)
+        write_pvd(fields, series, film.numbers, lambda frame: add_motion(frame, of))
         write_text(out, text)
-    return f"{out}: {len(film.numbers)} frames, {fields.name} and {frames_beside(fields).name} beside it"
+    return f"{out}: {len(film.numbers)} frames, {fields.name} and {frames_folder(fields).name} beside it"
 
 
-def _ends(series: Series, film: Film, of: str) -> tuple:
+def _colour_range(series: Series, film: Film, of: str) -> tuple:
     """Return the ends of the colours of a stress [Pa].
 
     For the von Mises stress they are those of pictures; for a component they are symmetric about 0.
@@ -184,20 +184,21 @@ def _ends(series: Series, film: Film, of: str) -> tuple:
         return 0.0, float(film.tops[0])
     top = 0.0
     for number in film.numbers:
-        values = stress_of(series.frame(number).cell_data, of)
+        values = get_stress(series.frame(number).cell_data, of)
         top = max(
-            top, float(np.quantile(np.abs(values[np.isfinite(values)]), SHARPEST, method="higher"))
+            top,
+            float(np.quantile(np.abs(values[np.isfinite(values)]), MAX_SHARPNESS, method="higher")),
         )
     return -top, top
 
 
-def stress_of(cell_data: dict, of: str) -> np.ndarray:
+def get_stress(cell_data: dict, of: str) -> np.ndarray:
     """Return a stress (cells,) [Pa] of STRESSES; tension is positive."""
     place = STRESSES[of][1]
     return cell_data["von_mises"] if place is None else cell_data["stress"][:, place]
 
 
-def script(out: Path, film: Film, of: str, ends: tuple, status: bool = False) -> str:
+def script_text(out: Path, film: Film, of: str, ends: tuple, status: bool = False) -> str:
     """Return the ParaView script that plays an animation.
 
     Parameters
@@ -225,14 +226,14 @@ def script(out: Path, film: Film, of: str, ends: tuple, status: bool = False) ->
     )
 
 
-def with_motion(frame: Frame, of: str = "von_mises") -> Frame:
+def add_motion(frame: Frame, of: str = "von_mises") -> Frame:
     """Return a frame with the additional arrays `motion` and `slide` (n, 3) [m].
 
     Their sum is the displacement as drawn. The arrays that the script colours [MPa] are added as
     well.
     """
     slide = np.zeros((len(frame.points), 3))
-    slide[upper_points(frame), 0] = slide_of(frame)
+    slide[upper_points(frame), 0] = upper_piece_slide(frame)
     motion = np.column_stack([drawn_displacement(frame), np.zeros(len(slide))]) - slide
     blocks, first = {}, 0
     for name, block in frame.blocks.items():
@@ -240,7 +241,7 @@ def with_motion(frame: Frame, of: str = "von_mises") -> Frame:
         more = {"motion": motion[mine].astype(np.float32), "slide": slide[mine].astype(np.float32)}
         cells = {}
         if "von_mises" in block.cell_data:
-            cells["shown"] = (MPA * stress_of(block.cell_data, of)).astype(np.float32)
+            cells["shown"] = (MPA * get_stress(block.cell_data, of)).astype(np.float32)
         if "normal_stress" in block.point_data:
             more["contact_pressure"] = (MPA * block.point_data["normal_stress"]).astype(np.float32)
         blocks[name] = replace(

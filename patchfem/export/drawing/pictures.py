@@ -65,7 +65,7 @@ def make_figure(columns: int = 1, height: float = 3.2, onto=None, **layout):
     return figure, axes
 
 
-def _svg(figure) -> str:
+def _figure_svg(figure) -> str:
     """Return the SVG of a figure without date, creator and addresses.
 
     The only addresses left are those of the XML namespaces.
@@ -95,13 +95,13 @@ def returns_svg(draw):
             drawn = draw(*args, **kwargs)
         if kwargs.get("onto") is None:  # otherwise the caller owns the figure
             for shown in (drawn, *drawn.axes):
-                shown._repr_svg_ = partial(_svg, drawn)
+                shown._repr_svg_ = partial(_figure_svg, drawn)
         return drawn
 
     @wraps(draw)
     def svg(*args, **kwargs) -> str:
         """Return the SVG text of the drawn Figure."""
-        return _svg(figure(*args, **kwargs))
+        return _figure_svg(figure(*args, **kwargs))
 
     svg.figure = figure
     return svg
@@ -178,17 +178,17 @@ def _write_label(axis, label: dict) -> None:
     )
 
 
-def _colour(mark: dict) -> str:
+def _mark_colour(mark: dict) -> str:
     """Return the colour of a mark."""
     return COLOURS.get(mark["colour"], mark["colour"])
 
 
-def _line(axis, mark: dict) -> None:
+def _draw_line(axis, mark: dict) -> None:
     """Draw a line."""
     axis.plot(
         mark["x"],
         mark["y"],
-        color=_colour(mark),
+        color=_mark_colour(mark),
         label=mark["name"] or None,
         linewidth=mark.get("width"),
         linestyle=mark.get("dash", "solid"),
@@ -196,7 +196,7 @@ def _line(axis, mark: dict) -> None:
     )
 
 
-def _dots(axis, mark: dict) -> None:
+def _draw_dots(axis, mark: dict) -> None:
     """Draw points with error bars."""
     axis.errorbar(
         mark["x"],
@@ -205,62 +205,65 @@ def _dots(axis, mark: dict) -> None:
         fmt=SHAPES[mark.get("shape", "circle")],
         ms=mark.get("size", 5),
         capsize=2,
-        color=_colour(mark),
+        color=_mark_colour(mark),
         label=mark["name"] or None,
         markerfacecolor="white" if mark.get("hollow") else None,
     )
 
 
-def _band(axis, mark: dict) -> None:
+def _draw_band(axis, mark: dict) -> None:
     """Draw a band between two curves."""
     axis.fill_between(
         mark["x"],
         mark["low"],
         mark["high"],
-        color=_colour(mark),
+        color=_mark_colour(mark),
         alpha=0.22,
         lw=0,
         label=mark["name"] or None,
     )
 
 
-def _span(axis, mark: dict) -> None:
+def _draw_span(axis, mark: dict) -> None:
     """Draw a vertical strip."""
     axis.axvspan(
         mark["left"],
         mark["right"],
-        color=_colour(mark),
+        color=_mark_colour(mark),
         alpha=0.12,
         lw=0,
         label=mark["name"] or None,
     )
 
 
-def _rule(axis, mark: dict) -> None:
+def _draw_rule(axis, mark: dict) -> None:
     """Draw a vertical line."""
     axis.axvline(
         mark["x"],
-        color=_colour(mark),
+        color=_mark_colour(mark),
         lw=0.9,
         ls=mark.get("dash", "dashdot"),
         label=mark["name"] or None,
     )
 
 
-def _arrow(axis, mark: dict) -> None:
+def _draw_arrow(axis, mark: dict) -> None:
     """Draw a line with an arrowhead in its middle; with a floor the axis is logarithmic."""
-    _line(axis, mark)
+    _draw_line(axis, mark)
     (a, b), (c, d) = mark["x"], mark["y"]
     tail, tip = (
         ((1 - s) * a + s * b, c ** (1 - s) * d**s if "floor" in mark else (1 - s) * c + s * d)
         for s in (0.45, 0.58)
     )
     axis.annotate(
-        "", xy=tip, xytext=tail, arrowprops={"arrowstyle": "-|>", "color": _colour(mark), "lw": 1.2}
+        "",
+        xy=tip,
+        xytext=tail,
+        arrowprops={"arrowstyle": "-|>", "color": _mark_colour(mark), "lw": 1.2},
     )
 
 
-def _cells(axis, mark: dict) -> None:
+def _draw_cells(axis, mark: dict) -> None:
     """Draw cells between the lines x and y, coloured by value; the first ones add a colour bar."""
     first = not axis.collections
     drawn = axis.pcolormesh(
@@ -272,11 +275,11 @@ def _cells(axis, mark: dict) -> None:
 
 
 MARKS = {
-    "cells": _cells,
-    "line": _line,
-    "dots": _dots,
-    "band": _band,
-    "span": _span,
-    "rule": _rule,
-    "arrow": _arrow,
+    "cells": _draw_cells,
+    "line": _draw_line,
+    "dots": _draw_dots,
+    "band": _draw_band,
+    "span": _draw_span,
+    "rule": _draw_rule,
+    "arrow": _draw_arrow,
 }

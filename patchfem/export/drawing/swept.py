@@ -6,7 +6,7 @@ from ...core import PatchfemError
 from ...formatting import UNIT_LADDERS, choose_axis_unit, format_number, format_quantity
 from ...runs.results.patch_rows import minimum_value
 from ..tolerance_misses import is_over_tolerance
-from ..written import label
+from ..written import measure_label
 from . import charts
 
 # Largest / smallest value of a key, all positive, above which its axis is logarithmic.
@@ -48,46 +48,49 @@ def sweep_chart(dataset, measure: str) -> dict:
     }
     hollow = is_over_tolerance(table, dataset.attrs.get("tolerance", np.nan))
     values, errors = table["values"], np.nan_to_num(table["errors"])
-    unit, scale = _axis_unit(values, dataset[measure].attrs.get("units", "1"))
+    unit, scale = _choose_axis_unit(values, dataset[measure].attrs.get("units", "1"))
     below = np.fmin(errors, np.fmax(values - minimum_value(measure), 0.0))
-    x, x_axis = _key_axis(key, along)
+    x, x_axis = _make_key_axis(key, along)
     lines, rings, filled = [], [], []
     for k, place in enumerate(np.ndindex(*(dataset[name].size for name in others))):
         text = ", ".join(
-            f"{label(name)} {_format_key(dataset[name], at)}" for name, at in zip(others, place)
+            f"{measure_label(name)} {_format_key(dataset[name], at)}"
+            for name, at in zip(others, place)
         )
         y = scale * values[k]
         bars = scale * np.stack([below[k], errors[k]])
         colour = charts.COLOURS[k % len(charts.COLOURS)]
         if dim != "case":
-            lines.append(charts.line(x, y, colour))
-        rings.append(charts.dots(x, y, colour, text, errors=bars, hollow=True))
-        filled.append(charts.dots(x[~hollow[k]], y[~hollow[k]], colour))
+            lines.append(charts.make_line(x, y, colour))
+        rings.append(charts.make_dots(x, y, colour, text, errors=bars, hollow=True))
+        filled.append(charts.make_dots(x[~hollow[k]], y[~hollow[k]], colour))
     shown = values[np.isfinite(values)]
-    is_log = _spans(shown, MIN_MEASURE_RATIO)
-    y_axis = charts.axis(label(measure), "" if unit == "1" else unit, is_log)
-    return charts.chart("", x_axis, y_axis, [*lines, *rings, *filled])
+    is_log = _spans_ratio(shown, MIN_MEASURE_RATIO)
+    y_axis = charts.make_axis(measure_label(measure), "" if unit == "1" else unit, is_log)
+    return charts.make_chart("", x_axis, y_axis, [*lines, *rings, *filled])
 
 
-def _key_axis(key: str, along) -> tuple:
+def _make_key_axis(key: str, along) -> tuple:
     """Return the positions (n,) of the values of a key, and their axis; words are evenly spaced."""
     if along.dtype.kind != "f":
         places = np.arange(float(along.size))
         ticks = [(place, str(word)) for place, word in zip(places, along.values)]
-        return places, charts.axis(label(key)) | {"ticks": ticks}
-    unit, scale = _axis_unit(along.values, along.attrs.get("units", "1"))
-    is_log = _spans(along.values, MIN_KEY_RATIO)
-    return along.values * scale, charts.axis(label(key), "" if unit == "1" else unit, is_log)
+        return places, charts.make_axis(measure_label(key)) | {"ticks": ticks}
+    unit, scale = _choose_axis_unit(along.values, along.attrs.get("units", "1"))
+    is_log = _spans_ratio(along.values, MIN_KEY_RATIO)
+    return along.values * scale, charts.make_axis(
+        measure_label(key), "" if unit == "1" else unit, is_log
+    )
 
 
-def _spans(values, ratio: float) -> bool:
+def _spans_ratio(values, ratio: float) -> bool:
     """Return whether values are all positive and span a ratio."""
     if values.dtype.kind != "f" or values.size < 2 or values.min() <= 0:
         return False
     return values.max() >= ratio * values.min()
 
 
-def _axis_unit(values, unit: str) -> tuple:
+def _choose_axis_unit(values, unit: str) -> tuple:
     """Return unit and scale for an axis of these values [SI]."""
     return choose_axis_unit(values, unit) if unit in UNIT_LADDERS else (unit, 1.0)
 

@@ -17,18 +17,18 @@ from ...disk.atomic_write import write_atomically
 from ...formatting import choose_axis_unit
 from ..fields.series import Frame, Series
 from . import film, flat
-from .panels import Panel, borders, curves, panels
+from .panels import Panel, interface_curves, make_panels, outer_edges
 
-ENDINGS = (".png", ".svg", ".pdf")
+PICTURE_EXTENSIONS = (".png", ".svg", ".pdf")
 # [s] for the child process; to start pyvista and draw takes 6 s to 9 s on a busy machine
-SECONDS = 60
+MAX_PROBE_SECONDS = 60
 PROBE = """\
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(32, 32))
 plotter.add_mesh(pyvista.Plane(), color="red")
 assert plotter.screenshot(None, return_img=True).std() > 0, "the picture is empty"
 """
-SIZE = (1800, 1000)
+WINDOW_SIZE = (1800, 1000)
 COLOURS = "viridis"
 FONT = 20
 
@@ -58,12 +58,12 @@ def view(
     """
     if magnify is not None and not (np.isfinite(magnify) and magnify >= 0):
         raise PatchfemError(f"--magnify: {magnify} must be 0 or more")
-    if out is not None and Path(out).suffix in film.ENDINGS:
-        _film(folder, Path(out), frame, magnify)
+    if out is not None and Path(out).suffix in film.FILM_EXTENSIONS:
+        _write_film(folder, Path(out), frame, magnify)
         return
-    if out is not None and Path(out).suffix not in ENDINGS:
+    if out is not None and Path(out).suffix not in PICTURE_EXTENSIONS:
         raise PatchfemError(
-            f"{out}: pictures are written as {', '.join(ENDINGS)}, films as {', '.join(film.ENDINGS)}"
+            f"{out}: pictures are written as {', '.join(PICTURE_EXTENSIONS)}, films as {', '.join(film.FILM_EXTENSIONS)}"
             " or .html"
         )
     with Series(folder) as series:
@@ -73,14 +73,14 @@ def view(
             last = len(series) - 1
             head += f", frame {one.number} ({f'of 0 to {last}' if one.number < last else 'the last'}), {one.time:.6g} s"
     if out is None:
-        _window(one, head, magnify)
+        _open_window(one, head, magnify)
         return
     with write_atomically(Path(out)) as partial:
-        flat.draw(one, head, magnify, partial)
+        flat.draw_frame(one, head, magnify, partial)
     print(f"{out}: {head}")
 
 
-def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> None:
+def _write_film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> None:
     """Write a film of the last cycle."""
     if frame is not None:
         raise PatchfemError(
@@ -93,7 +93,7 @@ def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> 
     print(f"{out}: {said}")
 
 
-def _window(one: Frame, head: str, magnify) -> None:
+def _open_window(one: Frame, head: str, magnify) -> None:
     """Open a window; Missing without a screen or without OpenGL."""
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
@@ -101,25 +101,28 @@ def _window(one: Frame, head: str, magnify) -> None:
         raise Missing(
             "view: there is no screen for a window (DISPLAY is not set); write a picture with -o FILE.png"
         )
-    why = no_opengl()
+    why = explain_missing_opengl()
     if why is not None:
         raise Missing(
             f"view: no working OpenGL for a window ({why}); write a picture with -o FILE.png"
         )
-    plotter(one, head, magnify).show(title=f"patchfem: {head}")
+    make_plotter(one, head, magnify).show(title=f"patchfem: {head}")
 
 
-def no_opengl() -> str | None:
+def explain_missing_opengl() -> str | None:
     """Return the reason why OpenGL cannot draw here; None if it can.
 
     A child process draws a tiny picture.
     """
     try:
         done = subprocess.run(
-            [sys.executable, "-P", "-c", PROBE], capture_output=True, text=True, timeout=SECONDS
+            [sys.executable, "-P", "-c", PROBE],
+            capture_output=True,
+            text=True,
+            timeout=MAX_PROBE_SECONDS,
         )
     except subprocess.TimeoutExpired:
-        return f"the test drawing of a small picture took more than {SECONDS:g} s"
+        return f"the test drawing of a small picture took more than {MAX_PROBE_SECONDS:g} s"
     if done.returncode == 0:
         return None
     if done.returncode < 0:
@@ -132,7 +135,7 @@ def no_opengl() -> str | None:
     )
 
 
-def plotter(one: Frame, head: str, magnify: float | None, off_screen: bool = False):
+def make_plotter(one: Frame, head: str, magnify: float | None, off_screen: bool = False):
     """Return the pyvista Plotter of the window: both pieces, their contact, and the stresses."""
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
@@ -141,23 +144,23 @@ def plotter(one: Frame, head: str, magnify: float | None, off_screen: bool = Fal
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     made = pv.Plotter(
         off_screen=off_screen,
-        window_size=SIZE,
+        window_size=WINDOW_SIZE,
         shape=(2, 2),
         groups=[(slice(None), 0)],
         border=False,
     )
     made.set_background("white")
-    whole, close = panels(one, magnify)
+    whole, close = make_panels(one, magnify)
     made.subplot(0, 0)
-    _bodies(made, one, whole, f"{head}\n{whole.title()}", True)
+    _draw_pieces(made, one, whole, f"{head}\n{whole.title()}", True)
     made.subplot(0, 1)
-    _bodies(made, one, close, f"where they touch, {close.title(False)}", False)
+    _draw_pieces(made, one, close, f"where they touch, {close.title(False)}", False)
     made.subplot(1, 1)
-    _chart(made, one)
+    _draw_stresses(made, one)
     return made
 
 
-def _bodies(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
+def _draw_pieces(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
     """Draw both pieces in a panel."""
     import pyvista as pv
 
@@ -191,7 +194,7 @@ def _bodies(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
             position_y=0.2,
             unconstrained_font_size=True,
         )
-    for edges, colour in zip(borders(one, panel.cells), ("black", "white")):
+    for edges, colour in zip(outer_edges(one, panel.cells), ("black", "white")):
         if len(edges):
             lines = pv.PolyData(places, lines=np.insert(edges, 0, 2, axis=1).ravel())
             plotter.add_mesh(lines, color=colour, line_width=2, lighting=False)
@@ -215,11 +218,11 @@ def _bodies(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
     plotter.camera.zoom(0.95)  # leaves space for the colour bar beside the pieces
 
 
-def _chart(plotter, one: Frame) -> None:
+def _draw_stresses(plotter, one: Frame) -> None:
     """Draw the stresses along the interface."""
     import pyvista as pv
 
-    x, shown, unit = curves(one)
+    x, shown, unit = interface_curves(one)
     chart = pv.Chart2D(x_label="x [mm]", y_label=f"stress on the interface [{unit}]")
     for (label, values), colour in zip(shown, ("#1f5f99", "#c8551b")):
         chart.line(x, values, color=colour, width=3, label=label)

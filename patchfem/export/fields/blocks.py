@@ -47,7 +47,7 @@ class Block:
     cell_data: dict
 
 
-def block(points, cells: list, point_data: dict, cell_data: dict) -> Block:
+def make_block(points, cells: list, point_data: dict, cell_data: dict) -> Block:
     """Return a Block of points and cells.
 
     Parameters
@@ -69,7 +69,7 @@ def block(points, cells: list, point_data: dict, cell_data: dict) -> Block:
     )
 
 
-def blocks_of(lower: dict, upper: dict, x, interface: dict, width: float = 0.0) -> dict:
+def build_blocks(lower: dict, upper: dict, x, interface: dict, width: float = 0.0) -> dict:
     """Return the blocks of a pair of pieces by name.
 
     The interface moves with the lower piece.
@@ -112,13 +112,13 @@ def blocks_of(lower: dict, upper: dict, x, interface: dict, width: float = 0.0) 
         }
     ends = np.stack([np.arange(len(x) - 1), np.arange(1, len(x))], axis=1)
     return {
-        "lower": _body(lower),
-        "upper": _body(upper),
-        "interface": block(np.column_stack([x, np.zeros(len(x))]), [ends], fields, {}),
-    } | ({"strips": _strips(x, width, areal)} if areal else {})
+        "lower": _piece_block(lower),
+        "upper": _piece_block(upper),
+        "interface": make_block(np.column_stack([x, np.zeros(len(x))]), [ends], fields, {}),
+    } | ({"strips": _strips_block(x, width, areal)} if areal else {})
 
 
-def _strips(x, width: float, areal: dict) -> Block:
+def _strips_block(x, width: float, areal: dict) -> Block:
     """Return strips side by side over the width [m], in the plane of the interface.
 
     The values (f, s, k) of a strip are constant from edge to edge; the width is along z.
@@ -127,7 +127,7 @@ def _strips(x, width: float, areal: dict) -> Block:
     edges = np.linspace(-width / 2, width / 2, count + 1)
     sides = np.stack([edges[:-1], edges[1:]], axis=1).ravel()  # edges of each strip in turn
     low = (np.arange(count)[:, None] * 2 * k + np.arange(k - 1)).ravel()
-    one = block(
+    one = make_block(
         np.column_stack([np.tile(x, 2 * count), np.zeros(2 * count * k)]),
         [np.stack([low, low + 1, low + k + 1, low + k], axis=1)],
         {name: np.repeat(rows, 2, axis=1).reshape(len(rows), -1) for name, rows in areal.items()},
@@ -137,14 +137,14 @@ def _strips(x, width: float, areal: dict) -> Block:
     return one
 
 
-def _body(body: dict) -> Block:
+def _piece_block(body: dict) -> Block:
     """Return the block of a piece."""
     frames, cells = len(body["displacement"]), len(body["material"])
     move = np.zeros((frames, len(body["points"]), 3), np.float32)
     move[..., :2] = body["displacement"]
     stress = np.zeros((frames, cells, 6), np.float32)
     stress[..., :4] = body["stress"]
-    return block(
+    return make_block(
         body["points"],
         body["blocks"],
         {"displacement": move},
@@ -157,7 +157,7 @@ def _body(body: dict) -> Block:
     )
 
 
-def joined(blocks: dict) -> Block:
+def merge_blocks(blocks: dict) -> Block:
     """Merge blocks of one time into one block with the cell array `part` of CODES.
 
     Values that a block does not have are NaN, or -1 for codes.
@@ -174,13 +174,15 @@ def joined(blocks: dict) -> Block:
         np.concatenate([one.connectivity + at for one, at in zip(all_of, first)]),
         np.concatenate([[0], *(one.offsets[1:] + at for one, at in zip(all_of, ends))]),
         np.concatenate([one.types for one in all_of]),
-        _filled([one.point_data for one in all_of], [len(one.points) for one in all_of]),
-        _filled([one.cell_data for one in all_of], [len(one.types) for one in all_of])
+        _concatenate_arrays(
+            [one.point_data for one in all_of], [len(one.points) for one in all_of]
+        ),
+        _concatenate_arrays([one.cell_data for one in all_of], [len(one.types) for one in all_of])
         | {"part": part},
     )
 
 
-def _filled(parts: list, sizes: list) -> dict:
+def _concatenate_arrays(parts: list, sizes: list) -> dict:
     """Concatenate arrays by name, with NaN or -1 for a block that does not have an array."""
     out = {}
     for name in dict.fromkeys(name for part in parts for name in part):

@@ -21,7 +21,7 @@ from ...elasticity.recovery import (
     make_points,
 )
 from ...runs.results.result import patch_surface
-from .blocks import blocks_of
+from .blocks import build_blocks
 from .strength import find_yielding
 from .vtkhdf import write_series
 
@@ -62,16 +62,19 @@ def write_fields(result, path: Path) -> dict:
     patch, fields = result.patch, result.fields
     times = fields["time"]
     interface = {k: v for k, v in fields.items() if k != "time" and not k.startswith("holder_")}
-    loads = [_loads(patch, fields, side) for side in ("lower", "upper")]
-    motions = _motions(patch, loads)
-    insides = [_inside(patch.pair.piece, patch.pair.grid)]
+    loads = [_nodal_loads(patch, fields, side) for side in ("lower", "upper")]
+    motions = _piece_displacements(patch, loads)
+    insides = [_mesh_and_stress(patch.pair.piece, patch.pair.grid)]
     insides += (
         insides
         if patch.pair.upper is patch.pair.piece
-        else [_inside(patch.pair.upper, patch.pair.upper_grid)]
+        else [_mesh_and_stress(patch.pair.upper, patch.pair.upper_grid)]
     )
     x = patch_surface(patch, fields).x
-    low, high = (_body(patch, fields, x, *of) for of in zip(("lower", "upper"), insides, motions))
+    low, high = (
+        _collect_piece_fields(patch, fields, x, *of)
+        for of in zip(("lower", "upper"), insides, motions)
+    )
     for one, other in ((low, high), (high, low)):
         one["stress_error"] = one["error"].relative_error(other["error"])[0]
     notes = result.extra.setdefault("notes", [])
@@ -82,7 +85,7 @@ def write_fields(result, path: Path) -> dict:
     steps = {"lower": low["steps"], "upper": high["steps"]}
     write_series(
         path,
-        blocks_of(low, high, x, interface, result.plan.model.patch.pieces.width),
+        build_blocks(low, high, x, interface, result.plan.model.patch.pieces.width),
         times,
         UNITS,
         steps,
@@ -99,7 +102,7 @@ def write_fields(result, path: Path) -> dict:
     }
 
 
-def _loads(patch, fields: dict, side: str) -> tuple:
+def _nodal_loads(patch, fields: dict, side: str) -> tuple:
     """Return the loads (shear, normal) (1 + f, n) [N/m] on the nodes of a piece.
 
     The first row is the pressed state; the others are the shear of every frame.
@@ -123,7 +126,7 @@ def _loads(patch, fields: dict, side: str) -> tuple:
     return shear, normal
 
 
-def _motions(patch, loads: list) -> list:
+def _piece_displacements(patch, loads: list) -> list:
     """Return the displacements (1 + f, nodes, 2) of both pieces.
 
     Equal pieces share one factorisation.
@@ -163,7 +166,7 @@ class _PieceFields:
     found: Recovery
 
 
-def _inside(piece, grid) -> _PieceFields:
+def _mesh_and_stress(piece, grid) -> _PieceFields:
     """Return mesh, stress and recovery of a piece."""
     cells = get_cells(piece)
     if isinstance(piece, Piece):
@@ -185,7 +188,7 @@ def _inside(piece, grid) -> _PieceFields:
     )
 
 
-def _body(patch, fields: dict, x, side: str, inside: _PieceFields, u) -> dict:
+def _collect_piece_fields(patch, fields: dict, x, side: str, inside: _PieceFields, u) -> dict:
     """Return the fields of a piece for the file: mesh, displacement and stress in all frames.
 
     y points away from the interface.
@@ -199,7 +202,7 @@ def _body(patch, fields: dict, x, side: str, inside: _PieceFields, u) -> dict:
     side : {"lower", "upper"}
     inside : _Inside
     u : (1 + f, n, 2) array
-        From `_motions`; its first row is the pressed state.
+        From `_piece_displacements`; its first row is the pressed state.
     """
     lower, cells, frames = side == "lower", inside.cells, len(u) - 1
     sign = -1.0 if lower else 1.0

@@ -7,8 +7,8 @@ import h5py
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from ..read_results import MAX_NUMBER, is_real, reading_errors, require
-from .blocks import NAMES, PARTS, Block, joined
+from ..read_results import MAX_NUMBER, is_real, reading_errors, require_valid
+from .blocks import NAMES, PARTS, Block, merge_blocks
 from .vtkhdf import NAME
 
 TAILS = {"displacement": (3,), "stress": (6,)}  # shape of arrays with several values at a point
@@ -40,7 +40,7 @@ def last_consecutive_frames(times) -> tuple:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Frame(Block):
-    """One time of a series: all blocks as one mesh, as from `joined`, and each of them.
+    """One time of a series: all blocks as one mesh, as from `merge_blocks`, and each of them.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class Series:
                 f"{self.path}: written by an older version of patchfem; run the scene again"
             )
         self.times = self.root["Steps/Values"][:]
-        require(
+        require_valid(
             self.times.ndim == 1
             and self.times.size
             and is_real(self.times)
@@ -133,15 +133,15 @@ class Series:
         self.units = dict(text.decode().rstrip("]").split(" [", 1) for text in texts)
         self.parts = [name for name in PARTS if name in NAMES or name in self.root]
         for name in self.parts:
-            self._looked(name, self.root[name])
+            self._check_block(name, self.root[name])
 
-    def _looked(self, name: str, group) -> None:
+    def _check_block(self, name: str, group) -> None:
         """Raise ValueError for a block whose cells or arrays do not fit its points in every frame."""
         points, nodes, ends, types = (
             group[one][:] for one in ("Points", "Connectivity", "Offsets", "Types")
         )
         # the comparison is False for NaN
-        require(
+        require_valid(
             points.ndim == 2
             and points.shape[1] == 3
             and len(points)
@@ -149,7 +149,7 @@ class Series:
             and np.abs(points).max() < MAX_NUMBER,
             f"{name}/Points are not valid positions",
         )
-        require(
+        require_valid(
             all(
                 one.ndim == 1 and one.size and one.dtype.kind in "iu"
                 for one in (nodes, ends, types)
@@ -157,7 +157,7 @@ class Series:
             f"{name}: the numbers that define the cells are not whole",
         )
         sizes = np.diff(ends.astype(np.int64))
-        require(
+        require_valid(
             len(sizes) == len(types)
             and ends[0] == 0
             and ends[-1] == len(nodes)
@@ -169,14 +169,14 @@ class Series:
         )
         for kind, size in ("PointData", len(points)), ("CellData", len(types)):
             lacks = sorted(set(REQUIRED_ARRAYS[name][kind]) - set(group[kind]))
-            require(not lacks, f"{name}/{kind} lacks {', '.join(lacks)}")
+            require_valid(not lacks, f"{name}/{kind} lacks {', '.join(lacks)}")
             for one, rows in group[kind].items():
                 first = group[f"Steps/{kind}Offsets/{one}"][:]
-                require(
+                require_valid(
                     rows.dtype.kind in "iuf" and rows.shape[1:] == TAILS.get(one, ()),
                     f"{name}/{kind}/{one} contains {rows.ndim}-dimensional {rows.dtype}",
                 )
-                require(
+                require_valid(
                     first.shape == self.times.shape
                     and first.dtype.kind in "iu"
                     and first.min() >= 0
@@ -206,7 +206,7 @@ class Series:
         number %= count
         with reading_errors(self.path, f"frame {number}"):
             blocks = {name: self._block(self.root[name], number) for name in self.parts}
-        one = joined(blocks)
+        one = merge_blocks(blocks)
         return Frame(
             one.points,
             one.connectivity,
@@ -258,7 +258,7 @@ class Series:
     def _block(group, number: int) -> Block:
         """Read a block in one frame."""
         data = [
-            {name: _rows(group, kind, name, number, size) for name in group[kind]}
+            {name: _read_rows(group, kind, name, number, size) for name in group[kind]}
             for kind, size in (
                 ("PointData", len(group["Points"])),
                 ("CellData", len(group["Types"])),
@@ -273,7 +273,7 @@ class Series:
         )
 
 
-def _rows(group, kind: str, name: str, number: int, size: int) -> np.ndarray:
+def _read_rows(group, kind: str, name: str, number: int, size: int) -> np.ndarray:
     """Read the values of an array in one frame."""
     first = int(group[f"Steps/{kind}Offsets/{name}"][number])
     return group[f"{kind}/{name}"][first : first + size]

@@ -51,14 +51,14 @@ def find_yielding(asked, bodies: dict) -> dict:
             if highest.max() > known.pressure:
                 found.setdefault(known, []).append((float(highest.max()), side, middle[cell]))
     return {
-        known: _note(
+        known: _yielding_note(
             known, max(places, key=lambda one: one[0]), len({side for _, side, _ in places})
         )
         for known, places in found.items()
     }
 
 
-def _note(known: Strength, highest: tuple, pieces: int) -> str:
+def _yielding_note(known: Strength, highest: tuple, pieces: int) -> str:
     """Return the note on a material; highest: (stress [Pa], side, position [m])."""
     stress, side, (x, y) = highest
     both = "; the other piece exceeds its yield strength too" * (pieces > 1)

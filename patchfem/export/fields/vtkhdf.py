@@ -76,25 +76,30 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
         open_lossy(partial) as kept,
         h5py.File(kept, "w", libver=("earliest", "v110")) as file,
     ):
-        root = _group(file, "VTKHDF")
+        root = _create_group(file, "VTKHDF")
         root.attrs["Version"] = VERSION
         root.attrs.create("Type", np.bytes_("MultiBlockDataSet"))
-        text = _text(blocks, units)
-        assembly = _group(root, "Assembly")
+        text = _field_texts(blocks, units)
+        assembly = _create_group(root, "Assembly")
         for name, one in blocks.items():
             rounding = (steps or {}).get(name, {}) if packed else None
-            _block(
-                _group(root, name), one, times, (units, text, later if large else None, rounding)
+            _write_block(
+                _create_group(root, name),
+                one,
+                times,
+                (units, text, later if large else None, rounding),
             )
             assembly[name] = h5py.SoftLink(f"/VTKHDF/{name}")
-        all_steps = _steps(root, times)
-        _mesh(all_steps, EMPTY)
+        all_steps = _create_steps(root, times)
+        _write_mesh(all_steps, EMPTY)
         all_steps["Steps"] = root[next(iter(blocks))]["Steps"]
         if later:
-            _frames(file, [all_steps, *(root[name]["Steps"] for name in blocks)], later, len(times))
+            _write_frames(
+                file, [all_steps, *(root[name]["Steps"] for name in blocks)], later, len(times)
+            )
 
 
-def _frames(file, steps: list, later: list, count: int) -> None:
+def _write_frames(file, steps: list, later: list, count: int) -> None:
     """Write arrays frame after frame; each frame is on disk before it counts.
 
     VTK reads beyond its memory unless there are as many times as frames.
@@ -113,12 +118,12 @@ def _frames(file, steps: list, later: list, count: int) -> None:
     for number in range(count):
         _set_frame_count(steps, times, number)
         for one in later:
-            _frame(*one, number)
+            _write_frame(*one, number)
         file.flush()
     _set_frame_count(steps, times, count)
 
 
-def _frame(dataset, values, nearest, number: int) -> None:
+def _write_frame(dataset, values, nearest, number: int) -> None:
     """Write a frame of an array, with one chunk per component.
 
     A chunk has the bytes of its numbers shuffled and deflated, as HDF5 does it. A chunk of zeros is
@@ -186,7 +191,7 @@ def round_to_step(values, step: float) -> np.ndarray:
         )
 
 
-def _nearest(dataset, step: float, bits: int):
+def _rounding_function(dataset, step: float, bits: int):
     """Return the function that rounds an array, and state the rounding in its attributes.
 
     It rounds to the power of two at or below `step`, or to `bits` if the step is 0 or outside the range
@@ -200,12 +205,12 @@ def _nearest(dataset, step: float, bits: int):
     return partial(round_to_step, step=step)
 
 
-def _group(parent, name: str):
+def _create_group(parent, name: str):
     """Create a group whose entries keep their order."""
     return parent.create_group(name, track_order=True)
 
 
-def _text(blocks: dict, units: dict) -> dict:
+def _field_texts(blocks: dict, units: dict) -> dict:
     """Return the field arrays of text: the units of all arrays, and the meanings of their codes."""
     names = dict.fromkeys(
         name for one in blocks.values() for name in (*one.point_data, *one.cell_data)
@@ -220,18 +225,21 @@ def _text(blocks: dict, units: dict) -> dict:
     }
 
 
-def _steps(group, times):
+def _create_steps(group, times):
     """Create the group `Steps` with the times."""
-    steps = _group(group, "Steps")
+    steps = _create_group(group, "Steps")
     steps.attrs["NSteps"] = np.int64(len(times))
     steps.create_dataset("Values", data=np.asarray(times, np.float64), maxshape=(None,))
     return steps
 
 
-def _field_data(group, steps, text: dict, count: int) -> None:
+def _write_field_data(group, steps, text: dict, count: int) -> None:
     """Write field arrays of text, which are the same in all frames."""
     field = group["FieldData"]
-    offsets, sizes = _group(steps, "FieldDataOffsets"), _group(steps, "FieldDataSizes")
+    offsets, sizes = (
+        _create_group(steps, "FieldDataOffsets"),
+        _create_group(steps, "FieldDataSizes"),
+    )
     for name, lines in text.items():
         if lines:
             field.create_dataset(name, data=lines, dtype=h5py.string_dtype("ascii"))
@@ -239,7 +247,7 @@ def _field_data(group, steps, text: dict, count: int) -> None:
             sizes[name] = np.tile([1, len(lines)], (count, 1)).astype(np.int64)
 
 
-def _mesh(group, one: Block) -> None:
+def _write_mesh(group, one: Block) -> None:
     """Write the mesh of a block."""
     group.attrs["Version"] = VERSION
     group.attrs.create("Type", np.bytes_("UnstructuredGrid"))
@@ -249,10 +257,10 @@ def _mesh(group, one: Block) -> None:
     group["Points"], group["Connectivity"] = one.points, one.connectivity
     group["Offsets"], group["Types"] = one.offsets, one.types
     for kind in ("PointData", "CellData", "FieldData"):
-        _group(group, kind)
+        _create_group(group, kind)
 
 
-def _block(group, one: Block, times, about: tuple) -> None:
+def _write_block(group, one: Block, times, about: tuple) -> None:
     """Write a block.
 
     about: units by name; the field arrays of text; the list for arrays that are written frame after
@@ -260,21 +268,25 @@ def _block(group, one: Block, times, about: tuple) -> None:
     compression.
     """
     units, text, later, rounding = about
-    _mesh(group, one)
-    steps, count = _steps(group, times), len(times)
+    _write_mesh(group, one)
+    steps, count = _create_steps(group, times), len(times)
     for name in ("PartOffsets", "PointOffsets"):
         steps[name] = np.zeros(count, np.int64)
     steps["NumberOfParts"] = np.ones(count, np.int64)
     for name in ("CellOffsets", "ConnectivityIdOffsets"):
         steps[name] = np.zeros((count, 1), np.int64)
-    _arrays(group, steps, "PointData", one.point_data, (units, later, rounding))
-    _arrays(group, steps, "CellData", one.cell_data, (units, later, rounding))
-    _field_data(group, steps, text, count)
+    _write_arrays(group, steps, "PointData", one.point_data, (units, later, rounding))
+    _write_arrays(group, steps, "CellData", one.cell_data, (units, later, rounding))
+    _write_field_data(group, steps, text, count)
 
 
-def _arrays(group, steps, kind: str, data: dict, about: tuple) -> None:
-    """Write the arrays of a block; about: as for `_block`, without the text."""
-    (units, later, rounding), into, offsets = about, group[kind], _group(steps, f"{kind}Offsets")
+def _write_arrays(group, steps, kind: str, data: dict, about: tuple) -> None:
+    """Write the arrays of a block; about: as for `_write_block`, without the text."""
+    (units, later, rounding), into, offsets = (
+        about,
+        group[kind],
+        _create_group(steps, f"{kind}Offsets"),
+    )
     count = int(steps.attrs["NSteps"])
     for name, values in data.items():
         size = values.shape[1]
@@ -290,10 +302,10 @@ def _arrays(group, steps, kind: str, data: dict, about: tuple) -> None:
                 compression="gzip",
                 compression_opts=1,
             )
-            nearest = _nearest(one, rounding.get(name, 0.0), BITS.get(name, MOST_BITS))
+            nearest = _rounding_function(one, rounding.get(name, 0.0), BITS.get(name, MOST_BITS))
             if later is None:
                 for number in range(count):
-                    _frame(one, values, nearest, number)
+                    _write_frame(one, values, nearest, number)
             else:
                 later.append((one, values, nearest))
         else:

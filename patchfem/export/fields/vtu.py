@@ -46,7 +46,7 @@ FRAME = re.compile(rf"frame_\d+(\.vtm|(_({'|'.join(PARTS)}))?\.vtu)")  # files o
 ENDINGS = (".pvd", ".vtu", ".csv", ".vtkhdf")
 
 
-def export(folder: Path, out: Path, frame: int | None = None) -> str:
+def export_fields(folder: Path, out: Path, frame: int | None = None) -> str:
     """Write the fields of a results folder in the format of a suffix; return a line on the file.
 
     Parameters
@@ -75,19 +75,19 @@ def export(folder: Path, out: Path, frame: int | None = None) -> str:
             f"--frame: {out.suffix} contains the whole series; use a .vtu or .csv for one frame"
         )
     with Series(folder) as series:
-        return _export(series, out, -1 if frame is None else frame)
+        return _write_format(series, out, -1 if frame is None else frame)
 
 
-def _export(series: Series, out: Path, number: int) -> str:
+def _write_format(series: Series, out: Path, number: int) -> str:
     """Write a series, or its frame of a number, in the format of a suffix."""
     if out.suffix == ".vtkhdf":
         if out.exists() and out.samefile(series.path):
             raise PatchfemError(f"{out}: this is the file to export; choose another name with -o")
         with write_atomically(out, series.path.stat().st_size) as partial:
             shutil.copyfile(series.path, partial)
-        return f"{out}: {_frames(len(series))}"
+        return f"{out}: {_format_frame_count(len(series))}"
     if out.suffix == ".pvd":
-        return f"{out}: {_frames(write_pvd(out, series))} in {frames_beside(out).name}"
+        return f"{out}: {_format_frame_count(write_pvd(out, series))} in {frames_folder(out).name}"
     one = series.frame(number)
     if out.suffix == ".vtu":
         write_vtu(out, one, one.time, one.units)
@@ -98,12 +98,12 @@ def _export(series: Series, out: Path, number: int) -> str:
     return f"{out}: frame {one.number} ({which}), {one.time:.6g} s"
 
 
-def _frames(count: int) -> str:
+def _format_frame_count(count: int) -> str:
     """Return the number of frames as text."""
     return f"{count} frame{'s' * (count != 1)}"
 
 
-def frames_beside(path: Path) -> Path:
+def frames_folder(path: Path) -> Path:
     """Return the folder of the frames of a .pvd."""
     return path.with_name(path.stem + "_frames")
 
@@ -128,7 +128,7 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
     PatchfemError
         If the folder contains other files.
     """
-    folder = frames_beside(path)
+    folder = frames_folder(path)
     old = list(folder.iterdir()) if folder.is_dir() else []
     strange = sorted(
         one.name for one in old if not FRAME.fullmatch(one.name) and not is_partial_name(one.name)
@@ -152,7 +152,7 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
             f'<DataSet timestep="{one.time!r}" group="" part="0" '
             f"file={quoteattr(f'{folder.name}/{names[0]}')}/>"
         )
-    _listing(path, "Collection", "0.1", lines)
+    _write_listing(path, "Collection", "0.1", lines)
     for one in old:
         if one.name not in written:
             one.unlink(missing_ok=True)
@@ -164,7 +164,7 @@ def _write_vtm(folder: Path, stem: str, frame: Frame) -> list:
     names = [f"{stem}_{name}.vtu" for name in frame.blocks]
     for name, one in zip(names, frame.blocks.values()):
         write_vtu(folder / name, one, frame.time, frame.units)
-    _listing(
+    _write_listing(
         folder / f"{stem}.vtm",
         "vtkMultiBlockDataSet",
         "1.0",
@@ -176,7 +176,7 @@ def _write_vtm(folder: Path, stem: str, frame: Frame) -> list:
     return [f"{stem}.vtm", *names]
 
 
-def _listing(path: Path, kind: str, version: str, lines: list) -> None:
+def _write_listing(path: Path, kind: str, version: str, lines: list) -> None:
     """Write a VTK file that lists other files."""
     text = "\n".join(
         [
@@ -212,10 +212,10 @@ def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> Non
         "<UnstructuredGrid>",
         "<FieldData>",
         *(
-            _array(name, np.array([value]), unit, ' NumberOfTuples="1"')
+            _array_xml(name, np.array([value]), unit, ' NumberOfTuples="1"')
             for name, value, unit in (
                 ("TimeValue", time, "s"),
-                *_meanings((*frame.point_data, *frame.cell_data), units),
+                *_field_meanings((*frame.point_data, *frame.cell_data), units),
             )
         ),
         "</FieldData>",
@@ -224,17 +224,17 @@ def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> Non
     for kind, data in (("PointData", frame.point_data), ("CellData", frame.cell_data)):
         text += [
             f"<{kind}>",
-            *(_array(name, values, units.get(name)) for name, values in data.items()),
+            *(_array_xml(name, values, units.get(name)) for name, values in data.items()),
             f"</{kind}>",
         ]
     text += [
         "<Points>",
-        _array("Points", frame.points, "m"),
+        _array_xml("Points", frame.points, "m"),
         "</Points>",
         "<Cells>",
-        _array("connectivity", frame.connectivity.astype(np.int64)),
-        _array("offsets", frame.offsets[1:].astype(np.int64)),
-        _array("types", frame.types.astype(np.uint8)),
+        _array_xml("connectivity", frame.connectivity.astype(np.int64)),
+        _array_xml("offsets", frame.offsets[1:].astype(np.int64)),
+        _array_xml("types", frame.types.astype(np.uint8)),
         "</Cells>",
         "</Piece>",
         "</UnstructuredGrid>",
@@ -244,7 +244,7 @@ def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> Non
     write_text(path, "\n".join(text), "ascii")
 
 
-def _meanings(names: tuple, units: dict) -> list:
+def _field_meanings(names: tuple, units: dict) -> list:
     """Return field arrays (name, value, None) that state the unit and the codes of every array."""
     return [(f"unit of {name}: {units.get(name, '1')}", 1.0, None) for name in names] + [
         (f"code of {name}: {meaning}", code, None)
@@ -253,7 +253,7 @@ def _meanings(names: tuple, units: dict) -> list:
     ]
 
 
-def _array(name: str, values, unit: str | None = None, more: str = "") -> str:
+def _array_xml(name: str, values, unit: str | None = None, more: str = "") -> str:
     """Return an array as XML."""
     values = np.ascontiguousarray(values)
     kind = TYPES[values.dtype.newbyteorder("<").str[1:]]
@@ -265,10 +265,10 @@ def _array(name: str, values, unit: str | None = None, more: str = "") -> str:
         else f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{unit}</InformationKey>'
     )
     head = f'<DataArray type="{kind}" Name={quoteattr(name)}{more} format="binary">'
-    return f"{head}\n{_packed(values)}\n{label}</DataArray>"
+    return f"{head}\n{_compress_array(values)}\n{label}</DataArray>"
 
 
-def _packed(values) -> str:
+def _compress_array(values) -> str:
     """Return sizes and LZMA blocks of an array in base64, as in the XML formats of VTK."""
     raw = values.astype(values.dtype.newbyteorder("<")).tobytes()
     width = values.dtype.itemsize * (values.shape[1] if values.ndim > 1 else 1)

@@ -32,7 +32,7 @@ def describe_curve_fit(fitted: FittedCurve, folder: Path) -> FitFiles:
 
     folder: the paths in the fitted scene are relative to it.
     """
-    answer = _answer(fitted)
+    answer = _fit_json(fitted)
     rms = answer["rms"]
     head = (
         f"{answer['outcome']}: {answer['rows']} amplitudes of {answer['measured']} by "
@@ -49,14 +49,14 @@ def describe_curve_fit(fitted: FittedCurve, folder: Path) -> FitFiles:
         lines=[head, *format_values(answer), *rest],
         summary=[head, *rest],
         scenes={FITTED_SCENE: scene},
-        rows=_rows(fitted),
-        charts=_charts(fitted),
+        rows=_csv_rows(fitted),
+        charts=_draw_charts(fitted),
         caption="Frequency and damping ratio against amplitude: measured values with errors, and "
         "the fit",
     )
 
 
-def _answer(fitted: FittedCurve) -> dict:
+def _fit_json(fitted: FittedCurve) -> dict:
     """Return the object of fit.json."""
     keys, measured = fitted.keys, fitted.measured
     deviation = (fitted.model - measured.value) / np.abs(measured.value)
@@ -76,7 +76,7 @@ def _answer(fitted: FittedCurve) -> dict:
     }
 
 
-def _rows(fitted: FittedCurve) -> list:
+def _csv_rows(fitted: FittedCurve) -> list:
     """Return the rows of fit.csv; errors are half the width of a 95 % interval."""
     measured = fitted.measured
     errors = 2 * measured.error
@@ -93,18 +93,18 @@ def _rows(fitted: FittedCurve) -> list:
     return [HEAD, *([*map(repr, row)] for row in columns.tolist())]
 
 
-def _charts(fitted: FittedCurve) -> list:
+def _draw_charts(fitted: FittedCurve) -> list:
     """Return frequency and damping ratio against amplitude, measured with errors and fitted."""
     measured = fitted.measured
     unit, scale = choose_axis_unit(measured.amplitude, "m")
-    along = charts.axis("amplitude", unit, True)
+    along = charts.make_axis("amplitude", unit, True)
     x = measured.amplitude * scale
     out = []
     for k, (title, name, of) in enumerate(
         (("Frequency", "frequency", "Hz"), ("Damping ratio", "damping ratio", ""))
     ):
         errors = 2 * measured.error[k]
-        dots = charts.dots(x, measured.value[k], "soft", "measured", errors=errors)
-        fit = charts.line(x, fitted.model[k], "accent", "fitted")
-        out.append(charts.chart(title, along, charts.axis(name, of), [dots, fit]))
+        dots = charts.make_dots(x, measured.value[k], "soft", "measured", errors=errors)
+        fit = charts.make_line(x, fitted.model[k], "accent", "fitted")
+        out.append(charts.make_chart(title, along, charts.make_axis(name, of), [dots, fit]))
     return out

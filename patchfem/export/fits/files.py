@@ -15,7 +15,7 @@ from ...scene.scene import move_scene
 from ..drawing import pictures
 from ..results import PAGE, Folder
 from ..summary import write_json
-from .page import page
+from .page import page_html
 
 FITTED_SCENE = "scene.fitted.toml"
 
@@ -61,7 +61,7 @@ def write_fit(files: FitFiles, folder: Folder) -> None:
     if files.charts:
         picture = pictures.draw_charts(files.charts)
         write_text(folder.path / "fit.svg", picture)
-    text = page(
+    text = page_html(
         files.answer,
         lines=files.lines,
         summary=files.summary,

@@ -28,7 +28,7 @@ def describe_loop_fit(fitted: FittedLoop, folder: Path) -> FitFiles:
 
     folder: the paths in the fitted scene are relative to it.
     """
-    answer = _answer(fitted)
+    answer = _fit_json(fitted)
     share = answer["rms"] / answer["peak"]
     head = (
         f"{answer['outcome']}: {answer['rows']} rows of {answer['measured']}, "
@@ -46,13 +46,13 @@ def describe_loop_fit(fitted: FittedLoop, folder: Path) -> FitFiles:
         lines=[head, *format_values(answer), *rest],
         summary=[head, *rest],
         scenes={FITTED_SCENE: scene},
-        rows=_rows(fitted),
-        charts=_charts(fitted),
+        rows=_csv_rows(fitted),
+        charts=_draw_charts(fitted),
         caption="Measured and fitted values; on the right the residual of each row",
     )
 
 
-def _answer(fitted: FittedLoop) -> dict:
+def _fit_json(fitted: FittedLoop) -> dict:
     """Return the object of fit.json."""
     keys, loop = fitted.keys, fitted.loop
     found = keys.fit
@@ -87,7 +87,7 @@ def _answer(fitted: FittedLoop) -> dict:
     }
 
 
-def _rows(fitted: FittedLoop) -> list:
+def _csv_rows(fitted: FittedLoop) -> list:
     """Return the rows of fit.csv in SI units, which can be used as input of another fit."""
     loop = fitted.loop
     unit = LABELS[loop.quantity][1]
@@ -101,7 +101,7 @@ def _rows(fitted: FittedLoop) -> list:
     return [head, *([*map(repr, row), int(out)] for row, out in zip(rows, held))]
 
 
-def _charts(fitted: FittedLoop) -> list:
+def _draw_charts(fitted: FittedLoop) -> list:
     """Return the reading against displacement, and the residual of each row."""
     loop = fitted.loop
     name, unit = LABELS[loop.quantity]
@@ -111,18 +111,26 @@ def _charts(fitted: FittedLoop) -> list:
     slide, reading = loop.displacement * size, loop.reading * scale
     residual = (fitted.model - loop.reading) * scale
     over_slide = []
-    over_rows = [charts.line(number[[0, -1]], [0.0, 0.0], "soft", width=0.8)]
+    over_rows = [charts.make_line(number[[0, -1]], [0.0, 0.0], "soft", width=0.8)]
     groups = ((~fitted.held, "soft", "measured"), (fitted.held, "warm", "measured, held out"))
     for rows, colour, text in groups:
         if rows.any():
-            over_slide.append(charts.dots(slide[rows], reading[rows], colour, text, size=DOT_SIZE))
-            over_rows.append(charts.dots(number[rows], residual[rows], colour, size=DOT_SIZE))
-    over_slide.append(charts.line(slide, fitted.model * scale, "accent", "fitted", width=1.0))
+            over_slide.append(
+                charts.make_dots(slide[rows], reading[rows], colour, text, size=DOT_SIZE)
+            )
+            over_rows.append(charts.make_dots(number[rows], residual[rows], colour, size=DOT_SIZE))
+    over_slide.append(charts.make_line(slide, fitted.model * scale, "accent", "fitted", width=1.0))
     return [
-        charts.chart(
-            "Measured and fitted", charts.axis("slide", along), charts.axis(name, up), over_slide
+        charts.make_chart(
+            "Measured and fitted",
+            charts.make_axis("slide", along),
+            charts.make_axis(name, up),
+            over_slide,
         ),
-        charts.chart(
-            "Residual", charts.axis("row"), charts.axis("fitted - measured", up), over_rows
+        charts.make_chart(
+            "Residual",
+            charts.make_axis("row"),
+            charts.make_axis("fitted - measured", up),
+            over_rows,
         ),
     ]

@@ -4,7 +4,14 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from ..pages.document import Section, document, figure, sentence_html, table, warning_box
+from ..pages.document import (
+    Section,
+    document_html,
+    figure_html,
+    sentence_html,
+    table_html,
+    warning_box,
+)
 from .text import format_fitted, named_values
 
 FILES = {
@@ -14,7 +21,7 @@ FILES = {
 }
 
 
-def page(
+def page_html(
     answer: dict, lines: Sequence, summary: Sequence, *, picture: str, caption: str, scene_text: str
 ) -> str:
     """Return the HTML page of a fit.
@@ -37,7 +44,7 @@ def page(
     values = named_values(answer)
     sections = [Section("values", "Fitted values", _values_table(values))]
     if picture:
-        shown = figure(0, picture, f"{caption}.", caption)
+        shown = figure_html(0, picture, f"{caption}.", caption)
         sections.append(Section("picture", "Measured and fitted", shown))
     if len(answer.get("correlation", ())) > 1:
         rows = _correlation_table(answer["correlation"], list(values))
@@ -53,10 +60,10 @@ def page(
     )
     sections.append(Section("origin", "Scene and files", origin))
     title = f"{answer['title'] or 'Fit'}: fitted to {Path(answer['measured']).name}"
-    return document(title, _verdict(answer, values, summary), sections)
+    return document_html(title, _verdict_html(answer, values, summary), sections)
 
 
-def _verdict(answer: dict, values: dict, summary: Sequence) -> str:
+def _verdict_html(answer: dict, values: dict, summary: Sequence) -> str:
     """Return the values with their intervals, the summary and the warnings."""
     short = "; ".join(f"{escape(key)} = {_value_with_ends(one)}" for key, one in values.items())
     law = f"{answer['law']}: " if "law" in answer else ""
@@ -92,7 +99,7 @@ def _values_table(values: dict) -> str:
         if described.get("at_bound"):
             searched += f", at its {described['at_bound']} bound"
         rows.append([escape(key), value, interval, escape(unit), searched])
-    return table(("key", ">value", ">95 %", "unit", "searched"), rows)
+    return table_html(("key", ">value", ">95 %", "unit", "searched"), rows)
 
 
 def _format_bound(described: dict, end: float) -> str:
@@ -107,7 +114,7 @@ def _correlation_table(correlation: list, names: list) -> str:
     for name, row in zip(names, correlation):
         cells = ["&ndash;" if part is None else f"{part:.2f}" for part in row]
         rows.append([escape(name), *cells])
-    return table(("key", *(f">{escape(name)}" for name in names)), rows) + (
+    return table_html(("key", *(f">{escape(name)}" for name in names)), rows) + (
         "<p class=soft>If a correlation is near 1 or -1, the measurement determines only a "
         "combination of these two values.</p>"
     )

@@ -30,8 +30,8 @@ def describe_patch_fit(fitted: FittedPatch, folder: Path) -> FitFiles:
 
     folder: the paths in the fitted scenes are relative to it.
     """
-    answer = _answer(fitted)
-    lines = _lines(answer)
+    answer = _fit_json(fitted)
+    lines = _format_answer(answer)
     names = {FITTED_SCENE: fitted.best} | {f"scene.{law}.toml": law for law in FITTED_LAWS}
     scenes = {name: _scene_text(fitted, law, answer, folder / name) for name, law in names.items()}
     return FitFiles(
@@ -39,21 +39,21 @@ def describe_patch_fit(fitted: FittedPatch, folder: Path) -> FitFiles:
         lines=lines,
         summary=lines[:1],
         scenes=scenes,
-        rows=_rows(fitted),
-        charts=_charts(fitted),
+        rows=_csv_rows(fitted),
+        charts=_draw_charts(fitted),
         caption="Stiffness and loss per cycle of the patch and of each fitted law, against slide "
         "amplitude",
     )
 
 
-def _answer(fitted: FittedPatch) -> dict:
+def _fit_json(fitted: FittedPatch) -> dict:
     """Return the object of fit.json."""
     patch = fitted.patch
     laws = {law: _describe_law(law, one, fitted) for law, one in fitted.laws.items()}
     best = laws[fitted.best]
     mesh = None
     if patch.mesh_change is not None:
-        mesh = _sizes(patch.mesh_change, patch.slides) | {"nodes": patch.nodes}
+        mesh = _difference_sizes(patch.mesh_change, patch.slides) | {"nodes": patch.nodes}
     scene = fitted.scene
     return describe_measurement(scene.title, scene.path.name, "patch", best["outcome"]) | {
         "law": fitted.best,
@@ -74,7 +74,7 @@ def _answer(fitted: FittedPatch) -> dict:
 def _describe_law(law: str, one: FittedLaw, fitted: FittedPatch) -> dict:
     """Return a law as written in fit.json."""
     units = FITTED_LAWS[law].units
-    sizes = _sizes(one.deviations, fitted.patch.slides)
+    sizes = _difference_sizes(one.deviations, fitted.patch.slides)
     return {
         "values": {
             f"friction.{key}": {"value": value, "unit": units.get(key, "1")}
@@ -86,7 +86,7 @@ def _describe_law(law: str, one: FittedLaw, fitted: FittedPatch) -> dict:
     }
 
 
-def _sizes(deviations, slides) -> dict:
+def _difference_sizes(deviations, slides) -> dict:
     """Return the largest and the rms relative difference (2, k) of stiffness and loss."""
     out = {}
     for name, row in zip(PARTS, deviations):
@@ -122,12 +122,15 @@ def _scene_text(fitted: FittedPatch, law: str, answer: dict, path: Path) -> str:
     tables["friction"] = {"law": law, "static": scene.friction.static, **values}
     tables["accuracy"] = {"tolerance": scene.accuracy.tolerance}
     whole = loads(format_scene(tables), scene.path)
-    comments = [f"law '{law}' in place of the patch of {scene.path.name}", *_costs(law, answer)]
+    comments = [
+        f"law '{law}' in place of the patch of {scene.path.name}",
+        *_error_sentences(law, answer),
+    ]
     head = "\n".join(f"# {line}" for line in comments)
     return f"{head}\n\n{write_resolved(move_scene(whole, path), build(whole))}"
 
 
-def _rows(fitted: FittedPatch) -> list:
+def _csv_rows(fitted: FittedPatch) -> list:
     """Return the rows of fit.csv."""
     curves = {"patch": fitted.patch.curves} | {law: one.curves for law, one in fitted.laws.items()}
     parts = ("force [N]", "loss [J]")
@@ -138,25 +141,27 @@ def _rows(fitted: FittedPatch) -> list:
     return [head, *([*map(repr, row)] for row in np.column_stack(columns).tolist())]
 
 
-def _charts(fitted: FittedPatch) -> list:
+def _draw_charts(fitted: FittedPatch) -> list:
     """Return stiffness and loss per cycle against the amplitude of the slide."""
     slides = fitted.patch.slides
     unit, scale = choose_axis_unit(slides, "m")
-    along = charts.axis("amplitude of the slide", unit, True)
+    along = charts.make_axis("amplitude of the slide", unit, True)
     x = slides * scale
     own = fitted.patch.curves
-    stiffness = [charts.dots(x, own.force / slides, PATCH_COLOUR, "patch", size=4)]
-    loss = [charts.dots(x, _above_zero(own.loss), PATCH_COLOUR, "patch", size=4)]
+    stiffness = [charts.make_dots(x, own.force / slides, PATCH_COLOUR, "patch", size=4)]
+    loss = [charts.make_dots(x, _above_zero(own.loss), PATCH_COLOUR, "patch", size=4)]
     peak = float((own.force / slides).max())
     for law, one in fitted.laws.items():
         values = one.curves.force / slides
         peak = max(peak, float(values.max()))
-        stiffness.append(charts.line(x, values, COLOURS[law], law))
-        loss.append(charts.line(x, _above_zero(one.curves.loss), COLOURS[law], law))
-    from_zero = charts.axis("stiffness", "N/m") | {"range": [0.0, Y_MARGIN * peak]}
+        stiffness.append(charts.make_line(x, values, COLOURS[law], law))
+        loss.append(charts.make_line(x, _above_zero(one.curves.loss), COLOURS[law], law))
+    from_zero = charts.make_axis("stiffness", "N/m") | {"range": [0.0, Y_MARGIN * peak]}
     return [
-        charts.chart("Stiffness", along, from_zero, stiffness),
-        charts.chart("Loss per cycle", along, charts.axis("loss per cycle", "J", True), loss),
+        charts.make_chart("Stiffness", along, from_zero, stiffness),
+        charts.make_chart(
+            "Loss per cycle", along, charts.make_axis("loss per cycle", "J", True), loss
+        ),
     ]
 
 
@@ -165,7 +170,7 @@ def _above_zero(values) -> np.ndarray:
     return np.where(values > 0, values, np.nan)
 
 
-def _lines(answer: dict) -> list:
+def _format_answer(answer: dict) -> list:
     """Return the answer as lines of text."""
     low, high = (format_quantity(end, "m", 3) for end in answer["amplitudes"])
     out = [
@@ -173,27 +178,28 @@ def _lines(answer: dict) -> list:
         f"{format_quantity(answer['load'], 'N', 4)}; the patch slips as a whole at "
         f"{format_quantity(answer['slip_force'], 'N', 4)} and has {_format_stiffness(answer)} while the "
         f"whole patch sticks; {answer['rows']} amplitudes of the slide from {low} to {high}. "
-        f"{_headline(answer)}",
+        f"{_best_law_sentence(answer)}",
         f"  {'law':<16}{'error of stiffness':>22}{'error of loss':>22}   values",
     ]
     for law, one in answer["laws"].items():
         cells = [
-            f"{_percent(one[part]['largest'])} (rms {_percent(one[part]['rms'])})" for part in PARTS
+            f"{_format_percent(one[part]['largest'])} (rms {_format_percent(one[part]['rms'])})"
+            for part in PARTS
         ]
         values = ", ".join(
-            f"{key.partition('.')[2]} {_format(value['value'], value['unit'])}"
+            f"{key.partition('.')[2]} {_format_in_unit(value['value'], value['unit'])}"
             for key, value in one["values"].items()
         )
         out.append(f"  {law:<16}{cells[0]:>22}{cells[1]:>22}   {values}")
-    out += [f"  {line}" for line in _costs(answer["law"], answer)]
+    out += [f"  {line}" for line in _error_sentences(answer["law"], answer)]
     if answer["mesh"] is not None:
         stiffness, loss = (answer["mesh"][part] for part in PARTS)
         out.append(
             f"  A mesh coarser than the present one ({answer['mesh']['nodes']} interface nodes) "
             "changes the stiffness of the patch by at most "
-            f"{_percent(abs(stiffness['largest']))}, and the energy dissipated per cycle by at "
-            f"most {_percent(abs(loss['largest']))} (at {format_quantity(loss['at'], 'm', 3)}) and by "
-            f"{_percent(loss['rms'])} rms."
+            f"{_format_percent(abs(stiffness['largest']))}, and the energy dissipated per cycle by at "
+            f"most {_format_percent(abs(loss['largest']))} (at {format_quantity(loss['at'], 'm', 3)}) and by "
+            f"{_format_percent(loss['rms'])} rms."
         )
     return out
 
@@ -202,33 +208,33 @@ def _format_stiffness(answer: dict) -> str:
     """Format the stiffness while nothing slips, with its error if it is known."""
     value, error = answer["stiffness"], answer["stiffness_error"]
     if error is None:
-        return _format(value, "N/m")
+        return _format_in_unit(value, "N/m")
     return format_value(value, error, unit=SENTENCE_UNITS["N/m"])
 
 
-def _headline(answer: dict) -> str:
+def _best_law_sentence(answer: dict) -> str:
     """Name the best law, with the signs and sizes of its largest errors."""
     stiffness, loss = (answer["laws"][answer["law"]][part] for part in PARTS)
     return (
         f"Law '{answer['law']}' fits best; its largest errors over this range are "
-        f"{_signed_percent(stiffness['largest'])} of the stiffness "
-        f"(at {format_quantity(stiffness['at'], 'm', 3)}) and {_signed_percent(loss['relative'])} of the "
+        f"{_format_signed_percent(stiffness['largest'])} of the stiffness "
+        f"(at {format_quantity(stiffness['at'], 'm', 3)}) and {_format_signed_percent(loss['relative'])} of the "
         f"energy loss per cycle (at {format_quantity(loss['relative_at'], 'm', 3)})"
     )
 
 
-def _costs(law: str, answer: dict) -> list:
+def _error_sentences(law: str, answer: dict) -> list:
     """Return sentences on the error of a law in place of the patch."""
     low, high = (format_quantity(end, "m", 3) for end in answer["amplitudes"])
     stiffness, loss = (answer["laws"][law][part] for part in PARTS)
     side = "larger" if loss["largest"] > 0 else "smaller"
     return [
         f"For slide amplitudes from {low} to {high} the stiffness of '{law}' differs from that of "
-        f"the patch by at most {_percent(abs(stiffness['largest']))} "
-        f"(at {format_quantity(stiffness['at'], 'm', 3)}) and by {_percent(stiffness['rms'])} rms.",
+        f"the patch by at most {_format_percent(abs(stiffness['largest']))} "
+        f"(at {format_quantity(stiffness['at'], 'm', 3)}) and by {_format_percent(stiffness['rms'])} rms.",
         "The energy that this law dissipates per cycle is up to "
-        f"{_percent(abs(loss['largest']))} {side} than that of the patch "
-        f"(at {format_quantity(loss['at'], 'm', 3)}) and differs by {_percent(loss['rms'])} rms; where this "
+        f"{_format_percent(abs(loss['largest']))} {side} than that of the patch "
+        f"(at {format_quantity(loss['at'], 'm', 3)}) and differs by {_format_percent(loss['rms'])} rms; where this "
         "energy is below a thousandth of 4 x force x slide, the difference is given relative to "
         f"that thousandth.{_relative_sentence(loss)}",
         "If this law replaces the patch, the relative error of a mode's frequency is at most about "
@@ -243,21 +249,21 @@ def _relative_sentence(loss: dict) -> str:
         return ""
     return (
         " Relative to the energy that the patch itself dissipates, the largest difference is "
-        f"{_signed_percent(loss['relative'])} (at {format_quantity(loss['relative_at'], 'm', 3)})."
+        f"{_format_signed_percent(loss['relative'])} (at {format_quantity(loss['relative_at'], 'm', 3)})."
     )
 
 
-def _percent(fraction: float) -> str:
+def _format_percent(fraction: float) -> str:
     """Format a fraction in percent."""
     return f"{format_number(100 * fraction, 2)} %"
 
 
-def _signed_percent(fraction: float) -> str:
+def _format_signed_percent(fraction: float) -> str:
     """Format a fraction in percent with its sign."""
     sign = "+" if fraction > 0 else ""
-    return f"{sign}{_percent(fraction)}"
+    return f"{sign}{_format_percent(fraction)}"
 
 
-def _format(value: float, unit: str) -> str:
+def _format_in_unit(value: float, unit: str) -> str:
     """Format a value in a suitable unit."""
     return format_quantity(value, SENTENCE_UNITS.get(unit, unit), 5)

@@ -121,7 +121,7 @@ def fit_into(
     """
     format_option = listener.format_option
     kind = "patch" if options.from_patch else choose_kind(scene, to)
-    _refuse(kind, options, format_option)
+    _check_options(kind, options, format_option)
     if options.from_patch == bool(to) or (options.from_patch and free):
         raise PatchfemError(
             f"{format_option('to')} MEASURED and {format_option('free')} KEYS are needed, or "
@@ -162,7 +162,7 @@ def choose_kind(scene: Scene, to: str) -> str:
     return "curve" if is_curve(to) else "rows"
 
 
-def _refuse(kind: str, options: Options, format_option: Callable) -> None:
+def _check_options(kind: str, options: Options, format_option: Callable) -> None:
     """Raise PatchfemError for an option that this kind of fit does not have, or a wrong value."""
     others = [name for name in options.names_given() if name not in OPTIONS_BY_KIND[kind]]
     if others:

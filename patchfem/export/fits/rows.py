@@ -11,7 +11,7 @@ from ... import __version__
 from ...campaigns.rows.asked import READINGS
 from ...campaigns.rows.cells import scores
 from ...campaigns.rows.fit import SAME_SCORE, FittedRows
-from ...campaigns.rows.null_models import NULLS
+from ...campaigns.rows.null_models import NULL_MODELS
 from ...core import G_N
 from ...disk.atomic_write import write_text
 from ..drawing import charts
@@ -73,15 +73,15 @@ def describe_rows_fit(fitted: FittedRows, folder: Path) -> FitFiles:
     folder: the paths in the fitted scene are relative to it.
     """
     answer = describe_answer(fitted)
-    lines = _lines(answer)
+    lines = _format_answer(answer)
     scene = fitted_scene_text(fitted.keys, fitted.cells.path.name, folder)
     return FitFiles(
         answer=answer,
         lines=lines,
         summary=lines[:1],
         scenes={FITTED_SCENE: scene},
-        rows=_table(answer),
-        charts=_charts(answer),
+        rows=_csv_rows(answer),
+        charts=_draw_charts(answer),
         caption="Computed against measured readings; the line is where both are equal",
     )
 
@@ -92,7 +92,7 @@ def describe_answer(fitted: FittedRows) -> dict:
     found = keys.fit
     nulls = {}
     nulls_stable = {}
-    for name in NULLS:
+    for name in NULL_MODELS:
         null = fitted.nulls[name]
         nulls[name] = fitted.score(null.logs, null.left) | {"numbers": null.numbers}
         nulls_stable[name] = fitted.score(null.logs, null.left, stable=True)
@@ -103,17 +103,17 @@ def describe_answer(fitted: FittedRows) -> dict:
         "nulls": nulls,
         "nulls_stable": nulls_stable,
         "unstable": fitted.how.unstable,
-        "reading": _reading(fitted),
+        "reading": _instrument_settings(fitted),
         "unknown": describe_unknown(keys.ranges, found),
         "correlation": describe_correlation(found),
         "readings": int((~fitted.held).sum()),
         "held": int(fitted.held.sum()),
         "rms": found.rms,
         "seed": fitted.how.seed,
-        "starts": _starts(fitted),
-        "folds": _folds(fitted),
-        "placebos": _placebos(fitted),
-        "rows": _rows(fitted),
+        "starts": _search_starts(fitted),
+        "folds": _fold_scores(fitted),
+        "placebos": _placebo_scores(fitted),
+        "rows": _row_entries(fitted),
         "evaluations": found.counts.evaluations,
         "failures": found.counts.failures,
         "motions": fitted.runs,
@@ -122,7 +122,7 @@ def describe_answer(fitted: FittedRows) -> dict:
     }
 
 
-def _reading(fitted: FittedRows) -> dict:
+def _instrument_settings(fitted: FittedRows) -> dict:
     """Return how the instruments read, with fitted or given gains."""
     read = fitted.asked.read
     out = {
@@ -137,7 +137,7 @@ def _reading(fitted: FittedRows) -> dict:
     return out
 
 
-def _starts(fitted: FittedRows) -> list:
+def _search_starts(fitted: FittedRows) -> list:
     """Return where each search began and ended, with its training score."""
     names = [bound.key for bound in fitted.keys.ranges]
     found = fitted.found
@@ -154,7 +154,7 @@ def _starts(fitted: FittedRows) -> list:
     return out
 
 
-def _folds(fitted: FittedRows) -> list:
+def _fold_scores(fitted: FittedRows) -> list:
     """Return the fits without the readings of each value, and their scores on these readings."""
     names = [bound.key for bound in fitted.keys.ranges]
     return [
@@ -169,7 +169,7 @@ def _folds(fitted: FittedRows) -> list:
     ]
 
 
-def _placebos(fitted: FittedRows) -> list:
+def _placebo_scores(fitted: FittedRows) -> list:
     """Return the scores of each placebo, a fit repeated with another value of a fixed key.
 
     Placebos leave out no readings, so they have no score "left_out".
@@ -182,7 +182,7 @@ def _placebos(fitted: FittedRows) -> list:
     return out
 
 
-def _rows(fitted: FittedRows) -> list:
+def _row_entries(fitted: FittedRows) -> list:
     """Return every row as measured and computed, in SI units."""
     cells = fitted.cells
     keys = zip(cells.row.tolist(), map(bool, cells.felt))
@@ -204,7 +204,7 @@ def _rows(fitted: FittedRows) -> list:
     return out
 
 
-def _table(answer: dict) -> list:
+def _csv_rows(answer: dict) -> list:
     """Return the rows of fit.csv in g and mil, with the computed readings."""
     rows: list = [
         [
@@ -233,15 +233,15 @@ def _format_cell(value: float | None, unit: float) -> str:
     return "" if value is None else f"{value / unit:.6g}"
 
 
-def _charts(answer: dict) -> list:
+def _draw_charts(answer: dict) -> list:
     """Return computed against measured accelerations and displacements."""
     return [
-        _chart(answer, "acceleration", "g", G_N),
-        _chart(answer, "displacement", "mil", MIL),
+        _draw_chart(answer, "acceleration", "g", G_N),
+        _draw_chart(answer, "displacement", "mil", MIL),
     ]
 
 
-def _chart(answer: dict, name: str, unit: str, scale: float) -> dict:
+def _draw_chart(answer: dict, name: str, unit: str, scale: float) -> dict:
     """Return computed against measured readings of one kind, by whether they were held out."""
     groups: dict = {}
     for row in answer["rows"]:
@@ -256,20 +256,22 @@ def _chart(answer: dict, name: str, unit: str, scale: float) -> dict:
         if unstable:
             text += ", unstable in the test"
         shape = "triangle" if unstable else "circle"
-        marks.append(charts.dots(x, y, "warm" if held else "accent", text, size=4, shape=shape))
+        marks.append(
+            charts.make_dots(x, y, "warm" if held else "accent", text, size=4, shape=shape)
+        )
     if groups:
         numbers = np.concatenate([np.ravel(points) for points in groups.values()])
         ends = [numbers.min() / AXIS_MARGIN, numbers.max() * AXIS_MARGIN]
-        marks.append(charts.line(ends, ends, "soft", width=0.8))
-    return charts.chart(
+        marks.append(charts.make_line(ends, ends, "soft", width=0.8))
+    return charts.make_chart(
         name.capitalize(),
-        charts.axis("measured", unit),
-        charts.axis("computed", unit),
+        charts.make_axis("measured", unit),
+        charts.make_axis("computed", unit),
         marks,
     )
 
 
-def _lines(answer: dict) -> list:
+def _format_answer(answer: dict) -> list:
     """Return the values, and the scores of the rig and of the models without mechanics."""
     good = [one["training"] for one in answer["starts"] if one["training"] is not None]
     alike = sum(rms <= min(good) * SAME_SCORE for rms in good)
@@ -285,7 +287,9 @@ def _lines(answer: dict) -> list:
         score = answer["scores"][part]
         if score is not None:
             out.append(_score_line(part.replace("_", " "), score))
-            out += [_score_line(f"  null {name}", answer["nulls"][name][part]) for name in NULLS]
+            out += [
+                _score_line(f"  null {name}", answer["nulls"][name][part]) for name in NULL_MODELS
+            ]
             stable = answer["scores_stable"][part]
             if stable != score:
                 out.append(_score_line("  without rows flagged U", stable))

@@ -86,11 +86,15 @@ def convert_file(file: Path, out: Path, asked: Iterable[str], zero: bool, how: E
             "--zero can be used only when importing a table of records (-o table.csv)"
         )
     if ending == ".csv":
-        return _decay(file, out, asked, how.begin) if how.decay else _table(file, out, asked, zero)
-    return (_modes if ending == ".toml" else _response)(file, out, asked, how)
+        return (
+            _write_decay(file, out, asked, how.begin)
+            if how.decay
+            else _write_table(file, out, asked, zero)
+        )
+    return (_write_modes if ending == ".toml" else _write_response)(file, out, asked, how)
 
 
-def _table(file: Path, out: Path, asked, zero: bool) -> dict:
+def _write_table(file: Path, out: Path, asked, zero: bool) -> dict:
     """Write records as a table."""
     found = laboratory.read_records(file, records.parse_requests(asked))
     values = records.shift_to_zero(found.values) if zero else found.values
@@ -121,10 +125,12 @@ def _table(file: Path, out: Path, asked, zero: bool) -> dict:
     }
 
 
-def _decay(file: Path, out: Path, asked, begin: str) -> dict:
+def _write_decay(file: Path, out: Path, asked, begin: str) -> dict:
     """Write frequency and damping of a free decay as a table."""
-    values, notes = _records(file, asked)
-    found, more = measured.compute_decay_curve(values, _quantity(begin, "time", f"--begin {begin}"))
+    values, notes = _read_records(file, asked)
+    found, more = measured.compute_decay_curve(
+        values, _parse_quantity(begin, "time", f"--begin {begin}")
+    )
     write.write_table(
         out,
         {f"decay_{name}": one for name, one in found._asdict().items()},
@@ -144,23 +150,26 @@ def _decay(file: Path, out: Path, asked, begin: str) -> dict:
     }
 
 
-def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
+def _write_modes(file: Path, out: Path, asked, how: Estimate) -> dict:
     """Write modes as tables of a scene."""
-    shapes, notes = _shapes(file, asked, how)
+    shapes, notes = _read_shapes(file, asked, how)
     if shapes is not None:
         found = measured.list_shape_modes(*shapes)
     else:
-        values, notes = _records(file, asked)
+        values, notes = _read_records(file, asked)
         found = (
             measured.identify_decay_modes(
-                values, _quantity(how.begin, "time", f"--begin {how.begin}")
+                values, _parse_quantity(how.begin, "time", f"--begin {how.begin}")
             )
             if how.decay
             else measured.identify_driven_modes(
-                values, _segment(how.segment), _window(how.window), _band(how.band)
+                values,
+                _parse_segment(how.segment),
+                _parse_window(how.window),
+                _parse_band(how.band),
             )
         )
-    atomic_write.write_text(out, mode_lines.fragment(found, file.name))
+    atomic_write.write_text(out, mode_lines.structure_text(found, file.name))
     listed = [
         {"frequency": f, "damping": zeta, "about": about}
         for f, zeta, about in zip(
@@ -178,15 +187,15 @@ def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
     }
 
 
-def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
+def _write_response(file: Path, out: Path, asked, how: Estimate) -> dict:
     """Write a frequency response as a universal file."""
     if how.decay or how.begin or how.band:
         raise PatchfemError(
             "--decay, --begin and --band can be used only for modes (-o modes.toml)"
         )
-    values, notes = _records(file, asked)
+    values, notes = _read_records(file, asked)
     found, step, drive, response = measured.estimate_record(
-        values, _segment(how.segment), _window(how.window)
+        values, _parse_segment(how.segment), _parse_window(how.window)
     )
     write.write_response(out, found, drive, response)
     return {
@@ -199,7 +208,7 @@ def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
     }
 
 
-def _records(file: Path, asked) -> tuple:
+def _read_records(file: Path, asked) -> tuple:
     """Read records and check that one of them is a response."""
     found = laboratory.read_records(file, records.parse_requests(asked), OUTPUT)
     if found.channel_list and not found.values.keys() & measured.DERIVATIVE_ORDERS.keys():
@@ -210,7 +219,7 @@ def _records(file: Path, asked) -> tuple:
     return found.values, found.notes
 
 
-def _shapes(file: Path, asked, how: Estimate) -> tuple:
+def _read_shapes(file: Path, asked, how: Estimate) -> tuple:
     """Return ((shapes, points), notes) of a universal file with modes or frequency responses.
 
     (None, ()) for any other file.
@@ -240,7 +249,7 @@ def _shapes(file: Path, asked, how: Estimate) -> tuple:
     ), ()
 
 
-def _quantity(text: str, kind: str, option: str) -> float | None:
+def _parse_quantity(text: str, kind: str, option: str) -> float | None:
     """Return the value of an option in SI; None if it is ""."""
     try:
         return quantities.parse_quantity(text, kind) if text else None
@@ -248,25 +257,27 @@ def _quantity(text: str, kind: str, option: str) -> float | None:
         raise PatchfemError(f"{option}: {error}") from None
 
 
-def _segment(text: str) -> float | None:
+def _parse_segment(text: str) -> float | None:
     """Return the length of a segment [s]; None for the default."""
-    return _quantity(text, "time", f"--segment {text}")
+    return _parse_quantity(text, "time", f"--segment {text}")
 
 
-def _window(text: str) -> str | None:
+def _parse_window(text: str) -> str | None:
     """Return the name of the window; None for the default."""
     if text not in ("", "hann", "none"):
         raise PatchfemError(f"--window {text}: hann or none")
     return text or None
 
 
-def _band(text: str) -> tuple:
+def _parse_band(text: str) -> tuple:
     """Return both ends of a band [Hz]."""
     if not text:
         return (0.0, float("inf"))
     low, dots, high = text.partition("..")
     ends = [
-        _quantity(one, "frequency", f"--band {one}") for one in (low.strip(), high.strip()) if dots
+        _parse_quantity(one, "frequency", f"--band {one}")
+        for one in (low.strip(), high.strip())
+        if dots
     ]
     if not ends or None in ends or not 0 <= ends[0] < ends[1]:
         raise PatchfemError(

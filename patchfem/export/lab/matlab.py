@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from .series import Histories, program
+from .series import Histories, program_name
 
 LONGEST = 63  # largest number of characters of a name in MATLAB
 
 
-def write(path: Path, found: Histories) -> None:
+def write_arrays(path: Path, found: Histories) -> None:
     """Write all arrays of a folder by name, histories as (k, 1).
 
     `units.NAME` is the unit of NAME.
@@ -21,7 +21,7 @@ def write(path: Path, found: Histories) -> None:
     with open(path, "wb") as file:
         savemat(
             file,
-            {**values, "units": units, "title": found.title, "source": program()},
+            {**values, "units": units, "title": found.title, "source": program_name()},
             oned_as="column",
             long_field_names=True,
         )

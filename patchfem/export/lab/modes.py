@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .universal import SI, program, write_sets
+from .series import program_name
+from .universal import SI, write_sets
 
 FORCE, ACCELERATION, FREQUENCY = 13, 12, 18  # data types of dataset 58
 KINDS = {"displacement": (8, "m"), "velocity": (11, "m/s"), "acceleration": (12, "m/s^2")}
@@ -12,13 +13,13 @@ OVER = {"force": (FORCE, "N"), "base_acceleration": (ACCELERATION, "m/s^2")}
 RESPONSE, COHERENCE = 4, 6  # function types
 
 
-def fragment(found, source: str) -> str:
+def structure_text(found, source: str) -> str:
     """Return [structure] and its [[structure.mode]] as text.
 
     found: `identify.measured_modes.ListedModes`; source: name of the file with the measurement.
     """
-    lines = [f"# modes of {plain(source)}, by {program()}"] + [
-        f"# {plain(note)}" for note in found.notes
+    lines = [f"# modes of {make_printable(source)}, by {program_name()}"] + [
+        f"# {make_printable(note)}" for note in found.notes
     ]
     mass = (
         f'moving_mass = "{found.mass!r} kg"'
@@ -34,7 +35,7 @@ def fragment(found, source: str) -> str:
             "[[structure.mode]]",
             f'name = "mode {k + 1}"',
             f'frequency = "{f!r} Hz"',
-            f"damping = {zeta!r}" + (f"  # {plain(about)}" if about else ""),
+            f"damping = {zeta!r}" + (f"  # {make_printable(about)}" if about else ""),
         ]
         lines += [
             f'{key} = "{float(row[k])!r} rad/m"' if key == "pitch" else f"{key} = {float(row[k])!r}"
@@ -43,7 +44,7 @@ def fragment(found, source: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def plain(text: str) -> str:
+def make_printable(text: str) -> str:
     """Return a text as one line of printable characters, for a comment."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
 
@@ -67,7 +68,7 @@ def write_response(path: Path, estimate, drive: str, response: str) -> None:
         "type": 58,
         "binary": 1,
         "id1": f"{response} over {drive}",
-        "id2": program(),
+        "id2": program_name(),
         "rsp_node": 1,
         "rsp_dir": 1,
         "ref_node": 1,

@@ -11,7 +11,7 @@ from ...core import Missing, PatchfemError
 from ...inputs.cells import TableFormat
 from ...inputs.columns import read_columns
 from ...inputs.units import FORCE_UNITS, SLIDE_UNITS
-from ..read_results import is_real, variables
+from ..read_results import is_real, read_variables
 
 # Names of slide and resistance; the first pair that a folder has counts.
 LOOPS = (
@@ -73,7 +73,7 @@ class Histories:
         return list(found.values())
 
 
-def histories_of(folder: Path) -> Histories:
+def read_histories(folder: Path) -> Histories:
     """Read the histories in a results folder.
 
     They are those of a run (result.nc), or of a fit to a loop (fit.csv).
@@ -85,15 +85,15 @@ def histories_of(folder: Path) -> Histories:
     if not folder.is_dir():
         raise Missing(f"{folder}: no such results folder")
     if (folder / "result.nc").is_file():
-        return _of_run(folder / "result.nc")
+        return _read_run_histories(folder / "result.nc")
     if (folder / "fit.csv").is_file():
-        return _of_fit(folder / "fit.csv")
+        return _read_fit_histories(folder / "fit.csv")
     raise Missing(f"{folder}: it contains neither result.nc of a run nor fit.csv of a fit")
 
 
-def _of_run(path: Path) -> Histories:
+def _read_run_histories(path: Path) -> Histories:
     """Read the histories of a run."""
-    about, found = variables(path)
+    about, found = read_variables(path)
     title = str(about.get("title", ""))
     arrays = {name: (one.values, one.unit) for name, one in found.items() if is_real(one.values)}
     columns = []
@@ -113,7 +113,7 @@ def _of_run(path: Path) -> Histories:
     return Histories(title, found["time"][1].astype(float), columns, arrays)
 
 
-def _of_fit(path: Path) -> Histories:
+def _read_fit_histories(path: Path) -> Histories:
     """Read measured and fitted loop of a fit."""
     units = {**FORCE_UNITS, **SLIDE_UNITS, "fitted": {"": 1.0}}
     fitted_loop = TableFormat(
@@ -135,6 +135,6 @@ def _of_fit(path: Path) -> Histories:
     )
 
 
-def program() -> str:
+def program_name() -> str:
     """Return the name of the program with its version."""
     return f"patchfem {__version__}"

@@ -55,7 +55,7 @@ class Elements(NamedTuple):
     speed: np.ndarray
 
 
-def export(model: Model, out: Path) -> str:
+def export_structure(model: Model, out: Path) -> str:
     """Write the rig of a Model as .mat or .npz, and return a line about it.
 
     Raises
@@ -76,13 +76,13 @@ def export(model: Model, out: Path) -> str:
                 "results folder",
                 "structure",
             )
-        _refuse(model)
-        arrays, found = matrices_of(model), elements_of(model)
+        _refuse_unsupported(model)
+        arrays, found = rig_matrices(model), friction_elements(model)
     with write_atomically(out) as partial, open(partial, "wb") as file:
         if out.suffix.lower() == ".npz":
             np.savez(file, **arrays, **found._asdict())
         else:
-            _matlab(file, arrays, found)
+            _write_nlvib(file, arrays, found)
     counts = (
         f"{count} {name}{'s' * (count != 1)}"
         for count, name in (
@@ -93,10 +93,10 @@ def export(model: Model, out: Path) -> str:
     name = "output" if out.suffix.lower() == ".npz" else "T_out"
     rows = f"; in these coordinates x the output is {name}·x, Fex1 is the force on each of them"
     slides = ", the slide of interface i is row i of slide·x" if "slide" in arrays else ""
-    return f"{out}: {', '.join(counts)}{rows}{slides}{_left_out(model)}"
+    return f"{out}: {', '.join(counts)}{rows}{slides}{_omitted_features(model)}"
 
 
-def _left_out(model: Model) -> str:
+def _omitted_features(model: Model) -> str:
     """Return the end of a sentence on what the file lacks of the scene."""
     rig = model.rig
     out = ["[wear]"] * (model.wear is not None) + ["structure.travel"] * (
@@ -114,7 +114,7 @@ def _left_out(model: Model) -> str:
     return unit + ("; not in the file: " + ", ".join(out) if out else "")
 
 
-def matrices_of(model: Model) -> dict:
+def rig_matrices(model: Model) -> dict:
     """Return the matrices and vectors of a rig.
 
     For a drive other than a sine, Fex1 is that of 1 N or 1 m/s^2; for a release it is 0.
@@ -177,7 +177,7 @@ def _is_speed_only(rig) -> bool:
     return all(one.numbers.law == "tanh" for one in rig.friction.interfaces)
 
 
-def _refuse(model: Model) -> None:
+def _refuse_unsupported(model: Model) -> None:
     """Raise PatchfemError for features that neither matrices nor friction elements have."""
     rig = model.rig
     motion = engines.motion_properties(model, steady=True)
@@ -199,7 +199,7 @@ def _refuse(model: Model) -> None:
         )
 
 
-def elements_of(model: Model) -> Elements:
+def friction_elements(model: Model) -> Elements:
     """Return the friction elements of a rig; none if it has no friction."""
     rig, n = model.rig, model.rig.modes.omega.size
     none = np.zeros(0)
@@ -230,7 +230,7 @@ def elements_of(model: Model) -> Elements:
     return Elements("elements", direction, limit, stiffness, none)
 
 
-def _matlab(file, arrays: dict, found: Elements) -> None:
+def _write_nlvib(file, arrays: dict, found: Elements) -> None:
     """Write the variables of NLvib, column vectors, and a cell array of its structures."""
     from scipy.io import savemat
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from .series import Column
 
 
-def write(path: Path, time, columns: list) -> None:
+def write_columns(path: Path, time, columns: list) -> None:
     """Write columns with headers such as `force [N]`, the time (k,) [s] first if there is one."""
     whole = [*([] if time is None else [Column("time", "s", time, 0)]), *columns]
     lines = [",".join(f"{one.label} [{one.unit}]" for one in whole)]

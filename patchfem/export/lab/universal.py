@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from .series import Column, Histories, program
+from .series import Column, Histories, program_name
 
 TIME, DISPLACEMENT, GENERAL = 17, 8, 1  # data types
 TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13}  # data type by unit; all others are general
@@ -28,7 +28,7 @@ SI = {
 }
 
 
-def write(path: Path, found: Histories) -> int:
+def write_histories(path: Path, found: Histories) -> int:
     """Write the columns over time and the loops; return the number of datasets 58.
 
     Identification line 1 is the name of the history (for a loop, "force over slide"), line 2 the
@@ -52,12 +52,14 @@ def write(path: Path, found: Histories) -> int:
         []
         if found.time is None
         else [
-            _function(one.label, Column("time", "s", found.time, 0), one, HISTORY, found.title)
+            _function_dataset(
+                one.label, Column("time", "s", found.time, 0), one, HISTORY, found.title
+            )
             for one in found.columns
         ]
     )
     sets += [
-        _function(f"{force.label} over {slide.label}", slide, force, LOOP, found.title)
+        _function_dataset(f"{force.label} over {slide.label}", slide, force, LOOP, found.title)
         for slide, force in found.loops()
     ]
     if not sets:
@@ -85,10 +87,12 @@ def write_sets(path: Path, sets: list) -> None:
         file.write_sets(one, "add")
         if one["type"] == 58:
             values = 2 if one["data"].dtype.kind == "c" else 1
-            _count(path, begin, 8 * one["data"].size * (values + 1 - one["abscissa_spacing"]))
+            _write_byte_count(
+                path, begin, 8 * one["data"].size * (values + 1 - one["abscissa_spacing"])
+            )
 
 
-def _count(path: Path, begin: int, size: int) -> None:
+def _write_byte_count(path: Path, begin: int, size: int) -> None:
     """Write the number of bytes after the eleven lines of text into a dataset 58.
 
     Parameters
@@ -108,7 +112,7 @@ def _count(path: Path, begin: int, size: int) -> None:
         file.write(b"%12d" % size)
 
 
-def _function(name: str, over: Column, one: Column, kind: int, title: str) -> dict:
+def _function_dataset(name: str, over: Column, one: Column, kind: int, title: str) -> dict:
     """Return a dataset 58 of a column over another one."""
     line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
     return {
@@ -119,7 +123,7 @@ def _function(name: str, over: Column, one: Column, kind: int, title: str) -> di
         "ver_num": 0,
         "load_case_id": 0,
         "id1": name[:80],
-        "id2": program(),
+        "id2": program_name(),
         "id3": "NONE",
         "id4": line or "NONE",
         "id5": "NONE",

@@ -9,9 +9,9 @@ from ...disk.atomic_write import write_atomically
 from ...formatting import format_quantity
 from ...structure.drive_sizes import MAX_STORED_SAMPLES, MIN_SAMPLES_PER_CYCLE
 from . import ENDINGS, matlab, modes, table, universal
-from .series import histories_of
+from .series import read_histories
 
-FEW = 5  # rows between reversals, below which only reversals are stored
+MIN_ROWS_PER_SWING = 5  # rows between reversals, below which only reversals are stored
 # columns of a decay without the prefix "decay_"
 DECAY = {
     "time": "s",
@@ -23,7 +23,7 @@ DECAY = {
 }
 
 
-def export(folder: Path, out: Path) -> str:
+def export_histories(folder: Path, out: Path) -> str:
     """Write the histories and loops of a results folder, and return a line about it.
 
     PatchfemError for another suffix and for a folder without histories; Missing if it does not
@@ -32,31 +32,31 @@ def export(folder: Path, out: Path) -> str:
     out = Path(out)
     if out.suffix.lower() not in ENDINGS:
         raise PatchfemError(f"{out}: histories are exported as {', '.join(ENDINGS)}")
-    found = histories_of(folder)
+    found = read_histories(folder)
     rows = found.columns[0].values.size
     told = f"{out}: {rows} rows of {', '.join(one.label for one in found.columns[:8])}" + (
         f" and {len(found.columns) - 8} more" if len(found.columns) > 8 else ""
     )
-    told += _thinned(found)
+    told += _thinning_note(found)
     with write_atomically(out) as partial:
         if out.suffix.lower() == ".mat":
-            matlab.write(partial, found)
+            matlab.write_arrays(partial, found)
         elif out.suffix.lower() == ".csv":
-            table.write(partial, found.time, found.columns)
+            table.write_columns(partial, found.time, found.columns)
         else:
-            universal.write(partial, found)
+            universal.write_histories(partial, found)
             told += f"; {len(found.loops())} loops"
     return told
 
 
-def _thinned(found) -> str:
+def _thinning_note(found) -> str:
     """Return the note on early rows of histories that contain only reversals; else ""."""
     place = next((one.values for one in found.columns if one.name.endswith("displacement")), None)
     if place is None or found.time is None:
         return ""
     turns = np.flatnonzero(np.diff(np.sign(np.diff(place))) != 0) + 1
-    few = np.flatnonzero(np.diff(turns) < FEW)
-    if few.size < FEW or few.size < (few[-1] + 1) / 2:
+    few = np.flatnonzero(np.diff(turns) < MIN_ROWS_PER_SWING)
+    if few.size < MIN_ROWS_PER_SWING or few.size < (few[-1] + 1) / 2:
         return ""
     return (
         f"; before {format_quantity(float(found.time[turns[few[-1] + 1]]), 's', 3)} the rows are turning points, stops and "
@@ -69,7 +69,7 @@ def write_table(out: Path, values: dict, units: dict) -> None:
     """Write arrays of equal length as CSV with their units; Missing if `out` cannot be written."""
     columns = [table.Column(name, units[name], column, 0) for name, column in values.items()]
     with write_atomically(out) as partial:
-        table.write(partial, None, columns)
+        table.write_columns(partial, None, columns)
 
 
 def write_response(out: Path, estimate, drive: str, response: str) -> None:

@@ -19,7 +19,7 @@ OLD_BROWSER_NOTE = (
 )
 NOT_FINITE = re.compile("nan|-?inf")
 # A word of a scene or of a command inside a sentence stands between two backquotes.
-QUOTED = re.compile(r"`([^`\s](?:[^`\n]*[^`\s])?)`")
+QUOTED_WORD = re.compile(r"`([^`\s](?:[^`\n]*[^`\s])?)`")
 # Colours of `drawing.pictures`, and the colours of the page that replace them in the light and the
 # dark theme.
 PAGE_COLOURS = {
@@ -41,7 +41,7 @@ class Section(NamedTuple):
     html: str
 
 
-def document(
+def document_html(
     title: str, lead: str, sections: list, data: dict | None = None, scripts: tuple = ()
 ) -> str:
     """Build the HTML of a page.
@@ -91,7 +91,7 @@ def document(
     )
 
 
-def table(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = "") -> str:
+def table_html(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = "") -> str:
     """Build the HTML of a table in a frame that scrolls sideways.
 
     Parameters
@@ -137,7 +137,7 @@ def table(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = ""
 
 def sentence_html(text: str) -> str:
     """Return a sentence as HTML, in which text between two backquotes is marked as code."""
-    return QUOTED.sub(r"<code>\1</code>", escape(text))
+    return QUOTED_WORD.sub(r"<code>\1</code>", escape(text))
 
 
 def with_line_breaks(text: str) -> str:
@@ -151,7 +151,7 @@ def warning_box(texts: Sequence, heading: str = "") -> str:
     return told and f"<div class='verdict warn'>{heading and f'<b>{heading}</b>'}{told}</div>"
 
 
-def figure(number: int | str, svg: str, caption: str, alternative: str) -> str:
+def figure_html(number: int | str, svg: str, caption: str, alternative: str) -> str:
     """Build the HTML of a figure from SVG, in the colours of the page.
 
     Parameters

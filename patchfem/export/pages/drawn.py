@@ -37,7 +37,7 @@ def select_cases(table: dict, data) -> DrawnCases:
     Parameters
     ----------
     table : dict
-        As `sweep.page` takes it.
+        As `sweep.page_html` takes it.
     data : callable
         data(cases, whole) returns what the scripts would draw of some cases, with all digits or not.
     """
@@ -92,7 +92,7 @@ def _extreme_cases(values) -> list:
     )
 
 
-def digits(values: np.ndarray, count: int) -> np.ndarray:
+def round_to_digits(values: np.ndarray, count: int) -> np.ndarray:
     """Round values to `count` significant digits."""
     with np.errstate(all="ignore"):
         unit = 10.0 ** (np.floor(np.log10(np.abs(values))) - count + 1)

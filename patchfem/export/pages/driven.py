@@ -8,7 +8,7 @@ from ...core import G_N
 from ...effects import SINE_WAVEFORM, WAVEFORMS
 from ...formatting import UNIT_LADDERS, choose_axis_unit
 
-PLAIN = {
+DRIVE_UNITS = {
     "m/s^2": ("g", 1 / G_N),
     "m/s": ("mm/s", 1e3),
     "Hz": ("Hz", 1.0),
@@ -20,8 +20,8 @@ def format_resolved(text) -> str:
     """Write a quantity of a resolved scene, such as `49.03325 m/s^2`, in a usual unit: `5 g`."""
     value, _, unit = str(text).partition(" ")
     name, scale = (
-        PLAIN[unit]
-        if unit in PLAIN
+        DRIVE_UNITS[unit]
+        if unit in DRIVE_UNITS
         else choose_axis_unit([float(value)], unit)
         if unit in UNIT_LADDERS
         else (unit, 1.0)
@@ -35,11 +35,11 @@ def describe_drive(resolved: dict) -> str:
     resolved: the scene with all defaults, as nested tables.
     """
     if "drive" in resolved:
-        return _drive(resolved["drive"])
-    return _slide(resolved["slide"]) if "slide" in resolved else ""
+        return _describe_waveform(resolved["drive"])
+    return _describe_slide(resolved["slide"]) if "slide" in resolved else ""
 
 
-def _drive(keys: dict) -> str:
+def _describe_waveform(keys: dict) -> str:
     """Describe the drive by the phrase of its waveform."""
     if keys["kind"] == "free":
         start = (
@@ -58,7 +58,7 @@ def _drive(keys: dict) -> str:
 
 def _drive_values(keys: dict) -> dict:
     """Return the fields of the phrase of a waveform, as text by name (see `effects.Waveform`)."""
-    values = {key: _text_of(key, value) for key, value in keys.items()}
+    values = {key: _format_drive_value(key, value) for key, value in keys.items()}
     values["seed"] = keys.get("seed", 0)
     sized = next((name for name in ("displacement", "acceleration", "force") if name in keys), None)
     if sized is not None:
@@ -84,7 +84,7 @@ def _drive_values(keys: dict) -> dict:
     return values
 
 
-def _text_of(key: str, value) -> str:
+def _format_drive_value(key: str, value) -> str:
     """Return the value of a key of [drive] in a usual unit."""
     if key == "file":
         return Path(value).name
@@ -104,7 +104,7 @@ def _describe_by_level(name: str, values: dict) -> str:
     return f"{values['what']}{level}{frequency}{values['place']} (waveform '{name}')"
 
 
-def _slide(keys: dict) -> str:
+def _describe_slide(keys: dict) -> str:
     """Describe the prescribed slide."""
     kind = keys["kind"]
     if kind == "file":

@@ -10,17 +10,17 @@ from ...core import Outcome
 from ...formatting import format_number
 from ...runs.batch.case_results import FAILED_OUTCOME
 from .. import tolerance_misses
-from ..written import NUMBER, label, shorten
+from ..written import NUMBER, measure_label, shorten_number
 from . import limits, peaks, ranked
-from .key_lines import varies
+from .key_lines import is_varied
 from .limits import Limits
-from .sentences import format_pair, join_sentences, zero_below
+from .sentences import format_pair, format_zero, join_sentences
 
 # relative error up to which no error is stated, because values are shown with four digits
 MIN_STATED_ERROR = 1e-6
 EQUAL_FREQUENCY_TOL = 1e-9  # relative difference up to which two frequencies are equal
 EMPTY = MappingProxyType({})
-SETTLED = ranked.FINAL_OUTCOMES
+SETTLED_OUTCOMES = ranked.FINAL_OUTCOMES
 # Outcomes of cases that still change when their run ends.
 CHANGING_OUTCOMES = (
     Outcome.TRANSIENT.value,
@@ -82,7 +82,7 @@ class SweepHeadline(NamedTuple):
     limits : limits.Limits
         Limits of the key.
     ranks, spread : dict
-        From `ranked.ranks_of` and `ranked.quantiles`.
+        From `ranked.sobol_indices` and `ranked.measure_quantiles`.
     peaks : Sequence
         From `peaks.find_peaks`.
     asked : str
@@ -148,52 +148,54 @@ class SweepHeadline(NamedTuple):
 
 
 def summarise_sweep(table: dict) -> SweepHeadline:
-    """Summarise a sweep; table: as for `sweep.page`."""
+    """Summarise a sweep; table: as for `sweep.page_html`."""
     measures, tolerance = table["measures"], table.get("tolerance", np.nan)
-    values = columns(table)
+    values = measure_columns(table)
     outcome = np.asarray(table["outcome"], str)
-    settled = np.isin(outcome, SETTLED)
-    trusted = {name: _trusted(name, one, tolerance, settled) for name, one in measures.items()}
+    settled = np.isin(outcome, SETTLED_OUTCOMES)
+    trusted = {
+        name: _trusted_cases(name, one, tolerance, settled) for name, one in measures.items()
+    }
     keys = [
         key | {"words": not any(NUMBER.match(str(text)) for text in key["texts"])}
         for key in table["keys"]
     ]
     key_limits = Limits()
     if not table.get("drawn"):
-        key_limits = limits.limits_of_sweep(
-            keys, values, trusted, table["grid"], table.get("patch")
-        )
+        key_limits = limits.find_limits(keys, values, trusted, table["grid"], table.get("patch"))
     if key_limits.key is not None:  # All sentences show values of the key in the same unit.
         keys = [key_limits.key if key["name"] == key_limits.key["name"] else key for key in keys]
 
     def where(case: int) -> str:
         """Return the values of the keys in a case as text."""
         return ", ".join(
-            f"{key['name']} {shorten(str(key['texts'][case]))}"
+            f"{key['name']} {shorten_number(str(key['texts'][case]))}"
             for key in keys
-            if varies(key) or len(keys) == 1
+            if is_varied(key) or len(keys) == 1
         )
 
     found_peaks = peaks.find_peaks(keys, values, trusted, table["grid"])
     keys_ranked = ranked.rank_keys(table, trusted, settled)
-    span_of_measure = span(
+    span_of_measure = span_sentence(
         values,
         trusted,
         settled,
         ranked.asked_first(MAIN_MEASURES, table),
-        _floors(measures, tolerance),
+        _cases_within_floor(measures, tolerance),
     )
-    unsettled = _unsettled(values, outcome)
+    unsettled = _unsettled_sentence(values, outcome)
     asked = table.get("first", "")
     said = Sentences(
-        limit=limits.sentence(key_limits),
-        peak=peaks.sentence(found_peaks),
+        limit=limits.limits_sentence(key_limits),
+        peak=peaks.peaks_sentence(found_peaks),
         rank=keys_ranked.rank,
         scatter=keys_ranked.scatter,
         span=span_of_measure,
-        misses=tolerance_misses.sentence(measures, tolerance, where, asked),
-        left=_qualifications(table, outcome, keys_ranked.rank == ranked.too_few(table, settled)),
-        ends=_peaks_at_ends(table),
+        misses=tolerance_misses.tolerance_sentence(measures, tolerance, where, asked),
+        left=_qualification_sentence(
+            table, outcome, keys_ranked.rank == ranked.too_few(table, settled)
+        ),
+        ends=_end_peaks_sentence(table),
         unsettled=unsettled,
     )
     if table.get("drawn"):
@@ -206,7 +208,7 @@ def summarise_sweep(table: dict) -> SweepHeadline:
     )
 
 
-def _trusted(name: str, measure: dict, tolerance, settled: np.ndarray) -> np.ndarray:
+def _trusted_cases(name: str, measure: dict, tolerance, settled: np.ndarray) -> np.ndarray:
     """Return whether each case meets the tolerance and has settled.
 
     It need not have settled if no settled case has the measure, or if the measure is a steady
@@ -218,7 +220,7 @@ def _trusted(name: str, measure: dict, tolerance, settled: np.ndarray) -> np.nda
     return ~tolerance_misses.is_over_tolerance(measure, tolerance) & (settled | needs_no_settling)
 
 
-def _floors(measures: dict, tolerance) -> dict:
+def _cases_within_floor(measures: dict, tolerance) -> dict:
     """Return, by measure, the cases that meet the tolerance only by its floor, and this floor.
 
     The floor is given as text.
@@ -227,13 +229,13 @@ def _floors(measures: dict, tolerance) -> dict:
         name: tolerance_misses.is_within_by_floor(one, tolerance) for name, one in measures.items()
     }
     return {
-        name: (cases, tolerance_misses.floor_of(measures[name], cases))
+        name: (cases, tolerance_misses.format_floor(measures[name], cases))
         for name, cases in by_floor.items()
         if cases.any()
     }
 
 
-def _unsettled(measures: dict, outcome: np.ndarray) -> str:
+def _unsettled_sentence(measures: dict, outcome: np.ndarray) -> str:
     """State how far unsettled cases move, if that is farther than any settled case; else "".
 
     Parameters
@@ -248,21 +250,21 @@ def _unsettled(measures: dict, outcome: np.ndarray) -> str:
     values, unit = np.asarray(measures[name][0], float), measures[name][2]
     known = np.isfinite(values)
     late = values[known & np.isin(outcome, CHANGING_OUTCOMES)]
-    settled = values[known & np.isin(outcome, SETTLED)]
+    settled = values[known & np.isin(outcome, SETTLED_OUTCOMES)]
     if not late.size or not settled.size or late.max() <= settled.max():
         return ""
     low, high = format_pair(name, late.min(), late.max(), unit, 4)
     extent = high if low == high else f"{low} to {high}"
     count = int(np.isin(outcome, CHANGING_OUTCOMES).sum())
     return (
-        f"{count} of {outcome.size} cases did not settle; their {label(name)} at the end of "
+        f"{count} of {outcome.size} cases did not settle; their {measure_label(name)} at the end of "
         f"the run is {extent}."
     )
 
 
-def _peaks_at_ends(table: dict) -> str:
+def _end_peaks_sentence(table: dict) -> str:
     """State in how many cases the peak frequency is an end of the frequency range, or ""."""
-    measures, name = columns(table), "peak_frequency"
+    measures, name = measure_columns(table), "peak_frequency"
     if name not in measures:
         return ""
     values = np.asarray(measures[name][0], float)
@@ -270,7 +272,7 @@ def _peaks_at_ends(table: dict) -> str:
     at_end = np.any(
         [np.isclose(values, end, rtol=EQUAL_FREQUENCY_TOL, atol=0) for end in ends], axis=0
     )
-    at_end &= np.asarray(measures[MAIN_MEASURES[0]][0], float) > zero_below(MAIN_MEASURES[0])
+    at_end &= np.asarray(measures[MAIN_MEASURES[0]][0], float) > format_zero(MAIN_MEASURES[0])
     count, total = int(at_end.sum()), int(np.isfinite(values).sum())
     where = f"In {count} of {total} cases" if total > 1 else "In this case"
     return (
@@ -280,7 +282,7 @@ def _peaks_at_ends(table: dict) -> str:
     )
 
 
-def _qualifications(table: dict, outcome: np.ndarray, known: bool) -> str:
+def _qualification_sentence(table: dict, outcome: np.ndarray, known: bool) -> str:
     """State what qualifies the whole summary; "" if nothing does.
 
     This is how many cases of an interrupted sweep have no result, that no case has settled, and
@@ -289,7 +291,7 @@ def _qualifications(table: dict, outcome: np.ndarray, known: bool) -> str:
     Parameters
     ----------
     table : dict
-        As for `sweep.page`.
+        As for `sweep.page_html`.
     outcome : (n,) ndarray
     known : bool
         Whether another sentence already says that no case has settled.
@@ -304,17 +306,17 @@ def _qualifications(table: dict, outcome: np.ndarray, known: bool) -> str:
             f"{count} of {outcome.size} cases {'has' if count == 1 else 'have'} no result yet and "
             f"{'is' if count == 1 else 'are'} left out."
         )
-    if ran.size and not np.isin(ran, SETTLED).any() and not known:
+    if ran.size and not np.isin(ran, SETTLED_OUTCOMES).any() and not known:
         said.append("No case has settled, so this answer describes the end of each run.")
     first = table.get("first", "")
     if first and not np.isfinite(table["measures"].get(first, {"values": ()})["values"]).any():
         said.append(
-            f"No case has a value of {label(first)}, so this answer describes other measures."
+            f"No case has a value of {measure_label(first)}, so this answer describes other measures."
         )
     return join_sentences(said)
 
 
-def span(
+def span_sentence(
     measures: dict,
     trusted: dict,
     settled: np.ndarray,
@@ -362,7 +364,7 @@ def span(
             else f"is {high}"
         )
         # A value of 0 is known absolutely.
-        known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))
+        known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > format_zero(name))
         known &= ~least[name][0][there] if name in least else True
         share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
         bands = [f"{format_number(100 * share, 1)} %"] * (share > MIN_STATED_ERROR)
@@ -381,7 +383,7 @@ def span(
     return ""
 
 
-def columns(table: dict) -> dict:
+def measure_columns(table: dict) -> dict:
     """Return the measures of a table as (values, errors, unit)."""
     return {
         name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()

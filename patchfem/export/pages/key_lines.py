@@ -7,7 +7,7 @@ import numpy as np
 from ..written import shorten_to_spacing
 
 
-def varies(key: dict) -> bool:
+def is_varied(key: dict) -> bool:
     """Check whether a key has more than one value."""
     texts = key["texts"]
     return any(text != texts[0] for text in texts)
@@ -22,12 +22,12 @@ def key_formatter(key: dict) -> Callable[[int], str]:
     sizes = np.unique(values)
     apart = np.minimum(np.diff(sizes, prepend=-np.inf), np.diff(sizes, append=np.inf))
 
-    def shown(case: int) -> str:
+    def format_case(case: int) -> str:
         """Return the value of the key in a case."""
         spacing = apart[np.searchsorted(sizes, values[case])]
         return shorten_to_spacing(str(key["texts"][case]), values[case], spacing)
 
-    return shown
+    return format_case
 
 
 def group_cases_along_key(key: dict, others: list) -> list:

@@ -6,14 +6,14 @@ from functools import cache
 from gzip import compress
 from pathlib import Path
 
-FILES = ("bokeh.min.js", "bokeh-api.min.js")
-HERE = Path(__file__).parent
+LIBRARY_FILES = ("bokeh.min.js", "bokeh-api.min.js")
+LIBRARY_FOLDER = Path(__file__).parent
 
 
 @cache
 def packed_bokeh() -> str:
     """Return BokehJS as one packed text of JavaScript."""
-    return pack_text("\n".join(read_file(f"bokehjs/{name}") for name in FILES))
+    return pack_text("\n".join(read_file(f"bokehjs/{name}") for name in LIBRARY_FILES))
 
 
 def pack_text(text: str) -> str:
@@ -24,7 +24,7 @@ def pack_text(text: str) -> str:
 @cache
 def read_file(name: str) -> str:
     """Return a file of this folder as text."""
-    return (HERE / name).read_text(encoding="utf-8")
+    return (LIBRARY_FOLDER / name).read_text(encoding="utf-8")
 
 
 def escape_script(text: str) -> str:

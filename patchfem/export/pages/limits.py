@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...formatting import UNIT_LADDERS, choose_unit, format_number
-from ..written import NUMBER, label, without_unit
+from ..written import NUMBER, drop_repeated_unit, measure_label
 from . import document
 from .key_lines import group_cases_along_key, key_formatter
-from .sentences import format_measure, measure_link, zero_below
+from .sentences import format_measure, format_zero, measure_link
 
 # Relative change at which a measure reaches its limit; engineers call a change of 5 % negligible.
 LARGEST_CHANGE = 0.05
@@ -125,7 +125,7 @@ class Limits(NamedTuple):
         return sizes[limit.inside] > sizes.min()
 
 
-def limits_of_sweep(
+def find_limits(
     keys: list, measures: dict, trusted: dict, grid: bool = True, patch: dict | None = None
 ) -> Limits:
     """Find the limits of the key with the most values.
@@ -161,7 +161,7 @@ def limits_of_sweep(
         values, errors = (
             np.asarray(part, float) for part in measures.get(name, ([np.nan], [np.nan]))[:2]
         )
-        if not np.any(np.abs(values) > zero_below(name)):  # no case has a value above round-off
+        if not np.any(np.abs(values) > format_zero(name)):  # no case has a value above round-off
             continue
         values = np.where(trusted[name], values, np.nan)
         along = [
@@ -175,8 +175,8 @@ def limits_of_sweep(
     limits = Limits(key, found, lost, patch=patch)
     if not any(limits.is_resolved(limit) for limit in found):
         return limits
-    unit, scale = _unit(limits)
-    return limits._replace(key=_in_unit(key, unit, scale), unit=unit, scale=scale)
+    unit, scale = _choose_unit(limits)
+    return limits._replace(key=_convert_to_unit(key, unit, scale), unit=unit, scale=scale)
 
 
 def _limit_along_line(
@@ -254,7 +254,7 @@ def _sort_key(limit: KeyLimit) -> tuple:
     return limit.beyond is None and limit.covers_line, limit.value, limit.beyond is None
 
 
-def as_json(limits: Limits) -> list:
+def limits_json(limits: Limits) -> list:
     """Return the limits as stored in sweep.json, in SI.
 
     `value` of the key, interpolated between the cases `low` and `high`, is the one at which a
@@ -275,7 +275,7 @@ def as_json(limits: Limits) -> list:
     ]
 
 
-def sentence(limits: Limits) -> str:
+def limits_sentence(limits: Limits) -> str:
     """State in one sentence how far the key may go; "" if the cases do not show it."""
     if limits.key is None:
         return ""
@@ -285,7 +285,7 @@ def sentence(limits: Limits) -> str:
     ]
     parts = [motion] if motion else []
     parts += [
-        f"the {label(limit.name)} doubles {_format_position(limits, limit)}"
+        f"the {measure_label(limit.name)} doubles {_format_position(limits, limit)}"
         for limit in reached
         if limit.change >= DOUBLING
     ]
@@ -313,7 +313,7 @@ def _motion_sentence(limits: Limits) -> str:
         return ""
     key_name = GAP_OF_ANGLE.get(limits.key["name"], (limits.key["name"],))[0]
     percent = f"{100 * LARGEST_CHANGE:g} %"
-    *first_names, last_name = (label(limit.name) for limit in moving)
+    *first_names, last_name = (measure_label(limit.name) for limit in moving)
     ends = sorted(
         (limit for limit in moving if limit.beyond is not None or not limit.covers_line),
         key=_sort_key,
@@ -327,27 +327,30 @@ def _motion_sentence(limits: Limits) -> str:
             if first_names
             else f"{last_name} changes"
         )
-        return f"{key_name} may reach {_value_and_gap(limits, far)}: {names} by less than {percent}"
+        return f"{key_name} may reach {_format_limit_and_gap(limits, far)}: {names} by less than {percent}"
     names = f"{', '.join(first_names)} or {last_name}" if first_names else last_name
     before = f"before {names} changes by {percent}"
     smallest = ends[0]
     if smallest.beyond is None:
-        return f"{key_name} may reach at least {_value_and_gap(limits, smallest)} {before}; {_reached(limits, ends)}"
-    between = f"interpolated between the cases at {_cases(limits, smallest)}"
+        return (
+            f"{key_name} may reach at least {_format_limit_and_gap(limits, smallest)} {before}; "
+            f"{_exceeded_sentence(limits, ends)}"
+        )
+    between = f"interpolated between the cases at {_format_cases(limits, smallest)}"
     return (
-        f"{key_name} may reach {_value_and_gap(limits, smallest, between)} {before} "
+        f"{key_name} may reach {_format_limit_and_gap(limits, smallest, between)} {before} "
         f"({_first_to_change(limits, ends)})"
     )
 
 
-def _reached(limits: Limits, ends: list) -> str:
+def _exceeded_sentence(limits: Limits, ends: list) -> str:
     """State which measure surely exceeds its limit, and in which case."""
     beyond = [limit for limit in ends if limit.beyond is not None]
     if not beyond:
         return "the cases with larger values do not show where this limit lies"
     soonest = min(beyond, key=lambda limit: limits.sizes()[limit.beyond])
     return (
-        f"{label(soonest.name)} has changed by more than {100 * LARGEST_CHANGE:g} % at "
+        f"{measure_label(soonest.name)} has changed by more than {100 * LARGEST_CHANGE:g} % at "
         f"{key_formatter(limits.key)(soonest.beyond)}"
     )
 
@@ -360,35 +363,39 @@ def _first_to_change(limits: Limits, ends: list) -> str:
     sizes = limits.sizes()
     reached = [limit for limit in ends if limit.beyond is not None]
     soonest = min(sizes[limit.beyond] for limit in reached)
-    early = [label(limit.name) for limit in reached if sizes[limit.inside] < soonest]
+    early = [measure_label(limit.name) for limit in reached if sizes[limit.inside] < soonest]
     last = ends[-1]
     later = ""
-    if last.beyond is not None and label(last.name) not in early:
-        later = f"; {label(last.name)} {_format_position(limits, last)}"
+    if last.beyond is not None and measure_label(last.name) not in early:
+        later = f"; {measure_label(last.name)} {_format_position(limits, last)}"
     return f"first to change: {' or '.join(early)}{later}"
 
 
-def _value_and_gap(limits: Limits, limit: KeyLimit, *notes: str) -> str:
+def _format_limit_and_gap(limits: Limits, limit: KeyLimit, *notes: str) -> str:
     """Write a limit with notes in brackets, such as the gap that an angle opens over the patch."""
-    notes = [note for note in (_gap(limits, limit), *notes) if note]
-    return f"{_value(limits, limit)} ({'; '.join(notes)})" if notes else _value(limits, limit)
+    notes = [note for note in (_format_gap(limits, limit), *notes) if note]
+    return (
+        f"{_format_limit(limits, limit)} ({'; '.join(notes)})"
+        if notes
+        else _format_limit(limits, limit)
+    )
 
 
-def _value(limits: Limits, limit: KeyLimit) -> str:
+def _format_limit(limits: Limits, limit: KeyLimit) -> str:
     """Write a limit in the unit of the limits, rounded down."""
-    return f"{format_number(_rounded_down(limits, limit), _digits(limits, limit))} {limits.unit}".strip()
+    return f"{format_number(_round_down(limits, limit), _count_digits(limits, limit))} {limits.unit}".strip()
 
 
-def _rounded_down(limits: Limits, limit: KeyLimit) -> float:
+def _round_down(limits: Limits, limit: KeyLimit) -> float:
     """Round a limit down to the digits that are shown, but for round-off."""
     value = limit.value * limits.scale
     if not value:
         return value
-    step = 10.0 ** (floor(log10(abs(value)) + 1e-9) - _digits(limits, limit) + 1)
+    step = 10.0 ** (floor(log10(abs(value)) + 1e-9) - _count_digits(limits, limit) + 1)
     return floor(value / step + 1e-6) * step
 
 
-def _digits(limits: Limits, limit: KeyLimit) -> int:
+def _count_digits(limits: Limits, limit: KeyLimit) -> int:
     """Count the digits of a limit: two, or as many as distinguish the cases around it."""
     if limit.beyond is None or not limit.value:
         return 2
@@ -398,29 +405,29 @@ def _digits(limits: Limits, limit: KeyLimit) -> int:
     return max(2, 1 + ceil(log10(abs(limit.value) / apart)))
 
 
-def _gap(limits: Limits, limit: KeyLimit) -> str:
+def _format_gap(limits: Limits, limit: KeyLimit) -> str:
     """Write the gap that an angle opens over the patch; "" for other keys or an unknown size."""
     side = (limits.patch or {}).get(GAP_OF_ANGLE.get(limits.key["name"], ("", ""))[1])
     if not side or not limit.value:
         return ""
-    gap = _rounded_down(limits, limit) / limits.scale * side
+    gap = _round_down(limits, limit) / limits.scale * side
     unit, scale = choose_unit(UNIT_LADDERS["m"], gap)
     return f"{format_number(gap * scale, 2)} {unit} over the patch"
 
 
 def _format_position(limits: Limits, limit: KeyLimit, *notes: str) -> str:
     """Write the position of a limit, and between which cases it lies."""
-    return f"at about {_value(limits, limit)} ({'; '.join([*notes, f'between {_cases(limits, limit)}'])})"
+    return f"at about {_format_limit(limits, limit)} ({'; '.join([*notes, f'between {_format_cases(limits, limit)}'])})"
 
 
-def _cases(limits: Limits, limit: KeyLimit) -> str:
+def _format_cases(limits: Limits, limit: KeyLimit) -> str:
     """Write the values of the key in the two cases around a limit: `0.1 and 0.32 mrad`."""
     shown = key_formatter(limits.key)
     inside, beyond = shown(limit.inside), shown(limit.beyond)
-    return f"{without_unit(inside, beyond)} and {beyond}"
+    return f"{drop_repeated_unit(inside, beyond)} and {beyond}"
 
 
-def _unit(limits: Limits) -> tuple:
+def _choose_unit(limits: Limits) -> tuple:
     """Choose the (unit, scale from SI) in which all values of the key are shown.
 
     It is the unit in which the cases are written, unless the smallest limit would be a number below
@@ -451,7 +458,7 @@ def _unit(limits: Limits) -> tuple:
     return choose_unit(UNIT_LADDERS[key["unit"]], abs(value))
 
 
-def _in_unit(key: dict, unit: str, scale: float) -> dict:
+def _convert_to_unit(key: dict, unit: str, scale: float) -> dict:
     """Return a key with the strings of its values in a unit."""
     if all(str(text).partition(" ")[2] in ("", unit) for text in key["texts"]):
         return key
@@ -462,7 +469,7 @@ def _in_unit(key: dict, unit: str, scale: float) -> dict:
     }
 
 
-def table(limits: Limits, measures: dict) -> str:
+def limits_table(limits: Limits, measures: dict) -> str:
     """Return the limits of all measures as an HTML table; "" if there are none.
 
     Parameters
@@ -477,7 +484,7 @@ def table(limits: Limits, measures: dict) -> str:
     rows = []
     for limit in limits.found:
         if limit.beyond is not None:
-            where = f"about {_value(limits, limit)} (between the cases at {_cases(limits, limit)})"
+            where = f"about {_format_limit(limits, limit)} (between the cases at {_format_cases(limits, limit)})"
         elif limit.covers_line:
             where = "in no case"
         else:
@@ -488,9 +495,9 @@ def table(limits: Limits, measures: dict) -> str:
         reference = format_measure(limit.name, limit.reference, measures[limit.name][2], 4)
         rows.append(
             [
-                measure_link(label(limit.name), limit.name),
+                measure_link(measure_label(limit.name), limit.name),
                 escape(reference),
-                _percent(limit.last_change),
+                _format_change(limit.last_change),
                 "double" if abs(limit.change) >= DOUBLING else f"{100 * LARGEST_CHANGE:g} %",
                 f"<td class=soft>{escape(where)}</td>",
             ]
@@ -516,11 +523,11 @@ def table(limits: Limits, measures: dict) -> str:
         "by&rdquo; by more than the sum of both numerical errors. Limits are interpolated between two cases; for "
         "more accurate limits, add cases between them. Cases that miss their tolerance do not count, "
         f"nor do unsettled cases if settled cases have the measure.{smallest}</p>"
-        + document.table(heads, rows, "wide")
+        + document.table_html(heads, rows, "wide")
     )
 
 
-def _percent(change: float) -> str:
+def _format_change(change: float) -> str:
     """Write a relative change in percent; from ten times on as a factor; 0 for round-off."""
     if abs(change) < ROUND_OFF_CHANGE:
         return "0 %"

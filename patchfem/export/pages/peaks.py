@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...formatting import format_number, format_value
-from ..written import label
+from ..written import measure_label
 from . import document
-from .key_lines import group_cases_along_key, key_formatter, varies
-from .sentences import measure_link, zero_below
+from .key_lines import group_cases_along_key, is_varied, key_formatter
+from .sentences import format_zero, measure_link
 
 KEYS = ("drive.frequency",)
 HEIGHTS = ("relative_displacement_amplitude", "absolute_acceleration_peak")
@@ -84,7 +84,7 @@ def find_peaks(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
     measures : dict
     trusted : dict
     grid : bool
-        All as for `limits.limits_of_sweep`.
+        All as for `limits.find_limits`.
 
     Returns
     -------
@@ -94,12 +94,12 @@ def find_peaks(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
     name = next((one for one in HEIGHTS if one in measures), None)
     if key is None or name is None or (len(keys) > 1 and not grid):
         return []
-    others = [one for one in keys if one is not key and varies(one)]
+    others = [one for one in keys if one is not key and is_varied(one)]
     shown = {one["name"]: str if one["words"] else key_formatter(one) for one in others}
-    height, error = _heights(name, measures, trusted)
+    height, error = _peak_heights(name, measures, trusted)
     out = []
     for line in group_cases_along_key(key, others):
-        swept = _swept_peak(np.asarray(key["values"], float)[line], height[line], error[line])
+        swept = _find_swept_peak(np.asarray(key["values"], float)[line], height[line], error[line])
         if swept is not None:
             held = ", ".join(
                 f"{one['name']} {one['texts'][line[0]] if one['words'] else shown[one['name']](line[0])}"
@@ -109,7 +109,7 @@ def find_peaks(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
     return out
 
 
-def _heights(name: str, measures: dict, trusted: dict) -> tuple:
+def _peak_heights(name: str, measures: dict, trusted: dict) -> tuple:
     """Return the heights (n,) of a measure in the cases and their errors.
 
     For a case that did not settle it is the steady estimate, if its relative error is at most
@@ -126,7 +126,9 @@ def _heights(name: str, measures: dict, trusted: dict) -> tuple:
     )
 
 
-def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) -> SweptPeak | None:
+def _find_swept_peak(
+    frequency: np.ndarray, height: np.ndarray, error: np.ndarray
+) -> SweptPeak | None:
     """Locate the peak of a response curve; None if its largest value is at an end of the range.
 
     The peak is that of the parabola of 1/y^2 over f^2, which is exact for a single mode, through
@@ -151,10 +153,12 @@ def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     case_error = float(np.nanmax(error[known][top - 1 : top + 2]) / y[top])
     square = x**2 - x[top] ** 2
     g = (y[top] / y) ** 2
-    at, least = _lowest(square, g, top, top - 1, top + 2) or (0.0, 1.0)
+    at, least = _find_minimum(square, g, top, top - 1, top + 2) or (0.0, 1.0)
     windows = ((top - 2, top + 2), (top - 1, top + 3), (top - 2, top + 3))
     others = [
-        _lowest(square, g, top, low, high) for low, high in windows if low >= 0 and high <= y.size
+        _find_minimum(square, g, top, low, high)
+        for low, high in windows
+        if low >= 0 and high <= y.size
     ]
     agreeing = [one for one in others if one]
     places = np.sqrt(x[top] ** 2 + np.array([at, *(place for place, _ in agreeing)]))
@@ -168,7 +172,8 @@ def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
         height_error += peak * (1 - (y[top - 1 : top + 2] / peak).min())
         frequency_error += spacing
     below, above = (
-        _crossing(square[top::step], g[top::step], x[top], (y[top] / peak) ** 2) for step in (-1, 1)
+        _find_crossing(square[top::step], g[top::step], x[top], (y[top] / peak) ** 2)
+        for step in (-1, 1)
     )
     width = float(above.value - below.value)
     fallen = frequency[height <= peak / 2**0.5]
@@ -185,7 +190,7 @@ def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     )
 
 
-def _lowest(square: np.ndarray, g: np.ndarray, top: int, low: int, high: int) -> tuple | None:
+def _find_minimum(square: np.ndarray, g: np.ndarray, top: int, low: int, high: int) -> tuple | None:
     """Find the minimum of the polynomial through 1/y^2 over f^2 in some cases.
 
     Parameters
@@ -217,7 +222,7 @@ def _lowest(square: np.ndarray, g: np.ndarray, top: int, low: int, high: int) ->
     return (at, float(line(at))) if inside else None
 
 
-def _crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) -> Estimate:
+def _find_crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) -> Estimate:
     """Find the frequency at which 1/y^2 first reaches twice its minimum.
 
     It comes from parabolas through the interval and a case on either side, whose difference gives
@@ -249,14 +254,17 @@ def _crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) -> Es
     return Estimate(float(at[0]), ERROR_FACTOR * float(np.ptp(at)))
 
 
-def sentence(peaks: list) -> str:
+def peaks_sentence(peaks: list) -> str:
     """State where the peak is, or from where to where it moves; "" if there is none."""
     known, lost = (
         [one for one in peaks if one.swept.height.is_known() == there] for there in (True, False)
     )
     return "; ".join(
         said
-        for said in (_known(known).rstrip("." if lost else ""), _unknown_peaks(lost, bool(known)))
+        for said in (
+            _known_peaks_sentence(known).rstrip("." if lost else ""),
+            _unknown_peaks(lost, bool(known)),
+        )
         if said
     )
 
@@ -270,25 +278,25 @@ def _unknown_peaks(peaks: list, others: bool) -> str:
         return ""
     more = f" and {len(peaks) - 1} other{'s' * (len(peaks) > 2)}" if len(peaks) > 1 else ""
     held = f" with {peaks[0].held}{more}" if peaks[0].held else ""
-    where = "where it" if others else f"Where {label(peaks[0].name)}"
+    where = "where it" if others else f"Where {measure_label(peaks[0].name)}"
     return (
         f"{where} peaks{held} is not known: cases next to the largest value have not settled or miss the "
         "tolerance; raise drive.cycles so that these cases settle."
     )
 
 
-def _known(peaks: list) -> str:
+def _known_peaks_sentence(peaks: list) -> str:
     """State where the first and the last known peaks are."""
     if not peaks:
         return ""
     first, last = peaks[0], peaks[-1]
-    head = f"{label(first.name).capitalize()} peaks at {_format_frequency(first)}"
+    head = f"{measure_label(first.name).capitalize()} peaks at {_format_frequency(first)}"
     if len(peaks) == 1:
-        return f"{head}, {_format_height(first)}{_width(first)}."
+        return f"{head}, {_format_height(first)}{_format_width(first)}."
     return (
-        f"{head} with {first.held} ({_format_height(first)}{_width(first)}) "
+        f"{head} with {first.held} ({_format_height(first)}{_format_width(first)}) "
         f"and at {_format_frequency(last)} with {last.held} "
-        f"({_format_height(last)}{_width(last)})."
+        f"({_format_height(last)}{_format_width(last)})."
     )
 
 
@@ -299,34 +307,35 @@ def _format_frequency(one: Peak) -> str:
 
 def _format_height(one: Peak) -> str:
     """Write the height of a peak."""
-    return format_value(*one.swept.height, zero_below(one.name), one.unit)
+    return format_value(*one.swept.height, format_zero(one.name), one.unit)
 
 
-def _width(one: Peak) -> str:
+def _format_width(one: Peak) -> str:
     """Write the half-power width of a peak, as the end of a clause."""
     if one.swept.half_power_width.is_known():
         return f", half-power width {format_value(*one.swept.half_power_width, unit='Hz')}"
     return f", half-power width {OPEN}" if one.swept.falls_unresolved else ""
 
 
-def table(peaks: list) -> str:
+def peaks_table(peaks: list) -> str:
     """Return the peaks as an HTML table; "" if there are none."""
     if not peaks:
         return ""
-    rows = [[escape(one.held), *_cells(one)] for one in peaks]
+    rows = [[escape(one.held), *_peak_cells(one)] for one in peaks]
     return (
-        f"<p class=soft>The largest {measure_link(label(peaks[0].name), peaks[0].name)} of each curve is found from a "
+        f"<p class=soft>The largest {measure_link(measure_label(peaks[0].name), peaks[0].name)} of each curve is found "
+        "from a "
         "parabola of 1/y&sup2; against f&sup2; through the case with the largest value and its two neighbours in "
         "frequency. The stated errors combine the errors of these cases with the differences between this parabola "
         "and polynomials through more cases. For an unsettled case the "
         "estimate of the steady value is used if the error of this estimate is at most 1 %; otherwise the case is "
         "left out. A half-power width is given if the curve falls to its peak/&radic;2 on both sides within the "
         "swept range.</p>"
-        + document.table(("case", ">at", ">height", ">half-power width"), rows, "wide")
+        + document.table_html(("case", ">at", ">height", ">half-power width"), rows, "wide")
     )
 
 
-def _cells(peak: Peak) -> list:
+def _peak_cells(peak: Peak) -> list:
     """Return the strings of frequency, height and half-power width."""
     swept = peak.swept
     if not swept.height.is_known():

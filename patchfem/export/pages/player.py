@@ -12,10 +12,10 @@ import numpy as np
 
 from ...disk.atomic_write import write_text
 from ...formatting import choose_axis_unit
-from ..drawing.panels import corners, slides, surface_shape_motion
+from ..drawing.panels import cell_corners, surface_shape_motion, upper_piece_slides
 from ..fields.series import Series, last_consecutive_frames
 from ..fields.vtkhdf import NAME
-from .document import Section, document
+from .document import Section, document_html
 from .library import read_file
 from .thinned import reduce_mesh, select_lines
 
@@ -90,10 +90,10 @@ def write_page(folder: Path, out: Path) -> str:
     film = _read_frames(folder)
     write_text(
         out,
-        document(
+        document_html(
             Path(folder).resolve().name,
             "",
-            [section(film)],
+            [player_section(film)],
             {"charts": [], "player": film},
             ("figures.js", "stage.js", "player.js"),
         ),
@@ -115,10 +115,10 @@ def _read_frames(folder: Path) -> dict:
             for name in ("displacement", *(name for name, _ in CURVES), "status")
             if name in series.names("interface", "PointData")
         }
-        near = _contact(x, line["normal_stress"])
+        near = _contact_range(x, line["normal_stress"])
         places = select_lines(x, min(PLACES, x.size) - 1, near)
-        lower = _piece(series, "lower", numbers, most, near)
-        upper = _piece(series, "upper", numbers, most, near)
+        lower = _read_piece(series, "lower", numbers, most, near)
+        upper = _read_piece(series, "upper", numbers, most, near)
         slide = _separate_slide(upper, x, line)
         times = series.times[numbers]
     unit, scale = choose_axis_unit(
@@ -126,7 +126,7 @@ def _read_frames(folder: Path) -> dict:
     )
     shear = np.any(line.get("shear_stress", 0.0))
     curves = [
-        _curve(line[name][:, places], label, "Pa" if name.endswith("stress") else "m")
+        _pack_curve(line[name][:, places], label, "Pa" if name.endswith("stress") else "m")
         for name, label in CURVES
         if name in line and (name == "normal_stress" or np.any(line[name]))
     ]
@@ -151,7 +151,7 @@ def _read_frames(folder: Path) -> dict:
     } | ({"status": pack_array(line["status"][:, places])} if "status" in line and shear else {})
 
 
-def _contact(x, sigma) -> tuple | None:
+def _contact_range(x, sigma) -> tuple | None:
     """Return the range of x (n,) [m] in which some frame of sigma (f, n) has contact, widened.
 
     The range is twice as long as the contact. None if the contact is longer than MAX_CONTACT_FRACTION times the
@@ -164,7 +164,7 @@ def _contact(x, sigma) -> tuple | None:
     return touching[0] - more, touching[-1] + more
 
 
-def _piece(series: Series, side: str, numbers: list, most: int, near: tuple | None) -> dict:
+def _read_piece(series: Series, side: str, numbers: list, most: int, near: tuple | None) -> dict:
     """Read a piece and reduce it to about `most` cells.
 
     Parameters
@@ -184,7 +184,7 @@ def _piece(series: Series, side: str, numbers: list, most: int, near: tuple | No
         c) [Pa].
     """
     points = series.points(side)[:, :2]
-    cells = corners(*series.cells(side))
+    cells = cell_corners(*series.cells(side))
     coated = series.stack(side, "CellData", "material", [0])[0] > 0
     mesh = reduce_mesh(points, cells, coated, most, near)
     moves = series.stack(side, "PointData", "displacement", numbers)[..., :2].astype(float)
@@ -206,7 +206,7 @@ def _piece(series: Series, side: str, numbers: list, most: int, near: tuple | No
 def _separate_slide(upper: dict, x, line: dict) -> np.ndarray:
     """Separate the slide (f,) [m] of the upper piece from its moves, and add the gap to them."""
     points, moves = upper["points"], upper["moves"]
-    slide = slides(points, moves)
+    slide = upper_piece_slides(points, moves)
     moves[:, :, 0] -= slide[:, None]
     moves[:, :, 1] += surface_shape_motion(
         points, moves[:, :, 1], x, line["displacement"][..., 1] + line["gap"]
@@ -226,13 +226,13 @@ def _pack_piece(piece: dict, scale: float) -> dict:
     }
 
 
-def _curve(values, label: str, unit: str) -> dict:
+def _pack_curve(values, label: str, unit: str) -> dict:
     """Return a curve as packed data in a suitable unit."""
     name, scale = choose_axis_unit(values, unit)
     return {"label": label, "unit": name, "values": pack_array(values * scale)}
 
 
-def section(film: dict) -> Section:
+def player_section(film: dict) -> Section:
     """Return the section of a page that contains the player."""
     frames, (cells, fine) = len(film["times"]), film["cells"]
     label, scale = choose_axis_unit(film["times"], "s")

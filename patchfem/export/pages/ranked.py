@@ -8,9 +8,9 @@ import numpy as np
 from ...campaigns.sweeps.ranking import compute_sobol_indices
 from ...core import Outcome
 from ...formatting import choose_display_unit, format_number
-from ..written import NUMBER, label
+from ..written import NUMBER, measure_label
 from . import document
-from .key_lines import key_formatter, varies
+from .key_lines import is_varied, key_formatter
 from .sentences import format_measure, format_pair, is_share, join_sentences, measure_link
 
 RANKED_MEASURES = (
@@ -39,7 +39,7 @@ MIN_SETTLED_FRACTION = 0.95
 FINAL_OUTCOMES = "steady", "stuck", "done", "no_contact"  # outcomes of cases whose result is final
 MAX_NAMED_KEYS = 3  # number of keys in the sentence
 # Text for a measure whose label does not say that it is a ratio.
-CALLED = {"equivalent_damping": "equivalent damping ratio"}
+MEASURE_LABELS = {"equivalent_damping": "equivalent damping ratio"}
 N_TREND_GROUPS = (
     5  # groups of the random cases by the value of a key, between which a trend is determined
 )
@@ -53,11 +53,11 @@ class RankedKeys(NamedTuple):
     Attributes
     ----------
     shares : dict
-        Sobol indices of the keys for each measure, from `ranks_of`.
+        Sobol indices of the keys for each measure, from `sobol_indices`.
     rank : str
         The sentence on them; "" if there is nothing to say.
     quantiles : dict
-        From `quantiles`.
+        From `measure_quantiles`.
     scatter : str
         The sentence on them.
     """
@@ -74,21 +74,21 @@ def rank_keys(table: dict, trusted: dict, settled: np.ndarray) -> RankedKeys:
     Parameters
     ----------
     table : dict
-        As `sweep.page` takes it.
+        As `sweep.page_html` takes it.
     trusted : dict
         {measure: (n,) whether a case settled and meets its tolerance}.
     settled : (n,) ndarray of bool
     """
-    shares, found = ranks_of(table), quantiles(table, trusted)
+    shares, found = sobol_indices(table), measure_quantiles(table, trusted)
     count, asked = len(table["outcome"]), table.get("first", "")
     ends_unsettled = not settled.any() or Outcome.TRANSIENT.value in list(table["outcome"])
     rank = ""
     if not asked or asked in shares or asked not in table["measures"]:
         left_out = count - int(np.sum(trusted[next(iter(shares))])) if shares else 0
-        rank = sentence(shares, left_out, ends_unsettled, count)
+        rank = ranking_sentence(shares, left_out, ends_unsettled, count)
     elif shares:
         rank = (
-            f"These {count} cases do not show on which key the {label(asked)} depends most; more cases may show "
+            f"These {count} cases do not show on which key the {measure_label(asked)} depends most; more cases may show "
             "this."
         )
     rank = join_sentences([one for one in (rank, describe_trend(table, shares, settled)) if one])
@@ -126,13 +126,13 @@ def too_few(table: dict, settled: np.ndarray) -> str:
     )
     said = f"{f'Only {count}' if count else 'None'} of {len(outcome)} cases {end}"
     others = (
-        f" ({', '.join(f'{number} {label(name)}' for name, number in ended.items())})"
+        f" ({', '.join(f'{number} {measure_label(name)}' for name, number in ended.items())})"
         if ended
         else ""
     )
     lost = (
         "no ranking is possible"
-        if sum(map(varies, table["keys"])) > 1
+        if sum(map(is_varied, table["keys"])) > 1
         else "the scatter is not known"
     )
     return f"{said}{others}, so {lost}{'; ' * bool(helps)}{' and '.join(helps)}."
@@ -140,7 +140,7 @@ def too_few(table: dict, settled: np.ndarray) -> str:
 
 def measure_name(name: str) -> str:
     """Return the name of a measure in a sentence."""
-    return CALLED.get(name, label(name))
+    return MEASURE_LABELS.get(name, measure_label(name))
 
 
 def describe_trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
@@ -152,12 +152,12 @@ def describe_trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
     Parameters
     ----------
     table : dict
-        As for `sweep.page`.
+        As for `sweep.page_html`.
     ranks : dict
-        From `ranks_of`.
+        From `sobol_indices`.
     settled : (n,) ndarray of bool
     """
-    moving, first = [one for one in table["keys"] if varies(one)], table.get("first", "")
+    moving, first = [one for one in table["keys"] if is_varied(one)], table.get("first", "")
     name = first if first in table["measures"] else next(iter(ranks), SCATTER_MEASURES[0])
     strongest = ranks[name][0].key if name in ranks else ""
     key = next((one for one in moving if len(moving) == 1 or one["name"] == strongest), None)
@@ -185,7 +185,7 @@ def describe_trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
             for part in parts
         ]
     )
-    return _trend(
+    return _trend_sentence(
         name,
         key,
         middle,
@@ -202,7 +202,7 @@ def has_word_values(key: dict) -> bool:
     return not any(NUMBER.match(str(text)) for text in key["texts"])
 
 
-def _trend(
+def _trend_sentence(
     name: str,
     key: dict,
     middle: np.ndarray,
@@ -254,7 +254,7 @@ def asked_first(names: tuple, table: dict) -> tuple:
     return (first, *(name for name in names if name != first)) if first else names
 
 
-def ranks_of(table: dict) -> dict:
+def sobol_indices(table: dict) -> dict:
     """Return the Sobol indices by measure, [Share], of a grid or of random cases; {} for others.
 
     They are computed once for a table and stored in it.
@@ -272,7 +272,7 @@ def ranks_of(table: dict) -> dict:
     return table["ranks"]
 
 
-def sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0) -> str:
+def ranking_sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0) -> str:
     """State how much each key matters for the first measure that is ranked; "" if there is none.
 
     Keys whose intervals overlap are named together.
@@ -280,7 +280,7 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0) -> str
     Parameters
     ----------
     ranks : dict
-        From `ranks_of`.
+        From `sobol_indices`.
     left : int
         Number of cases that miss the tolerance or have not settled; they count with their last
         values.
@@ -296,21 +296,25 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0) -> str
     name = next(iter(ranks), None)
     if name is None:
         return ""
-    first, *others = _alike(ranks[name])
+    first, *others = _group_overlapping(ranks[name])
     said = [
-        f"depends most on {_listed(first)}"
+        f"depends most on {_list_keys(first)}"
         if others or len(first) == 1
-        else f"depends on {_listed(first)}"
+        else f"depends on {_list_keys(first)}"
     ]
     if len(first) == 1:
-        said[0] += f", which contributes to {percent(first[0])} of the variance{_between(first[0])}"
+        said[0] += (
+            f", which contributes to {format_percent(first[0])} of the variance{_format_interval(first[0])}"
+        )
     else:
         said[0] += (
-            f"{' about equally' * _equal(first)} ({_shares(first)} of the variance; their intervals overlap)"
+            f"{' about equally' * _all_overlap(first)} ({_format_shares(first)} of the variance; their intervals overlap)"
         )
-    said += [f"then on {_listed(one)} ({_shares(one)})" for one in others[: MAX_NAMED_KEYS - 1]]
+    said += [
+        f"then on {_list_keys(one)} ({_format_shares(one)})" for one in others[: MAX_NAMED_KEYS - 1]
+    ]
     if len(others) >= MAX_NAMED_KEYS:
-        said.append(f"least on {_listed(others[-1])} ({_shares(others[-1])})")
+        said.append(f"least on {_list_keys(others[-1])} ({_format_shares(others[-1])})")
     if sum(round(100 * each.total) for each in ranks[name]) > 100:
         said.append(
             "where each share includes interactions between keys, so that the shares can sum to more than "
@@ -326,7 +330,7 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0) -> str
     return f"{what.capitalize()} {said}{counted}{f' with {its} {last}' if left and moves else ''}."
 
 
-def _alike(shares: list) -> list:
+def _group_overlapping(shares: list) -> list:
     """Return the Sobol indices in groups, the largest first.
 
     The interval of each index overlaps that of the first index of its group.
@@ -340,12 +344,12 @@ def _alike(shares: list) -> list:
     return out
 
 
-def _equal(group: list) -> bool:
+def _all_overlap(group: list) -> bool:
     """Return whether no index of a group lies outside the interval of another."""
     return all(one.low <= other.total <= one.high for one in group for other in group)
 
 
-def _listed(group: list) -> str:
+def _list_keys(group: list) -> str:
     """List the keys of a group; of many keys only the first."""
     names = [one.key for one in group]
     if len(names) > MAX_NAMED_KEYS + 1:
@@ -353,47 +357,47 @@ def _listed(group: list) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _shares(group: list) -> str:
+def _format_shares(group: list) -> str:
     """Write the shares of a group."""
     if len(group) == 1:
-        return percent(group[0])
-    if all(map(_small, group)):
-        most = max(map(_most, group))
+        return format_percent(group[0])
+    if all(map(_may_be_zero, group)):
+        most = max(map(_upper_percent, group))
         return f"at most {most} % each" if most else "below 1 % each"
     if len(group) > MAX_NAMED_KEYS + 1:
         ends = dict.fromkeys(f"{100 * one.total:.0f}" for one in (group[-1], group[0]))
         return f"{' to '.join(ends)} % each"
-    *before, end = (percent(one) for one in group)
-    if not any(map(_small, group)):
+    *before, end = (format_percent(one) for one in group)
+    if not any(map(_may_be_zero, group)):
         before = [one.removesuffix(" %") for one in before]
     return f"{', '.join(before)} and {end}"
 
 
-def percent(one) -> str:
+def format_percent(one) -> str:
     """Write the total index of a key; if its interval includes 0, the upper end of the interval."""
-    if not _small(one):
+    if not _may_be_zero(one):
         return f"{100 * one.total:.0f} %"
-    return f"at most {_most(one)} %" if _most(one) else "below 1 %"
+    return f"at most {_upper_percent(one)} %" if _upper_percent(one) else "below 1 %"
 
 
-def _small(one) -> bool:
+def _may_be_zero(one) -> bool:
     """Return whether an index may be 0."""
     return one.total < 0.01 or (one.low < 0.005 and one.total < 0.1)
 
 
-def _most(one) -> int:
+def _upper_percent(one) -> int:
     """Return the upper end [%] of the interval of an index, rounded up; 0 up to 1 %."""
     most = int(np.ceil(100 * one.high - 1e-9))
     return most if most > 1 else 0
 
 
-def _between(one) -> str:
+def _format_interval(one) -> str:
     """Write the interval of an index in brackets; "" if it has none."""
     low, high = round(100 * one.low), round(100 * one.high)
-    return f" ({low} to {high} %)" if low != high and not _small(one) else ""
+    return f" ({low} to {high} %)" if low != high and not _may_be_zero(one) else ""
 
 
-def quantiles(table: dict, trusted: dict) -> dict:
+def measure_quantiles(table: dict, trusted: dict) -> dict:
     """Return the quantiles of the measures of random cases.
 
     Cases count if they have a value and have settled; if no case with a value has settled, all
@@ -402,7 +406,7 @@ def quantiles(table: dict, trusted: dict) -> dict:
     Parameters
     ----------
     table : dict
-        As for `sweep.page`.
+        As for `sweep.page_html`.
     trusted : dict
         {measure: (n,) whether a case settled and meets its tolerance}.
 
@@ -439,7 +443,7 @@ def describe_scatter(
     Parameters
     ----------
     found : dict
-        From `quantiles`.
+        From `measure_quantiles`.
     of : int
         Number of random cases.
     settled : bool
@@ -488,14 +492,14 @@ def share_bars(ranks: dict) -> str:
                 escape(one.key),
                 f"{100 * one.first:.0f} %",
                 f"{100 * one.total:.0f} %",
-                _range(one),
-                f"<td class=bars>{_bar(one)}</td>",
+                _format_range(one),
+                f"<td class=bars>{_bar_svg(one)}</td>",
             ]
             for one in shares
         ]
         parts.append(
-            f"<h3>{measure_link(label(name), name)}</h3>"
-            + document.table(
+            f"<h3>{measure_link(measure_label(name), name)}</h3>"
+            + document.table_html(
                 ("key", ">alone", ">total", ">from, to", "share"), rows, "wide", "shares"
             )
         )
@@ -506,17 +510,17 @@ def share_bars(ranks: dict) -> str:
     )
 
 
-def _bar(one) -> str:
+def _bar_svg(one) -> str:
     """Return the bar of a key's Sobol indices as SVG."""
     first, total, low, high = (f"{100 * part:.1f}" for part in one[1:])
     return (
-        f"<svg viewBox='0 0 100 8' preserveAspectRatio=none role=img aria-label='{percent(one)}'>"
+        f"<svg viewBox='0 0 100 8' preserveAspectRatio=none role=img aria-label='{format_percent(one)}'>"
         f"<rect class=total y=1 height=6 width={total} /><rect class=first y=1 height=6 width={first} />"
         f"<path class=range d='M{low} 4H{high}'/></svg>"
     )
 
 
-def _range(one) -> str:
+def _format_range(one) -> str:
     """Write the interval of an index."""
     return "&ndash;" if one.low == one.high else f"{100 * one.low:.0f} to {100 * one.high:.0f} %"
 
@@ -530,7 +534,7 @@ def quantile_table(found: dict, of: int) -> str:
     Parameters
     ----------
     found : dict
-        From `quantiles`.
+        From `measure_quantiles`.
     of : int
         Number of random cases.
 
@@ -551,7 +555,13 @@ def quantile_table(found: dict, of: int) -> str:
             else [format_number(one * scale, 4) for one in values.tolist()]
         )
         rows.append(
-            [measure_link(label(name), name), *known, escape(in_unit), str(count), str(misses)]
+            [
+                measure_link(measure_label(name), name),
+                *known,
+                escape(in_unit),
+                str(count),
+                str(misses),
+            ]
         )
     if not rows:
         return ""
@@ -564,7 +574,7 @@ def quantile_table(found: dict, of: int) -> str:
         )
     )
     return (
-        document.table(
+        document.table_html(
             ("measure", ">5 %", ">half", ">95 %", "unit", ">cases", ">miss the tolerance"),
             rows,
             "wide",

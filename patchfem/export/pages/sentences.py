@@ -1,7 +1,7 @@
 """Results of a run as sentences, and its measures in groups, in the units that people use.
 
-In: the summary of a run, as in summary.json. Out: strings, among them the verdict (`verdict`), the
-headline (`headline`) and the table of measures (`table_of`).
+In: the summary of a run, as in summary.json. Out: strings, among them the verdict (`verdict_sentence`), the
+headline (`headline_sentence`) and the table of measures (`format_measures`).
 """
 
 import re
@@ -43,7 +43,7 @@ NO_SLIP = 1e-15  # [m], the last digits of a slide
 WHOLE_RUN = "over the whole run"
 LOOPS = "over the two stored cycles of the steady motion"
 PERIOD_BY_ENGINE = {"harmonic": LOOPS}  # period to which energies refer, by engine
-MARCHED = "over the cycles of the motion, not those of wear"
+OVER_MOTION_CYCLES = "over the cycles of the motion, not those of wear"
 QUALIFIERS = {  # Added to a value that would otherwise be mistaken for another quantity.
     "loop_area": "per cycle",
     "friction_work": WHOLE_RUN,
@@ -61,10 +61,10 @@ RANDOM_MEASURES = {
     "response_damping": "the damping ratio of that peak is {}",
 }
 POWER = "friction_power"  # Measure of a random drive, which has no cycle.
-RELEASED = (
+UNFINISHED_DECAY = (
     "The run ended before the motion came to rest; raise drive.cycles to see more of the decay."
 )
-GROWN = (
+GROWING_MOTION = (
     "The motion still grows at the end of the run, after {}: the measures describe its last cycles and have no "
     "error estimate."
 )
@@ -73,14 +73,16 @@ LEVEL_MEASURES = (
     "jump_level",
 )  # lies between two drive levels of the scene, whatever the tolerance
 RANGES = {"fraction": 1.0, "phase": pi}  # range of a measure [SI], by the end of its name
-ROUND = 1e-12  # Fraction of the friction force times the motion; a smaller work is round-off.
+ROUND_OFF_FRACTION = (
+    1e-12  # Fraction of the friction force times the motion; a smaller work is round-off.
+)
 NONE = MappingProxyType({})
 UNKNOWN = " (error unknown)"
 EXACT_NOTE = "values without ± are exact to the last digit shown"
 SHARP_BUT_UNKNOWN = f"{EXACT_NOTE}, except where the error is unknown"
 
 
-def units(name: str, value: float, unit: str, error: float | None = None) -> list:
+def display_units(name: str, value: float, unit: str, error: float | None = None) -> list:
     """Return the units [(unit, scale)] in which a measure is shown, the metric one first.
 
     The size of the value, or of its error, chooses them.
@@ -122,11 +124,11 @@ def format_value_and_error(name: str, measure: dict, scale: float | None = None)
     value, error, unit = measure["value"], measure["error"], measure["unit"]
     if value is None:
         return "-", ""
-    scale = units(name, value, unit, error)[0][1] if scale is None else scale
+    scale = display_units(name, value, unit, error)[0][1] if scale is None else scale
     return formatting.round_to_error(
         value * scale,
         None if error is None else error * scale,
-        zero_below(name, measure) * scale,
+        format_zero(name, measure) * scale,
         is_ratio=unit == "1",
     )
 
@@ -154,7 +156,7 @@ def format_measure(name: str, value: float, unit: str, digits: int) -> str:
     str
     """
     value, unit = (100 * value, "%") if is_share(name) else (value, unit)
-    return formatting.format_quantity(value, unit, digits, zero_below(name))
+    return formatting.format_quantity(value, unit, digits, format_zero(name))
 
 
 def format_pair(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
@@ -192,19 +194,19 @@ def format_with_error(name: str, measure: dict) -> str:
     value, error = format_value_and_error(name, measure)
     if value == "-":
         return value
-    unit, scale = units(name, measure["value"], measure["unit"], measure["error"])[0]
-    if below_minimum(name, measure):
+    unit, scale = display_units(name, measure["value"], measure["unit"], measure["error"])[0]
+    if format_below_minimum(name, measure):
         return f"0 to {formatting.format_number((measure['value'] + measure['error']) * scale, 2)} {unit}".rstrip()
     return formatting.format_with_error(value, error, unit)
 
 
-def below_minimum(name: str, measure: dict) -> bool:
+def format_below_minimum(name: str, measure: dict) -> bool:
     """Return whether value minus error is below the smallest possible value, 0."""
     value, error = measure["value"], measure["error"]
     return minimum_value(name) == 0 and value is not None and bool(error) and error >= value > 0
 
 
-def zero_below(name: str, measure: dict = NONE) -> float:
+def format_zero(name: str, measure: dict = NONE) -> float:
     """Return the value of a measure below which it is shown as 0 [SI].
 
     It is the floor of its definition, or the floor in the run if this is smaller: a floor that the
@@ -227,7 +229,7 @@ def format_imperial(name: str, measure: dict) -> str:
         or abs(value) <= (error or 0.0)
     ):
         return ""
-    found = units(name, value, measure["unit"], error)[1:]
+    found = display_units(name, value, measure["unit"], error)[1:]
     return " = ".join(
         f"{format_value_and_error(name, measure, scale)[0]} {unit}"
         for unit, scale in found
@@ -235,7 +237,7 @@ def format_imperial(name: str, measure: dict) -> str:
     )
 
 
-def _unknown(measures: dict) -> str:
+def _unknown_measures(measures: dict) -> str:
     """Return the names of the static measures whose error is as large as the value; "" if none."""
     found = {
         name: Measure(**{key: one[key] for key in ("value", "unit", "error")})
@@ -244,7 +246,7 @@ def _unknown(measures: dict) -> str:
     return " and of ".join(unknown_measures(found))
 
 
-def verdict(summary: dict) -> str:
+def verdict_sentence(summary: dict) -> str:
     """Return the sentence on how a run ended, from its summary.
 
     `stuck` refers to the interface as a whole. If the last cycles dissipate or slip more than their
@@ -252,7 +254,7 @@ def verdict(summary: dict) -> str:
     whether it slipped.
     """
     outcome, measures = Outcome(summary["outcome"]), summary["measures"]
-    if outcome is Outcome.NOT_CONVERGED and (unknown := _unknown(measures)):
+    if outcome is Outcome.NOT_CONVERGED and (unknown := _unknown_measures(measures)):
         known = "use the other measures with their stated errors"
         return f"The numerical error of {unknown} is as large as the value, so it is not known; {known}."
     if summary["kind"] == "bench" and outcome is Outcome.DONE:
@@ -273,7 +275,7 @@ def verdict(summary: dict) -> str:
     if outcome is Outcome.TRANSIENT and any(
         one["effect"] == "drive.kind=free" for one in summary["effects"]
     ):
-        return RELEASED
+        return UNFINISHED_DECAY
     if outcome is not Outcome.STUCK or not {"loop_area", "slip_amplitude"} & measures.keys():
         return outcome.sentence
     force, motion = (
@@ -285,7 +287,7 @@ def verdict(summary: dict) -> str:
     )
     part = "part of the patch slips" if "contact_fraction" in measures else "part of it slips"
     for first, least, form in (
-        ("loop_area", ROUND * abs(force * motion), "{} per cycle"),
+        ("loop_area", ROUND_OFF_FRACTION * abs(force * motion), "{} per cycle"),
         ("slip_amplitude", 0.0, "by {}"),
     ):
         found = {
@@ -336,7 +338,7 @@ def _bench_slip_sentence(slip: dict | None, done: str, patch: bool) -> str:
 
 
 def _bench_loop_sentence(loop: dict, stiffness: dict) -> str:
-    """Return the sentence on stiffness and damping of a bench; loop: from `summary.loop_of`."""
+    """Return the sentence on stiffness and damping of a bench; loop: from `summary.loop_entry`."""
     factor, error = loop["loss_factor"], loop["error"]
 
     def number(scale: float) -> str:
@@ -368,7 +370,7 @@ class Statement(NamedTuple):
     text: str
 
 
-def headline(
+def headline_sentence(
     summary: dict,
     cycles: float | None,
     number: Callable[[str, str], str] | None = None,
@@ -399,14 +401,18 @@ def headline(
         if covers_cycle and not released:
             statements += _energy_statements(summary)
         statements += _patch_statements(summary)
-    parts = [part for part in (_filled(one, measures, number) for one in statements) if part]
+    parts = [
+        part for part in (_fill_statement(one, measures, number) for one in statements) if part
+    ]
     text = "; ".join(parts)
     if text and not covers_cycle and not released:
         text = f"in {cycles:.2g} of a cycle {text}"
     return f"{text[0].upper() + text[1:]}." if text else ""
 
 
-def _filled(statement: Statement, measures: dict, number: Callable[[str, str], str] | None) -> str:
+def _fill_statement(
+    statement: Statement, measures: dict, number: Callable[[str, str], str] | None
+) -> str:
     """Return a statement with the value of its measure; "" if the measure has no value."""
     name, text = statement
     if not name:
@@ -500,7 +506,7 @@ def describe_contact(contact: dict | None, fraction: float | None = None) -> str
     Parameters
     ----------
     contact : dict or None
-        From `summary.contact_of`.
+        From `summary.contact_entry`.
     fraction : float, optional
         Fraction in contact, which may be extrapolated to finer meshes, whereas the positions are
         those of the finest mesh.
@@ -576,7 +582,9 @@ def tolerance_sentence(result: Result) -> str:
         if one.value is not None and one.error is not None and not name.endswith(SCATTER)
     }
     if result.outcome is Outcome.GROWS and result.response is not None:
-        return GROWN.format(formatting.format_quantity(float(result.response.time[-1]), "s", 3))
+        return GROWING_MOTION.format(
+            formatting.format_quantity(float(result.response.time[-1]), "s", 3)
+        )
     if not known or max(one.error_ratio(tolerance) for one in known.values()) > 1:
         return ""
     texts_of = {name: format_with_error(name, measure_object(one)) for name, one in known.items()}
@@ -628,7 +636,7 @@ def _absolute_limits(names: list, known: dict, tolerance: float) -> str:
 
 def _plain_value(name: str, value: float, unit: str) -> str:
     """Write a value [SI] of a measure with three digits in a suitable unit."""
-    shown, scale = units(name, value, unit)[0]
+    shown, scale = display_units(name, value, unit)[0]
     return f"{formatting.format_number(value * scale, 3)} {shown}".rstrip()
 
 
@@ -649,13 +657,13 @@ def find_definition(name: str, pressed: bool = False):
     return None
 
 
-def meaning(name: str) -> str:
+def measure_meaning(name: str) -> str:
     """Return the definition of a measure as a sentence; "" if no table has it."""
     row = find_definition(name)
     return "" if row is None else row.text
 
 
-def group_of(name: str, pressed: bool = True) -> str:
+def measure_group(name: str, pressed: bool = True) -> str:
     """Return the group of a measure, one of GROUPS; pressed: as for `find_definition`."""
     row = find_definition(name, pressed)
     return GROUPS[0] if row is None else row.group
@@ -684,7 +692,7 @@ def record_interval(name: str, measures: dict) -> tuple:
     if one.get("value") is None or spread.get("value") is None:
         return "", ""
     value, half = one["value"], spread["value"]
-    unit, scale = units(name, value, one["unit"])[0]
+    unit, scale = display_units(name, value, one["unit"])[0]
     digits = max(2, 2 + ceil(log10(abs(value) / half))) if half > 0 and value else 6
     own, low, high = (
         formatting.format_number(at * scale, digits + extra)
@@ -693,7 +701,7 @@ def record_interval(name: str, measures: dict) -> tuple:
     return f"{own} {unit}".strip(), f"95 % interval {low} to {high} {unit}".strip()
 
 
-def table_of(measures: dict, engine: str = "") -> list[str]:
+def format_measures(measures: dict, engine: str = "") -> list[str]:
     """Return the lines of all measures in their groups, each with its error or its reason.
 
     Under a random drive a line also has the interval over other records.
@@ -712,12 +720,15 @@ def table_of(measures: dict, engine: str = "") -> list[str]:
     every, measures = measures, order_measures(measures)
     width = max(map(len, measures), default=0)
     out, pressed = [], "contact_fraction" in measures
-    over = MARCHED if "worn_volume" in measures else PERIOD_BY_ENGINE.get(engine, WHOLE_RUN)
+    over = (
+        OVER_MOTION_CYCLES if "worn_volume" in measures else PERIOD_BY_ENGINE.get(engine, WHOLE_RUN)
+    )
     for group in GROUPS:
         lines = [
-            f"  {name:<{width}}  {_value(name, one, over, POWER in every)}{_records(name, every)}"
+            f"  {name:<{width}}  {_format_measure_line(name, one, over, POWER in every)}"
+            f"{_format_record_interval(name, every)}"
             for name, one in measures.items()
-            if group_of(name, pressed) == group
+            if measure_group(name, pressed) == group
         ]
         out += [group, *lines] if lines else []
     return out
@@ -733,26 +744,26 @@ def notebook_html(summary: dict, sentence: str, cycles: float | None, released: 
     sentence : str
         How the run ended.
     cycles, released
-        As for `headline`.
+        As for `headline_sentence`.
 
     Returns
     -------
     str
     """
     rows, measures = [], summary["measures"]
-    for line in table_of(measures, summary.get("numerics", {}).get("engine", "")):
+    for line in format_measures(measures, summary.get("numerics", {}).get("engine", "")):
         name, _, value = line.strip().partition(" ")
         cells = f"<td>{escape(name)}</td><td style='text-align:right'>{escape(value.strip())}</td>"
         rows.append(f"<tr>{cells if value else f'<th colspan=2>{escape(name)}</th>'}</tr>")
     title = f"<b>{escape(summary['title'])}</b><br>" if summary["title"] else ""
     warnings = "".join(f"<p>&#9888; {sentence_html(text)}</p>" for text in summary["warnings"])
     answer = escape(
-        f"{summary['outcome']}: {sentence} {headline(summary, cycles, released=released)}"
+        f"{summary['outcome']}: {sentence} {headline_sentence(summary, cycles, released=released)}"
     )
     return f"<div>{title}{answer}{warnings}<table>{''.join(rows)}</table></div>"
 
 
-def _records(name: str, measures: dict) -> str:
+def _format_record_interval(name: str, measures: dict) -> str:
     """Write the interval over other records in brackets, and state that ± is the numerical error."""
     text = record_interval(name, measures)[1]
     numerics = (
@@ -761,7 +772,7 @@ def _records(name: str, measures: dict) -> str:
     return f" ({numerics}{text} for other records)" if text else ""
 
 
-def _value(name: str, one: dict, over: str, shaken: bool) -> str:
+def _format_measure_line(name: str, one: dict, over: str, shaken: bool) -> str:
     """Write a measure with its error and what it refers to, or the reason why it has no value."""
     if one.get("reason"):
         return f"- ({one['reason']})"

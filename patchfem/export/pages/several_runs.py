@@ -10,13 +10,12 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...formatting import UNIT_LADDERS, choose_axis_unit
-from ..drawing.charts import COLOURS, mark
-from ..read_results import is_real, reading_errors, require, variables
+from ..drawing.charts import COLOURS, make_mark
+from ..read_results import is_real, read_variables, reading_errors, require_valid
 from ..summary import read_summary
-from ..written import NUMBER
-from .document import Section, document, sentence_html, table
-from .sentences import format_with_error, meaning, measure_link
-from .sweep import label
+from ..written import NUMBER, measure_label
+from .document import Section, document_html, sentence_html, table_html
+from .sentences import format_with_error, measure_link, measure_meaning
 
 HEIGHT = 410  # height of a figure [px]
 POINTS = 4000  # points of a line in a figure
@@ -80,17 +79,17 @@ def read_run(folder: Path) -> FinishedRun:
         ) from None
     except (ValueError, OSError, RecursionError) as fault:
         raise PatchfemError(f"{folder}: its results cannot be read: {fault}") from None
-    return FinishedRun(folder.resolve().name, summary, resolved, _arrays(folder / "result.nc"))
+    return FinishedRun(folder.resolve().name, summary, resolved, _read_arrays(folder / "result.nc"))
 
 
-def _arrays(path: Path) -> dict:
+def _read_arrays(path: Path) -> dict:
     """Read the variables of CHARTS that have finite values."""
     if not path.is_file():
         return {}
     shown, out = {name for _, *axes in CHARTS for name, _ in axes}, {}
-    for name, one in variables(path, shown)[1].items():
+    for name, one in read_variables(path, shown)[1].items():
         with reading_errors(path, "results of a run"):
-            require(
+            require_valid(
                 is_real(one.values) and one.values.ndim in (1, 2) and one.values.size > 0,
                 f"{name} contains {one.values.ndim}-dimensional {one.values.dtype}",
             )
@@ -100,19 +99,19 @@ def _arrays(path: Path) -> dict:
     return out
 
 
-def page(runs: list) -> str:
+def page_html(runs: list) -> str:
     """Return the HTML page of several `FinishedRun`s; differences are relative to the first."""
     names = number_duplicates([run.name for run in runs])
     charts = []
     for title, x, y in CHARTS:
         for units, lines in _lines_by_units(x[0], y[0], runs, names).items():
-            charts.append(_chart(len(charts), title, (x, y), units, lines))
+            charts.append(_chart_figure(len(charts), title, (x, y), units, lines))
     outcomes = "; ".join(
         f"{escape(name)}: {escape(run.summary['outcome'])}" for name, run in zip(names, runs)
     )
     sections = [
-        Section("scenes", "What differs in the scenes", _differences(runs, names)),
-        Section("measures", "Measures side by side", _measures(runs, names)),
+        Section("scenes", "What differs in the scenes", _differences_table(runs, names)),
+        Section("measures", "Measures side by side", _measures_table(runs, names)),
     ]
     sections += [
         Section(
@@ -125,12 +124,15 @@ def page(runs: list) -> str:
     ]
     known = dict.fromkeys(name for run in runs for name in run.summary["measures"])
     means = [
-        (f" id='measure-{escape(name)}'", [escape(label(name)), sentence_html(meaning(name))])
+        (
+            f" id='measure-{escape(name)}'",
+            [escape(measure_label(name)), sentence_html(measure_meaning(name))],
+        )
         for name in known
     ]
-    sections.append(Section("means", "What the measures are", table(("", ""), means)))
+    sections.append(Section("means", "What the measures are", table_html(("", ""), means)))
     title = " and ".join(names) if len(names) < 4 else f"{len(names)} runs side by side"
-    return document(
+    return document_html(
         title,
         f"<p class=verdict>{outcomes}.</p>",
         sections,
@@ -182,7 +184,7 @@ def _lines_by_units(x: str, y: str, runs: list, names: list) -> dict:
         if a.shape != b.shape or not a.size:
             continue
         if "time" in run.arrays and run.arrays["time"][0].shape == a.shape:
-            late = _last_cycles(run)
+            late = _select_last_cycles(run)
             a, b = a[late], b[late]
             a = a - a[-1] if x == "time" else a
         step = -(-a.size // POINTS)
@@ -190,7 +192,7 @@ def _lines_by_units(x: str, y: str, runs: list, names: list) -> dict:
     return lines
 
 
-def _chart(number: int, title: str, axes: tuple, units: tuple, lines: list) -> dict:
+def _chart_figure(number: int, title: str, axes: tuple, units: tuple, lines: list) -> dict:
     """Return a figure.
 
     Parameters
@@ -219,7 +221,7 @@ def _chart(number: int, title: str, axes: tuple, units: tuple, lines: list) -> d
         "y": {"label": y[1], "unit": unit_b, "log": False},
         "told": f"{y[1].capitalize()} [{unit_b}] over {x[1]}: {peaks}.",
         "marks": [
-            mark(
+            make_mark(
                 "dots" if x[0] == "level_drive" else "line",
                 colour,
                 name,
@@ -238,25 +240,25 @@ def _axis_unit(arrays: list, unit: str) -> tuple:
     return unit, 1.0
 
 
-def period_of(run: FinishedRun) -> float | None:
+def drive_period(run: FinishedRun) -> float | None:
     """Return the period [s] of the sine that drives a run; None if there is none."""
     written = NUMBER.match(str(run.resolved.get("drive", {}).get("frequency", "")))
     return 1 / float(written[1]) if written and float(written[1]) > 0 else None
 
 
-def _last_cycles(run: FinishedRun) -> np.ndarray:
+def _select_last_cycles(run: FinishedRun) -> np.ndarray:
     """Return which samples lie in the last N_SHOWN_CYCLES cycles of a sine.
 
     Without a sine it is the last tenth of the run; on a bench all samples.
     """
-    time, period = run.arrays["time"][0], period_of(run)
+    time, period = run.arrays["time"][0], drive_period(run)
     span = N_SHOWN_CYCLES * period if period else np.ptp(time) / 10
     if run.summary["kind"] == "bench":
         span = np.ptp(time)
     return time >= time[-1] - span * (1 + 1e-9)
 
 
-def _flatten(table, at: str = "") -> dict:
+def _flatten_tables(table, at: str = "") -> dict:
     """Flatten nested tables: "contact.tilt.angle" -> value.
 
     Entries of lists are named by their name or number.
@@ -270,13 +272,13 @@ def _flatten(table, at: str = "") -> dict:
     return {
         key: value
         for name, one in pairs
-        for key, value in _flatten(one, f"{at}.{name}" if at else str(name)).items()
+        for key, value in _flatten_tables(one, f"{at}.{name}" if at else str(name)).items()
     }
 
 
-def _differences(runs: list, names: list) -> str:
+def _differences_table(runs: list, names: list) -> str:
     """Return a table of the keys whose values differ between the resolved scenes."""
-    flat = [_flatten(run.resolved) for run in runs]
+    flat = [_flatten_tables(run.resolved) for run in runs]
     keys = [
         key
         for key in dict.fromkeys(key for one in flat for key in one)
@@ -284,14 +286,14 @@ def _differences(runs: list, names: list) -> str:
     ]
     if not keys:
         return "<p>There is no difference: the resolved scenes are the same.</p>"
-    rows = [[escape(key), *(_written(one.get(key)) for one in flat)] for key in keys]
+    rows = [[escape(key), *(_format_scene_value(one.get(key)) for one in flat)] for key in keys]
     return (
         "<p class=soft>The table lists the keys whose values differ between the resolved scenes, in SI.</p>"
-        + table(("key", *map(escape, names)), rows)
+        + table_html(("key", *map(escape, names)), rows)
     )
 
 
-def _written(value) -> str:
+def _format_scene_value(value) -> str:
     """Write a value of a resolved scene as HTML; long strings are cut."""
     text = (
         "&ndash;"
@@ -303,7 +305,7 @@ def _written(value) -> str:
     return text if len(text) < 80 else text[:76] + " …"
 
 
-def _measures(runs: list, names: list) -> str:
+def _measures_table(runs: list, names: list) -> str:
     """Return a table of the measures of all runs.
 
     Values that differ from those of the first run by more than both errors are marked.
@@ -313,9 +315,9 @@ def _measures(runs: list, names: list) -> str:
         found = [run.summary["measures"].get(name) for run in runs]
         rows.append(
             [
-                measure_link(label(name), name),
+                measure_link(measure_label(name), name),
                 *(
-                    _cell(name, one, found[0] if number else None)
+                    _format_cell(name, one, found[0] if number else None)
                     for number, one in enumerate(found)
                 ),
             ]
@@ -325,11 +327,11 @@ def _measures(runs: list, names: list) -> str:
         "first run by more than the sum of both errors. The change from the first run is in brackets: in per "
         "cent; as a factor if the value is ten times the first value or more; as a dash if the first value is "
         "smaller than its error.</p>"
-        + table(("measure", *(f">{escape(name)}" for name in names)), rows, "across side")
+        + table_html(("measure", *(f">{escape(name)}" for name in names)), rows, "across side")
     )
 
 
-def _cell(name: str, one: dict | None, first: dict | None) -> str:
+def _format_cell(name: str, one: dict | None, first: dict | None) -> str:
     """Write a measure as a cell, with its change from the first run."""
     if one is None or one["value"] is None or not math.isfinite(one["value"]):
         return "&ndash;"

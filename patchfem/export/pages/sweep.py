@@ -10,12 +10,18 @@ from ...core import Outcome
 from ...formatting import UNIT_LADDERS, choose_axis_unit, round_to_error
 from ...runs.results.patch_rows import minimum_value
 from ..tolerance_misses import is_over_tolerance
-from ..written import NUMBER, label, shorten
+from ..written import NUMBER, measure_label, shorten_number
 from . import document, limits, peaks, ranked
 from .document import Section, sentence_html, with_line_breaks
-from .drawn import ERROR_DIGITS, VALUE_DIGITS, digits, select_cases
-from .headline import MAIN_MEASURES, SETTLED, SweepHeadline, columns, summarise_sweep
-from .sentences import is_share, measure_link, zero_below
+from .drawn import ERROR_DIGITS, VALUE_DIGITS, round_to_digits, select_cases
+from .headline import (
+    MAIN_MEASURES,
+    SETTLED_OUTCOMES,
+    SweepHeadline,
+    measure_columns,
+    summarise_sweep,
+)
+from .sentences import format_zero, is_share, measure_link
 
 # Numbers of measures, and of keys and measures together, in the table of cases: more do not fit a
 # wide screen.
@@ -32,7 +38,7 @@ MAX_LISTED_CASES, MIN_SCROLLED_ROWS = (
 )
 
 
-def page(table: dict, told: SweepHeadline | None = None) -> str:
+def page_html(table: dict, told: SweepHeadline | None = None) -> str:
     """Return the HTML page of a sweep.
 
     Parameters
@@ -63,22 +69,22 @@ def page(table: dict, told: SweepHeadline | None = None) -> str:
     )
     told, part = (
         told or summarise_sweep(table),
-        select_cases(table, lambda cases, whole: _data(table, first, cases, whole)),
+        select_cases(table, lambda cases, whole: _script_data(table, first, cases, whole)),
     )
-    data = _data(table, first, part.cases, not part.said)
+    data = _script_data(table, first, part.cases, not part.said)
     sections = [
         Section(
             "answers",
             "Results",
-            _explorer(part.said, table["folders"])
+            _explorer_html(part.said, table["folders"])
             if data["measures"]
             else "<p>No case has a value to draw.</p>",
         ),
-        *_change(table, told.limits),
+        *_change_section(table, told.limits),
         *(
             Section(*one)
             for one in (
-                ("peaks", "Peaks", peaks.table(told.peaks)),
+                ("peaks", "Peaks", peaks.peaks_table(told.peaks)),
                 ("ranking", "Keys that matter most", ranked.share_bars(told.ranks)),
                 (
                     "scatter",
@@ -88,37 +94,37 @@ def page(table: dict, told: SweepHeadline | None = None) -> str:
             )
             if one[2]
         ),
-        Section("cases", "Cases", _cases(table)),
-        Section("measures", "What the measures mean", _meanings(table)),
+        Section("cases", "Cases", _cases_table(table)),
+        Section("measures", "What the measures mean", _meanings_table(table)),
         Section("again", "How to repeat the sweep", _repeat_section(table)),
     ]
-    return document.document(
+    return document.document_html(
         table["title"] or "patchfem sweep",
-        _lead(table, told),
+        _lead_html(table, told),
         sections,
         *((data, ("figures.js", "explorer.js")) if data["measures"] else (None, ())),
     )
 
 
-def _data(table: dict, first: str | None, cases: np.ndarray, whole: bool) -> dict:
+def _script_data(table: dict, first: str | None, cases: np.ndarray, whole: bool) -> dict:
     """Return the data of some cases for the scripts; whole: with all digits."""
-    keys = [_key(one, cases) for one in table["keys"]]
+    keys = [_key_data(one, cases) for one in table["keys"]]
     measures = [
-        _measure(name, one, cases, table.get("tolerance", np.nan))
+        _measure_data(name, one, cases, table.get("tolerance", np.nan))
         for name, one in table["measures"].items()
         if np.isfinite(one["values"]).any()
     ]
     for one in measures if not whole else ():
         one |= {
-            "values": digits(one["values"], VALUE_DIGITS),
-            "errors": digits(one["errors"], ERROR_DIGITS),
+            "values": round_to_digits(one["values"], VALUE_DIGITS),
+            "errors": round_to_digits(one["errors"], ERROR_DIGITS),
         }
     links = table["folders"]
     return {
         "keys": keys,
         "measures": measures,
         "outcome": [str(table["outcome"][i]) for i in cases.tolist()],
-        "settled": SETTLED,
+        "settled": SETTLED_OUTCOMES,
         "grid": bool(table["grid"] and whole),
         "first": first,
         "along": _axis_key(keys),
@@ -127,7 +133,7 @@ def _data(table: dict, first: str | None, cases: np.ndarray, whole: bool) -> dic
     }
 
 
-def _key(one: dict, cases) -> dict:
+def _key_data(one: dict, cases) -> dict:
     """Return a swept key in the unit in which it was written, if all values have the same unit.
 
     `words`: (number, text) of its values if they are words.
@@ -139,19 +145,19 @@ def _key(one: dict, cases) -> dict:
         unit, values = units.pop(), [float(match[1]) for match in written]
     else:
         unit, values = one["unit"], np.asarray(one["values"], float)[cases]
-    words = None if any(written) else list(dict(zip(values, map(shorten, texts))).items())
+    words = None if any(written) else list(dict(zip(values, map(shorten_number, texts))).items())
     return {
         "name": one["name"],
         "label": one["name"],
         "unit": "" if unit == "1" else unit,
         "values": values,
-        "texts": [shorten(text) for text in texts],
+        "texts": [shorten_number(text) for text in texts],
         "log": bool(one["log"]),
         "words": words,
     }
 
 
-def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
+def _measure_data(name: str, one: dict, cases, tolerance=np.nan) -> dict:
     """Return a measure in a unit that suits its largest value, for the scripts.
 
     `over`: whether a case misses its tolerance.
@@ -160,7 +166,7 @@ def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
     ----------
     name : str
     one : dict
-        The measure, as in the table of `page`.
+        The measure, as in the table of `page_html`.
     cases : (m,) array or slice
     tolerance : float or (n,) array
     """
@@ -179,12 +185,12 @@ def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
     missed = is_over_tolerance(some, tolerance[cases] if np.ndim(tolerance) else tolerance)
     return {
         "name": name,
-        "label": label(name),
+        "label": measure_label(name),
         "unit": "" if unit == "1" else unit,
         "means": one.get("means", ""),
         "values": some["values"] * scale,
         "errors": some["errors"] * scale,
-        "least": zero_below(name) * scale,
+        "least": format_zero(name) * scale,
         "minimum": minimum_value(name) * scale,
         "over": missed.astype(int),
     }
@@ -195,7 +201,7 @@ def _axis_key(keys: list) -> str:
     return max(keys, key=lambda one: np.unique(one["values"]).size)["name"] if keys else ""
 
 
-def _explorer(said: str, folders: list | None) -> str:
+def _explorer_html(said: str, folders: list | None) -> str:
     """Return the controls and the empty figure, which `explorer.js` fills.
 
     Parameters
@@ -231,20 +237,20 @@ def _explorer(said: str, folders: list | None) -> str:
     )
 
 
-def _change(table: dict, found: limits.Limits) -> list:
+def _change_section(table: dict, found: limits.Limits) -> list:
     """Return the section on the change of each main measure since the first case.
 
     [] if the sweep has no limits.
     """
-    text = limits.table(found, columns(table))
+    text = limits.limits_table(found, measure_columns(table))
     return [Section("change", "Change relative to the first case", text)] if text else []
 
 
-def _lead(table: dict, said: SweepHeadline) -> str:
+def _lead_html(table: dict, said: SweepHeadline) -> str:
     """Return the verdict as HTML: the answer, number of cases, keys, outcomes, other sentences."""
     number, over = len(table["outcome"]), " × ".join(one["name"] for one in table["keys"])
     ended = ", ".join(
-        f"{count} {label(name)}" for name, count in Counter(table["outcome"]).most_common()
+        f"{count} {measure_label(name)}" for name, count in Counter(table["outcome"]).most_common()
     )
     first, others = said.sentences()[:1], said.sentences()[1:]
     lines = [
@@ -253,9 +259,9 @@ def _lead(table: dict, said: SweepHeadline) -> str:
         *map(escape, others),
     ]
     lines += [
-        f"<i>{escape(label(one))}</i>: {sentence_html(one.sentence)}"
+        f"<i>{escape(measure_label(one))}</i>: {sentence_html(one.sentence)}"
         for one in Outcome
-        if one.value in table["outcome"] and one.value not in SETTLED
+        if one.value in table["outcome"] and one.value not in SETTLED_OUTCOMES
     ]
     text = "".join(f"<p>{line}</p>" for line in lines)
     fault = document.warning_box(
@@ -271,7 +277,7 @@ def _lead(table: dict, said: SweepHeadline) -> str:
     )
 
 
-def _cases(table: dict) -> str:
+def _cases_table(table: dict) -> str:
     """Return the first cases as a table with keys, outcome and the measures that vary."""
     shown = [
         name
@@ -284,13 +290,13 @@ def _cases(table: dict) -> str:
         name
         for name, one in table["measures"].items()
         if name not in shown
-        and _changes(one["values"])
-        and np.nanmax(np.abs(one["values"])) > zero_below(name)
+        and _is_varied(one["values"])
+        and np.nanmax(np.abs(one["values"])) > format_zero(name)
     ]
     shown = shown[: min(MAX_MEASURES, max(2, MAX_COLUMNS - len(table["keys"])))]
     few = slice(MAX_LISTED_CASES)
     columns = [
-        _measure(name, table["measures"][name], few, table.get("tolerance", np.nan))
+        _measure_data(name, table["measures"][name], few, table.get("tolerance", np.nan))
         for name in shown
     ]
     heads = [
@@ -303,19 +309,22 @@ def _cases(table: dict) -> str:
     ]
     rows = []
     for i, outcome in enumerate(table["outcome"][:MAX_LISTED_CASES]):
-        said = escape(label(outcome))
+        said = escape(measure_label(outcome))
         if table["folders"] is not None:
             said = f'<a href="{escape(table["folders"][i])}">{said}</a>'
         numbers = (
             f"<td class=n{' data-over' * bool(one['over'][i])}>"
-            f"{_number(one['values'][i], one['errors'][i], one['least'])}</td>"
+            f"{_format_number(one['values'][i], one['errors'][i], one['least'])}</td>"
             for one in columns
         )
         rows.append(
             (
-                "" if outcome in SETTLED else " class=bad",
+                "" if outcome in SETTLED_OUTCOMES else " class=bad",
                 [
-                    *(_unbroken(shorten(str(one["texts"][i]))) for one in table["keys"]),
+                    *(
+                        _keep_unit_together(shorten_number(str(one["texts"][i])))
+                        for one in table["keys"]
+                    ),
                     said,
                     *numbers,
                 ],
@@ -337,22 +346,22 @@ def _cases(table: dict) -> str:
         if table.get("own", True)
         else ""
     )
-    return f"{files}{document.table(heads, rows, 'wide long' if len(rows) > MIN_SCROLLED_ROWS else 'wide')}{more}"
+    return f"{files}{document.table_html(heads, rows, 'wide long' if len(rows) > MIN_SCROLLED_ROWS else 'wide')}{more}"
 
 
-def _unbroken(text: str) -> str:
+def _keep_unit_together(text: str) -> str:
     """Return a value of a key as HTML without a line break before its unit."""
     return escape(text).replace(" ", "&nbsp;") if NUMBER.match(text) else escape(text)
 
 
-def _changes(values) -> bool:
+def _is_varied(values) -> bool:
     """Return whether values (n,) differ by more than round-off."""
     found = np.asarray(values, float)
     found = found[np.isfinite(found)]
     return found.size > 0 and np.ptp(found) > 1e-9 * np.abs(found).max()
 
 
-def _number(value: float, error: float, least: float) -> str:
+def _format_number(value: float, error: float, least: float) -> str:
     """Write a value with its error, rounded by this error; least: its floor in the same unit."""
     if not np.isfinite(value):
         return "&ndash;"
@@ -361,16 +370,16 @@ def _number(value: float, error: float, least: float) -> str:
     )
 
 
-def _meanings(table: dict) -> str:
+def _meanings_table(table: dict) -> str:
     """Return a table of the definitions of the measures."""
     rows = [
         (
             f" id='measure-{escape(name)}'",
-            [escape(label(name)), escape(one["unit"]), sentence_html(one.get("means", ""))],
+            [escape(measure_label(name)), escape(one["unit"]), sentence_html(one.get("means", ""))],
         )
         for name, one in table["measures"].items()
     ]
-    return document.table(("measure", "unit", "meaning"), rows)
+    return document.table_html(("measure", "unit", "meaning"), rows)
 
 
 def _repeat_section(table: dict) -> str:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..drawing.panels import sizes
+from ..drawing.panels import quadrilateral_areas
 
 COLUMNS_PER_ROW = 3.0  # ratio of columns to rows, if there are enough lines of both
 
@@ -64,11 +64,11 @@ def reduce_mesh(points, cells, material, most: int, near: tuple | None = None) -
     -------
     ReducedMesh
     """
-    count, size = len(cells), sizes(points, cells)
+    count, size = len(cells), quadrilateral_areas(points, cells)
     if count <= most:
         every = np.arange(count)
         return ReducedMesh(np.arange(len(points)), cells, every, every, every, size)
-    bins, heights = _bins(points, cells, material, most, near)
+    bins, heights = _line_bins(points, cells, material, most, near)
     key = bins[0] * heights + bins[1]
     away = np.abs(points[:, 0] - points[:, 0].min()) + np.abs(points[:, 1])
     # The first point of a box is the one nearest to its corner; in a grid it is this corner.
@@ -88,7 +88,7 @@ def reduce_mesh(points, cells, material, most: int, near: tuple | None = None) -
     return ReducedMesh(by_key[first], moved[whole], order, starts, of_cell[whole], size[order])
 
 
-def _bins(points, cells, material, most: int, near: tuple | None) -> tuple:
+def _line_bins(points, cells, material, most: int, near: tuple | None) -> tuple:
     """Return the indices of the kept lines at or before each point, and the number of rows.
 
     The indices count columns along x and rows in depth.

@@ -17,7 +17,7 @@ from ...surface.roughness.peaks import (
 PRESSURE_FRACTION = 1e-5
 
 
-def data_of(moments: TraceMoments | None, cutoff: float | None) -> dict | None:
+def asperity_data(moments: TraceMoments | None, cutoff: float | None) -> dict | None:
     """Return the moments of a trace and its peaks as plain data in SI; None for a flat trace.
 
     `stiffness` is the ratio of stiffness to pressure [1/m], and `stiffness_half_sampled` the same
@@ -49,9 +49,9 @@ def data_of(moments: TraceMoments | None, cutoff: float | None) -> dict | None:
     return out
 
 
-def lines_of(moments: TraceMoments | None, cutoff: float | None) -> list:
-    """Return `data_of` as lines of text, ready to paste."""
-    data = data_of(moments, cutoff)
+def format_asperities(moments: TraceMoments | None, cutoff: float | None) -> list:
+    """Return `asperity_data` as lines of text, ready to paste."""
+    data = asperity_data(moments, cutoff)
     if data is None:
         return []
     if "reason" in data:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import __version__
 from ...campaigns.compare import SurfaceRuns
-from ...campaigns.compare import data_of as pressed_data
+from ...campaigns.compare import surface_runs_data as pressed_data
 from ...disk.atomic_write import write_text
 from ...surface.areal import level_plane
 from ...surface.compare.compare import Comparison
@@ -17,7 +17,14 @@ from ...surface.profile import Profile, level, resample_evenly
 from ...surface.quantity import LEVEL
 from ...surface.roughness.spectrum import BAND
 from ...surface.scans.change import Change, refuse_hidden_wear
-from ..pages.document import Section, document, figure, sentence_html, table, warning_box
+from ..pages.document import (
+    Section,
+    document_html,
+    figure_html,
+    sentence_html,
+    table_html,
+    warning_box,
+)
 from ..pages.sentences import format_with_error
 from . import pictures
 from .areal import write_columns, write_x3p
@@ -63,7 +70,7 @@ WORDS = {
 TABLE_HEADS = ("quantity", "value", "95 %", "unit")
 SIDES = ("before", "after")
 MAX_DRAWN = 1_000_000  # heights of a histogram or Abbott curve; larger scans are thinned
-NOTE = (
+PAGE_NOTE = (
     "All intervals are 95 % intervals. The intervals of shift, depth and area hold for the "
     "measured place and come from the noise of the unworn heights. A track or worn part begins "
     "where the flank that is fitted to its depths leaves the unworn surface. The flank is a "
@@ -86,7 +93,7 @@ def _averaged_part(comparison: Comparison) -> str | None:
     return "track" if comparison.reference == "flanks" else "common length"
 
 
-def _table(comparison: Comparison) -> QuantityTable:
+def _quantities_table(comparison: Comparison) -> QuantityTable:
     """Return the table of quantities of one direction."""
     rows = []
     for name, quantity in comparison.values.items():
@@ -99,7 +106,7 @@ def _table(comparison: Comparison) -> QuantityTable:
     return QuantityTable(TABLE_HEADS, rows)
 
 
-def lines_of(parts: list, verdict: tuple, pressed: SurfaceRuns | None = None) -> list:
+def format_comparison(parts: list, verdict: tuple, pressed: SurfaceRuns | None = None) -> list:
     """Return the comparison as lines of text.
 
     Parameters
@@ -120,7 +127,7 @@ def lines_of(parts: list, verdict: tuple, pressed: SurfaceRuns | None = None) ->
     for part in parts:
         direction = f", along {part.direction}" if part.direction else ""
         out.append(f"{part.before.source} -> {part.after.source}{direction}")
-        out += _table(part).lines()
+        out += _quantities_table(part).lines()
     if pressed is not None:
         out += ["", f"{pressed.title}, pressed with each surface"]
         rows = []
@@ -148,7 +155,7 @@ def _format_measure(name: str, measure) -> str:
     )
 
 
-def data_of(
+def comparison_data(
     parts: list, verdict: tuple, directions: list, pressed: SurfaceRuns | None = None
 ) -> dict:
     """Return the comparison as plain data in SI; the first direction is at the top level.
@@ -243,7 +250,7 @@ def _scans_data(change: Change) -> dict:
     }
 
 
-def surfaces(comparison: Comparison) -> tuple:
+def pressed_traces(comparison: Comparison) -> tuple:
     """Return the traces (before, after) that a scene presses: their common part if there is one.
 
     x is measured from the middle, and heights are levelled by least squares, as the scene does.
@@ -293,7 +300,7 @@ class Article(NamedTuple):
         lead += f"<b>{sentence_html(headline[0].upper() + headline[1:])}.</b>"
         lead += "".join(f"<p>{sentence_html(text)}</p>" for text in sentences)
         lead += f"</div>{warning_box(self.notes)}"
-        return document(f"{self.title}: before and after", lead, sections)
+        return document_html(f"{self.title}: before and after", lead, sections)
 
 
 def write_page(
@@ -309,12 +316,12 @@ def write_page(
     ----------
     path : Path
     parts, verdict, directions, pressed
-        As in `data_of`.
+        As in `comparison_data`.
     """
-    write_text(path, page(parts, verdict, directions, pressed))
+    write_text(path, page_html(parts, verdict, directions, pressed))
 
 
-def page(
+def page_html(
     parts: list, verdict: tuple, directions: list = (), pressed: SurfaceRuns | None = None
 ) -> str:
     """Return the page of a comparison, the verdict first.
@@ -322,7 +329,7 @@ def page(
     Parameters
     ----------
     parts, verdict, directions, pressed
-        As in `data_of`.
+        As in `comparison_data`.
 
     Returns
     -------
@@ -334,7 +341,7 @@ def page(
         ratios = []
         for when, amplitude, _ in directions:
             ratios.append(f"{when} {' '.join(format_quantity(amplitude)[:2])}")
-        crossed = figure(
+        crossed = figure_html(
             "xy",
             pictures.draw_directions(parts, directions),
             "Left: spectra of both directions. Right: amplitude of the band along x divided by "
@@ -352,9 +359,10 @@ def page(
         if part.direction:
             heading += f" along {part.direction}"
         body = [
-            figure(f"{number}{place}", *picture) for place, picture in enumerate(_pictures(part))
+            figure_html(f"{number}{place}", *picture)
+            for place, picture in enumerate(_draw_pictures(part))
         ]
-        body += [_table(part).html(), f"<p class=soft>{sentence_html(NOTE)}</p>"]
+        body += [_quantities_table(part).html(), f"<p class=soft>{sentence_html(PAGE_NOTE)}</p>"]
         sections.append(Section(f"changes{number}", heading, "\n".join(body)))
     if pressed is not None:
         sections.append(
@@ -366,7 +374,7 @@ def page(
     return Article(f"{names[0]} and {names[1]}", verdict, notes).html(sections)
 
 
-def _pictures(part: Comparison) -> list:
+def _draw_pictures(part: Comparison) -> list:
     """Draw the pictures of one direction."""
     out = []
     if part.alignment is not None:
@@ -509,7 +517,9 @@ def _pressed_html(pressed: SurfaceRuns) -> str:
             "settings of the scene are the same."
         )
         parts.append(
-            figure("p", drawn, caption, f"Pressure along the patch, largest: {', '.join(peaks)}")
+            figure_html(
+                "p", drawn, caption, f"Pressure along the patch, largest: {', '.join(peaks)}"
+            )
         )
         rows = []
         for name, words, first, second in pressed.rows():
@@ -520,7 +530,7 @@ def _pressed_html(pressed: SurfaceRuns) -> str:
                 _format_ratio(first, second),
             )
             rows.append([escape(text) for text in texts])
-        parts.append(table(("measure", ">before", ">after", ">after / before"), rows))
+        parts.append(table_html(("measure", ">before", ">after", ">after / before"), rows))
     parts += [f"<p class=soft>{sentence_html(text)}.</p>" for text in pressed.lacking]
     return "\n".join(parts)
 

@@ -9,7 +9,14 @@ from ...core import PatchfemError
 from ...disk.atomic_write import write_rows, write_text
 from ...formatting import format_number
 from ...surface.compare import pairs, verdict
-from ..pages.document import Section, document, figure, sentence_html, table, warning_box
+from ..pages.document import (
+    Section,
+    document_html,
+    figure_html,
+    sentence_html,
+    table_html,
+    warning_box,
+)
 from . import compare, worn
 from .pictures import PairsPanel, draw_pairs
 from .quantities import UNITS, QuantityTable, Row, csv_columns, format_quantity
@@ -26,7 +33,7 @@ MEANING = (
 )
 
 
-def answers(
+def compare_pairs(
     asked: list, direction: str = "", done: Callable | None = None, **settings
 ) -> list[dict]:
     """Compare each pair, of files or of results folders.
@@ -49,17 +56,19 @@ def answers(
 
     def answer(paths: tuple, own: str) -> dict:
         if not any(path.is_dir() for path in paths):
-            return compare.data_of(*verdict.judge_files(paths, own or direction, **settings))
+            return compare.comparison_data(
+                *verdict.judge_files(paths, own or direction, **settings)
+            )
         if own or settings.get("shift") is not None:
             what = "a direction" if own else "a shift"
             raise PatchfemError(f"{what} can be given only for traces, not for results folders")
         wear = compare_runs(*paths)
-        return worn.data_of(wear, worn.verdict(wear))
+        return worn.wear_data(wear, worn.wear_verdict(wear))
 
     return pairs.compare_pairs(asked, answer, done)
 
 
-def data_of(rows: list) -> dict:
+def pairs_data(rows: list) -> dict:
     """Return the pairs and the means over them as plain data in SI."""
     means = []
     for (group, direction, kind), count, averages in pairs.average_pairs(rows):
@@ -69,10 +78,10 @@ def data_of(rows: list) -> dict:
             entry[name] = {"value": value, "low": low, "high": high, "unit": unit}
             entry[name] |= {"scatter": average.scatter, "pairs": average.count}
         means.append(entry)
-    return {"patchfem": __version__, "pairs": rows, "means": means, "notes": notes(rows)}
+    return {"patchfem": __version__, "pairs": rows, "means": means, "notes": mean_notes(rows)}
 
 
-def notes(rows: list) -> list:
+def mean_notes(rows: list) -> list:
     """State the limits of the means as sentences."""
     out = []
     firsts = [(pairs.find_group(row), row["before"]) for row in rows if row["outcome"] == "done"]
@@ -84,19 +93,19 @@ def notes(rows: list) -> list:
         )
     for group, count, averages in pairs.average_pairs(rows):
         fewer = [
-            f"{_words(name)} ({average.count})"
+            f"{_quantity_name(name)} ({average.count})"
             for name, average in averages.items()
             if average.count < count
         ]
         if fewer:
             out.append(
-                f"{_title(*group)}: not all {count} pairs have a value of {', '.join(fewer)}; the "
+                f"{_group_title(*group)}: not all {count} pairs have a value of {', '.join(fewer)}; the "
                 "mean of this value says nothing about the other pairs"
             )
     return out
 
 
-def _words(name: str) -> str:
+def _quantity_name(name: str) -> str:
     """Return the name of a quantity of a pair.
 
     `amplitude_ratio_y` is the one of the other direction of a scan.
@@ -106,7 +115,7 @@ def _words(name: str) -> str:
     return f"{compare.WORDS[name.removesuffix('_x').removesuffix('_y')]} along {name[-1]}"
 
 
-def _title(group: str, direction: str, kind: str) -> str:
+def _group_title(group: str, direction: str, kind: str) -> str:
     """Return the title of a group of pairs over which means are taken."""
     along = f"along {direction}" if direction else ""
     return ", ".join(filter(None, (group, pairs.KINDS[kind], along)))
@@ -133,19 +142,19 @@ def write_csv(rows: list, path: Path) -> None:
     write_rows(path, lines)
 
 
-def lines_of(rows: list) -> list:
+def format_pairs(rows: list) -> list:
     """Return each pair, then the means of each group, as lines of text."""
-    out = [_headline(rows), ""]
+    out = [_count_sentence(rows), ""]
     for row in rows:
-        out.append(f"{row['before']} -> {row['after']}{_direction(row)}")
+        out.append(f"{row['before']} -> {row['after']}{_direction_text(row)}")
         out.append("; ".join([f"  {row['message'] or row['verdict']}", *_main_texts(row)]))
     for group, count, averages in pairs.average_pairs(rows):
         if averages:
-            out += ["", _heading(group, count), *_table(averages).lines()]
+            out += ["", _group_heading(group, count), *_means_table(averages).lines()]
     return out
 
 
-def _headline(rows: list) -> str:
+def _count_sentence(rows: list) -> str:
     """Count the pairs, those that show wear, and those that failed."""
     failed = sum(row["outcome"] == "failed" for row in rows)
     with_wear = sum(
@@ -160,7 +169,7 @@ def _main_names(row: dict) -> tuple:
     return SCAN_NUMBERS if "worn_volume" in row else TRACE_NUMBERS
 
 
-def _direction(row: dict) -> str:
+def _direction_text(row: dict) -> str:
     """Return the direction of a pair of traces as text."""
     return (
         f", along {row['direction']}"
@@ -178,11 +187,11 @@ def _main_texts(row: dict) -> list:
         text = format_quantity(pairs.parse_quantity(row[name]))
         if text.interval:
             interval = text.interval.replace(" .. ", " to ")
-            out.append(f"{_words(name)} {text.value} ({interval}) {text.unit}".rstrip())
+            out.append(f"{_quantity_name(name)} {text.value} ({interval}) {text.unit}".rstrip())
     return out
 
 
-def _table(averages: dict) -> QuantityTable:
+def _means_table(averages: dict) -> QuantityTable:
     """Return the means of a group, with the scatter in the unit of each."""
     rows = []
     for name, average in averages.items():
@@ -190,7 +199,7 @@ def _table(averages: dict) -> QuantityTable:
         scale = dict(UNITS[average.mean.unit])[unit]
         rows.append(
             Row(
-                _words(name),
+                _quantity_name(name),
                 average.mean,
                 more=(format_number(average.scatter * scale, 3), str(average.count)),
             )
@@ -198,10 +207,10 @@ def _table(averages: dict) -> QuantityTable:
     return QuantityTable(("quantity", "mean", "95 %", "scatter", "pairs", "unit"), rows)
 
 
-def page(rows: list, name: str) -> str:
+def page_html(rows: list, name: str) -> str:
     """Return the self-contained page of a table of pairs."""
-    lead = f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict><b>{_headline(rows)}.</b></div>"
-    lead += warning_box([f"{text}." for text in notes(rows)])
+    lead = f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict><b>{_count_sentence(rows)}.</b></div>"
+    lead += warning_box([f"{text}." for text in mean_notes(rows)])
     sections = []
     for number, (group, count, averages) in enumerate(pairs.average_pairs(rows)):
         if averages:
@@ -210,12 +219,14 @@ def page(rows: list, name: str) -> str:
             ]
             sections.append(
                 Section(
-                    f"means{number}", _heading(group, count), _means_html(number, own, averages)
+                    f"means{number}",
+                    _group_heading(group, count),
+                    _means_html(number, own, averages),
                 )
             )
     lines = []
     for row in rows:
-        names = (row["before"], row["after"] + _direction(row), *row["labels"].values())
+        names = (row["before"], row["after"] + _direction_text(row), *row["labels"].values())
         outcome = sentence_html(row["message"] or row["verdict"])
         lines.append(
             [str(row["line"]), *map(escape, names), outcome, escape("; ".join(_main_texts(row)))]
@@ -228,13 +239,13 @@ def page(rows: list, name: str) -> str:
         "verdict",
         "main numbers, 95 %",
     )
-    sections.append(Section("pairs", "Each pair", table(heads, lines)))
-    return document(f"{name}: pairs before and after", lead, sections)
+    sections.append(Section("pairs", "Each pair", table_html(heads, lines)))
+    return document_html(f"{name}: pairs before and after", lead, sections)
 
 
-def _heading(group: tuple, count: int) -> str:
+def _group_heading(group: tuple, count: int) -> str:
     """Return the heading of a group of pairs."""
-    text = _title(*group)
+    text = _group_title(*group)
     return f"{text[0].upper()}{text[1:]}: mean of {count} pairs"
 
 
@@ -244,7 +255,7 @@ def _means_html(number: int, rows: list, averages: dict) -> str:
     for name in _main_names(rows[0]):
         if name in averages:
             values = {row["line"]: pairs.parse_quantity(row[name]) for row in rows}
-            panels.append(PairsPanel(_words(name), values, averages[name].mean))
+            panels.append(PairsPanel(_quantity_name(name), values, averages[name].mean))
     parts = []
     if panels:
         caption = (
@@ -252,9 +263,9 @@ def _means_html(number: int, rows: list, averages: dict) -> str:
             "the table. The band is the mean with its interval."
         )
         texts = [f"{panel.title}: mean {format_quantity(panel.mean).short}" for panel in panels]
-        parts.append(figure(f"m{number}", draw_pairs(panels), caption, "; ".join(texts)))
+        parts.append(figure_html(f"m{number}", draw_pairs(panels), caption, "; ".join(texts)))
     return "\n".join(
-        [*parts, _table(averages).html(), f"<p class=soft>{sentence_html(MEANING)}</p>"]
+        [*parts, _means_table(averages).html(), f"<p class=soft>{sentence_html(MEANING)}</p>"]
     )
 
 
@@ -268,4 +279,4 @@ def write_page(path: Path, rows: list, name: str) -> None:
     name : str
         Name of the table.
     """
-    write_text(path, page(rows, name))
+    write_text(path, page_html(rows, name))

@@ -9,7 +9,7 @@ from ...surface.profile import level, resample_evenly
 from ...surface.quantity import Quantity
 from ...surface.roughness.parameters import Heights, abbott_curve
 from ...surface.roughness.spectrum import Spectrum
-from ..drawing.charts import axis, chart, line, mark
+from ..drawing.charts import make_axis, make_chart, make_line, make_mark
 from ..drawing.pictures import BLUE, draw_charts, make_figure, returns_svg
 
 MAX_POINTS = 2400  # points of a drawn line, eight for each pixel column of the page
@@ -37,16 +37,19 @@ def draw_trace(primary, waviness) -> str:
     along, mm = choose_axis_unit(primary.x, "m")
     up, um = choose_axis_unit(primary.z, "m")
     if waviness is None:
-        marks = [line(primary.x * mm, primary.z * um, "accent", most=MAX_POINTS, width=0.7)]
+        marks = [make_line(primary.x * mm, primary.z * um, "accent", most=MAX_POINTS, width=0.7)]
     else:
         marks = [
-            line(
+            make_line(
                 primary.x * mm, primary.z * um, "soft", "levelled trace", most=MAX_POINTS, width=0.7
             ),
-            line(waviness.x * mm, waviness.z * um, "warm", "waviness", most=MAX_POINTS, width=1.6),
+            make_line(
+                waviness.x * mm, waviness.z * um, "warm", "waviness", most=MAX_POINTS, width=1.6
+            ),
         ]
     return draw_charts(
-        [chart("", _full_axis("x", along, primary.x * mm), axis("height", up), marks)], height=2.7
+        [make_chart("", _full_axis("x", along, primary.x * mm), make_axis("height", up), marks)],
+        height=2.7,
     )
 
 
@@ -68,13 +71,17 @@ def draw_roughness(roughness, ends: tuple, cutoff: float) -> str:
     """
     along, mm = choose_axis_unit(ends, "m")
     up, um = choose_axis_unit(roughness.z, "m")
-    marks = [line(roughness.x * mm, roughness.z * um, "accent", most=MAX_POINTS, width=0.7)]
+    marks = [make_line(roughness.x * mm, roughness.z * um, "accent", most=MAX_POINTS, width=0.7)]
     count = roughness.length / cutoff
     if count < MAX_SECTION_RULES:
         places = roughness.x[0] + cutoff * np.arange(int(count + 1e-6) + 1)
-        marks += [mark("rule", "soft", x=place * mm, dash="dotted") for place in places]
+        marks += [make_mark("rule", "soft", x=place * mm, dash="dotted") for place in places]
     return draw_charts(
-        [chart("", _full_axis("x", along, np.array(ends) * mm), axis("roughness", up), marks)],
+        [
+            make_chart(
+                "", _full_axis("x", along, np.array(ends) * mm), make_axis("roughness", up), marks
+            )
+        ],
         height=2.4,
     )
 
@@ -87,18 +94,22 @@ def abbott_core_chart(heights: Heights, names: tuple = ("Mr1", "Mr2")) -> dict:
     ratio, height = abbott_curve(heights)
     core = heights.core
     up, um = choose_axis_unit(height, "m")
-    marks = [line(100 * ratio, height * um, "accent")]
+    marks = [make_line(100 * ratio, height * um, "accent")]
     if core is not None:
         bottom = core.top - core.height
-        marks.append(line([0, 100], [core.top * um, bottom * um], "warm", width=1.2, dash="dashed"))
+        marks.append(
+            make_line([0, 100], [core.top * um, bottom * um], "warm", width=1.2, dash="dashed")
+        )
         ends = ((core.first_ratio, core.top, "circle"), (core.second_ratio, bottom, "square"))
         for name, (place, level_of_end, shape) in zip(names, ends):
             label = f"{name} {100 * place:.1f} %"
             marks.append(
-                mark("dots", "warm", label, x=[100 * place], y=[level_of_end * um], shape=shape)
+                make_mark(
+                    "dots", "warm", label, x=[100 * place], y=[level_of_end * um], shape=shape
+                )
             )
-    return chart(
-        "Abbott curve", _full_axis("material ratio", "%", [0, 100]), axis("height", up), marks
+    return make_chart(
+        "Abbott curve", _full_axis("material ratio", "%", [0, 100]), make_axis("height", up), marks
     )
 
 
@@ -123,14 +134,19 @@ def draw_statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: f
     title = "Power spectral density"
     if not spectrum.density.any():
         return draw_charts(
-            [left, chart(f"{title}: the trace is flat", axis("wavelength"), axis("density"), [])]
+            [
+                left,
+                make_chart(
+                    f"{title}: the trace is flat", make_axis("wavelength"), make_axis("density"), []
+                ),
+            ]
         )
     name, scale = _wavelength_unit(spectrum)
     marks = _density_marks(spectrum, scale, "accent", band="95 % band")
     waves = marks[-1]["x"]
     if band[1] > 1 / spectrum.frequency[-1] and band[0] < 1 / spectrum.frequency[0]:
         marks.append(
-            mark(
+            make_mark(
                 "span",
                 "soft",
                 "wavelengths of band_amplitude",
@@ -140,7 +156,7 @@ def draw_statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: f
         )
     if spectrum.dominant_wavelength is not None:
         marks.append(
-            mark(
+            make_mark(
                 "rule",
                 "warm",
                 "dominant wavelength",
@@ -149,20 +165,22 @@ def draw_statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: f
             )
         )
     if cutoff is not None:
-        marks.append(mark("rule", GREY, "cut-off", x=cutoff * scale, dash="dotted"))
-    wavelength = axis("wavelength", name, True) | {"range": [waves.min(), waves.max()]}
-    return draw_charts([left, chart(title, wavelength, axis("density", "um$^3$", True), marks)])
+        marks.append(make_mark("rule", GREY, "cut-off", x=cutoff * scale, dash="dotted"))
+    wavelength = make_axis("wavelength", name, True) | {"range": [waves.min(), waves.max()]}
+    return draw_charts(
+        [left, make_chart(title, wavelength, make_axis("density", "um$^3$", True), marks)]
+    )
 
 
 def _full_axis(label: str, unit: str, x) -> dict:
     """Return an axis from the first to the last of the positions x."""
-    return axis(label, unit) | {"range": [x[0], x[-1]]}
+    return make_axis(label, unit) | {"range": [x[0], x[-1]]}
 
 
 def depth_axis(unit: str, depth, scale: float) -> dict:
     """Return an axis of depths [m] that points down."""
     room = 0.05 * float(np.ptp(depth))
-    return axis("worn depth", unit) | {
+    return make_axis("worn depth", unit) | {
         "range": [(np.max(depth) + room) * scale, (np.min(depth) - room) * scale]
     }
 
@@ -182,10 +200,10 @@ def _density_marks(
     pick = pick[spectrum.density[pick] > 0]
     waves = scale / spectrum.frequency[pick]
     return [
-        mark(
+        make_mark(
             "band", colour, band, x=waves, low=low[pick] * UM3_PER_M3, high=high[pick] * UM3_PER_M3
         ),
-        line(waves, spectrum.density[pick] * UM3_PER_M3, colour, name, width=1.0),
+        make_line(waves, spectrum.density[pick] * UM3_PER_M3, colour, name, width=1.0),
     ]
 
 
@@ -271,10 +289,12 @@ def draw_both_heights(heights: tuple) -> str:
     bars = []
     for z, (colour, name) in zip(heights, SIDES):
         percent = np.histogram(z, edges)[0] * 100 / z.size
-        bars.append(line(middles, percent, colour, name, width=1.2))
+        bars.append(make_line(middles, percent, colour, name, width=1.2))
     return draw_charts(
         [
-            chart("Heights", axis("height", up), axis("share of the points", "%"), bars),
+            make_chart(
+                "Heights", make_axis("height", up), make_axis("share of the points", "%"), bars
+            ),
             _abbott_chart(heights),
         ]
     )
@@ -286,9 +306,9 @@ def _abbott_chart(heights: tuple) -> dict:
     up, um = choose_axis_unit(np.concatenate([height for _, height in curves]), "m")
     lines = []
     for (ratio, height), (colour, name) in zip(curves, SIDES):
-        lines.append(line(100 * ratio, height * um, colour, name))
-    return chart(
-        "Abbott curves", _full_axis("material ratio", "%", [0, 100]), axis("height", up), lines
+        lines.append(make_line(100 * ratio, height * um, colour, name))
+    return make_chart(
+        "Abbott curves", _full_axis("material ratio", "%", [0, 100]), make_axis("height", up), lines
     )
 
 
@@ -316,14 +336,16 @@ def draw_mean_section(track, start: float, end: float) -> str:
     low = depth - spread
     high = depth + spread
     marks = [
-        mark("band", "soft", "scatter of the sections", x=x * mm, low=low * um, high=high * um),
-        line(x * mm, depth * um, "warm", "mean", most=MAX_POINTS, width=1.2),
-        line(x[[0, -1]] * mm, [0.0, 0.0], GREY, width=0.8),
+        make_mark(
+            "band", "soft", "scatter of the sections", x=x * mm, low=low * um, high=high * um
+        ),
+        make_line(x * mm, depth * um, "warm", "mean", most=MAX_POINTS, width=1.2),
+        make_line(x[[0, -1]] * mm, [0.0, 0.0], GREY, width=0.8),
     ]
-    marks += [mark("rule", GREY, x=place * mm, dash="dotted") for place in (start, end)]
+    marks += [make_mark("rule", GREY, x=place * mm, dash="dotted") for place in (start, end)]
     down = depth_axis(up, [low.min(), high.max()], um)
     return draw_charts(
-        [chart("", _full_axis("across the track", along, x * mm), down, marks)], height=2.7
+        [make_chart("", _full_axis("across the track", along, x * mm), down, marks)], height=2.7
     )
 
 
@@ -347,18 +369,18 @@ def draw_aligned(x, first, second, worn) -> str:
     up, um = choose_axis_unit(np.concatenate([first, second]), "m")
     marks = []
     for z, (colour, name) in zip((first, second), SIDES):
-        marks.append(line(x * mm, z * um, colour, name, most=MAX_POINTS, width=1.0))
+        marks.append(make_line(x * mm, z * um, colour, name, most=MAX_POINTS, width=1.0))
     bottom = np.where(worn > 0, second, np.nan)
-    marks.append(mark("band", "warm", "worn off", x=x * mm, low=bottom * um, high=first * um))
+    marks.append(make_mark("band", "warm", "worn off", x=x * mm, low=bottom * um, high=first * um))
     ends = _detail_ends(x, worn)
     inside = (x >= ends[0]) & (x <= ends[1])
     detail = np.concatenate([first[inside], second[inside]]) * um
     room = np.ptp(detail)
     label = "x of the second trace"
-    height = axis("height", up)
+    height = make_axis("height", up)
     detail_height = height | {"range": [detail.min() - 0.1 * room, detail.max() + 0.15 * room]}
-    whole = chart("Both traces", _full_axis(label, along, x * mm), height, marks)
-    part = chart("A part of them", _full_axis(label, along, ends * mm), detail_height, marks)
+    whole = make_chart("Both traces", _full_axis(label, along, x * mm), height, marks)
+    part = make_chart("A part of them", _full_axis(label, along, ends * mm), detail_height, marks)
     return draw_charts([whole, part], height=3.4)
 
 
@@ -381,9 +403,16 @@ def draw_separate(before, after) -> str:
     marks = []
     for profile, shift, (colour, name) in zip(flat, (lift, 0.0), SIDES):
         x = (profile.x - profile.x[0]) * mm
-        marks.append(line(x, (profile.z + shift) * um, colour, name, most=MAX_POINTS, width=0.8))
+        marks.append(
+            make_line(x, (profile.z + shift) * um, colour, name, most=MAX_POINTS, width=0.8)
+        )
     return draw_charts(
-        [chart("", axis("along the trace", along), axis("height, shifted", up), marks)], height=3.4
+        [
+            make_chart(
+                "", make_axis("along the trace", along), make_axis("height, shifted", up), marks
+            )
+        ],
+        height=3.4,
     )
 
 
@@ -406,16 +435,20 @@ def draw_depth(x, depth, used=None, ends: tuple | None = None) -> str:
     along, mm = choose_axis_unit(x, "m")
     up, um = choose_axis_unit(depth, "m")
     marks = [
-        line(x * mm, depth * um, "warm", "depth of the second trace", most=MAX_POINTS, width=1.0),
-        line(x[[0, -1]] * mm, [0.0, 0.0], GREY, width=0.8),
+        make_line(
+            x * mm, depth * um, "warm", "depth of the second trace", most=MAX_POINTS, width=1.0
+        ),
+        make_line(x[[0, -1]] * mm, [0.0, 0.0], GREY, width=0.8),
     ]
     if used is not None:
         name = "unworn heights, used for the alignment"
-        marks.append(mark("dots", "accent", name, x=x[used] * mm, y=depth[used] * um, size=1.5))
+        marks.append(
+            make_mark("dots", "accent", name, x=x[used] * mm, y=depth[used] * um, size=1.5)
+        )
     if ends is not None:
-        marks.append(mark("span", "soft", "track", left=ends[0] * mm, right=ends[1] * mm))
+        marks.append(make_mark("span", "soft", "track", left=ends[0] * mm, right=ends[1] * mm))
     place = _full_axis("x of the second trace", along, x * mm)
-    return draw_charts([chart("", place, depth_axis(up, depth, um), marks)], height=2.5)
+    return draw_charts([make_chart("", place, depth_axis(up, depth, um), marks)], height=2.5)
 
 
 def draw_both_statistics(heights: tuple, spectra: tuple, band: tuple) -> str:
@@ -438,7 +471,7 @@ def draw_both_statistics(heights: tuple, spectra: tuple, band: tuple) -> str:
     for spectrum, (colour, name) in zip(spectra, SIDES):
         marks += _density_marks(spectrum, scale, colour, name)
     marks.append(
-        mark(
+        make_mark(
             "span",
             "warm",
             "band of the amplitude ratio",
@@ -446,9 +479,9 @@ def draw_both_statistics(heights: tuple, spectra: tuple, band: tuple) -> str:
             right=band[1] * scale,
         )
     )
-    density = axis("density", "um$^3$", True)
-    right = chart(
-        "Power spectral density, 95 % bands", axis("wavelength", unit, True), density, marks
+    density = make_axis("density", "um$^3$", True)
+    right = make_chart(
+        "Power spectral density, 95 % bands", make_axis("wavelength", unit, True), density, marks
     )
     return draw_charts([_abbott_chart(heights), right])
 
@@ -466,16 +499,18 @@ def draw_directions(parts: list, directions: list) -> str:
             curves.append(curve | {"dash": dash})
     bars = [(f"amplitude\n{when}", amplitude) for when, amplitude, _ in directions]
     bars += [(f"slope\n{when}", slope) for when, _, slope in directions]
-    marks = [line([0.5, len(bars) + 0.5], [1.0, 1.0], GREY, width=0.8)]
+    marks = [make_line([0.5, len(bars) + 0.5], [1.0, 1.0], GREY, width=0.8)]
     for place, (_, ratio) in enumerate(bars, 1):
         if ratio.value is not None:
-            marks.append(line([place, place], [ratio.low, ratio.high], "accent"))
-            marks.append(mark("dots", "accent", x=[place], y=[ratio.value]))
+            marks.append(make_line([place, place], [ratio.low, ratio.high], "accent"))
+            marks.append(make_mark("dots", "accent", x=[place], y=[ratio.value]))
     ticks = [(place, label) for place, (label, _) in enumerate(bars, 1)]
-    places = axis("") | {"range": [0.5, len(bars) + 0.5], "ticks": ticks}
-    density = axis("density", "um$^3$", True)
-    left = chart("Power spectral density", axis("wavelength", unit, True), density, curves)
-    return draw_charts([left, chart("x over y", places, axis("ratio"), marks)])
+    places = make_axis("") | {"range": [0.5, len(bars) + 0.5], "ticks": ticks}
+    density = make_axis("density", "um$^3$", True)
+    left = make_chart(
+        "Power spectral density", make_axis("wavelength", unit, True), density, curves
+    )
+    return draw_charts([left, make_chart("x over y", places, make_axis("ratio"), marks)])
 
 
 class PairsPanel(NamedTuple):
@@ -501,19 +536,21 @@ def draw_pairs(panels: list) -> str:
             np.full(2, value * scale) for value in (mean.low, mean.value, mean.high)
         )
         marks = [
-            mark("band", "soft", "mean", x=ends, low=low, high=high),
-            line(ends, middle, "soft"),
+            make_mark("band", "soft", "mean", x=ends, low=low, high=high),
+            make_line(ends, middle, "soft"),
         ]
         for number, value in known.items():
             if value.high is not None:
                 bar = [value.low * scale, value.high * scale]
-                marks.append(line([number, number], bar, "accent", width=1.0))
+                marks.append(make_line([number, number], bar, "accent", width=1.0))
         heights = np.array([value.value * scale for value in known.values()])
         marks.append(
-            mark("dots", "accent", "each pair", x=np.array([*known], float), y=heights, size=4.0)
+            make_mark(
+                "dots", "accent", "each pair", x=np.array([*known], float), y=heights, size=4.0
+            )
         )
-        place = axis("line number in the table") | {"range": ends}
-        charts.append(chart(panel.title, place, axis("", unit), marks))
+        place = make_axis("line number in the table") | {"range": ends}
+        charts.append(make_chart(panel.title, place, make_axis("", unit), marks))
     return draw_charts(charts, height=2.7)
 
 
@@ -537,11 +574,13 @@ def draw_pressures(sides: list) -> str:
         stress = side.stress * scale
         colour = colours[side.name]
         marks = [
-            mark("band", colour, x=x, low=0 * x, high=stress),
-            line(x, stress, colour, width=0.9),
+            make_mark("band", colour, x=x, low=0 * x, high=stress),
+            make_line(x, stress, colour, width=0.9),
         ]
-        up = axis("normal stress", unit) | {"range": [0.0, top]}
+        up = make_axis("normal stress", unit) | {"range": [0.0, top]}
         charts.append(
-            chart(f"Pressure with the surface {side.name}", _full_axis("x", along, x), up, marks)
+            make_chart(
+                f"Pressure with the surface {side.name}", _full_axis("x", along, x), up, marks
+            )
         )
     return draw_charts(charts, height=2.9)

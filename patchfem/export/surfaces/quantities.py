@@ -9,7 +9,7 @@ import numpy as np
 from ...formatting import UNIT_LADDERS, choose_unit, format_number
 from ...surface.compare.reference import NO_LIMIT
 from ...surface.quantity import Quantity
-from ..pages.document import sentence_html, table
+from ..pages.document import sentence_html, table_html
 
 MAX_PLAIN = 1e6  # larger numbers are written with a power of ten
 MIN_DIGITS = 3  # digits of a value with a wide interval
@@ -176,4 +176,4 @@ class QuantityTable(NamedTuple):
             rows.append(line)
         numbers = [f">{head}" for head in self.heads[1:-1]]
         heads = (self.heads[0], *numbers, self.heads[-1], *(("meaning",) if has_meaning else ()))
-        return table(heads, rows)
+        return table_html(heads, rows)

@@ -13,7 +13,14 @@ from ...surface.roughness.means import KINDS, Means, average_reports
 from ...surface.roughness.peaks import TraceMoments, trace_moments
 from ...surface.roughness.report import RoughnessReport, fitting_cutoff
 from ...surface.roughness.spectrum import BAND
-from ..pages.document import Section, document, figure, sentence_html, table, warning_box
+from ..pages.document import (
+    Section,
+    document_html,
+    figure_html,
+    sentence_html,
+    table_html,
+    warning_box,
+)
 from . import asperities, pictures
 from .areal import write_columns, write_profile, write_x3p
 from .pictures import Picture
@@ -40,7 +47,7 @@ MEANS = (
 )
 
 
-def _units(report: RoughnessReport) -> dict:
+def _parameter_units(report: RoughnessReport) -> dict:
     """Return the unit (name, scale) of each parameter: one for all heights, one for all lengths."""
     rms = report["Sq" if report.kind == "areal" else "Pq"].value
     lengths = [
@@ -56,9 +63,9 @@ def _units(report: RoughnessReport) -> dict:
     return units
 
 
-def _parameters(report: RoughnessReport) -> QuantityTable:
+def _parameters_table(report: RoughnessReport) -> QuantityTable:
     """Return the table of the parameters."""
-    units = _units(report)
+    units = _parameter_units(report)
     rows = []
     for value in report.values:
         reason = value.reason if value.value is None else ""
@@ -66,7 +73,7 @@ def _parameters(report: RoughnessReport) -> QuantityTable:
     return QuantityTable(("parameter", "value", "90 %: from .. to", "unit"), rows)
 
 
-def heading(report: RoughnessReport) -> str:
+def describe_surface(report: RoughnessReport) -> str:
     """Describe the surface and its treatment in one line."""
     size = report.sampling
     treatment = report.treatment
@@ -130,9 +137,9 @@ def _areal_filters(short: float | None, cutoff: float | None, *, has_holes: bool
     )
 
 
-def lines_of(report: RoughnessReport, *, verbose: bool = False) -> list:
+def format_roughness(report: RoughnessReport, *, verbose: bool = False) -> list:
     """Return the report as lines: a table of the parameters, with their definitions if verbose."""
-    out = [f"{report.source}: {heading(report)}", *_parameters(report).lines()]
+    out = [f"{report.source}: {describe_surface(report)}", *_parameters_table(report).lines()]
     if verbose:
         out += [f"  {value.name}: {value.text}" for value in report.values]
     out += [
@@ -142,7 +149,7 @@ def lines_of(report: RoughnessReport, *, verbose: bool = False) -> list:
     return out + _asperity_lines(report)
 
 
-def _asperities(report: RoughnessReport) -> TraceMoments | None:
+def _profile_moments(report: RoughnessReport) -> TraceMoments | None:
     """Return the moments of the primary profile below the cut-off; None if it has none."""
     try:
         return trace_moments(report.surface.primary, report.treatment.cutoff)
@@ -154,7 +161,7 @@ def _asperity_lines(report: RoughnessReport) -> list:
     """Return the asperities of a trace as lines."""
     if report.kind == "areal":
         return []
-    return asperities.lines_of(_asperities(report), report.treatment.cutoff)
+    return asperities.format_asperities(_profile_moments(report), report.treatment.cutoff)
 
 
 def means_lines(reports: list) -> list:
@@ -164,10 +171,10 @@ def means_lines(reports: list) -> list:
     """
     out = []
     if len(reports) == 2 and all(report.kind == "profile" for report in reports):
-        first, second = map(_asperities, reports)
+        first, second = map(_profile_moments, reports)
         both = first.combine(second) if first and second else None
         out = ["", "Both surfaces as the two faces of one contact:"]
-        out += asperities.lines_of(both, reports[0].treatment.cutoff)
+        out += asperities.format_asperities(both, reports[0].treatment.cutoff)
     for means in average_reports(reports):
         out += ["", _means_heading(means), *_means_table(means).lines()]
         if means.caution:
@@ -241,7 +248,7 @@ def write_surfaces(folder: Path, reports: list) -> None:
         suffix = f"-{number}" if len(reports) > 1 else ""
         surface = report.surface
         if report.kind == "areal":
-            title = f"{Path(report.source).name}: {heading(report)}"
+            title = f"{Path(report.source).name}: {describe_surface(report)}"
             write_x3p(folder / f"surface{suffix}.x3p", surface.x, surface.y, surface.z, title)
             write_columns(folder / f"surface{suffix}.csv", surface.x, surface.y, surface.z)
             continue
@@ -261,7 +268,7 @@ def _names_by_reason(report: RoughnessReport) -> dict:
     return out
 
 
-def data_of(report: RoughnessReport) -> dict:
+def roughness_data(report: RoughnessReport) -> dict:
     """Return the report as plain data in SI."""
     measures = {}
     for value in report.values:
@@ -290,21 +297,21 @@ def data_of(report: RoughnessReport) -> dict:
     }
     if report.kind == "profile":
         out["band"] = list(BAND)
-        out["asperities"] = asperities.data_of(_asperities(report), treatment.cutoff)
+        out["asperities"] = asperities.asperity_data(_profile_moments(report), treatment.cutoff)
     return out
 
 
-def page(reports: list) -> str:
+def page_html(reports: list) -> str:
     """Return the self-contained page of one or several surfaces."""
     title = "Roughness of " + ", ".join(Path(report.source).name for report in reports)
     sections = [_means_section(means) for means in average_reports(reports)]
-    sections += [_section(number, report) for number, report in enumerate(reports)]
-    return document(title, f"<p class=soft>patchfem {escape(__version__)}</p>", sections)
+    sections += [_surface_section(number, report) for number, report in enumerate(reports)]
+    return document_html(title, f"<p class=soft>patchfem {escape(__version__)}</p>", sections)
 
 
 def write_page(path: Path, reports: list) -> None:
     """Write the page of one or several surfaces."""
-    write_text(path, page(reports))
+    write_text(path, page_html(reports))
 
 
 def _means_section(means: Means) -> Section:
@@ -316,16 +323,16 @@ def _means_section(means: Means) -> Section:
     return Section(f"mean-{means.kind}", _means_heading(means), body)
 
 
-def _section(number: int, report: RoughnessReport) -> Section:
+def _surface_section(number: int, report: RoughnessReport) -> Section:
     """Return the section of a surface."""
     parts = [
-        f"<p class=verdict>{_verdict(report)}</p>",
-        f"<p class=soft>{escape(heading(report))}.</p>",
+        f"<p class=verdict>{_verdict_sentence(report)}</p>",
+        f"<p class=soft>{escape(describe_surface(report))}.</p>",
         warning_box([f"{text}." for text in report.notes]),
     ]
     drawn = _scan_pictures(report) if report.kind == "areal" else _trace_pictures(report)
-    parts += [figure(f"{number}{place}", *picture) for place, picture in enumerate(drawn)]
-    parts.append(f"<h3>Parameters</h3>{_parameters(report).html()}")
+    parts += [figure_html(f"{number}{place}", *picture) for place, picture in enumerate(drawn)]
+    parts.append(f"<h3>Parameters</h3>{_parameters_table(report).html()}")
     if any(value.low is not None for value in report.values):
         parts.append(
             f"<p class=soft>{SCAN_INTERVAL if report.kind == 'areal' else TRACE_INTERVAL}</p>"
@@ -335,13 +342,13 @@ def _section(number: int, report: RoughnessReport) -> Section:
             f"<p class=soft>No interval of {escape(', '.join(names))}: {sentence_html(reason)}.</p>"
         )
     definitions = [[escape(value.name), sentence_html(value.text)] for value in report.values]
-    parts.append(f"<h3>Definitions</h3>{table(('', ''), definitions)}")
+    parts.append(f"<h3>Definitions</h3>{table_html(('', ''), definitions)}")
     if report.kind == "profile":
         parts.append(f"<pre>{escape(chr(10).join(_asperity_lines(report)))}</pre>")
     return Section(f"surface{number}", report.source, "\n".join(parts))
 
 
-def _verdict(report: RoughnessReport) -> str:
+def _verdict_sentence(report: RoughnessReport) -> str:
     """Return the main parameters as one sentence of HTML."""
     if report.kind == "areal":
         names = ("Sa", "Sq", "Sz", "Ssk")
@@ -350,14 +357,14 @@ def _verdict(report: RoughnessReport) -> str:
         names += ("dominant_wavelength", "band_amplitude")
     spans = [
         f"<span class=v><b>{escape(name.replace('_', ' '))}</b> "
-        f"{escape(_text(report, name))}</span>"
+        f"{escape(_format_parameter(report, name))}</span>"
         for name in names
         if report[name].value is not None
     ]
     return "; ".join(spans) + "."
 
 
-def _text(report: RoughnessReport, name: str) -> str:
+def _format_parameter(report: RoughnessReport, name: str) -> str:
     """Format a parameter with its interval."""
     return format_quantity(report[name]).long
 
@@ -369,13 +376,13 @@ def _scan_pictures(report: RoughnessReport) -> list:
         pictures.draw_scan(surface.x, surface.y, surface.z),
         "Heights from which the parameters are computed, and their distribution; the colours leave "
         "out the outermost 0.2 % of the points.",
-        f"Map and histogram of the heights of {report.source}: {_text(report, 'Sq')} root mean "
+        f"Map and histogram of the heights of {report.source}: {_format_parameter(report, 'Sq')} root mean "
         "square",
     )
     bearing = Picture(
         pictures.draw_charts([pictures.abbott_core_chart(report.heights, ("Smr1", "Smr2"))]),
         "Abbott curve of these heights; dashed: the straight line of its core.",
-        f"Abbott curve of {report.source}: core height {_text(report, 'Sk')}",
+        f"Abbott curve of {report.source}: core height {_format_parameter(report, 'Sk')}",
     )
     return [heights, bearing]
 
@@ -390,7 +397,7 @@ def _trace_pictures(report: RoughnessReport) -> list:
         Picture(
             pictures.draw_trace(parts.primary, parts.waviness),
             f"Trace about the least-squares {report.treatment.form}; {waviness}.",
-            f"Heights of {report.source} along x: {_text(report, 'Pt')} from the deepest valley to "
+            f"Heights of {report.source} along x: {_format_parameter(report, 'Pt')} from the deepest valley to "
             "the highest peak",
         )
     ]
@@ -401,7 +408,7 @@ def _trace_pictures(report: RoughnessReport) -> list:
                 pictures.draw_roughness(parts.roughness, ends, cutoff),
                 f"Roughness: the trace minus the waviness, in sections of {format_length(cutoff)}; half a "
                 "section is trimmed at each end.",
-                f"Roughness profile: Rq {_text(report, 'Rq')}",
+                f"Roughness profile: Rq {_format_parameter(report, 'Rq')}",
             )
         )
     tapers = parts.spectrum.tapers
@@ -412,7 +419,7 @@ def _trace_pictures(report: RoughnessReport) -> list:
             f"spectrum of the levelled trace, the mean of {tapers} sine tapers, with its 95 % band "
             f"by chi-square of {2 * tapers} degrees of freedom.",
             "Abbott curve and power spectral density; the dominant wavelength is "
-            f"{_text(report, 'dominant_wavelength')}",
+            f"{_format_parameter(report, 'dominant_wavelength')}",
         )
     )
     return out

@@ -9,11 +9,11 @@ from ... import __version__
 from ...disk.atomic_write import write_text
 from ...formatting import choose_axis_unit, format_length
 from ...surface.quantity import LEVEL, Quantity
-from ..drawing.charts import axis, chart, line, loop, mark
+from ..drawing.charts import loop_chart, make_axis, make_chart, make_line, make_mark
 from ..drawing.pictures import draw_charts
-from ..pages.document import Section, figure, table
+from ..pages.document import Section, figure_html, table_html
 from ..pages.sentences import format_with_error
-from ..pages.sweep import label
+from ..written import measure_label
 from .compare import SIDES, TABLE_HEADS, WORDS, Article, sides_lines
 from .pictures import GREY, Picture, PressedSide, depth_axis, draw_maps, draw_pressures
 from .pictures import SIDES as SIDE_COLOURS
@@ -48,7 +48,7 @@ RUN_WORDS = WORDS | {
 }
 
 
-def verdict(wear: Wear) -> tuple:
+def wear_verdict(wear: Wear) -> tuple:
     """Return the headline and the sentences of a comparison of two runs."""
     mean = wear.values["worn_depth_mean"]
     if not mean.value > 0:
@@ -74,7 +74,7 @@ def verdict(wear: Wear) -> tuple:
             f"{describe_hidden_wear(ends)} that a {seen} alone could not show"
         )
     volume = format_quantity(wear.values["worn_volume"]).short
-    place = after.place(np.argmax(wear.depth))
+    place = after.describe_position(np.argmax(wear.depth))
     cycles = f"after {after.cycles:.6g} cycles of wear"
     start = after.run.resolved["wear"].get("start")
     if start:
@@ -89,7 +89,7 @@ def verdict(wear: Wear) -> tuple:
         measures = [run.measure(name) for run in (wear.before, after)]
         if None not in measures:
             first, second = (format_with_error(name, measure) for measure in measures)
-            sentences.append(f"{label(name)}: {first} before, {second} after.")
+            sentences.append(f"{measure_label(name)}: {first} before, {second} after.")
     return headline, sentences
 
 
@@ -102,10 +102,10 @@ def describe_hidden_wear(ends: tuple) -> str:
     return "uniform wear" if low > EVEN_RATIO * high else "uniform wear with a wedge"
 
 
-def data_of(wear: Wear, found: tuple) -> dict:
+def wear_data(wear: Wear, found: tuple) -> dict:
     """Return the comparison as plain data in SI, with the names of a comparison of traces.
 
-    found: result of `verdict`.
+    found: result of `wear_verdict`.
     """
     zero = Quantity(
         0.0, 0.0, 0.0, "m", "positions are known, because both runs are of the same patch"
@@ -141,7 +141,7 @@ def data_of(wear: Wear, found: tuple) -> dict:
     }
 
 
-def _table(wear: Wear) -> QuantityTable:
+def _wear_table(wear: Wear) -> QuantityTable:
     """Return the table of quantities of a comparison of two runs."""
     quantities = [(RUN_WORDS[name], quantity) for name, quantity in wear.values.items()]
     for name in ("from", "to", "depth_mean", "depth_floor", "hidden_wear"):
@@ -167,7 +167,7 @@ def _measure_rows(wear: Wear) -> list:
         if any(measures):
             rows.append(
                 (
-                    label(name),
+                    measure_label(name),
                     *(
                         MISSING if measure is None else format_with_error(name, measure)
                         for measure in measures
@@ -177,15 +177,15 @@ def _measure_rows(wear: Wear) -> list:
     return rows
 
 
-def lines_of(wear: Wear, found: tuple) -> list:
-    """Return the comparison as lines of text; found: result of `verdict`."""
+def format_wear(wear: Wear, found: tuple) -> list:
+    """Return the comparison as lines of text; found: result of `wear_verdict`."""
     out = [
         found[0],
         *(f"  {text}" for text in found[1]),
         "",
         f"{wear.before.path} -> {wear.after.path}",
     ]
-    return [*out, *_table(wear).lines(), "", *sides_lines(_measure_rows(wear))]
+    return [*out, *_wear_table(wear).lines(), "", *sides_lines(_measure_rows(wear))]
 
 
 def write_page(path: Path, wear: Wear, found: tuple) -> None:
@@ -196,11 +196,11 @@ def write_page(path: Path, wear: Wear, found: tuple) -> None:
     path : Path
     wear : Wear
     found : tuple
-        Result of `verdict`.
+        Result of `wear_verdict`.
     """
     both = (wear.before, wear.after)
-    body = [figure(number, *picture) for number, picture in enumerate(_pictures(wear))]
-    body.append(_table(wear).html())
+    body = [figure_html(number, *picture) for number, picture in enumerate(_draw_pictures(wear))]
+    body.append(_wear_table(wear).html())
     body.append(
         "<p class=soft>The intervals follow from the numerical errors that the runs state. In 19 "
         "of 20 scenes the stated error is at least as large as the true error.</p>"
@@ -211,17 +211,19 @@ def write_page(path: Path, wear: Wear, found: tuple) -> None:
     drawn = draw_pressures(
         [PressedSide(run.surface.x, run.pressure, name) for run, name in zip(both, SIDES)]
     )
-    runs = [figure("p", drawn, f"{caption}.", "Pressure along the patch before and after")]
+    runs = [figure_html("p", drawn, f"{caption}.", "Pressure along the patch before and after")]
     if all(run.loop is not None for run in both):
         loops = []
         for run, name in zip(both, SIDES):
-            loops += loop(*run.loop, f"Friction loop {name}")
+            loops += loop_chart(*run.loop, f"Friction loop {name}")
         caption = "Friction force over the slide in the last cycle."
         runs.append(
-            figure("l", draw_charts(loops, height=2.9), caption, "Friction loops before and after")
+            figure_html(
+                "l", draw_charts(loops, height=2.9), caption, "Friction loops before and after"
+            )
         )
     rows = [[escape(text) for text in row] for row in _measure_rows(wear)]
-    runs.append(table(("measure", ">before", ">after"), rows))
+    runs.append(table_html(("measure", ">before", ">after"), rows))
     sections = [
         Section("changes", "What wore off", "\n".join(body)),
         Section("runs", "Pressure, contact and loop", "\n".join(runs)),
@@ -230,7 +232,7 @@ def write_page(path: Path, wear: Wear, found: tuple) -> None:
     write_text(path, Article(f"{names[0]} and {names[1]}", found, wear.notes).html(sections))
 
 
-def _pictures(wear: Wear) -> list:
+def _draw_pictures(wear: Wear) -> list:
     """Draw the surfaces with their wear, and the worn depth."""
     surface = wear.after.surface
     mean = f"mean {format_length(wear.values['worn_depth_mean'].value, 3)}"
@@ -261,7 +263,7 @@ def _pictures(wear: Wear) -> list:
 def _place_axis(x) -> tuple[dict, float]:
     """Return the axis of positions x (m,) [m] and the scale of its unit."""
     unit, scale = choose_axis_unit(x, "m")
-    return axis("x", unit) | {"range": [x[0] * scale, x[-1] * scale]}, scale
+    return make_axis("x", unit) | {"range": [x[0] * scale, x[-1] * scale]}, scale
 
 
 def _draw_gaps(x, gaps: tuple) -> str:
@@ -269,11 +271,13 @@ def _draw_gaps(x, gaps: tuple) -> str:
     place, mm = _place_axis(x)
     up, um = choose_axis_unit(np.concatenate(gaps), "m")
     marks = [
-        line(x * mm, gap * um, colour, name) for gap, (colour, name) in zip(gaps, SIDE_COLOURS)
+        make_line(x * mm, gap * um, colour, name) for gap, (colour, name) in zip(gaps, SIDE_COLOURS)
     ]
-    marks.append(mark("band", "warm", "worn off", x=x * mm, low=gaps[0] * um, high=gaps[1] * um))
+    marks.append(
+        make_mark("band", "warm", "worn off", x=x * mm, low=gaps[0] * um, high=gaps[1] * um)
+    )
     return draw_charts(
-        [chart("", place, axis("gap of the unloaded surfaces", up), marks)], height=2.9
+        [make_chart("", place, make_axis("gap of the unloaded surfaces", up), marks)], height=2.9
     )
 
 
@@ -283,8 +287,8 @@ def _draw_worn_depth(x, depth) -> str:
     hidden = np.array(hidden_line(x, depth))
     unit, scale = choose_axis_unit(depth, "m")
     marks = [
-        line(x * mm, depth * scale, "warm", "worn depth"),
-        line(
+        make_line(x * mm, depth * scale, "warm", "worn depth"),
+        make_line(
             x[[0, -1]] * mm,
             hidden * scale,
             GREY,
@@ -294,4 +298,4 @@ def _draw_worn_depth(x, depth) -> str:
         ),
     ]
     down = depth_axis(unit, [*hidden, 0.0, float(depth.max()), float(depth.min())], scale)
-    return draw_charts([chart("", place, down, marks)], height=2.5)
+    return draw_charts([make_chart("", place, down, marks)], height=2.5)

@@ -13,15 +13,15 @@ from ...surface.compare.compare import AMPLITUDE, SLOPE
 from ...surface.profile import Profile, level
 from ...surface.quantity import Quantity, make_unknown
 from ..pages import several_runs
-from ..read_results import is_real, reading_errors, require, variables
+from ..read_results import is_real, read_variables, reading_errors, require_valid
 
-REQUIRED = {  # possible numbers of dimensions by variable
+REQUIRED_VARIABLES = {  # possible numbers of dimensions by variable
     "x": (1,),
     "weight": (1,),
     "unloaded_gap": (1, 2),
     "normal_stress": (2,),
 }
-OPTIONAL = (
+OPTIONAL_VARIABLES = (
     "strip_offset",
     "worn_depth",
     "time",
@@ -110,7 +110,7 @@ class PatchRun(NamedTuple):
         measure = self.run.summary["measures"].get(name)
         return measure if measure is not None and measure["value"] is not None else None
 
-    def place(self, number: int) -> str:
+    def describe_position(self, number: int) -> str:
         """Describe the position of a node by its index in the flattened depth."""
         x, y = self.surface.x, self.surface.y
         strip, node = divmod(int(number), x.size)
@@ -179,7 +179,9 @@ def read_run(path: Path) -> PatchRun:
         raise PatchfemError(f"{path}: not a results folder of a run: it has no result.nc")
     fields = {
         name: variable.values
-        for name, variable in variables(file, {*REQUIRED, *OPTIONAL})[1].items()
+        for name, variable in read_variables(file, {*REQUIRED_VARIABLES, *OPTIONAL_VARIABLES})[
+            1
+        ].items()
     }
     with reading_errors(file, "results of a patch"):
         surface = _check_fields(fields)
@@ -194,20 +196,24 @@ def _check_fields(fields: dict) -> PatchSurface:
 
     Raises ValueError if they do not match.
     """
-    for name, dimensions in REQUIRED.items():
-        require(name in fields, f"it contains no {name}; run the scene again")
+    for name, dimensions in REQUIRED_VARIABLES.items():
+        require_valid(name in fields, f"it contains no {name}; run the scene again")
         values = fields[name]
         is_field = is_real(values) and values.ndim in dimensions and np.isfinite(values).all()
-        require(is_field, f"{name} is not a field along the patch")
+        require_valid(is_field, f"{name} is not a field along the patch")
     x = fields["x"]
-    lengths = {fields[name].shape[-1] for name in (*REQUIRED, "worn_depth") if name in fields}
-    require(x.size > 1 and lengths == {x.size}, "its fields differ in length")
-    require((np.diff(x) > 0).all() and fields["weight"].sum() > 0, "x is not a list of positions")
+    lengths = {
+        fields[name].shape[-1] for name in (*REQUIRED_VARIABLES, "worn_depth") if name in fields
+    }
+    require_valid(x.size > 1 and lengths == {x.size}, "its fields differ in length")
+    require_valid(
+        (np.diff(x) > 0).all() and fields["weight"].sum() > 0, "x is not a list of positions"
+    )
     y = fields.get("strip_offset")
     shape = x.shape if y is None else (y.size, x.size)
     depth = fields["worn_depth"][-1] if "worn_depth" in fields else np.zeros(x.size)
     shapes = {depth.shape, fields["unloaded_gap"].shape}
-    require(shapes <= {x.shape, shape}, "the fields do not match the strips")
+    require_valid(shapes <= {x.shape, shape}, "the fields do not match the strips")
     area, gap, depth = (
         np.broadcast_to(field, shape) for field in (fields["weight"], fields["unloaded_gap"], depth)
     )
@@ -220,7 +226,7 @@ def _last_loop(run, fields: dict) -> tuple | None:
     if slide is None or "friction_force" not in fields or fields["friction_force"].ndim != 1:
         return None
     time = fields["time"]
-    period = several_runs.period_of(run)
+    period = several_runs.drive_period(run)
     start = time[-1] - period * (1 + 1e-9) if period else time[0]
     return slide[time >= start], fields["friction_force"][time >= start]
 
@@ -235,7 +241,7 @@ def _require_same_patch(first: PatchRun, second: PatchRun) -> None:
     for run in (first, second):
         contact = run.run.resolved["contact"]
         tables.append({key: value for key, value in contact.items() if key not in LOADING_KEYS})
-        unworn.append(_interpolate(x, run.surface.x, run.surface.gap - run.surface.depth))
+        unworn.append(_interpolate_columns(x, run.surface.x, run.surface.gap - run.surface.depth))
         volume = run.measure("worn_volume")
         volumes.append(volume["value"] if volume else 0.0)
     keys = {**tables[0], **tables[1]}
@@ -254,7 +260,7 @@ def _require_same_patch(first: PatchRun, second: PatchRun) -> None:
         )
 
 
-def _interpolate(x, own, values) -> np.ndarray:
+def _interpolate_columns(x, own, values) -> np.ndarray:
     """Interpolate values (k,) or (s, k) at positions `own` (k,) to x (m,)."""
     return np.apply_along_axis(lambda row: np.interp(x, own, row), -1, values)
 
@@ -263,11 +269,11 @@ def _measure_wear(first: PatchRun, second: PatchRun) -> Wear:
     """Compute the quantities of the wear between two runs."""
     surface = second.surface
     x = surface.x
-    depth = surface.depth - _interpolate(x, first.surface.x, first.surface.depth)
+    depth = surface.depth - _interpolate_columns(x, first.surface.x, first.surface.depth)
     gaps = (surface.gap - depth, surface.gap)
     area = float(surface.area.sum())
-    volume, volume_error = _difference(first, second, "worn_volume")
-    _, depth_error = _difference(first, second, "worn_depth_max")
+    volume, volume_error = _measure_change(first, second, "worn_volume")
+    _, depth_error = _measure_change(first, second, "worn_depth_max")
     if depth_error is not None:
         depth_error += _mesh_error(first.surface, x)
     error = depth_error or 0.0
@@ -280,13 +286,13 @@ def _measure_wear(first: PatchRun, second: PatchRun) -> Wear:
     length = float(np.ptp(x))
     relative_error = None if volume_error is None else volume_error / area
     values = {
-        "worn_volume": _quantity("worn_volume", volume, volume_error),
-        "worn_depth_max": _quantity("worn_depth_max", largest, depth_error),
-        "worn_depth_mean": _quantity("worn_depth_mean", volume / area, relative_error),
-        "worn_area": _quantity(
+        "worn_volume": _make_quantity("worn_volume", volume, volume_error),
+        "worn_depth_max": _make_quantity("worn_depth_max", largest, depth_error),
+        "worn_depth_mean": _make_quantity("worn_depth_mean", volume / area, relative_error),
+        "worn_area": _make_quantity(
             "worn_area", volume / area * length, relative_error and relative_error * length
         ),
-        "hidden_wear": _quantity(
+        "hidden_wear": _make_quantity(
             "hidden_wear", float(np.mean(hidden_depths(surface, depth))), depth_error
         ),
         "worn_share": Quantity(worn, worn, worn, *TEXTS["worn_share"]),
@@ -301,7 +307,7 @@ def _measure_wear(first: PatchRun, second: PatchRun) -> Wear:
     for name, run in (("before", first), ("after", second)):
         notes += [f"{name}: {text}" for text in run.run.summary.get("warnings", ())]
     if float(depth.min()) < -error:
-        place = second.place(np.argmin(depth))
+        place = second.describe_position(np.argmin(depth))
         less = format_length(-float(depth.min()), 3)
         notes.append(
             f"at {place} the later run is worn by {less} less, so it does not continue the earlier "
@@ -318,11 +324,11 @@ def _mesh_error(surface: PatchSurface, x) -> float:
     if np.array_equal(surface.x, x) or not surface.depth.any():
         return 0.0
     every = np.unique([*range(0, surface.x.size, 2), surface.x.size - 1])
-    coarse = _interpolate(surface.x, surface.x[every], surface.depth[..., every])
+    coarse = _interpolate_columns(surface.x, surface.x[every], surface.depth[..., every])
     return float(np.abs(surface.depth - coarse).max()) / 4
 
 
-def _difference(first: PatchRun, second: PatchRun, name: str) -> tuple[float, float | None]:
+def _measure_change(first: PatchRun, second: PatchRun, name: str) -> tuple[float, float | None]:
     """Return the change of a measure and the sum of its errors, None if one is unknown."""
     later = second.measure(name)
     earlier = first.measure(name)
@@ -332,13 +338,13 @@ def _difference(first: PatchRun, second: PatchRun, name: str) -> tuple[float, fl
     return later["value"] - earlier["value"], None if None in errors else float(sum(errors))
 
 
-def _quantity(name: str, value: float, error: float | None) -> Quantity:
+def _make_quantity(name: str, value: float, error: float | None) -> Quantity:
     """Return a quantity of TEXTS with its numerical error or None."""
     unit, text = TEXTS[name]
-    return _nonnegative(value, error, unit, text)
+    return _make_nonnegative_quantity(value, error, unit, text)
 
 
-def _nonnegative(value: float, error: float | None, unit: str, text: str) -> Quantity:
+def _make_nonnegative_quantity(value: float, error: float | None, unit: str, text: str) -> Quantity:
     """Return a quantity that cannot be below zero, with its numerical error or None."""
     if error is None:
         return Quantity(value, value, None, unit, text, "no error is estimated")
@@ -450,14 +456,16 @@ def _measure_track(x, depth, error: float, area: float) -> dict:
             start, start - cells[0], start + cells[0], "m", "where the worn part begins"
         ),
         "to": Quantity(end, end - cells[1], end + cells[1], "m", "where the worn part ends"),
-        "hidden_wear": _quantity("hidden_wear", hidden, error),
-        "depth_mean": _nonnegative(area / width, mean_error, "m", "area lost divided by the width"),
-        "depth_floor": _nonnegative(
+        "hidden_wear": _make_quantity("hidden_wear", hidden, error),
+        "depth_mean": _make_nonnegative_quantity(
+            area / width, mean_error, "m", "area lost divided by the width"
+        ),
+        "depth_floor": _make_nonnegative_quantity(
             floor, error, "m", "mean depth over the deepest fifth of the width"
         ),
-        "area_net": _nonnegative(
+        "area_net": _make_nonnegative_quantity(
             area, error * width, "m2", "lost area minus pile-up; pile-up is zero in a computed run"
         ),
-        "area_gross": _nonnegative(area, error * width, "m2", "lost area"),
+        "area_gross": _make_nonnegative_quantity(area, error * width, "m2", "lost area"),
         "pile_up": Quantity(0.0, 0.0, 0.0, "m2", "computed wear makes no pile-up"),
     }

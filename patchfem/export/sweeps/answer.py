@@ -11,12 +11,14 @@ from types import MappingProxyType
 from ...disk.atomic_write import write_text
 from ...runs.batch.case_results import FAILED_OUTCOME
 from ..pages.headline import SweepHeadline
-from ..pages.limits import as_json
+from ..pages.limits import limits_json
 
 NONE = MappingProxyType({})
 
 
-def answer_of(lead: SweepHeadline, outcome: Sequence, sign: str = "", of: Mapping = NONE) -> dict:
+def sweep_summary(
+    lead: SweepHeadline, outcome: Sequence, sign: str = "", of: Mapping = NONE
+) -> dict:
     """Return the summary of a sweep as a dict that can be written as JSON.
 
     `answer`: one sentence; `sentences`: all that is printed; `cases`: `count`, `failed`,
@@ -32,7 +34,7 @@ def answer_of(lead: SweepHeadline, outcome: Sequence, sign: str = "", of: Mappin
     outcome : sequence of str
         Outcome of each case.
     sign : str
-        Hash of what the tables were written for (`run.sign_of`).
+        Hash of what the tables were written for (`run.hash_tables`).
     of : mapping
         Scene and keys of the sweep (`run.sweep_identity`).
 
@@ -52,7 +54,7 @@ def answer_of(lead: SweepHeadline, outcome: Sequence, sign: str = "", of: Mappin
             "over_tolerance": lead.missed,
         },
         "ranking": {name: [one._asdict() for one in shares] for name, shares in lead.ranks.items()},
-        "limits": as_json(lead.limits),
+        "limits": limits_json(lead.limits),
         "of": dict(of),
         "sign": sign,
     }

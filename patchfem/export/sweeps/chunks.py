@@ -24,11 +24,11 @@ from ...disk.atomic_write import write_bytes
 from ...runs.batch.case_results import CaseResults
 
 CHUNKS, ENDING = "chunks", ".h5"
-MOST = 4096  # cases of a file
+MAX_CASES_PER_FILE = 4096  # cases of a file
 PARTS = ("values", "errors", "floors")
 
 
-def write(folder: Path, numbers: Sequence[int], names: np.ndarray, found: CaseResults) -> str:
+def write_chunk(folder: Path, numbers: Sequence[int], names: np.ndarray, found: CaseResults) -> str:
     """Write the results of cases into a folder, and return the name of the file.
 
     The name consists of the numbers of the first and last case and a hash of the bytes.
@@ -77,40 +77,40 @@ def write(folder: Path, numbers: Sequence[int], names: np.ndarray, found: CaseRe
             )
         file.flush()
         image = file.id.get_file_image()
-    name = f"{min(numbers)}-{max(numbers)}-{_hash(image)}{ENDING}"
+    name = f"{min(numbers)}-{max(numbers)}-{_hash_bytes(image)}{ENDING}"
     write_bytes(folder / name, image)
     return name
 
 
-def _hash(image: bytes) -> str:
+def _hash_bytes(image: bytes) -> str:
     """Return the hash of the bytes of a file."""
     return sha256(image).hexdigest()[:16]
 
 
-def _opened(path: Path) -> h5py.File:
+def _open_results(path: Path) -> h5py.File:
     """Open a file of results; ValueError if its bytes do not match its name."""
     image = path.read_bytes()
-    if not path.stem.endswith(f"-{_hash(image)}"):
+    if not path.stem.endswith(f"-{_hash_bytes(image)}"):
         raise ValueError(f"{path.name}: damaged")
     return h5py.File(BytesIO(image), "r")
 
 
-def read(path: Path) -> tuple[np.ndarray, CaseResults]:
+def read_chunk(path: Path) -> tuple[np.ndarray, CaseResults]:
     """Return the names (n,) and the CaseResults of a file.
 
     OSError, ValueError, KeyError or TypeError if it is damaged.
     """
-    with _opened(path) as file:
-        about, names = json.loads(bytes(file.attrs["about"])), _column(file["case"], np.uint64)
+    with _open_results(path) as file:
+        about, names = json.loads(bytes(file.attrs["about"])), _read_column(file["case"], np.uint64)
         count = names.size
         found = CaseResults.blank(count)
         found.outcome[:] = np.array(about["outcomes"], object)[
-            _column(file["outcome"], np.uint8, count)
+            _read_column(file["outcome"], np.uint8, count)
         ]
-        found.seconds[:] = _column(file["seconds"], np.float32, count)
+        found.seconds[:] = _read_column(file["seconds"], np.float32, count)
         measures = [(str(name), str(unit)) for name, unit in about["measures"]]
         for part in PARTS if measures else ():
-            table = _column(file[part], np.float64, count, len(measures))
+            table = _read_column(file[part], np.float64, count, len(measures))
             getattr(found, part).update({name: row for (name, _), row in zip(measures, table)})
     found.units.update(measures)
     found.messages.update({int(case): str(text) for case, text in about["messages"].items()})
@@ -122,13 +122,13 @@ def read(path: Path) -> tuple[np.ndarray, CaseResults]:
 def read_names(path: Path) -> np.ndarray:
     """Return the names (n,) uint64 of the cases of a file; an empty array if it is damaged."""
     try:
-        with _opened(path) as file:
-            return _column(file["case"], np.uint64)
+        with _open_results(path) as file:
+            return _read_column(file["case"], np.uint64)
     except (OSError, KeyError, ValueError, TypeError):
         return np.empty(0, np.uint64)
 
 
-def _column(held, kind, count: int | None = None, rows: int | None = None) -> np.ndarray:
+def _read_column(held, kind, count: int | None = None, rows: int | None = None) -> np.ndarray:
     """Read a dataset; ValueError if it has another shape or type.
 
     Parameters
@@ -136,7 +136,7 @@ def _column(held, kind, count: int | None = None, rows: int | None = None) -> np
     held : h5py.Dataset
     kind : numpy type
     count : int, optional
-        Number of cases; by default any up to 2 * MOST.
+        Number of cases; by default any up to 2 * MAX_CASES_PER_FILE.
     rows : int, optional
         Number of measures of a two-dimensional dataset.
     """
@@ -145,7 +145,7 @@ def _column(held, kind, count: int | None = None, rows: int | None = None) -> np
         held.dtype != kind
         or held.shape != shape
         or len(shape) > 2
-        or (count is None and held.size > 2 * MOST)
+        or (count is None and held.size > 2 * MAX_CASES_PER_FILE)
     ):
         raise ValueError(f"{held.name}: {held.dtype} of shape {held.shape}")
     return held[...]
@@ -203,7 +203,7 @@ class Chunks:
         for place in np.unique(self.held[numbers]).tolist():
             own = numbers[self.held[numbers] == place]
             try:
-                names, found = read(self.files[place]) if place >= 0 else (None, None)
+                names, found = read_chunk(self.files[place]) if place >= 0 else (None, None)
             except (OSError, KeyError, ValueError, TypeError, IndexError, AttributeError):
                 self.held[self.held == place] = -1
                 continue
@@ -219,14 +219,14 @@ class Chunks:
         wanted = np.flatnonzero(self.held >= 0)
         used = set(np.unique(self.held[wanted]).tolist())
         old = [self.files[place] for place in sorted(used)]
-        if len(old) > 2 * -(-wanted.size // MOST):
+        if len(old) > 2 * -(-wanted.size // MAX_CASES_PER_FILE):
             kept = set()
-            for first in range(0, wanted.size, MOST):
-                numbers = wanted[first : first + MOST]
+            for first in range(0, wanted.size, MAX_CASES_PER_FILE):
+                numbers = wanted[first : first + MAX_CASES_PER_FILE]
                 found = CaseResults.blank(numbers.size)
                 for at, part in self.parts(numbers):
                     found.place(np.searchsorted(numbers, at), part)
-                kept.add(write(self.folder, numbers.tolist(), self.names[numbers], found))
+                kept.add(write_chunk(self.folder, numbers.tolist(), self.names[numbers], found))
             gone = [path for path in old if path.name not in kept]
         else:
             gone = []

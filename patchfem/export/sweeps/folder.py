@@ -31,9 +31,9 @@ from ...disk.lock import FolderLock
 from ...effects import EFFECTS
 from ...model.model import Model
 from ...runs.batch.case_results import FAILED_OUTCOME, CaseResults
-from ..folder import save
+from ..folder import save_run
 from ..results import LOCK, PAGE, refuse_others
-from ..summary import read_summary, summary
+from ..summary import make_summary, read_summary
 from . import chunks
 from .answer import read_answer
 from .chunks import CHUNKS
@@ -69,12 +69,12 @@ class SummaryWriter:
         values = {axis.key: text for axis, text in zip(self.cases.axes, self.cases.texts(number))}
         known = isinstance(model, Model)
         effects = model.source.effects if known else ()
-        answer = summary(
+        answer = make_summary(
             __version__,
             model.source.title if known else "",
             model.kind if known else "",
             found.outcome[case],
-            _measures(found, case),
+            _case_measures(found, case),
             [{"effect": name, "equations": EFFECTS[name].equations} for name in effects],
             list(model.absent) if known else [],
             (found.warnings.get(case, ()), found.notes.get(case, ())),
@@ -92,7 +92,7 @@ class SummaryWriter:
         )
 
 
-def _measures(found: CaseResults, case: int) -> dict:
+def _case_measures(found: CaseResults, case: int) -> dict:
     """Return the measures of a case by name."""
     out = {}
     for name, unit in found.units.items():
@@ -122,10 +122,10 @@ class ResultsWriter:
 
     def __call__(self, number: int, result) -> None:
         """Write the folder of a case after its run."""
-        save(result, self.folder / CASES / key_of(self.names[number]), self.page)
+        save_run(result, self.folder / CASES / case_folder_name(self.names[number]), self.page)
 
 
-def key_of(name: int) -> str:
+def case_folder_name(name: int) -> str:
     """Return the name of the folder of a case in cases/."""
     return f"{int(name):016x}"
 
@@ -159,9 +159,11 @@ class Writer:
         for case, (number, text) in enumerate(zip(numbers, texts)):
             # Other cases have a results folder already.
             if self.keep == "summaries" or case in found.messages:
-                self._put(self.target / CASES / key_of(self.names[number]), text)
+                self._put(self.target / CASES / case_folder_name(self.names[number]), text)
         try:
-            chunks.write(self.target / CHUNKS, numbers, self.names[np.asarray(numbers, int)], found)
+            chunks.write_chunk(
+                self.target / CHUNKS, numbers, self.names[np.asarray(numbers, int)], found
+            )
         except (OSError, WriteError) as error:
             raise self._fault(error) from None
 
@@ -239,12 +241,12 @@ class Folder:
         named = {one.name for one in os.scandir(self.target / CASES)}
         numbers, found = [], []
         for number in np.flatnonzero(self.chunks.held < 0).tolist():
-            if (key := key_of(self.chunks.names[number])) in named:
+            if (key := case_folder_name(self.chunks.names[number])) in named:
                 with suppress(OSError, ValueError):
                     found.append(read_summary(self.target / CASES / key / SUMMARY))
                     numbers.append(number)
-        for first in range(0, len(numbers), chunks.MOST):
-            part = slice(first, first + chunks.MOST)
+        for first in range(0, len(numbers), chunks.MAX_CASES_PER_FILE):
+            part = slice(first, first + chunks.MAX_CASES_PER_FILE)
             answers = CaseResults.blank(len(numbers[part]))
             for case, one in enumerate(found[part]):
                 measures = {
@@ -256,7 +258,7 @@ class Folder:
                 answers.put(case, one["outcome"], measures, one["seconds"]["total"])
                 if one["outcome"] == FAILED_OUTCOME:
                     answers.fail(case, one.get("message", ""))
-            chunks.write(
+            chunks.write_chunk(
                 self.chunks.folder, numbers[part], self.chunks.names[numbers[part]], answers
             )
         if numbers:
@@ -275,7 +277,7 @@ class Folder:
             with suppress(OSError):  # the folder contains older files or results of this sweep
                 place.rmdir()
 
-    def whole(self) -> bool:
+    def is_complete(self) -> bool:
         """Return whether the folder contains the tables of a complete sweep."""
         return read_answer(self.target / "sweep.json").get("cases", {}).get("unfinished") == 0
 
@@ -298,7 +300,7 @@ class Folder:
             "run without --resume to replace that sweep"
         )
 
-    def there(self, numbers: np.ndarray, keep: str = "none") -> np.ndarray:
+    def find_complete_cases(self, numbers: np.ndarray, keep: str = "none") -> np.ndarray:
         """Return the numbers of the cases that have a result and the files that `keep` requires."""
         numbers = np.asarray(numbers, int)
         numbers = numbers[self.chunks.held[numbers] >= 0]
@@ -309,13 +311,17 @@ class Folder:
             for at, part in self.chunks.parts(numbers):
                 failed.update(at[list(part.messages)].tolist() if part.messages else ())
         return np.array(
-            [number for number in numbers.tolist() if self._kept(number, keep, number in failed)],
+            [
+                number
+                for number in numbers.tolist()
+                if self._has_kept_files(number, keep, number in failed)
+            ],
             int,
         )
 
-    def _kept(self, number: int, keep: str, failed: bool) -> bool:
+    def _has_kept_files(self, number: int, keep: str, failed: bool) -> bool:
         """Return whether the folder of a case has the files that `keep` requires."""
-        place = os.path.join(self.target, CASES, key_of(self.chunks.names[number]))
+        place = os.path.join(self.target, CASES, case_folder_name(self.chunks.names[number]))
         asked = (
             ()
             if failed or keep == "summaries"
@@ -342,7 +348,9 @@ class Folder:
 
     def keys(self) -> list[str]:
         """Return the names of the folders of the cases in cases/; [] if there are none."""
-        return list(map(key_of, self.chunks.names)) if (self.target / CASES).is_dir() else []
+        return (
+            list(map(case_folder_name, self.chunks.names)) if (self.target / CASES).is_dir() else []
+        )
 
     def unfinish(self) -> None:
         """Rename the tables of an older sweep while cases are computed, because they do not match."""
@@ -365,7 +373,7 @@ class Folder:
             if one.name.startswith(".") and one.name != self.token and not self.shared:
                 Path(one.path).unlink(missing_ok=True)
         if (self.target / CASES).is_dir():
-            own = set() if keep == "none" else set(map(key_of, self.chunks.names))
+            own = set() if keep == "none" else set(map(case_folder_name, self.chunks.names))
             for one in os.scandir(self.target / CASES):
                 if (
                     one.name.startswith(".")

@@ -51,25 +51,25 @@ def hash_request(path: Path, words: Sequence[str], cases: Path | None = None) ->
     ).hexdigest()
 
 
-def write(folder: Path, signed: str) -> None:
+def write_manifest(folder: Path, signed: str) -> None:
     """Write the record of a sweep in which every case has a result."""
     atomic_write.write_text(
-        folder / NAME, json.dumps({"sign": signed, "files": _files(folder)}) + "\n"
+        folder / NAME, json.dumps({"sign": signed, "files": _sweep_files(folder)}) + "\n"
     )
 
 
-def read(folder: Path, signed: str) -> dict:
+def read_manifest(folder: Path, signed: str) -> dict:
     """Return sweep.json of a folder with the complete sweep of this hash; else {}."""
     try:
         held = json.loads((folder / NAME).read_bytes())
-        if not signed or held != {"sign": signed, "files": _files(folder)}:
+        if not signed or held != {"sign": signed, "files": _sweep_files(folder)}:
             return {}
         return json.loads((folder / "sweep.json").read_bytes())
     except (OSError, ValueError):
         return {}
 
 
-def _files(folder: Path) -> list:
+def _sweep_files(folder: Path) -> list:
     """Return the files of a sweep with size and time; OSError if there is no folder."""
     chunks = [Path(one.path) for one in os.scandir(folder / "chunks") if one.name != "whole.json"]
     return sorted(

@@ -22,13 +22,13 @@ from ...runs.batch.case_results import CaseResults
 from ...runs.results.result import meaning
 from ..pages import sweep
 from ..pages.headline import SweepHeadline
-from ..read_results import MAX_NUMBER, require
+from ..read_results import MAX_NUMBER, require_valid
 from ..written import NUMBER
-from .tables import FACTS, facts, names_of
+from .tables import FACTS, shared_facts, sort_measures
 
 REPEAT_WORDS = "--cases", "sweep.csv"  # arguments for cases in rows whose command is not known
 # Files that a click on a case opens: its page if there is one, else its summary.
-WHOLE, SHORT = (
+FULL_PAGE, SHORT_SUMMARY = (
     "report.html",
     "summary.json",
 )
@@ -36,11 +36,13 @@ WHOLE, SHORT = (
 
 def write_page(table: dict, lead: SweepHeadline, folder: Path) -> None:
     """Write the page of all cases into the folder of their tables."""
-    write_text(folder / WHOLE, sweep.page(table, lead))
+    write_text(folder / FULL_PAGE, sweep.page_html(table, lead))
 
 
-def table_of(asked: SweepScene, cases: Cases, found: CaseResults, keys: list, folder: Path) -> dict:
-    """Return the table for `pages.sweep.page` from the results of the cases.
+def sweep_table(
+    asked: SweepScene, cases: Cases, found: CaseResults, keys: list, folder: Path
+) -> dict:
+    """Return the table for `pages.sweep.page_html` from the results of the cases.
 
     Parameters
     ----------
@@ -56,7 +58,7 @@ def table_of(asked: SweepScene, cases: Cases, found: CaseResults, keys: list, fo
     -------
     dict
     """
-    columns = columns_of(cases)
+    columns = key_columns(cases)
     measures = {
         name: {
             "unit": found.units[name],
@@ -65,14 +67,14 @@ def table_of(asked: SweepScene, cases: Cases, found: CaseResults, keys: list, fo
             "errors": found.errors[name],
             "floors": found.floors[name],
         }
-        for name in names_of(found)
+        for name in sort_measures(found)
         if name not in [axis.name for axis in cases.axes]
     }
     return {
         **page_titles(columns, tomllib.loads(asked.text).get("title") or asked.path.stem),
         "version": __version__,
-        **_shared(facts(asked, cases), columns),
-        "command": command(asked, cases),
+        **_shared_facts(shared_facts(asked, cases), columns),
+        "command": sweep_command(asked, cases),
         "scene": asked.text,
         "first": asked.of,
         "grid": not cases.rows,
@@ -85,7 +87,7 @@ def table_of(asked: SweepScene, cases: Cases, found: CaseResults, keys: list, fo
     }
 
 
-def columns_of(cases: Cases) -> list:
+def key_columns(cases: Cases) -> list:
     """Return the swept keys, each with its values in SI and as written in every case."""
     every = np.arange(len(cases))
     places = [every] * len(cases.axes) if cases.rows else np.unravel_index(every, cases.shape)
@@ -94,14 +96,14 @@ def columns_of(cases: Cases) -> list:
             "name": axis.key,
             "unit": axis.unit or "1",
             "texts": axis.texts if cases.rows else [axis.texts[k] for k in place],
-            "values": numbers(axis.values)[place],
+            "values": axis_numbers(axis.values)[place],
             "log": suits_log_axis(axis.values),
         }
         for axis, place in zip(cases.axes, places)
     ]
 
 
-def _shared(held: dict, columns: list) -> dict:
+def _shared_facts(held: dict, columns: list) -> dict:
     """Return tolerance, patch size [m] and ends [Hz] of the swept frequencies of all cases.
 
     They are those of the scene (`held`), or swept values (`columns`).
@@ -130,10 +132,10 @@ def page_titles(columns: list, of: str) -> dict:
 
 def case_link(folder: Path, key: str) -> str:
     """Return the file that a click on a case opens, relative to the page."""
-    return f"cases/{key}/{WHOLE if (folder / 'cases' / key / WHOLE).is_file() else SHORT}"
+    return f"cases/{key}/{FULL_PAGE if (folder / 'cases' / key / FULL_PAGE).is_file() else SHORT_SUMMARY}"
 
 
-def numbers(values) -> np.ndarray:
+def axis_numbers(values) -> np.ndarray:
     """Return values along an axis: numbers unchanged, words numbered in order of occurrence."""
     if isinstance(values, array) or all(isinstance(one, int | float) for one in values):
         return np.asarray(values, float)
@@ -161,7 +163,7 @@ def suits_log_axis(values) -> bool:
     return bool(above[-1] >= 10 * above[0])
 
 
-def command(asked: SweepScene, cases: Cases) -> str:
+def sweep_command(asked: SweepScene, cases: Cases) -> str:
     """Return the command line that computes the same cases."""
     words = [
         "patchfem",
@@ -195,15 +197,17 @@ def read_table(folder: Path) -> dict:
     try:
         with open(folder / "sweep.csv", newline="", encoding="utf-8") as file:
             head, *rows = csv.reader(file)
-        require(rows and "outcome" in head and "message" in head, "sweep.csv contains no case")
+        require_valid(
+            rows and "outcome" in head and "message" in head, "sweep.csv contains no case"
+        )
         lengths = {number for number, row in enumerate(rows, 2) if len(row) != len(head)}
-        require(
+        require_valid(
             not lengths,
             f"sweep.csv: a row of {len(head)} fields is needed in line {min(lengths, default=0)}",
         )
         with h5netcdf.File(folder / "sweep.nc", "r") as file:
-            return _whole(
-                _table(
+            return _check_table(
+                _read_sweep_table(
                     folder,
                     [dict(zip(head, row)) for row in rows],
                     head[: head.index("outcome")],
@@ -220,7 +224,7 @@ def read_table(folder: Path) -> dict:
         ) from None
 
 
-def _whole(table: dict) -> dict:
+def _check_table(table: dict) -> dict:
     """Return the table; ValueError if a column has a wrong length or impossible numbers."""
     count = len(table["outcome"])
     parts = [(one["name"], one["values"]) for one in table["keys"]]
@@ -230,18 +234,18 @@ def _whole(table: dict) -> dict:
         for part in ("values", "errors", "floors")
     ]
     for name, values in parts:
-        require(
+        require_valid(
             np.shape(values) == (count,), f"{name} has {np.size(values)} values for {count} cases"
         )
-        require(
+        require_valid(
             np.abs(values[np.isfinite(values)]).max(initial=0.0) < MAX_NUMBER,
             f"{name} contains a number beyond {MAX_NUMBER:g}",
         )
     return table
 
 
-def _table(folder: Path, rows: list, keys: list, file) -> dict:
-    """Return the table for `pages.sweep.page` from rows of sweep.csv and from sweep.nc."""
+def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
+    """Return the table for `pages.sweep.page_html` from rows of sweep.csv and from sweep.nc."""
     columns = []
     for key in keys:
         held = file[re.sub(r"\W", "_", key)]
@@ -253,7 +257,7 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
             if along.size == len(rows) and "case" in file.dimensions
             else along[[places[t] for t in texts]]
         )
-        values = numbers(values.tolist())
+        values = axis_numbers(values.tolist())
         columns.append(
             {
                 "name": key,
@@ -289,13 +293,13 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
     )
     held = {name: float(file.attrs[name]) for name in FACTS if name in file.attrs}
     title = tomllib.loads(text).get("title") or folder.resolve().name
-    require(
+    require_valid(
         isinstance(title, str) and all(isinstance(one, list | tuple) for one in (sets, words)),
         "sweep.nc: the scene, the --set or the cases stored in this file cannot be read",
     )
     return {
         **page_titles(columns, title),
-        **_shared(held, columns),
+        **_shared_facts(held, columns),
         "version": str(file.attrs["source"]).removeprefix("patchfem "),
         "scene": text,
         "command": shlex.join(
@@ -350,7 +354,7 @@ def join_tables(tables: list, names: list) -> dict:
                 "unit": own[0]["unit"],
                 "log": own[0]["log"],
                 "texts": texts,
-                "values": numbers(texts)
+                "values": axis_numbers(texts)
                 if words
                 else np.concatenate([one["values"] for one in own]),
             }

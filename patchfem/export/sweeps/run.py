@@ -22,10 +22,10 @@ from ...runs.batch.case_results import CaseResults
 from ...scene.axes import Axis, FormattedNumbers
 from .. import netcdf
 from ..pages.headline import summarise_sweep
-from .answer import answer_of, read_answer, write_answer
+from .answer import read_answer, sweep_summary, write_answer
 from .folder import TABLES, Folder, ResultsWriter, SummaryWriter, Writer
-from .page import WHOLE, case_link, command, table_of, write_page
-from .tables import contents, write_csv
+from .page import FULL_PAGE, case_link, sweep_command, sweep_table, write_page
+from .tables import table_contents, write_csv
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class SweepTarget:
     keep : str
         What is stored of each case besides its columns: "none", its "summaries", its folder of
         "results", or this with its "pages". A case that has less counts as missing. "" stores
-        summaries if there are at most FEW cases.
+        summaries if there are at most MAX_CASES_WITH_SUMMARY cases.
     shard : tuple or None
         (i, n) to compute only the i-th of n parts, into a folder that the parts share.
     page : bool
@@ -53,7 +53,7 @@ class SweepTarget:
     shard: tuple | None = None
     page: bool = True
 
-    def kept(self, count: int) -> str:
+    def kept_files(self, count: int) -> str:
         """Return what is stored of each case of a sweep with `count` cases."""
         return self.keep or ("summaries" if count <= MAX_CASES_WITH_SUMMARY else "none")
 
@@ -88,16 +88,16 @@ def sweep_into(
     -------
     CaseResults
     """
-    shared, keep = place.shard is not None, place.kept(len(cases))
+    shared, keep = place.shard is not None, place.kept_files(len(cases))
     with Folder(place.target, cases.names(asked), shared) as folder:
         if place.resume:
             folder.refuse_another(sweep_identity(asked, cases))
-            if folder.chunks.others and folder.whole() and say is not None:
+            if folder.chunks.others and folder.is_complete() and say is not None:
                 say(_left_out(folder.chunks.others))
-        wanted = _part(len(cases), place.shard)
-        there = folder.there(wanted, keep)
+        wanted = _shard_cases(len(cases), place.shard)
+        there = folder.find_complete_cases(wanted, keep)
         if not (place.resume or shared):
-            if there.size and not folder.whole() and say is not None:
+            if there.size and not folder.is_complete() and say is not None:
                 say(
                     f"note: {there.size} of {len(cases)} cases already have an answer from an interrupted sweep but "
                     "are run again; use --resume to keep such answers"
@@ -110,7 +110,7 @@ def sweep_into(
             told(there.size, wanted.size, None)
         total = CaseResults.blank(len(cases), folder.target)
         try:
-            died = _solve(
+            died = _compute_cases(
                 Jobs(asked, cases, folder, keep),
                 left,
                 executor,
@@ -127,7 +127,7 @@ def sweep_into(
         folder.answers(total)
         for numbers, found in died:
             total.place(numbers, found)
-        sign = sign_of(asked, cases, folder, place.page)
+        sign = hash_tables(asked, cases, folder, place.page)
         if left.size or not _tables_are_current(sign, folder, place.page):
             write_tables(asked, cases, total, folder, place.page, sign="" if died else sign)
         folder.tidy(not place.resume, keep)
@@ -167,7 +167,7 @@ class Jobs(NamedTuple):
     keep: str
 
 
-def _solve(
+def _compute_cases(
     jobs: Jobs, numbers: np.ndarray, executor, say: Callable | None, told: Callable | None
 ) -> list:
     """Compute cases into the folder, and return (numbers, CaseResults) of those that died.
@@ -223,7 +223,7 @@ def compute_in_memory(
     return total
 
 
-def collect(asked: SweepScene, cases: Cases, target: Path, page: bool = True) -> CaseResults:
+def collect_shards(asked: SweepScene, cases: Cases, target: Path, page: bool = True) -> CaseResults:
     """Write all tables of a sweep whose shards are complete, from its folder.
 
     Missing if cases have no result yet.
@@ -241,7 +241,7 @@ def collect(asked: SweepScene, cases: Cases, target: Path, page: bool = True) ->
     return found
 
 
-def sign_of(asked: SweepScene, cases: Cases, folder: Folder, page: bool) -> str:
+def hash_tables(asked: SweepScene, cases: Cases, folder: Folder, page: bool) -> str:
     """Return a hash of all that the tables of a complete sweep depend on.
 
     If sweep.json contains this hash, the tables exist.
@@ -249,15 +249,15 @@ def sign_of(asked: SweepScene, cases: Cases, folder: Folder, page: bool) -> str:
     made = [
         environment_versions()["patchfem"],
         asked.text,
-        [(axis.key, *_shown(axis)) for axis in cases.axes],
-        command(asked, cases),
+        [(axis.key, *_axis_content(axis)) for axis in cases.axes],
+        sweep_command(asked, cases),
         page,
         [case_link(folder.target, key) for key in folder.keys()],
     ]
     return sha256(json.dumps(made).encode() + folder.chunks.names.tobytes()).hexdigest()
 
 
-def _shown(axis: Axis) -> tuple:
+def _axis_content(axis: Axis) -> tuple:
     """Return what the tables contain of an axis: its strings, or a hash of its numbers."""
     texts = axis.texts
     return (
@@ -269,9 +269,11 @@ def _shown(axis: Axis) -> tuple:
 
 def _tables_are_current(sign: str, folder: Folder, page: bool) -> bool:
     """Return whether all tables of a sweep with this hash exist and are up to date."""
-    names = TABLES if len(folder.chunks.names) <= MAX_CASES_WITH_TABLES else ("sweep.json", WHOLE)
+    names = (
+        TABLES if len(folder.chunks.names) <= MAX_CASES_WITH_TABLES else ("sweep.json", FULL_PAGE)
+    )
     return read_answer(folder.target / "sweep.json").get("sign") == sign and all(
-        (folder.target / name).is_file() for name in names if page or name != WHOLE
+        (folder.target / name).is_file() for name in names if page or name != FULL_PAGE
     )
 
 
@@ -299,28 +301,30 @@ def write_tables(
     every : bool
         Whether sweep.csv and sweep.nc are written for more than MAX_CASES_WITH_TABLES cases.
     sign : str
-        From `sign_of` if every case has a result that is stored; else "".
+        From `hash_tables` if every case has a result that is stored; else "".
     """
     keys, tabled = folder.keys(), every or len(cases) <= MAX_CASES_WITH_TABLES
-    table = table_of(asked, cases, found, keys, folder.target) | {"tabled": tabled}
+    table = sweep_table(asked, cases, found, keys, folder.target) | {"tabled": tabled}
     lead = summarise_sweep(table)
     for name in () if tabled else ("sweep.csv", "sweep.nc"):
         (folder.target / name).unlink(missing_ok=True)
     if tabled:
         write_csv(cases, found, keys, folder.target / "sweep.csv")
-        netcdf.write(contents(asked, cases, found, keys, lead.answer()), folder.target / "sweep.nc")
+        netcdf.write_netcdf(
+            table_contents(asked, cases, found, keys, lead.answer()), folder.target / "sweep.nc"
+        )
     if page:
         write_page(table, lead, folder.target)
     else:
-        (folder.target / WHOLE).unlink(missing_ok=True)
+        (folder.target / FULL_PAGE).unlink(missing_ok=True)
     # This file comes last, because it contains the hash of the others.
     write_answer(
-        answer_of(lead, table["outcome"], sign, sweep_identity(asked, cases)),
+        sweep_summary(lead, table["outcome"], sign, sweep_identity(asked, cases)),
         folder.target / "sweep.json",
     )
 
 
-def _part(count: int, shard: tuple | None) -> np.ndarray:
+def _shard_cases(count: int, shard: tuple | None) -> np.ndarray:
     """Return the case numbers of a shard (i, n), which are neighbours.
 
     Neighbours share most of the work.

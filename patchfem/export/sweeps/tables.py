@@ -24,10 +24,12 @@ from ...runs.results.result import meaning
 from ...scene.keys import types
 from ...scene.keys.lookup import find_key
 from .. import netcdf
-from ..summary import versions
+from ..summary import package_versions
 
-BLOCK = 4000  # cases whose strings are in memory at the same time
-TRIED = 3  # maximum number of cases to read until one is valid, for the facts that all cases share
+CASES_PER_BLOCK = 4000  # cases whose strings are in memory at the same time
+MAX_CASES_TRIED = (
+    3  # maximum number of cases to read until one is valid, for the facts that all cases share
+)
 ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
 FACTS = {
     "tolerance": ("accuracy", "tolerance"),
@@ -47,7 +49,7 @@ class Column(NamedTuple):
     long_name: str
 
 
-def names_of(found: CaseResults) -> list[str]:
+def sort_measures(found: CaseResults) -> list[str]:
     """Return the measures of the cases in the order of the reference."""
     return sorted(
         found.values,
@@ -55,7 +57,7 @@ def names_of(found: CaseResults) -> list[str]:
     )
 
 
-def columns_of(found: CaseResults, name: str) -> list[Column]:
+def measure_columns(found: CaseResults, name: str) -> list[Column]:
     """Return the columns of a measure: its values and their errors."""
     unit = found.units[name]
     return [
@@ -66,9 +68,11 @@ def columns_of(found: CaseResults, name: str) -> list[Column]:
     ]
 
 
-def head(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> list[str]:
-    """Return the column names of `lines`."""
-    measures = [column.name for name in names_of(found) for column in columns_of(found, name)]
+def column_names(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> list[str]:
+    """Return the column names of `csv_lines`."""
+    measures = [
+        column.name for name in sort_measures(found) for column in measure_columns(found, name)
+    ]
     return [
         *(axis.key for axis in cases.axes),
         "outcome",
@@ -78,15 +82,17 @@ def head(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> list[str
     ]
 
 
-def lines(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> Iterator[list[str]]:
+def csv_lines(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> Iterator[list[str]]:
     """Yield a line of sweep.csv per case; a missing value is "".
 
     A line contains the swept keys as written, the outcome, every measure with its error in SI, the
     message of a failed case, and the name of its folder if `keys` are given.
     """
-    columns = [column for name in names_of(found) for column in columns_of(found, name)]
-    for first in range(0, len(cases), BLOCK):  # the strings of all cases would fill the memory
-        numbers = range(first, min(first + BLOCK, len(cases)))
+    columns = [column for name in sort_measures(found) for column in measure_columns(found, name)]
+    for first in range(
+        0, len(cases), CASES_PER_BLOCK
+    ):  # the strings of all cases would fill the memory
+        numbers = range(first, min(first + CASES_PER_BLOCK, len(cases)))
         block = [
             [
                 "" if value != value else repr(value)
@@ -107,11 +113,11 @@ def lines(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> Iterato
 
 def write_csv(cases: Cases, found: CaseResults, keys: Sequence[str], path: Path) -> Path:
     """Write sweep.csv to `path`."""
-    write_rows(path, chain([head(cases, found, keys)], lines(cases, found, keys)))
+    write_rows(path, chain([column_names(cases, found, keys)], csv_lines(cases, found, keys)))
     return path
 
 
-def contents(
+def table_contents(
     asked: SweepScene, cases: Cases, found: CaseResults, keys: Sequence[str] = (), answer: str = ""
 ) -> netcdf.Contents:
     """Return the content of sweep.nc in SI.
@@ -136,7 +142,11 @@ def contents(
     """
     dims = ("case",) if cases.rows else tuple(axis.name for axis in cases.axes)
     coordinates = {
-        axis.name: ("case" if cases.rows else axis.name, _numbers(axis.values), _about(axis))
+        axis.name: (
+            "case" if cases.rows else axis.name,
+            _to_array(axis.values),
+            _key_attributes(axis),
+        )
         for axis in cases.axes
     }
     if cases.rows:
@@ -146,10 +156,10 @@ def contents(
             {"units": "1", "long_name": "number of the case"},
         )
     columns = []
-    for name in names_of(found):
+    for name in sort_measures(found):
         if name in coordinates:  # normal.load is also the name of a measure
             continue
-        columns += columns_of(found, name)
+        columns += measure_columns(found, name)
         if np.nan_to_num(found.floors[name]).any():
             text = f"error of {name} that is allowed in addition to the tolerance"
             columns.append(Column(f"{name}_floor", found.floors[name], found.units[name], text))
@@ -169,10 +179,10 @@ def contents(
         texts["folder"] = (keys, "folder of the case inside cases/")
     for name, (values, text) in texts.items():
         data[name] = (dims, np.array(values, object).reshape(cases.shape), {"long_name": text})
-    return netcdf.Contents(data, coordinates, _attributes(asked, cases, answer))
+    return netcdf.Contents(data, coordinates, _file_attributes(asked, cases, answer))
 
 
-def _attributes(asked: SweepScene, cases: Cases, answer: str) -> dict:
+def _file_attributes(asked: SweepScene, cases: Cases, answer: str) -> dict:
     """Return the attributes of sweep.nc: its scene, its command and the versions."""
     return {
         "Conventions": "CF-1.11",
@@ -184,18 +194,18 @@ def _attributes(asked: SweepScene, cases: Cases, answer: str) -> dict:
         "answer": answer,
         "drawn": int(cases.drawn),
         "words": json.dumps(list(cases.words)),
-        **facts(asked, cases),
+        **shared_facts(asked, cases),
         "scene_sha256": hashlib.sha256(asked.text.encode()).hexdigest(),
-        "versions": json.dumps(versions()),
+        "versions": json.dumps(package_versions()),
     }
 
 
-def facts(asked: SweepScene, cases: Cases) -> dict:
+def shared_facts(asked: SweepScene, cases: Cases) -> dict:
     """Collect the FACTS that all cases share and that are not swept.
 
     These are the tolerance, the size of the patch [m] and the ends of the swept frequencies [Hz].
     """
-    for number in range(min(len(cases), TRIED)):
+    for number in range(min(len(cases), MAX_CASES_TRIED)):
         try:
             tables = tomllib.loads(asked.scene(cases.sets(number)).resolved())
             break
@@ -211,12 +221,12 @@ def facts(asked: SweepScene, cases: Cases) -> dict:
     }
 
 
-def _numbers(values: Sequence) -> np.ndarray:
+def _to_array(values: Sequence) -> np.ndarray:
     """Return values as an array of numbers or of strings."""
     return np.asarray(values, float if isinstance(values[0], float) else str)
 
 
-def _about(axis) -> dict:
+def _key_attributes(axis) -> dict:
     """Return the netCDF attributes of a key."""
     model, name = find_key(axis.key)
     try:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.campaigns.rows.cells import MAX_LOG, MIN_DISPLACEMENT, read_readings, scores
-from patchfem.campaigns.rows.null_models import NULLS, fit_null_model
+from patchfem.campaigns.rows.null_models import NULL_MODELS, fit_null_model
 from patchfem.core import G_N, PatchfemError
 
 TABLE_1 = Path(__file__).parents[3] / "studies" / "rig" / "table1.csv"
@@ -56,11 +56,11 @@ def test_exact_scores_are_root_mean_squares_by_kind(tmp_path):
 
 def test_held_rows_are_named_by_frequency_input_flag_or_run(tmp_path):
     cells = read_readings(table(tmp_path, "143,4,5.0,0.1,", "143,4,4.0,,R*", "0150,4,5,,U"))
-    assert cells.chosen("frequency=150 Hz").tolist() == [False, False, False, True]
-    assert cells.chosen("frequency=0.143 kHz,150 Hz").all()
-    assert cells.chosen("input=4 g").all()
-    assert cells.chosen("flag=R").tolist() == [False, False, True, False]
-    assert cells.chosen("run=143 Hz repeat").tolist() == [False, False, True, False]
+    assert cells.select("frequency=150 Hz").tolist() == [False, False, False, True]
+    assert cells.select("frequency=0.143 kHz,150 Hz").all()
+    assert cells.select("input=4 g").all()
+    assert cells.select("flag=R").tolist() == [False, False, True, False]
+    assert cells.select("run=143 Hz repeat").tolist() == [False, False, True, False]
     parts = cells.parts("run", np.ones(4, bool))
     assert [(name, int(part.sum())) for name, part in parts] == [
         ("143 Hz", 2),
@@ -81,7 +81,7 @@ def test_held_rows_are_named_by_frequency_input_flag_or_run(tmp_path):
 )
 def test_refuses_rows_to_hold_that_are_not_there(tmp_path, text, wanted):
     with pytest.raises(PatchfemError, match=wanted):
-        read_readings(table(tmp_path, "143,4,5.0,0.1,")).chosen(text)
+        read_readings(table(tmp_path, "143,4,5.0,0.1,")).select(text)
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_table_1_null_scores_are_those_of_the_closed_forms():
     """By hand: a mean of logarithms, and normal equations solved as they stand."""
     cells = read_readings(TABLE_1)
     f, a = cells.conditions[cells.condition].T
-    train = ~cells.chosen("frequency=135 Hz,150 Hz,155 Hz")
+    train = ~cells.select("frequency=135 Hz,150 Hz,155 Hz")
     every = np.ones(train.size, bool)
     for kind in (cells.felt, ~cells.felt):
         ratio = np.log(cells.measured / a)
@@ -123,7 +123,7 @@ def test_table_1_null_scores_leave_one_frequency_out():
     """The constant and the strong null, as an independent program found them: .125 and .090 of the accelerations."""
     cells = read_readings(TABLE_1)
     every, found = np.ones(cells.row.size, bool), {}
-    for name in NULLS:
+    for name in NULL_MODELS:
         left = np.full(cells.row.size, np.nan)
         for _, part in cells.parts("frequency", every):
             left[part] = fit_null_model(cells, name, ~part)[0][part]

@@ -9,7 +9,7 @@ from scene_texts import BENCH, PATCH, SMALL_PATCH
 
 from patchfem import SceneError
 from patchfem.campaigns.sweeps.case_models import SweepScene
-from patchfem.campaigns.sweeps.cases import Cases, product
+from patchfem.campaigns.sweeps.cases import Cases, combine_cases
 from patchfem.campaigns.sweeps.parse_request import Request, read_cases
 from patchfem.scene.axes import read_axes
 from patchfem.scene.scene import loads
@@ -36,12 +36,12 @@ def test_exact_all_combinations_the_last_key_fastest():
 
 def test_exact_a_product_of_products_is_the_product():
     whole = cases(*THREE)
-    assert product([cases(THREE[0]), cases(*THREE[1:])]) == whole
+    assert combine_cases([cases(THREE[0]), cases(*THREE[1:])]) == whole
 
 
 def test_exact_rows_beside_lists():
     rows = replace(cases("normal.load=1 N,2 N", "friction.static=0.3,0.4"), rows=True)
-    found = product([rows, cases("slide.speed=1 mm/s,2 mm/s")])
+    found = combine_cases([rows, cases("slide.speed=1 mm/s,2 mm/s")])
     assert found.rows and found.shape == (4,)
     assert [found.texts(number) for number in range(4)] == [
         ("1 N", "0.3", "1 mm/s"),
@@ -131,7 +131,7 @@ def test_always_spread_cases_hold_the_ends_of_every_axis():
     found = cases(
         "normal.load=1 N..9 N:9", "friction.static=0.1..0.9:40lin", "slide.speed=1 mm/s,2 mm/s"
     )
-    some = found.spread(100)
+    some = found.spread_cases(100)
     assert (
         len(set(some)) == len(some)
         and 50 < len(some) <= 100
@@ -139,7 +139,7 @@ def test_always_spread_cases_hold_the_ends_of_every_axis():
     )
     for axis, size in enumerate(found.shape):
         assert {0, size - 1} <= {found.places(one)[axis] for one in some}
-    assert found.spread(720) == list(range(720))
+    assert found.spread_cases(720) == list(range(720))
 
 
 def test_exact_a_mistake_of_all_drawn_cases_is_reported_once():

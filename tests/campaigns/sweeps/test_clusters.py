@@ -71,19 +71,23 @@ class Worn:
 def test_always_the_differences_of_a_worker_are_named():
     here = Cluster.__new__(Cluster)
     here.name, mine = "--executor dask:tcp://x:1", environment_versions(work(Path("a.toml")))
-    said = str(here._other(mine | {"patchfem": "0.3.0 (sources 12345678)", "files": "other"}, mine))
+    said = str(
+        here._worker_error(mine | {"patchfem": "0.3.0 (sources 12345678)", "files": "other"}, mine)
+    )
     assert (
         "a worker has patchfem 0.3.0 (sources 12345678), but this machine has patchfem "
         + mine["patchfem"]
         in said
     )
     assert "numpy" not in said and "files" not in said
-    assert "numpy 1.0" in str(here._other(mine | {"numpy": "1.0"}, mine))
-    assert "differ between a worker" in str(here._other(mine | {"files": "other"}, mine))
-    assert "is not installed on a worker" in str(here._other(AttributeError("no own_of"), mine))
+    assert "numpy 1.0" in str(here._worker_error(mine | {"numpy": "1.0"}, mine))
+    assert "differ between a worker" in str(here._worker_error(mine | {"files": "other"}, mine))
+    assert "is not installed on a worker" in str(
+        here._worker_error(AttributeError("no own_of"), mine)
+    )
     with pytest.raises(Missing, match="the connection to the scheduler is lost"):
-        here._died(Worn("cancelled"))
-    assert "OSError: no" in here._died(Worn("error", OSError("no")))[1].reason
+        here._report_death(Worn("cancelled"))
+    assert "OSError: no" in here._report_death(Worn("error", OSError("no")))[1].reason
 
 
 SEEN = []

@@ -7,7 +7,7 @@ from scene_texts import BENCH, COULOMB, POINT, SHORT, SMALL_PATCH
 
 from patchfem import plan
 from patchfem.campaigns.sweeps.case_models import SweepScene
-from patchfem.campaigns.sweeps.estimate import SWEEP_SECONDS, estimate
+from patchfem.campaigns.sweeps.estimate import SWEEP_SECONDS, estimate_sweep
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.parse_request import Request, contradictions, read_cases
 from patchfem.export.sweeps.run import SweepTarget, sweep_into
@@ -21,7 +21,7 @@ def test_exact_a_sweep_takes_what_its_cases_take_but_for_what_is_done_once(text,
     asked = SweepScene(Path("a.toml"), text)
     cases = read_cases(asked, Request([over]))
     told, plans = (
-        estimate(asked, cases),
+        estimate_sweep(asked, cases),
         [plan(asked.model(cases.sets(number))) for number in range(3)],
     )
     seconds, least = [one.seconds for one in plans], 0.05  # of the work that is in no plan
@@ -39,7 +39,7 @@ def test_always_a_sweep_leaves_on_disk_about_what_it_says(tmp_path):
         for one in (tmp_path / "a").rglob("*")
         if one.is_file() and one.suffix != ".html"
     ]
-    assert 0.5 < estimate(asked, cases)["disk_bytes"] / sum(files) < 2
+    assert 0.5 < estimate_sweep(asked, cases)["disk_bytes"] / sum(files) < 2
 
 
 def test_always_cases_that_march_alone_are_counted_so():
@@ -49,7 +49,7 @@ def test_always_cases_that_march_alone_are_counted_so():
     asked = SweepScene(path, path.read_text("utf-8"))
 
     def each(*over, count=64):
-        return estimate(asked, read_cases(asked, Request(over, None, count, count > 0)))[
+        return estimate_sweep(asked, read_cases(asked, Request(over, None, count, count > 0)))[
             "seconds_per_case"
         ]
 
@@ -98,4 +98,4 @@ def test_exact_a_contradiction_in_half_of_a_range_is_reported_and_leaves_a_plan(
         and bool(said) == bool(of)
         and helps in said
     )
-    assert estimate(asked, cases)["cases"] == count
+    assert estimate_sweep(asked, cases)["cases"] == count

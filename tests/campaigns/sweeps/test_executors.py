@@ -90,16 +90,16 @@ def test_exact_chunks_hand_out_every_case_once():
     chunks, seen = Chunks(range(1000), 2), []
     while (chunk := chunks.take()) is not None:
         seen += chunk
-        chunks.done(chunk, 0.01 * len(chunk))
+        chunks.record_time(chunk, 0.01 * len(chunk))
     assert seen == list(range(1000))
 
 
 def test_exact_chunks_take_as_long_as_was_asked_and_end_together():
     chunks = Chunks(range(1000), 2)
     assert len(chunks.take()) == 1
-    chunks.done([0], 0.02)
+    chunks.record_time([0], 0.02)
     assert len(chunks.take()) == 50  # of a second
-    chunks.done([0], 1e-6)
+    chunks.record_time([0], 1e-6)
     assert len(chunks.take()) == 238  # a quarter of what is left, for two workers
 
 
@@ -112,7 +112,7 @@ def test_exact_cases_of_lanes_are_handed_out_as_many_as_march_together():
     ] == [1, 300, 1]
     chunks = Chunks(range(200), 1, 64)
     chunks.take()
-    chunks.done(range(64), 640.0)
+    chunks.record_time(range(64), 640.0)
     assert len(chunks.take()) == 64 and len(chunks.take()) == 64 and len(chunks.take()) == 8
 
 
@@ -128,13 +128,13 @@ class Counting:
 
 def test_exact_what_died_is_tried_alone_after_all_others_and_given_up():
     chunks = Chunks(range(3), 1)
-    assert chunks.take() == [0] and chunks.died([0]) == [] and chunks.take() == [1]
+    assert chunks.take() == [0] and chunks.record_death([0]) == [] and chunks.take() == [1]
     chunks.take()
     assert chunks.take(idle=False) is None and chunks.take() == [0] and chunks.take() is None
     assert (
-        chunks.died([0]) == []
+        chunks.record_death([0]) == []
         and chunks.take() == [0]
-        and chunks.died([0]) == [0]
+        and chunks.record_death([0]) == [0]
         and chunks.take() is None
     )
 
@@ -144,7 +144,7 @@ def test_exact_a_chunk_that_died_is_halved_until_the_case_that_kills_is_alone():
     chunks, tried, lost = Chunks(range(1000), 1, 1000), [], []
     while (chunk := chunks.take()) is not None:
         tried.append(chunk)
-        lost += chunks.died(chunk) if 617 in chunk else []
+        lost += chunks.record_death(chunk) if 617 in chunk else []
     assert lost == [617] and [617] in tried
     fine = [chunk for chunk in tried if 617 not in chunk]
     assert (

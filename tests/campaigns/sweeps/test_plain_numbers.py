@@ -208,7 +208,7 @@ def test_exact_columns_of_models_are_the_numbers_of_each(name):
         )
         keys = [key for key in keys if name in OF_LAW.get(key.rpartition(".")[2], name)] or KEYS[:1]
         values = 10.0 ** r.uniform(-3, -0.4, (7, len(keys)))
-        alike = asked.alike(keys, values, partial(written, keys, values), np.arange(7))
+        alike = asked.similar_models(keys, values, partial(written, keys, values), np.arange(7))
         single = list(alike)
         smooth = name in ("tanh", "nonlocal", "bouc-wen", "lugre")
         for row in (numbers_of_rig, numbers_of_contact, *([lanes.law_numbers] if smooth else [])):

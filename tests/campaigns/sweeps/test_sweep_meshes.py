@@ -10,7 +10,7 @@ from patchfem.campaigns.sweeps.case_models import SweepScene
 from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.sweep import Work, iterate_chunks, with_meshes
+from patchfem.campaigns.sweeps.sweep import Work, choose_meshes, iterate_chunks
 from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene.axes import read_axes
 
@@ -21,8 +21,8 @@ WORK = Work(
 
 
 def test_exact_meshes_are_made_once_and_travel_with_the_work():
-    work = with_meshes(WORK)
-    assert with_meshes(work) is work and len(work.meshes.meshes) == 1
+    work = choose_meshes(WORK)
+    assert choose_meshes(work) is work and len(work.meshes.meshes) == 1
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from scipy.io import loadmat
 
 from patchfem.core import PatchfemError
 from patchfem.export.lab.series import Column, Histories
-from patchfem.export.lab.universal import write, write_sets
+from patchfem.export.lab.universal import write_histories, write_sets
 from patchfem.inputs.loops import read_loop
 
 TWO_MODES = """\
@@ -199,7 +199,7 @@ def test_refuses_what_the_format_would_change(tmp_path):
     )
     bad = Histories("", np.arange(2.0), [Column("force", "N", np.array([0.0, np.nan]), 0)], {})
     with pytest.raises(PatchfemError, match="force has values that are not finite"):
-        write(tmp_path / "a.uff", bad)
+        write_histories(tmp_path / "a.uff", bad)
     assert cli("export", tmp_path, "-o", tmp_path / "a.uff").code == 0
 
 

@@ -10,7 +10,7 @@ from scene_texts import COULOMB, POINT, SHORT
 from patchfem.campaigns.sweeps.ranking import SobolIndex
 from patchfem.export.pages import limits, peaks, ranked
 from patchfem.export.pages.headline import summarise_sweep
-from patchfem.export.pages.sweep import page
+from patchfem.export.pages.sweep import page_html
 from patchfem.export.sweeps.page import read_table
 from patchfem.scene.starting import read_template
 
@@ -55,7 +55,7 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
             (one.swept.frequency, one.swept.height, one.swept.half_power_width), truth
         ):
             assert abs(value - true) <= error + 1e-9 * true and error < 1e-6 * true
-    said = peaks.sentence(found)
+    said = peaks.peaks_sentence(found)
     assert "with drive.acceleration 1 g" in said and "with drive.acceleration 2 g" in said
     assert "(cases lie 0.25 Hz apart)" in said
     some = np.where(np.abs(np.tile(x, 2) - 99.6) < 0.4, np.nan, both)  # beside the first peak alone
@@ -64,8 +64,10 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
     assert found[1].swept.frequency.value == pytest.approx(
         95 * np.sqrt(1 - 2 * damping**2), abs=1e-3
     )
-    assert "; where it peaks with drive.acceleration 1 g is not known" in peaks.sentence(found)
-    assert "not known" in peaks.table(found) and peaks.sentence(found[:1]).startswith(
+    assert "; where it peaks with drive.acceleration 1 g is not known" in peaks.peaks_sentence(
+        found
+    )
+    assert "not known" in peaks.peaks_table(found) and peaks.peaks_sentence(found[:1]).startswith(
         "Where relative displacement am"
     )
 
@@ -89,7 +91,9 @@ def test_always_a_peak_at_an_end_is_none_and_a_side_that_stays_up_has_no_width()
         {name: np.ones(narrow.size, bool)},
         True,
     )
-    assert np.isnan(found.swept.half_power_width.value) and "width" not in peaks.sentence([found])
+    assert np.isnan(found.swept.half_power_width.value) and "width" not in peaks.peaks_sentence(
+        [found]
+    )
     assert peaks.find_peaks([key("drive.frequency", x)], {}, {}, True) == []
     unsettled = {name: x < 90, f"{name}_steady": np.ones(41, bool)}  # by its steady estimate
     steady = {
@@ -166,7 +170,7 @@ def test_exact_quantiles_are_those_of_all_cases_that_have_a_value():
     values = np.append(np.arange(1.0, 41), np.nan)
     one = {"values": values, "errors": np.where(values < 13, 0.5 * values, 0.0), "unit": "J"}
     table = {"outcome": ["steady"] * 40 + ["failed"], "drawn": True, "measures": {"loop_area": one}}
-    found = ranked.quantiles(table, {"loop_area": np.append(values[:-1] > 12, True)})
+    found = ranked.measure_quantiles(table, {"loop_area": np.append(values[:-1] > 12, True)})
     unit, ends, count, misses = found["loop_area"]
     assert (unit, count, misses) == ("J", 40, 12)
     assert ends == pytest.approx(np.quantile(np.arange(1.0, 41), (0.05, 0.5, 0.95)))
@@ -196,16 +200,16 @@ def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
 def test_static_cases_are_not_said_to_move():
     """Of patches that only miss the tolerance nothing has to settle."""
     ranks = {"pressure_peak": [SobolIndex("contact.load", 0.8, 0.9, 0.8, 1.0)]}
-    assert ranked.sentence(ranks, 3, False).endswith(
+    assert ranked.ranking_sentence(ranks, 3, False).endswith(
         "; 3 cases that miss the tolerance are included."
     )
-    assert ranked.sentence(ranks, 1, False).endswith(
+    assert ranked.ranking_sentence(ranks, 1, False).endswith(
         "; 1 case that misses the tolerance is included."
     )
-    assert ranked.sentence(ranks, 1).endswith(
+    assert ranked.ranking_sentence(ranks, 1).endswith(
         "; 1 case that has not settled is included with its last value."
     )
-    assert ranked.sentence(ranks, 3).endswith(
+    assert ranked.ranking_sentence(ranks, 3).endswith(
         "; 3 cases that have not settled are included with their last values."
     )
 
@@ -439,7 +443,7 @@ def test_exact_a_width_that_the_cases_do_not_tell_has_its_reason():
         found = peaks.find_peaks(
             keys, {name: (curve(at, centre, damping), 0 * at, "m")}, {name: np.ones(9, bool)}, True
         )
-        return peaks.sentence(found), peaks.table(found)
+        return peaks.peaks_sentence(found), peaks.peaks_table(found)
 
     said, rows = table(x, 102.4, 0.005)
     assert (
@@ -472,7 +476,7 @@ def test_exact_the_scatter_of_the_cases_that_settled_is_not_told_where_many_have
             scene="s",
             folders=None,
         )
-        text = page(table)
+        text = page_html(table)
         part = text[text.index("Scatter of the answers</h2>") :]
         return summarise_sweep(table), part[: part.index("</section>")]
 
@@ -497,28 +501,29 @@ def test_exact_keys_whose_intervals_overlap_stand_in_no_order():
         SobolIndex("damping", 0.01, 0.02, 0.0, 0.06),
         SobolIndex("tilt", 0.0, 0.001, 0.0, 0.04),
     )
-    said = ranked.sentence({name: [load, friction, damping, tilt]}, 56, True, 64)
+    said = ranked.ranking_sentence({name: [load, friction, damping, tilt]}, 56, True, 64)
     assert said.startswith(
         "56 of 64 cases have not settled; with their last values included, loop area depends most "
         "on contact.load and friction.static about equally (58 and 56 % of the variance; their "
         "intervals overlap), then on damping and tilt (at most 6 % each), where each share"
     )
-    apart = ranked.sentence({name: [load, damping]}, 3, True, 64)
+    apart = ranked.ranking_sentence({name: [load, damping]}, 3, True, 64)
     assert apart == (
         "Loop area depends most on contact.load, which contributes to 58 % of the variance (46 to 66 %), "
         "then on damping (at most 6 %); 3 cases that have not settled are included with their last "
         "values."
     )
     far = SobolIndex("far", 0.3, 0.3, 0.25, 0.47)
-    assert "depends on contact.load and far (58 and 30 % of the variance; their" in ranked.sentence(
-        {name: [load, far]}
+    assert (
+        "depends on contact.load and far (58 and 30 % of the variance; their"
+        in ranked.ranking_sentence({name: [load, far]})
     )
     grid = [
         SobolIndex("a", 0.6, 0.6, 0.6, 0.6),
         SobolIndex("b", 0.4, 0.4, 0.4, 0.4),
         SobolIndex("c", 0.005, 0.005, 0.005, 0.005),
     ]
-    assert ranked.sentence({name: grid}) == (
+    assert ranked.ranking_sentence({name: grid}) == (
         "Loop area depends most on a, which contributes to 60 % of the variance, "
         "then on b (40 %), then on c (below 1 %)."
     )

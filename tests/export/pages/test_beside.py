@@ -8,9 +8,9 @@ from page_data import charts_of, data_of
 
 import patchfem as pf
 from patchfem.core import Measure, PatchfemError
-from patchfem.export.netcdf import run_contents, write
-from patchfem.export.pages.several_runs import page, read_run
-from patchfem.export.summary import summary, write_json
+from patchfem.export.netcdf import run_contents, write_netcdf
+from patchfem.export.pages.several_runs import page_html, read_run
+from patchfem.export.summary import make_summary, write_json
 
 SCENE = """[normal]
 load = "{load} N"
@@ -49,13 +49,13 @@ def made(folder, load: float, amplitude: float, error: float):
         "normal_load": Measure(load, "N", 0.0, 0.0),
     }
     write_json(
-        summary("0", "", "rig", "steady", measures, [], [], ((), ()), {"total": 1.0}),
+        make_summary("0", "", "rig", "steady", measures, [], [], ((), ()), {"total": 1.0}),
         folder / "summary.json",
     )
     (folder / "scene.resolved.toml").write_text(SCENE.format(load=load))
     time = np.linspace(0.0, 0.2, 1001)
     motion = amplitude * np.sin(2 * np.pi * 100 * time)
-    write(
+    write_netcdf(
         run_contents(
             {
                 "time": time,
@@ -77,7 +77,7 @@ def test_exact_differences_and_the_last_two_cycles(tmp_path):
         read_run(made(tmp_path / "light", 10.0, 2e-6, 1e-9)),
         read_run(made(tmp_path / "<b>heavy", 20.0, 1e-6, 1e-9)),
     ]
-    text = page(runs)
+    text = page_html(runs)
     assert "<b>heavy" not in text and "&lt;b&gt;heavy" in text
     rows = re.search(r'<section id="scenes">.*?<tbody>(.*?)</tbody>', text, re.S)[1]
     assert re.findall(r"<tr><td>(.*?)</td>", rows) == ["normal.load"]
@@ -93,7 +93,7 @@ def test_exact_differences_and_the_last_two_cycles(tmp_path):
 
 
 def test_always_a_change_within_both_errors_is_not_marked(tmp_path):
-    text = page(
+    text = page_html(
         [
             read_run(made(tmp_path / "a", 10.0, 2e-6, 3e-8)),
             read_run(made(tmp_path / "b", 10.0, 2.05e-6, 3e-8)),
@@ -121,7 +121,7 @@ def test_always_a_change_within_both_errors_is_not_marked(tmp_path):
 )
 def test_exact_a_change_is_told_by_what_the_first_value_bears(tmp_path, value, first, error, told):
     """In per cent, as a factor from ten times on, and not at all from a value that is 0 within its error."""
-    text = page(
+    text = page_html(
         [
             read_run(made(tmp_path / "a", 10.0, first, error)),
             read_run(made(tmp_path / "b", 10.0, value, 1e-10)),
@@ -133,7 +133,7 @@ def test_exact_a_change_is_told_by_what_the_first_value_bears(tmp_path, value, f
 def test_always_runs_of_the_same_name_are_told_apart(tmp_path):
     (tmp_path / "x").mkdir()
     (tmp_path / "y").mkdir()
-    text = page([read_run(made(tmp_path / name / "out", 10.0, 2e-6, 1e-9)) for name in "xy"])
+    text = page_html([read_run(made(tmp_path / name / "out", 10.0, 2e-6, 1e-9)) for name in "xy"])
     assert "out (1)" in text and "out (2)" in text
 
 
@@ -145,7 +145,7 @@ def test_always_levels_in_different_units_have_different_figures(tmp_path):
         scene = LEVELS.format(kind=kind, first=first, last=last, unit=unit)
         pf.run(scene).save(tmp_path / f"run{number}")
         runs.append(read_run(tmp_path / f"run{number}"))
-    charts = data_of(page(runs))["charts"]
+    charts = data_of(page_html(runs))["charts"]
     assert len({one["anchor"] for one in charts}) == len(charts)
     levels = [one for one in charts if one["title"] == "Levels"]
     assert [one["x"]["unit"] for one in levels] == ["g", "N"]

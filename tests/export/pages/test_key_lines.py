@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from patchfem.export.pages.key_lines import group_cases_along_key, key_formatter, varies
+from patchfem.export.pages.key_lines import group_cases_along_key, is_varied, key_formatter
 
 
 def key(values, texts) -> dict:
@@ -27,4 +27,4 @@ def test_exact_lines_are_ordered_by_the_key_and_hold_the_others_fixed():
     tilt = key([3, 1, 2, 1, 3, 2], ["3", "1", "2", "1", "3", "2"])
     load = {"name": "normal.load", "texts": ["10 N"] * 3 + ["20 N"] * 3}
     assert [line.tolist() for line in group_cases_along_key(tilt, [load])] == [[1, 2, 0], [3, 5, 4]]
-    assert varies(load) and not varies({"texts": ["10 N", "10 N"]})
+    assert is_varied(load) and not is_varied({"texts": ["10 N", "10 N"]})

@@ -9,9 +9,9 @@ import pytest
 from page_data import own_part
 
 from patchfem.export.pages.headline import summarise_sweep
-from patchfem.export.pages.limits import as_json, limits_of_sweep, sentence, table
-from patchfem.export.pages.sweep import page
-from patchfem.export.sweeps.answer import answer_of
+from patchfem.export.pages.limits import find_limits, limits_json, limits_sentence, limits_table
+from patchfem.export.pages.sweep import page_html
+from patchfem.export.sweeps.answer import sweep_summary
 
 TILT = np.array([0.05, 0.1, 0.2, 0.5, 1.0])
 
@@ -33,7 +33,7 @@ def limits(measures: dict, errors=0.0, tilt=TILT, factors=False, trusted=None, *
         for name, values in measures.items()
     }
     good = np.ones(len(tilt), bool) if trusted is None else np.array(trusted, bool)
-    return limits_of_sweep([one], columns, dict.fromkeys(columns, good), True, {"length": 12.7e-3})
+    return find_limits([one], columns, dict.fromkeys(columns, good), True, {"length": 12.7e-3})
 
 
 def one_of(values, errors=0.0, **more):
@@ -47,7 +47,7 @@ def test_exact_a_straight_line_leaves_where_it_is_a_twentieth_off():
     one = one_of(1 + 0.25 * (TILT - 0.05))
     assert (one.inside, one.beyond) == (2, 3) and one.value == pytest.approx(0.25e-3)
     assert one.last_change == pytest.approx(0.25 * 0.95) and one.change == 0.05
-    assert sentence(limits({"loop_area": 1 + 0.25 * (TILT - 0.05)})) == (
+    assert limits_sentence(limits({"loop_area": 1 + 0.25 * (TILT - 0.05)})) == (
         "Tilt may reach 0.25 mrad (3.2 um over the patch; interpolated between the cases at 0.2 and 0.5 mrad) before "
         "loop area changes by 5 % (first to change: loop area)."
     )
@@ -57,10 +57,8 @@ def test_exact_a_straight_line_leaves_where_it_is_a_twentieth_off():
 def test_exact_a_limit_has_the_same_words_in_whatever_unit_its_cases_were_written(unit, size):
     one = key(TILT / size, unit=unit) | {"unit": "rad", "log": False, "values": TILT * 1e-3}
     values = 1 + 0.25 * (TILT - 0.05)
-    found = limits_of_sweep(
-        [one], {"loop_area": (values, 0 * values)}, {"loop_area": np.ones(5, bool)}
-    )
-    assert sentence(found).startswith(
+    found = find_limits([one], {"loop_area": (values, 0 * values)}, {"loop_area": np.ones(5, bool)})
+    assert limits_sentence(found).startswith(
         "Tilt may reach 0.25 mrad (interpolated between the cases at 0.2 and 0.5 mrad) before"
     )
 
@@ -93,12 +91,12 @@ def test_exact_a_limit_of_the_patch_stands_with_its_cases():
         tilt=tilt,
         factors=True,
     )
-    assert sentence(found) == (
+    assert limits_sentence(found) == (
         "As contact.tilt.angle grows, the pressure peak doubles at about 4 urad (between 3.2 "
         "and 10 urad); the stiffness of the patch changes by 5 % at about 15 urad (tangential; "
         "between 10 and 32 urad)."
     )
-    known, _ = as_json(found)
+    known, _ = limits_json(found)
     assert (known["low"], known["high"]) == pytest.approx((1e-5, 10**-4.5)) and known[
         "low"
     ] < 25e-6 < known["high"]
@@ -106,7 +104,7 @@ def test_exact_a_limit_of_the_patch_stands_with_its_cases():
 
 def test_exact_the_gap_is_that_of_the_angle_as_it_is_written():
     """0.169 mrad, written 0.16, opens 2.03 um over 12.7 mm."""
-    said = sentence(limits({"loop_area": 1 + (TILT - 0.05) * 0.05 / 0.119}))
+    said = limits_sentence(limits({"loop_area": 1 + (TILT - 0.05) * 0.05 / 0.119}))
     assert said.startswith("Tilt may reach 0.16 mrad (2 um over the patch; interpolated")
 
 
@@ -115,7 +113,7 @@ def test_exact_a_case_that_its_error_leaves_open_is_no_end():
     values = [1, 1.001, 1.04, 1.09, 1.2]
     one = one_of(values, 0.01)
     assert (one.inside, one.beyond) == (1, 3) and 1e-4 < one.value < 5e-4
-    assert "interpolated between the cases at 0.1 and 0.5 mrad)" in sentence(
+    assert "interpolated between the cases at 0.1 and 0.5 mrad)" in limits_sentence(
         limits({"loop_area": values}, 0.01)
     )
     assert (one_of(values).inside, one_of(values).beyond) == (2, 3)
@@ -127,15 +125,18 @@ def test_exact_cases_that_did_not_settle_or_miss_their_tolerance_are_passed_over
     assert (one.inside, one.beyond) == (1, 3) and one.value == pytest.approx(
         1e-4 + 4e-4 * 0.04 / 0.19
     )
-    assert sentence(limits({"loop_area": [1, 1.01, 1.02, 1.2, 1.3]}, trusted=[0, 1, 1, 1, 1])) == ""
+    assert (
+        limits_sentence(limits({"loop_area": [1, 1.01, 1.02, 1.2, 1.3]}, trusted=[0, 1, 1, 1, 1]))
+        == ""
+    )
 
 
 def test_exact_what_the_first_step_leaves_says_nothing():
     """A loop that doubles from case to case was once said to stay within 5 % up to its first case."""
-    said = sentence(
+    said = limits_sentence(
         limits({"loop_area": 2.0 ** np.arange(5), "friction_force_peak": [1, 1, 1, 1.1, 1.2]})
     )
-    (known,) = as_json(limits({"loop_area": 2.0 ** np.arange(5)}))
+    (known,) = limits_json(limits({"loop_area": 2.0 ** np.arange(5)}))
     assert said == "" and [known[name] for name in ("low", "high")] == pytest.approx([5e-5, 1e-4])
     assert limits({"loop_area": [0, 1, 2, 3, 4]}).found == []
 
@@ -146,10 +147,10 @@ def test_exact_keys_that_drive_have_no_limit():
 
 def test_exact_nothing_that_moves_changes():
     assert (
-        sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]}))
+        limits_sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]}))
         == "Tilt may reach 1 mrad (13 um over the patch): loop area changes by less than 5 %."
     )
-    assert sentence(
+    assert limits_sentence(
         limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]}, trusted=[1, 1, 1, 1, 0])
     ) == (
         "Tilt may reach at least 0.5 mrad (6.4 um over the patch) before loop area changes by 5 %; the cases with "
@@ -169,14 +170,14 @@ def test_exact_a_limit_that_errors_leave_open_is_told_with_the_case_that_is_sure
         "Tilt may reach at least 0.15 mrad (1.9 um over the patch) before slip amplitude or loop area changes by 5 "
         "%; loop area has changed by more than 5 % at 0.19 mrad."
     )
-    assert sentence(limits({"slip_amplitude": slip, "loop_area": loop}, 5e-4, tilt)) == want
+    assert limits_sentence(limits({"slip_amplitude": slip, "loop_area": loop}, 5e-4, tilt)) == want
     measures = {"slip_amplitude": [1, 1.01, 1.05, 1.05], "loop_area": [1, 1.01, 1.01, 1.2]}
-    assert sentence(limits(measures, 5e-4, tilt)) == want
+    assert limits_sentence(limits(measures, 5e-4, tilt)) == want
 
 
 def test_exact_a_measure_that_cannot_be_told_is_not_among_what_moves():
     line = 1 + 0.25 * (TILT - 0.05)
-    said = sentence(limits({"loop_area": line, "slip_amplitude": [0, 1, 1, 1, 1]}))
+    said = limits_sentence(limits({"loop_area": line, "slip_amplitude": [0, 1, 1, 1, 1]}))
     assert "before loop area changes by 5 %" in said
     line = {
         "loop_area": line,
@@ -185,14 +186,14 @@ def test_exact_a_measure_that_cannot_be_told_is_not_among_what_moves():
     }
     assert (
         "before slip amplitude or loop area changes by 5 % (first to change: loop area)"
-        in sentence(limits(line))
+        in limits_sentence(limits(line))
     )
 
 
 def test_exact_what_is_round_off_in_every_case_does_not_move():
     """Loops of 1e-12 J that change their sign once kept a stuck rig from having any limit."""
     line = 1 + 0.25 * (TILT - 0.05)
-    said = sentence(
+    said = limits_sentence(
         limits(
             {
                 "loop_area": [1e-12, -3e-12, 2e-12, -1e-12, 1e-12],
@@ -215,9 +216,9 @@ def test_exact_of_several_lines_the_one_that_allows_least():
         key(slope, "normal.load", "N") | {"unit": "N", "log": False},
     ]
     values, good = 1 + slope * (tilt - 0.05), {"loop_area": np.ones(10, bool)}
-    (one,) = limits_of_sweep(keys, {"loop_area": (values, 0 * values)}, good).found
+    (one,) = find_limits(keys, {"loop_area": (values, 0 * values)}, good).found
     assert one.value == pytest.approx(0.15)
-    assert limits_of_sweep(keys, {"loop_area": (values, 0 * values)}, good, grid=False).key is None
+    assert find_limits(keys, {"loop_area": (values, 0 * values)}, good, grid=False).key is None
 
 
 def swept() -> dict:
@@ -257,7 +258,10 @@ def swept() -> dict:
 
 def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
     """(1 + s)^0.5 is 1.05 at s = 0.1025, a tilt of 0.46 mrad; 2 MPa are doubled at 0.15 mrad; 1 - 0.1 t at 0.5475."""
-    text, found = own_part(page(swept())), answer_of(summarise_sweep(swept()), swept()["outcome"])
+    text, found = (
+        own_part(page_html(swept())),
+        sweep_summary(summarise_sweep(swept()), swept()["outcome"]),
+    )
     want = (
         "Tilt may reach 0.25 mrad (3.2 um over the patch; interpolated between the cases at 0.2 and 0.5 mrad) "
         "before relative displacement amplitude or loop area changes by 5 % (first to change: loop area or "
@@ -305,7 +309,7 @@ def test_always_the_sentence_of_a_sweep_without_numbers_is_empty():
     table = swept() | {
         "keys": [key(words=True) | {"unit": "1", "log": False, "texts": list("abcde")}]
     }
-    found = answer_of(summarise_sweep(table), table["outcome"])
+    found = sweep_summary(summarise_sweep(table), table["outcome"])
     assert (
         found["limits"] == []
         and "moment; the largest error, at contact.tilt.angle e" in found["answer"]
@@ -317,7 +321,7 @@ def test_exact_the_last_digits_of_a_value_are_no_change():
     share = (TILT - TILT[0]) / np.ptp(TILT)
     changes = {"friction_force_peak": -4.26e-13, "slip_amplitude": -0.0836, "loop_area": 58.6}
     values = {name: 1 + change * share for name, change in changes.items()}
-    text = table(limits(values), {name: (values[name], 0 * share, "N") for name in values})
+    text = limits_table(limits(values), {name: (values[name], 0 * share, "N") for name in values})
     cells = re.findall(r"<td[^>]*>(0 %|[-+]\S+ %|&times; \S+?)</td>", text)
     assert sorted(cells) == ["&times; 59.6", "-8.36 %", "0 %"]
 
@@ -328,7 +332,7 @@ def test_exact_what_may_change_first_is_all_named():
     found = limits(
         {"slip_amplitude": 1 - 14 * tilt**2, "loop_area": 1 - 13 * tilt**2}, tilt=tilt, factors=True
     )
-    assert "(first to change: slip amplitude or loop area)" in sentence(found)
+    assert "(first to change: slip amplitude or loop area)" in limits_sentence(found)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from patchfem.export.tolerance_misses import (
     count_over_tolerance,
     is_over_tolerance,
     is_within_by_floor,
-    sentence,
+    tolerance_sentence,
 )
 
 NAN = np.nan
@@ -44,7 +44,7 @@ def test_exact_the_worst_is_relative_and_named_with_its_case():
     """The largest absolute error, of the last case, is the smallest of all: 2e-5 of 0.19 is one in ten thousand."""
     loop = one([2e-7, 5e-6, 0.19], [4.4e-7, 5e-7, 2e-5])
     where = ["slide.amplitude 0.05 um", "", ""].__getitem__
-    assert sentence({"loop_area": loop}, 0.01, where) == (
+    assert tolerance_sentence({"loop_area": loop}, 0.01, where) == (
         "2 of 3 cases miss the tolerance of 1 % in loop area; the largest error, at slide.amplitude 0.05 um, is 220 "
         "% of its value."
     )
@@ -53,7 +53,7 @@ def test_exact_the_worst_is_relative_and_named_with_its_case():
         "moment": one([1, 1, 1], [9, 9, 9]),
         "rotation": one([1] * 3, [0, 0, 1]),
     }
-    assert sentence(others, 0.01, where).endswith(
+    assert tolerance_sentence(others, 0.01, where).endswith(
         "220 % of its value; 2 other measures miss the tolerance in some cases."
     )
     zero = {
@@ -61,27 +61,27 @@ def test_exact_the_worst_is_relative_and_named_with_its_case():
         "moment": one([1, 1, 1], [0.5, 0, 0]),
     }
     # not 10
-    assert "in moment; the largest error, at slide.amplitude 0.05 um, is 50" in sentence(
+    assert "in moment; the largest error, at slide.amplitude 0.05 um, is 50" in tolerance_sentence(
         zero, 0.01, where
     )
-    assert sentence({"energy": zero["energy"]}, 0.01, where).endswith(
+    assert tolerance_sentence({"energy": zero["energy"]}, 0.01, where).endswith(
         "0.05 um, is larger than the value."
     )
     assert (
-        sentence({"loop_area": one([1, 1], [1e-3, 0])}, 0.01, where)
+        tolerance_sentence({"loop_area": one([1, 1], [1e-3, 0])}, 0.01, where)
         == "All 2 cases meet the tolerance of 1 %."
     )
     assert (
-        sentence({"loop_area": one([1, NAN, 1], [1e-3, NAN, 0])}, 0.01, where)
+        tolerance_sentence({"loop_area": one([1, NAN, 1], [1e-3, NAN, 0])}, 0.01, where)
         == "2 of 3 cases have an answer; all of these meet the tolerance of 1 %."
     )
     assert (
-        sentence({"loop_area": loop}, np.array([9, 0.2, 0.1]), where)
+        tolerance_sentence({"loop_area": loop}, np.array([9, 0.2, 0.1]), where)
         == "All 3 cases meet their tolerance."
     )
     assert (
-        sentence({"loop_area": loop}, NAN, where)
-        == sentence({"a": one([1], [NAN])}, 0.1, where)
+        tolerance_sentence({"loop_area": loop}, NAN, where)
+        == tolerance_sentence({"a": one([1], [NAN])}, 0.1, where)
         == ""
     )
 
@@ -138,7 +138,7 @@ def test_exact_a_tolerance_that_only_the_floor_meets_is_told_with_the_floor():
     """A loop of 0.16 nJ, known to 60 %, "met the tolerance of 0.1 %" by a floor of 0.1 nJ, and nothing said so."""
     loop = one([1.6e-10, 1e-3], [0.96e-10, 1e-7], 1e-10) | {"unit": "J"}
     assert is_within_by_floor(loop, 1e-3).tolist() == [True, False]
-    assert sentence({"loop_area": loop}, 1e-3, str) == (
+    assert tolerance_sentence({"loop_area": loop}, 1e-3, str) == (
         "All 2 cases meet the tolerance of 0.1 % or the floor of their "
         "measure, such as 0.1 nJ of loop area."
     )
@@ -170,10 +170,10 @@ def test_exact_the_measure_that_is_asked_for_is_spoken_of_first():
         "peak_frequency": one([1, 1], [0, 0.02]),
         "moment": one([1], [0.1]),
     }
-    assert sentence(found, 0.01, str, "peak_frequency") == (
+    assert tolerance_sentence(found, 0.01, str, "peak_frequency") == (
         "1 of 2 cases misses the tolerance of 1 % in peak frequency; the largest error, at 1, is 2 % of its value; 2 "
         "other measures miss the tolerance in some cases."
     )
-    assert sentence(found, 0.1, str, "peak_frequency") == (
+    assert tolerance_sentence(found, 0.1, str, "peak_frequency") == (
         "In peak frequency all 2 cases meet the tolerance of 10 %; 1 other measure misses the tolerance in some cases."
     )

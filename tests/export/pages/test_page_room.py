@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.export.drawing import charts
-from patchfem.export.pages.document import document
+from patchfem.export.pages.document import document_html
 
 
 @pytest.mark.parametrize("size", [1000, 4001, 100_003])
@@ -15,7 +15,7 @@ def test_exact_a_sampled_line_keeps_its_extremes_and_its_ends(size):
         np.cumsum(rng.normal(size=size)),
         rng.normal(size=size),
     )
-    keep = charts.sampled(x, y, 1000)
+    keep = charts.sample_indices(x, y, 1000)
     assert keep.size <= 1000 and keep[0] == 0 and keep[-1] == size - 1 and np.all(np.diff(keep) > 0)
     for values in (x, y):
         assert values[keep].max() == values.max() and values[keep].min() == values.min()
@@ -32,17 +32,17 @@ def test_always_charts_of_any_size_leave_room_for_the_rest_of_the_page():
     """40 lines of 30 000 points: 6 MB as they are drawn, 18 MB as they are."""
     x = np.linspace(0, 1, 30_000)
     many = [
-        charts.chart(
+        charts.make_chart(
             "a",
-            charts.axis("x"),
-            charts.axis("y"),
-            [charts.line(x, np.sin(40 * x + k), "accent") for k in range(40)],
+            charts.make_axis("x"),
+            charts.make_axis("y"),
+            [charts.make_line(x, np.sin(40 * x + k), "accent") for k in range(40)],
         )
     ]
     for room in (700_000, 200_000):
         found = charts.limit_characters(many, room)
-        text = document("", "", [], {"charts": found}, ("figures.js",))
-        bare = document("", "", [], {"charts": []}, ("figures.js",))
+        text = document_html("", "", [], {"charts": found}, ("figures.js",))
+        bare = document_html("", "", [], {"charts": []}, ("figures.js",))
         assert len(text) - len(bare) < 1.1 * room
         assert all(
             max(one["y"]) == max(full["y"])

@@ -8,8 +8,8 @@ import pytest
 from chromium import LATER, Chromium
 
 from patchfem.export.drawing import charts, pictures
-from patchfem.export.pages.document import PAGE_COLOURS, Section, document, figure
-from patchfem.export.pages.sweep import page
+from patchfem.export.pages.document import PAGE_COLOURS, Section, document_html, figure_html
+from patchfem.export.pages.sweep import page_html
 
 TURN = "const e=document.getElementById('shown');e.value='map';e.dispatchEvent(new Event('change'))"
 
@@ -19,23 +19,23 @@ def stress_map() -> str:
     x, y = np.linspace(0.0, 4.0, 5), np.linspace(0.0, 3.0, 4)
     value = np.add.outer(np.arange(4.0), np.arange(3.0))
     drawn = [
-        charts.chart(
+        charts.make_chart(
             "Von Mises stress",
-            charts.axis("x", "mm"),
-            charts.axis("y", "mm"),
-            [charts.mark("cells", "", x=x, y=y, value=value, top=5.0, unit="MPa")],
+            charts.make_axis("x", "mm"),
+            charts.make_axis("y", "mm"),
+            [charts.make_mark("cells", "", x=x, y=y, value=value, top=5.0, unit="MPa")],
         ),
-        charts.chart(
+        charts.make_chart(
             "Gap",
-            charts.axis("x", "mm"),
-            charts.axis("gap", "um"),
-            [charts.mark("line", "accent", x=x, y=x**2)],
+            charts.make_axis("x", "mm"),
+            charts.make_axis("gap", "um"),
+            [charts.make_mark("line", "accent", x=x, y=x**2)],
         ),
     ]
     for number, one in enumerate(drawn):
         one["anchor"] = f"chart-{number}"
     places = "".join(f'<div id="{one["anchor"]}" class=chart role=img></div>' for one in drawn)
-    return document(
+    return document_html(
         "Maps",
         "",
         [Section("maps", "Maps", f"<div class=row>{places}</div>")],
@@ -45,7 +45,7 @@ def stress_map() -> str:
 
 
 def sweep_map(table: dict) -> str:
-    return page(table).replace("</body>", f"<script>{LATER.format(TURN)}</script></body>")
+    return page_html(table).replace("</body>", f"<script>{LATER.format(TURN)}</script></body>")
 
 
 def on_paper(chromium: Chromium, text: str, dark: bool) -> np.ndarray:
@@ -86,15 +86,17 @@ def test_exact_a_picture_drawn_beforehand_has_the_colours_of_the_page(chromium, 
     """Pages of surfaces stood dark on white in the dark."""
     svg = pictures.draw_charts(
         [
-            charts.chart(
+            charts.make_chart(
                 "Trace",
-                charts.axis("x", "mm"),
-                charts.axis("z", "um"),
-                [charts.line([0.0, 1.0], [0.0, 1.0], "accent", "before")],
+                charts.make_axis("x", "mm"),
+                charts.make_axis("z", "um"),
+                [charts.make_line([0.0, 1.0], [0.0, 1.0], "accent", "before")],
             )
         ]
     )
-    text = document("Traces", "", [Section("a", "Traces", figure(0, svg, "Two", "a line"))])
+    text = document_html(
+        "Traces", "", [Section("a", "Traces", figure_html(0, svg, "Two", "a line"))]
+    )
     assert not re.search("|".join(PAGE_COLOURS), text[text.index("<svg") :]) and set(
         pictures.COLOURS.values()
     ) < set(PAGE_COLOURS)

@@ -12,7 +12,7 @@ from exported import CROWNED
 from page_data import data_of
 
 from patchfem.export import report
-from patchfem.export.drawing.panels import panels, sizes
+from patchfem.export.drawing.panels import make_panels, quadrilateral_areas
 from patchfem.export.fields.series import Series, last_consecutive_frames
 from patchfem.export.page_data import PressedPatch, RunData, SceneText, Verdict
 from patchfem.export.pages import player
@@ -51,8 +51,10 @@ def test_exact_means_keep_the_integral_and_a_linear_field_its_middle_value(grade
     mesh = reduce_mesh(points, cells, coated, 300)
     middle = points[cells].mean(axis=1)
     field = np.stack([3 + 2 * middle[:, 0] - middle[:, 1], np.sin(9 * middle[:, 0])], axis=1)
-    means, size = mesh.means(field), sizes(points[mesh.nodes], mesh.cells)
-    np.testing.assert_allclose(size @ means, sizes(points, cells) @ field, rtol=1e-12, atol=1e-13)
+    means, size = mesh.means(field), quadrilateral_areas(points[mesh.nodes], mesh.cells)
+    np.testing.assert_allclose(
+        size @ means, quadrilateral_areas(points, cells) @ field, rtol=1e-12, atol=1e-13
+    )
     own = points[mesh.nodes][mesh.cells].mean(axis=1)
     np.testing.assert_allclose(means[:, 0], 3 + 2 * own[:, 0] - own[:, 1], rtol=1e-12, atol=1e-12)
 
@@ -65,7 +67,7 @@ def test_always_any_mesh_is_thinned_to_whole_cells_of_the_same_outline():
     triangles = np.concatenate([cells[:, [0, 1, 2, 2]], cells[:, [0, 2, 3, 3]]])
     mesh = reduce_mesh(points, triangles, np.zeros(len(triangles), bool), 600)
     assert 100 < len(mesh.cells) <= 660
-    size = sizes(points[mesh.nodes], mesh.cells)
+    size = quadrilateral_areas(points[mesh.nodes], mesh.cells)
     assert size.min() > 0 and size.sum() == pytest.approx(2.0, rel=0.05)
     kept = points[mesh.nodes]
     assert (kept.min(axis=0) == points.min(axis=0)).all() and (
@@ -111,7 +113,7 @@ def test_exact_numbers_and_places_are_those_of_the_fields(coarse):
         gap, aside = 200.0, 50.0
         for at, time in list(enumerate(film["times"]))[::5]:
             frame = series.frame(int(np.searchsorted(series.times, time)))
-            drawn = panels(frame, (gap, gap), aside=aside)[0]
+            drawn = make_panels(frame, (gap, gap), aside=aside)[0]
             assert film["slide"][at] == pytest.approx(drawn.slide, rel=1e-9)
             shift = np.array([aside * film["slide"][at], 0.0])
             parts = np.split(
@@ -141,7 +143,7 @@ def test_exact_numbers_and_places_are_those_of_the_fields(coarse):
 
 def test_always_a_page_holds_what_it_can(film):
     assert len(film["times"]) <= player.FRAMES and film["cells"][0] <= film["cells"][1]
-    told = player.section(film).html
+    told = player.player_section(film).html
     assert "frames from" in told and "Motion and gap are magnified by one factor" in told
 
 
@@ -165,7 +167,7 @@ def opened(bench, film, chromium):
                 "shear_stress": file["shear_stress"][...],
             },
         )
-    text = report.page(
+    text = report.page_html(
         RunData(
             SceneText("a", "</pre><b id=evil>&", ""),
             Verdict(summary, "s"),

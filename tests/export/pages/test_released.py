@@ -8,12 +8,12 @@ import pytest
 from command_line import cli
 
 import patchfem as pf
-from patchfem.export.drawing.charts import histories
+from patchfem.export.drawing.charts import history_charts
 from patchfem.export.drawing.pictures import draw_charts
 from patchfem.export.page_data import Motion, RunData, SceneText, Verdict
 from patchfem.export.pages.released import describe_release, describe_swing
-from patchfem.export.pages.sentences import headline
-from patchfem.export.report import picture
+from patchfem.export.pages.sentences import headline_sentence
+from patchfem.export.report import find_picture
 from patchfem.scene.starting import read_template
 
 IWAN = """
@@ -109,7 +109,7 @@ def test_exact_what_the_last_cycles_leave_is_no_headline_of_a_release():
         },
     }
     assert (
-        headline(summary, 40.0, released="released it rests")
+        headline_sentence(summary, 40.0, released="released it rests")
         == "Released it rests; friction dissipates 500 ± 10 mJ during the whole run."
     )
 
@@ -130,8 +130,8 @@ def test_exact_the_picture_of_the_whole_run_shows_every_turn():
     window = {"time": late, "displacement": still - 5e-6, "acceleration": still, "base": still}
     motion = Motion(history, {}, window, 1 / 143)
     data = RunData(SceneText("a", "", ""), Verdict({}, "", 43.0, "released"), {}, motion=motion)
-    found = picture("history", data)
-    early, last = histories(*found.values)[0]["marks"]
+    found = find_picture("history", data)
+    early, last = history_charts(*found.values)[0]["marks"]
     assert (
         {early["kind"], last["kind"]} == {"line"}
         and early["x"].size == 7

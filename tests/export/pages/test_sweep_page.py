@@ -9,15 +9,16 @@ from chromium import LATER
 from page_data import data_of, own_part, unheard
 
 from patchfem.export.pages import library
-from patchfem.export.pages.document import Section, document, figure, to_json
-from patchfem.export.pages.document import table as sheet
-from patchfem.export.pages.headline import span
-from patchfem.export.pages.sweep import page, shorten
+from patchfem.export.pages.document import Section, document_html, figure_html, to_json
+from patchfem.export.pages.document import table_html as sheet
+from patchfem.export.pages.headline import span_sentence
+from patchfem.export.pages.sweep import page_html
 from patchfem.export.sweeps.page import join_tables, suits_log_axis
+from patchfem.export.written import shorten_number
 
 
 def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table):
-    data = data_of(page(table))
+    data = data_of(page_html(table))
     assert data["keys"][0]["unit"] == "mrad" and data["keys"][1]["unit"] == "N"
     np.testing.assert_allclose(
         data["keys"][0]["values"], table["keys"][0]["values"] * 1e3, rtol=1e-9
@@ -43,7 +44,7 @@ def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table)
 
 
 def test_exact_a_key_of_words_carries_the_word_of_each_of_its_numbers(table):
-    assert [one["words"] for one in data_of(page(table))["keys"]] == [None, None]
+    assert [one["words"] for one in data_of(page_html(table))["keys"]] == [None, None]
     table["keys"][0] |= {
         "name": "friction.law",
         "values": np.arange(12) % 3.0,
@@ -51,14 +52,14 @@ def test_exact_a_key_of_words_carries_the_word_of_each_of_its_numbers(table):
         "log": False,
         "texts": [["coulomb", "iwan", "tanh"][case % 3] for case in range(12)],
     }
-    law, load = data_of(page(table))["keys"]
+    law, load = data_of(page_html(table))["keys"]
     assert (
         law["words"] == [[0.0, "coulomb"], [1.0, "iwan"], [2.0, "tanh"]] and load["words"] is None
     )
 
 
 def test_always_one_file_below_three_megabytes_that_fetches_nothing(table):
-    text = page(table)
+    text = page_html(table)
     assert len(text.encode()) < 3e6
     targets = re.findall(r"(?:src|href)=[\"']?([^\"' >]+)", own_part(text))
     assert targets and all(re.match(r"#|sweep\.|cases/", one) for one in targets)
@@ -66,7 +67,7 @@ def test_always_one_file_below_three_megabytes_that_fetches_nothing(table):
 
 
 def test_always_texts_from_outside_are_shown_as_texts(table):
-    whole = page(table)
+    whole = page_html(table)
     text = own_part(whole)
     assert "Tilt &lt;/script&gt;&lt;b&gt;&amp;amp;" in text
     for foreign in ("<b>&amp;", "<i>a scene", "<i>peak", "<refused>"):
@@ -90,18 +91,18 @@ def test_exact_a_case_shows_its_error_where_its_digits_do_not(table, value, erro
     one = table["measures"]["relative_displacement_amplitude"]
     one |= {"unit": "1", "values": np.full(12, value), "errors": np.full(12, error)}
     one["values"][3] = 7.25  # so that the measure changes from case to case
-    assert page(table).count(f"<td class=n>{shown}</td>") >= 11
+    assert page_html(table).count(f"<td class=n>{shown}</td>") >= 11
 
 
 def test_exact_the_scene_is_named_beneath_the_keys_that_were_swept(table):
-    text = own_part(page(table | {"of": "<a> rig tilted by 0.1 mrad"}))
+    text = own_part(page_html(table | {"of": "<a> rig tilted by 0.1 mrad"}))
     # and no seconds: those of all processes are neither wall nor CPU
     assert "patchfem 1.2.3</p>" in text
     assert "<p class=soft>Scene: &lt;a&gt; rig tilted by 0.1 mrad &middot; patchfem " in text
 
 
 def test_always_a_measure_without_any_value_is_not_offered_and_a_failed_case_is_told(table):
-    text = page(table)
+    text = page_html(table)
     assert "loop_area" not in [one["name"] for one in data_of(text)["measures"]]
     assert (
         "<b>12 cases</b> over contact.tilt.angle × normal.load: 10 steady, 1 failed, 1 grows."
@@ -115,7 +116,7 @@ def test_always_a_measure_without_any_value_is_not_offered_and_a_failed_case_is_
 def test_always_a_sweep_without_a_value_has_a_page_without_pictures(table):
     for one in table["measures"].values():
         one["values"] = np.full(12, np.nan)
-    text = page(table)
+    text = page_html(table)
     assert "No case has a value to draw" in text and "<script" not in text
 
 
@@ -141,7 +142,7 @@ def test_always_many_cases_are_thinned_to_a_page_below_three_megabytes_with_all_
         "grid": False,
         "folders": [f"cases/{case}" for case in range(many)],
     }
-    text = page(table)
+    text = page_html(table)
     data = data_of(text)
     assert len(text.encode()) < 3e6 and f"{len(data['outcome'])} of {many} cases are drawn" in text
     cases = [int(one.removeprefix("cases/")) for one in data["links"]]
@@ -175,7 +176,7 @@ def test_always_a_grid_that_is_too_large_is_thinned_to_points_with_its_extremes(
     for one in table["measures"].values():
         one["values"], one["errors"] = r.normal(size=many), np.full(many, 1e-3)
     table |= {"outcome": ["steady"] * many, "messages": {}, "folders": None}
-    text = page(table)
+    text = page_html(table)
     data, values = data_of(text), table["measures"]["relative_displacement_amplitude"]["values"]
     shown = np.array([one["values"] for one in data["keys"]])
     assert len(text.encode()) < 3e6 and 400 < shown.shape[1] < many
@@ -190,7 +191,7 @@ def test_always_a_grid_that_is_too_large_is_thinned_to_points_with_its_extremes(
 def test_exact_a_key_written_in_several_units_is_shown_in_that_of_its_numbers(table):
     load = table["keys"][1]
     load["texts"] = ["10 N" if value == 10 else f"{value / 1e3:g} kN" for value in load["values"]]
-    shown = data_of(page(table))["keys"][1]
+    shown = data_of(page_html(table))["keys"][1]
     assert shown["unit"] == "N" and shown["values"] == load["values"].tolist()
 
 
@@ -205,7 +206,7 @@ def test_exact_a_key_written_in_several_units_is_shown_in_that_of_its_numbers(ta
     ],
 )
 def test_exact_long_numbers_are_shown_short(text, shown):
-    assert shorten(text) == shown
+    assert shorten_number(text) == shown
 
 
 def test_exact_numbers_that_are_not_finite_are_null():
@@ -228,7 +229,7 @@ def test_exact_a_script_cannot_end_its_element():
         library.escape_script("a</script>b<!--c</SCRIPT x</p")
         == "a<\\/script>b<\\!--c<\\/SCRIPT x</p"
     )
-    hostile = document("t", "", [], {"x": "</script><!--"}, ("figures.js",))
+    hostile = document_html("t", "", [], {"x": "</script><!--"}, ("figures.js",))
     assert data_of(hostile) == {"x": "</script><!--"}
 
 
@@ -240,13 +241,13 @@ def test_always_a_browser_draws_a_sweep_that_does_not_settle_at_an_end(table, br
     """A shading without a left or right end once left the picture out."""
     table["outcome"] = np.array(table["outcome"], object)
     table["outcome"][off] = "grows"
-    seen = browser(page(table))
+    seen = browser(page_html(table))
     assert re.search(r'<div id="?chart"?[^>]*>\s*<div', seen), "no picture in its place"
 
 
 def test_exact_labels_of_a_logarithmic_axis_are_numbers_that_people_read(chromium, table):
     """An axis from 0.05 to 3 once had labels from 0.5 on alone, one from 1e-7 powers of ten."""
-    chromium.opened(page(table))
+    chromium.opened(page_html(table))
     for ends, labels in (
         ((0.05, 3), [0.05, 0.1, 0.2, 0.5, 1, 2]),
         ((0.9, 40), [1, 2, 5, 10, 20]),
@@ -268,7 +269,7 @@ def test_exact_values_over_two_decades_have_a_logarithmic_axis_and_what_misses_t
     amplitude["values"] = 1e-9 * 4.0 ** np.arange(12)
     # the bars go below 0
     amplitude["errors"] = amplitude["values"] * np.where(np.arange(12) < 3, 2.0, 1e-3)
-    text = page(table | {"tolerance": 0.01})
+    text = page_html(table | {"tolerance": 0.01})
     assert text.count(
         "<td class=n data-over>"
     ) == 3 and "3 of 12 cases miss the tolerance of 1 %" in own_part(text)
@@ -284,7 +285,7 @@ def test_exact_values_over_two_decades_have_a_logarithmic_axis_and_what_misses_t
     chromium.settled()
     assert chromium.js(f"{held}.y_scale.type") == "LinearScale" and not chromium.faults
     amplitude["values"] = amplitude["values"] - 2e-9  # one is negative
-    chromium.opened(page(table))
+    chromium.opened(page_html(table))
     assert chromium.js("document.getElementById('log').checked") is False
 
 
@@ -293,7 +294,7 @@ def test_exact_the_axis_can_be_switched_and_no_band_leaves_it(chromium, table):
     held = "Bokeh.documents[Bokeh.documents.length - 1].roots()[0]"
     for key in table["keys"]:
         key["log"] = True
-    chromium.opened(page(table), width=420)
+    chromium.opened(page_html(table), width=420)
     scales = []
     for _ in range(2):
         scales.append(chromium.js(f"{held}.x_scale.type"))
@@ -309,7 +310,7 @@ def test_exact_the_axis_can_be_switched_and_no_band_leaves_it(chromium, table):
 @pytest.mark.parametrize("shown", ["lines", "map", "cloud"])
 def test_always_a_browser_draws_it(table, browser, shown):
     table["grid"] = shown != "cloud"
-    text = page(table)
+    text = page_html(table)
     if shown == "map":
         turn = "const e=document.getElementById('shown');e.value='map';e.dispatchEvent(new Event('change'))"
         text = text.replace("</body>", f"<script>{LATER.format(turn)}</script></body>")
@@ -333,30 +334,35 @@ def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_relati
         ("loop_area", "pressure_peak", "relative_displacement_amplitude"), settled
     )
     assert (
-        span(measures, trusted, settled)
+        span_sentence(measures, trusted, settled)
         == "Pressure peak of the settled cases ranges from 2 MPa to 3.142 MPa, "
         "with errors of at most 0.2 %."
     )
     measures["loop_area"] = ([1e-3, lost, lost], [lost] * 3, "J")
-    assert span(measures, trusted, settled) == "Loop area is 1 mJ."
+    assert span_sentence(measures, trusted, settled) == "Loop area is 1 mJ."
     both = np.ones(2, bool)
     amplitude = {"relative_displacement_amplitude": ([2.939e-8, 8.2614e-3], [1e-9, 8e-8], "m")}
     start = "Relative displacement amplitude"
     assert (
-        span(amplitude, {"relative_displacement_amplitude": both}, both)
+        span_sentence(amplitude, {"relative_displacement_amplitude": both}, both)
         == f"{start} ranges from 29.39 nm to 8.261 mm, with errors of at most 3 %."
     )
-    assert span(amplitude, {"relative_displacement_amplitude": np.array([False, True])}, both) == (
+    assert span_sentence(
+        amplitude, {"relative_displacement_amplitude": np.array([False, True])}, both
+    ) == (
         f"{start} in the only case that meets the tolerance in this measure is 8.261 mm, with errors of at most "
         "0.001 %."
     )
     amplitude["relative_displacement_amplitude"] = ([0.0, 1.963e-5], [1e-13, 2e-14], "m")
     assert (
-        span(amplitude, {"relative_displacement_amplitude": both}, both)
+        span_sentence(amplitude, {"relative_displacement_amplitude": both}, both)
         == f"{start} ranges from 0 to 19.63 um."
     )
     assert (
-        span({"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}, {}, both[:1]) == ""
+        span_sentence(
+            {"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}, {}, both[:1]
+        )
+        == ""
     )
 
 
@@ -425,12 +431,12 @@ def test_exact_an_axis_of_a_decade_or_more_is_logarithmic(values, log):
 def test_exact_round_off_is_zero_in_the_span_and_known_absolutely():
     """A joint that holds in its first cases: -1.4e-19 J ± 1e-11 J was known to 2e11 % of its value."""
     loop = np.array([4.2e-21, -1.4e-19, 3.7e-2]), np.array([1e-11, 1e-11, 7.4e-5]), "J"
-    text = span({"loop_area": loop}, {"loop_area": np.ones(3, bool)}, np.ones(3, bool))
+    text = span_sentence({"loop_area": loop}, {"loop_area": np.ones(3, bool)}, np.ones(3, bool))
     assert text == "Loop area ranges from 0 to 37 mJ, with errors of at most 0.2 %."
 
 
 def test_always_a_browser_that_cannot_unpack_says_so(chromium, table):
-    text = page(table)
+    text = page_html(table)
     chromium.opened(text)
     assert chromium.js("document.getElementById('old').hidden") and not chromium.faults
     chromium._to(
@@ -444,10 +450,10 @@ def test_always_a_browser_that_cannot_unpack_says_so(chromium, table):
 
 def test_always_a_page_can_be_heard(table):
     """The sliders of the player had no name once: their labels named the value that stood before them."""
-    assert unheard(page(table)) == []
+    assert unheard(page_html(table)) == []
     assert unheard(library.read_file("player.html")) == []
     assert (
-        unheard(document("Ways", "", [Section("a", "Ways", sheet(("", ""), [["held", "1"]]))]))
+        unheard(document_html("Ways", "", [Section("a", "Ways", sheet(("", ""), [["held", "1"]]))]))
         == []
     )
     bad = "<html><h1>a</h1><h3>b</h3><label>c <output></output><input></label><svg></svg><th>d</th>"
@@ -455,7 +461,7 @@ def test_always_a_page_can_be_heard(table):
 
 
 def test_always_a_picture_is_one_stop_of_the_tab_key_and_obeys_keys(chromium, table):
-    seen = chromium.opened(page(table))
+    seen = chromium.opened(page_html(table))
     stops = """(function all(node) { return [...node.querySelectorAll('*')].flatMap((one) =>
         [...(one.tabIndex >= 0 ? [one.id] : []), ...(one.shadowRoot ? all(one.shadowRoot) : [])]) })"""
     assert seen.js(f"{stops}(document.getElementById('chart'))") == []
@@ -477,7 +483,7 @@ def test_exact_a_fraction_is_told_in_percent_as_a_run_tells_it():
     """0.2193 of the length is 21.93 % in sentence, table and picture alike."""
     values, none = np.array([1.0, 0.2193, 0.1231]), np.zeros(3)
     assert (
-        span(
+        span_sentence(
             {"contact_fraction": (values, none, "1")},
             {"contact_fraction": np.ones(3, bool)},
             np.ones(3, bool),
@@ -492,7 +498,7 @@ def test_exact_a_fraction_is_told_in_percent_as_a_run_tells_it():
         "log": False,
         "texts": ["0 mrad", "0.1 mrad", "0.2 mrad"],
     }
-    text = page(
+    text = page_html(
         {
             "title": "t",
             "version": "0",
@@ -543,7 +549,7 @@ def test_always_tables_and_pictures_are_whole_on_a_wide_and_on_a_narrow_page(chr
         "wide",
     )
     svg = "<svg viewBox='0 0 900 300'><text x=880 y=20>x</text></svg>"
-    text = document(
+    text = document_html(
         "Where",
         "",
         [
@@ -552,7 +558,7 @@ def test_always_tables_and_pictures_are_whole_on_a_wide_and_on_a_narrow_page(chr
                 "A",
                 sheet(heads, rows, "wide")
                 + sheet(heads, rows, "across many")
-                + figure(1, svg, "A picture.", "A picture"),
+                + figure_html(1, svg, "A picture.", "A picture"),
             ),
             Section("cases", "Cases", cases),
         ],
@@ -609,7 +615,7 @@ def test_exact_the_page_says_what_a_click_on_a_case_opens(links, said):
             "loop_area": {"unit": "J", "means": "m", "values": values, "errors": 0 * values}
         },
     }
-    text = page(table)
+    text = page_html(table)
     assert said in text and ("Click on a case" in text) == bool(said)
 
 
@@ -639,7 +645,7 @@ def test_exact_names_of_keys_break_behind_dots_and_the_table_of_cases_fits():
         "values": 1e-16 * values,
         "errors": 0 * values,
     }
-    text = page(
+    text = page_html(
         {
             "title": "Sweep of " + " × ".join(names),
             "version": "0",

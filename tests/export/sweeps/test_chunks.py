@@ -66,8 +66,8 @@ def same(found: CaseResults, want: CaseResults) -> None:
 @pytest.mark.parametrize("count", [1, 7, 4096])
 def test_exact_a_file_gives_back_what_was_written(tmp_path, count):
     names = np.random.default_rng(count).integers(0, 2**64 - 1, count, np.uint64)
-    written = chunks.write(tmp_path, range(count), names, some(count, count))
-    found, read = chunks.read(tmp_path / written)
+    written = chunks.write_chunk(tmp_path, range(count), names, some(count, count))
+    found, read = chunks.read_chunk(tmp_path / written)
     np.testing.assert_array_equal(found, names)
     same(read, some(count, count))
     assert [one.name for one in tmp_path.iterdir()] == [written]
@@ -77,8 +77,8 @@ def test_exact_cases_are_found_by_their_names_in_any_order(tmp_path):
     """Of files with cases of other sweeps, a case that stands twice, and one that two files have: the later counts."""
     names = np.arange(1, 12, dtype=np.uint64) ** 5
     first, second = some(6, 1), some(5, 2)
-    chunks.write(tmp_path, range(6), names[:6], first)
-    chunks.write(tmp_path, range(6, 11), names[[5, 7, 8, 9, 10]], second)
+    chunks.write_chunk(tmp_path, range(6), names[:6], first)
+    chunks.write_chunk(tmp_path, range(6, 11), names[[5, 7, 8, 9, 10]], second)
     wanted = Chunks(tmp_path, names[[9, 2, 0, 9, 5, 6]])
     wanted.look()
     assert (wanted.held >= 0).tolist() == [True] * 5 + [False]
@@ -106,13 +106,13 @@ def test_exact_cases_are_found_by_their_names_in_any_order(tmp_path):
 def test_exact_small_files_are_packed(tmp_path):
     names, found = np.arange(300, dtype=np.uint64) * 7919, some(300, 5)
     for first in range(0, 300, 3):
-        chunks.write(
+        chunks.write_chunk(
             tmp_path,
             range(first, first + 3),
             names[first : first + 3],
             found.some(np.arange(first, first + 3)),
         )
-    foreign = chunks.write(tmp_path, [0], np.array([3], np.uint64), some(1, 3))
+    foreign = chunks.write_chunk(tmp_path, [0], np.array([3], np.uint64), some(1, 3))
     wanted = Chunks(tmp_path, names)
     wanted.look()
     wanted.pack(False)
@@ -210,8 +210,8 @@ def test_a_sweep_without_room_for_its_first_case_leaves_no_folder_but_what_was_t
 
 def test_exact_columns_on_disk_make_the_same_tables(swept, scene, tmp_path, monkeypatch):
     monkeypatch.setattr(kept, "MIN_CASES_ON_DISK", 10)
-    monkeypatch.setattr(chunks, "MOST", 16)
-    monkeypatch.setattr(sweep, "MOST", 16)
+    monkeypatch.setattr(chunks, "MAX_CASES_PER_FILE", 16)
+    monkeypatch.setattr(sweep, "MAX_CASES_PER_CHUNK", 16)
     out = tmp_path / "out"
     assert cli("sweep", scene, *OVER, "-o", out, "--keep", "none").code == 3
     for name in TABLES:

@@ -57,7 +57,10 @@ def test_always_whatever_has_changed_is_looked_at(swept, change):
     scene, out, _ = swept
     assert cli("sweep", scene, *OVER, "-o", out, "--resume").code == 0
     over = OVER[1]
-    assert manifest.read(out, manifest.hash_request(scene, words(over)))["cases"]["count"] == 3
+    assert (
+        manifest.read_manifest(out, manifest.hash_request(scene, words(over)))["cases"]["count"]
+        == 3
+    )
     file = next((out / "chunks").glob("*.h5")) if change == "chunk" else out / "sweep.csv"
     text, stamp = scene.read_text("utf-8"), file.stat()
     if change in ("chunk", "table"):
@@ -73,11 +76,13 @@ def test_always_whatever_has_changed_is_looked_at(swept, change):
         if change == "page"
         else words(over)
     )
-    assert manifest.read(out, manifest.hash_request(scene, asked)) == {}
+    assert manifest.read_manifest(out, manifest.hash_request(scene, asked)) == {}
     scene.write_text(text, encoding="utf-8")
     # it is whole again, and has its receipt
     again = cli("sweep", scene, *OVER, "-o", out, "--resume")
-    assert again.code == 0 and manifest.read(out, manifest.hash_request(scene, words(over)))
+    assert again.code == 0 and manifest.read_manifest(
+        out, manifest.hash_request(scene, words(over))
+    )
 
 
 def test_exact_a_sweep_with_a_failed_case_has_no_receipt(swept, tmp_path):
@@ -152,5 +157,5 @@ def test_always_the_content_of_a_file_that_a_word_names_counts(swept):
     assert before != manifest.hash_request(scene, words('drive.file="push.csv"'))
     assert (
         manifest.hash_request(scene.parent / "none.toml", words()) == ""
-        and manifest.read(scene.parent, "") == {}
+        and manifest.read_manifest(scene.parent, "") == {}
     )

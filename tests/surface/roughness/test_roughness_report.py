@@ -10,7 +10,7 @@ from ring_traces import traces
 from synthetic import sine
 
 from patchfem.core import PatchfemError
-from patchfem.export.surfaces.roughness import heading
+from patchfem.export.surfaces.roughness import describe_surface
 from patchfem.surface.areal import Areal
 from patchfem.surface.profile import Profile
 from patchfem.surface.roughness.report import crop, fitting_cutoff, make_report
@@ -269,14 +269,16 @@ def test_exact_a_resampled_trace_says_how_many_heights_were_measured_and_what_re
     said = float(re.search(r"Pq by ([\d.]+) %", note).group(1))
     assert said == pytest.approx(100 * abs(found["Pq"].value / own - 1), rel=0.1) and said > 1
     count = found.sampling.shape[0]
-    assert heading(found).startswith(f"132 heights, resampled to {count}, ") and count > 140
+    assert (
+        describe_surface(found).startswith(f"132 heights, resampled to {count}, ") and count > 140
+    )
     assert not any("resampling" in text for text in make_report(made()).notes)
 
 
 def test_exact_a_trace_of_six_cutoffs_but_for_round_off_is_told_of_the_longest():
     """80 um were called the longest cut-off that fits five times into 1.5 mm: 250 um do, once both ends are trimmed."""
     one = made(1500)
-    told = heading(make_report(one))
+    told = describe_surface(make_report(one))
     assert (
         '--cutoff "250 um" is the longest standard cut-off of which five fit into the trace once half a'
         in told

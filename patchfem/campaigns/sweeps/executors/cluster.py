@@ -101,7 +101,7 @@ class Cluster:
         for own in found.values():
             if own != environment_versions():
                 self.client.close()
-                raise self._other(own, environment_versions())
+                raise self._worker_error(own, environment_versions())
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
         """Yield (chunk, seconds, answer or Died) of each chunk that `take` returns, as they come in."""
@@ -130,20 +130,20 @@ class Cluster:
                 future, found = next(ready)
                 chunk = on_the_way.pop(future)
                 if isinstance(found, dict):
-                    raise self._other(found, want)
-                yield chunk, *(found if future.status == "finished" else self._died(future))
+                    raise self._worker_error(found, want)
+                yield chunk, *(found if future.status == "finished" else self._report_death(future))
         except ClosedClientError:
-            raise self._lost() from None
+            raise self._connection_error() from None
         finally:
             self.client.close()
             if self.own is not None:
                 self.own.close()
 
-    def _lost(self) -> Missing:
+    def _connection_error(self) -> Missing:
         """Return the error of a lost connection."""
         return Missing(f"{self.name}: the connection to the scheduler is lost")
 
-    def _other(self, found: dict | Exception, want: dict) -> Missing:
+    def _worker_error(self, found: dict | Exception, want: dict) -> Missing:
         """Return the error of a worker that cannot compute the work.
 
         found: versions of the worker, or the exception in place of them; want: those of this
@@ -166,13 +166,13 @@ class Cluster:
             "files where all machines can read them"
         )
 
-    def _died(self, future) -> tuple:
+    def _report_death(self, future) -> tuple:
         """Return (0 s, Died) for a chunk whose worker died or failed.
 
         Missing if the connection to the scheduler is lost.
         """
         if future.status == "cancelled":  # nothing in this process cancels a chunk
-            raise self._lost()
+            raise self._connection_error()
         error = future.exception()
         killed = type(error).__name__ == "KilledWorker"
         return 0.0, Died(

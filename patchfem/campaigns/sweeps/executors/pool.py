@@ -61,22 +61,22 @@ class Worker:
         self.chunk = None
         self.pipe.send(work)
 
-    def tell(self, work: Work) -> None:
+    def send_work(self, work: Work) -> None:
         """Send the work with the meshes that its cases share."""
         try:
             self.pipe.send(work)
         except OSError:
-            pass  # The process is dead; `taken` notices this once it has a chunk.
+            pass  # The process is dead; `receive` notices this once it has a chunk.
 
-    def give(self, chunk: list) -> None:
+    def send_chunk(self, chunk: list) -> None:
         """Send a chunk."""
         self.chunk = chunk
         try:
             self.pipe.send(chunk)
         except OSError:
-            pass  # The process is dead, which `taken` notices next.
+            pass  # The process is dead, which `receive` notices next.
 
-    def taken(self) -> tuple:
+    def receive(self) -> tuple:
         """Return (chunk, seconds, answer), with Died instead of the answer if the process died."""
         try:
             seconds, found = self.pipe.recv()
@@ -129,7 +129,7 @@ class Pool:
         workers, self.ready = self.ready, []
         try:
             for one in workers:
-                one.tell(work)
+                one.send_work(work)
             while True:
                 self._hand_out(workers, lambda: _start_worker(work, say is None), take)
                 busy = {one.pipe: one for one in workers if one.chunk is not None}
@@ -137,14 +137,14 @@ class Pool:
                     return
                 for pipe in wait(list(busy)):
                     one = busy[pipe]
-                    taken = one.taken()
+                    taken = one.receive()
                     if isinstance(taken[2], Died):
                         workers.remove(one)
                         one.end()
                     elif (chunk := take()) is not None:
                         # The worker receives its next chunk before the result is written, which
                         # takes time.
-                        one.give(chunk)
+                        one.send_chunk(chunk)
                     yield taken
         finally:
             for one in workers:
@@ -160,7 +160,7 @@ class Pool:
                 return
             if one is None:
                 workers.append(one := start())
-            one.give(chunk)
+            one.send_chunk(chunk)
 
 
 def _start_worker(work: Work, silent: bool) -> Worker:

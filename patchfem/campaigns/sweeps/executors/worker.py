@@ -27,12 +27,12 @@ def main() -> None:
             if isinstance(asked, sweep.Work):  # the same work with the meshes that all cases share
                 work = asked
             else:
-                pipe.send(sweep.compute_timed(work, asked, None if sys.argv[2] else _say))
+                pipe.send(sweep.compute_timed(work, asked, None if sys.argv[2] else _print_line))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         # the process that started the sweep has ended
         return
 
 
-def _say(text: str) -> None:
+def _print_line(text: str) -> None:
     """Print a line at once."""
     print(text, file=sys.stderr, flush=True)
