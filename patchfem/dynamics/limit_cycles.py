@@ -4,7 +4,7 @@ Friction of at most F takes up to 4 F A of a cycle of amplitude A, and a damping
 omega A^2. Where both are equal a motion repeats: one mode under Coulomb friction at A = 4 F/(pi
 |c| omega), to first order in the damping (den Hartog's balance). Beyond the largest of these
 amplitudes friction no longer holds the motion: flutter. Below it the motion decays, to rest or to
-a smaller limit cycle that lasts.
+a smaller limit cycle that is stable.
 
 `find_relay_cycles` is exact for rigid friction, which is a relay of the sliding velocity (Tsypkin
 1984, ch. 6); `find_balance_cycles` serves every law of harmonic balance: it is the motion of
@@ -26,19 +26,19 @@ from .harmonic.point import make_balance
 
 N_SAMPLES = 4096  # samples of a cycle from which its largest motion is found
 N_AMPLITUDES = 48  # number of amplitudes at which the damping of a free motion is evaluated
-# the smallest and the largest of these amplitudes over 4 F/(pi |c| omega)
+# smallest and largest of these amplitudes over 4 F/(pi |c| omega)
 MIN_AMPLITUDE_RATIO = 1e-6
 MAX_AMPLITUDE_RATIO = 4.0
-# smallest amplitude (same unit) and number of amplitudes where smaller motions cannot be followed
+# the same where motions in micro-slip cannot be followed: smallest ratio, and number of amplitudes
 MIN_SLIDING_RATIO = 0.02
 N_SLIDING_AMPLITUDES = 16
 NOT_FOLLOWED_MESSAGE = (
     "limit cycles are looked for among free motions of rising amplitude, and these could not be followed up to the "
     "amplitude at which friction dissipates what the mode gains"
 )
-# relative error of an amplitude that round-off and the tolerances of the solvers leave
+# relative error that round-off and the tolerances of the solvers leave in an amplitude
 AMPLITUDE_TOL = 1e-9
-# fraction of the range by which a slide that counts as resting may move in a half period
+# velocity of a reversal times half the period over the range of the slide, which counts as rest
 REST_TOL = 1e-8
 MAX_SECANT_STEPS = 12  # largest number of secant steps to the damping that balances an amplitude
 MAX_FIRST_RATIO = 2.0  # damping ratio of friction by den Hartog's balance; where it is larger, friction is 3 times
@@ -53,13 +53,13 @@ class LimitCycle(NamedTuple):
 
     - amplitude, error: half the range at the output and its error [m]
     - omega: [rad/s]
-    - lasts: whether it is stable
+    - is_stable: whether disturbances of it decay
     """
 
     amplitude: float
     error: float
     omega: float
-    lasts: bool
+    is_stable: bool
 
 
 def find_unstable_modes(modes: ModalBasis) -> np.ndarray:
@@ -91,9 +91,9 @@ def estimate_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float
 def find_relay_cycles(modes: ModalBasis, row, slides: float, holds: float) -> list:
     """Find the limit cycles under rigid friction on an interface that never sticks.
 
-    From a turn on the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half
-    period T/2. It is a cycle where the interface comes to rest there, slides one way all the time,
-    and needs more than `holds` to be held.
+    After a reversal the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half
+    period T/2. It is a limit cycle if the interface comes to rest there, slides in one direction in
+    between, and needs more than `holds` to stick.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def find_relay_cycles(modes: ModalBasis, row, slides: float, holds: float) -> li
 
     Returns
     -------
-    list of Cycle
+    list of LimitCycle
         In increasing amplitude.
     """
     return sorted(
@@ -158,7 +158,7 @@ def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode
     Returns
     -------
     list
-        (Cycle, damping ratio), or None where the interface would stick on the way.
+        (LimitCycle, damping ratio), or None where the interface would stick on the way.
     """
 
     def cycle(log_more: float):
@@ -187,7 +187,7 @@ def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode
 
 
 def _solve_damping_at(cycle, amplitude: float, own: float, more: float) -> tuple | None:
-    """Return Cycle and damping ratio at an amplitude [m], by secants of logarithms.
+    """Return LimitCycle and damping ratio at an amplitude [m], by secants of logarithms.
 
     own: rate of the mode [1/s]; more: guess of what friction takes [1/s].
     """
@@ -239,7 +239,7 @@ def _find_reversal(modes: ModalBasis, row, force: float, t: float) -> tuple:
 
 
 def _make_relay_cycle(modes: ModalBasis, row, forces: tuple, t: float) -> LimitCycle | None:
-    """Return the Cycle of half period t [s], None where the interface reverses or sticks."""
+    """Return the LimitCycle of half period t [s], None where the interface reverses or sticks."""
     slides, holds = forces
     n = modes.omega.size
     y, _, rest = _find_reversal(modes, row, slides, t)
@@ -260,12 +260,12 @@ def _make_relay_cycle(modes: ModalBasis, row, forces: tuple, t: float) -> LimitC
     turned = (np.eye(2 * n) - np.outer(speed, face) / (face @ speed)) @ _free_motion_matrices(
         modes, [t]
     )[0]
-    lasts = bool(np.abs(np.linalg.eigvals(turned)).max() < 1)
-    return LimitCycle(found, abs(found - coarse) + AMPLITUDE_TOL * found, np.pi / t, lasts)
+    is_stable = bool(np.abs(np.linalg.eigvals(turned)).max() < 1)
+    return LimitCycle(found, abs(found - coarse) + AMPLITUDE_TOL * found, np.pi / t, is_stable)
 
 
 def _find_accelerations(modes: ModalBasis, y, row, force: float) -> np.ndarray:
-    """Return the accelerations (n,) in a state (2n,) under a force [N] along `row`."""
+    """Return the accelerations (n,) in a state (2 n,) under a force [N] along `row`."""
     n = modes.omega.size
     return row * force / modes.mass - modes.omega**2 * y[:n] - modes.damping_matrix @ y[n:]
 
@@ -301,7 +301,8 @@ def find_balance_cycles(modes: ModalBasis, group: LawGroup, row, limit: float) -
 
     Returns
     -------
-    list of Cycle float
+    cycles : list of LimitCycle
+    min_amplitude : float
         Smallest amplitude of the output that was looked at [m], 0 where all were.
 
     Raises

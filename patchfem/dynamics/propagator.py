@@ -15,10 +15,11 @@ import numpy as np
 from ..core import ModalBasis
 from . import doubling
 
-# smallest and largest number of Gauss points of a step
+# smallest and largest number of Gauss points of a step; 48 resolve 20 radians of the fastest motion
 MIN_GAUSS_POINTS = 8
 MAX_GAUSS_POINTS = 48
-# number of propagators that are cached, and largest number of coordinates of a cached one, to limit memory
+# number of propagators that are cached, and largest number of coordinates of a cached one, which
+# bound the memory
 MAX_CACHED = 4
 MAX_CACHED_COORDINATES = 32
 # fastest rate times step length, above which MOST Gauss points do not resolve the motion

@@ -66,7 +66,7 @@ def segment_borders(drive) -> list:
 def events_of_log(log) -> Events:
     """Return the Events of an EventLog of the exact engine."""
     part = slice(-MAX_EVENTS, None)
-    kind = KIND_TABLE[log.what[part] + LOG_OFFSET]
+    kind = KIND_TABLE[log.kind[part] + LOG_OFFSET]
     slide = np.where(kind == BORDER, np.nan, log.slide[part])
     return sort_events(
         np.stack([log.time[part], log.interface[part] + 1.0, kind, slide], axis=1),

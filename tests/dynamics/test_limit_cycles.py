@@ -33,7 +33,9 @@ def test_a_block_on_rigid_friction_has_its_closed_form(zeta):
     [found] = limit_cycles.find_relay_cycles(modes, modes.slide, force, force)
     gain, half = np.exp(np.pi * abs(zeta) / np.sqrt(1 - zeta**2)), force / (0.5 * 750.0**2)
     assert found.amplitude == pytest.approx(2 * half * (gain + 1) / (gain - 1), rel=1e-9)
-    assert not found.lasts and found.omega == pytest.approx(750.0 * np.sqrt(1 - zeta**2), rel=1e-10)
+    assert not found.is_stable and found.omega == pytest.approx(
+        750.0 * np.sqrt(1 - zeta**2), rel=1e-10
+    )
     assert 2 * limit_cycles.estimate_amplitude(modes, modes.slide, force, 0) == pytest.approx(
         found.amplitude, rel=(np.pi * zeta) ** 2
     )
@@ -111,7 +113,7 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
         modes, LawGroup(modes, Jenkins(stiffness, yields)), modes.slide, limit
     )
     assert least == 0.0
-    assert low.lasts and not high.lasts and low.amplitude < high.amplitude
+    assert low.is_stable and not high.is_stable and low.amplitude < high.amplitude
     assert high.error < 1e-3 * high.amplitude and low.error < 1e-3 * low.amplitude
 
     def swing(amplitude: float) -> float:
@@ -150,7 +152,7 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
             swing(cycle.amplitude * (1 + way * bar)) / (cycle.amplitude * (1 + way * bar)) - 1
             for way in (1, -1)
         )
-        assert (above < 0 < below) if cycle.lasts else (below < 0 < above)
+        assert (above < 0 < below) if cycle.is_stable else (below < 0 < above)
 
 
 def test_exact_the_backbone_of_rigid_friction_has_its_closed_form():

@@ -137,5 +137,5 @@ def run(modes, drive, static, kinetic, duration, start=None) -> list:
 def starts(done) -> np.ndarray:
     """Phases modulo pi of the releases of the first interface in the window of a PieceRun."""
     log = done.log
-    late = (log.interface == 0) & (np.abs(log.what) == 1) & (log.time > done.window.time[0])
+    late = (log.interface == 0) & (np.abs(log.kind) == 1) & (log.time > done.window.time[0])
     return log.phase[late] % np.pi

@@ -52,7 +52,7 @@ class Point(NamedTuple):
         """Motion and relative displacements of the turning points (2 n + d,)."""
         return np.concatenate([self.motion, self.memory.group_slide[self.turning_places]])
 
-    def moved(self, numbers) -> "Point":
+    def with_numbers(self, numbers) -> "Point":
         """Return the Point with other numbers and the same elements in every group."""
         memory = copy_memory(self.memory)
         count = self.motion.size

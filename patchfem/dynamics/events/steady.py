@@ -191,7 +191,7 @@ class YieldShooting(Shooting):
 
     def step_from(self, mapped_point: MappedPoint, step) -> Point:
         """Return the Point a step away, with the groups of elements at the end of the map."""
-        return mapped_point.image.end.moved(mapped_point.point.numbers + step)
+        return mapped_point.image.end.with_numbers(mapped_point.point.numbers + step)
 
     def run_from(self, mapped_point: MappedPoint, n_periods: int) -> Point:
         """Return the Point that a run from the end of a map reaches after some periods."""

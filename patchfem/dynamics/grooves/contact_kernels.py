@@ -149,8 +149,8 @@ def write_resistance(pulled, gain, middle, dt, flank, at):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def write_mean_force(dq, q, dt, c):
-    """Write the mean force over an increment and its derivative [N/m] into c.climb.
+def write_mean_force(dq, q, dt, contact):
+    """Write the mean force over an increment and its derivative [N/m] into contact.climb.
 
     Parameters
     ----------
@@ -160,15 +160,15 @@ def write_mean_force(dq, q, dt, c):
         Relative displacement [m].
     dt : float
         Duration of the step [s].
-    c : ClimbingPoints
+    contact : ClimbingPoints
     """
-    ds, flat, end = climb_flank(dq, q, dt, c.flank, c.climb)
-    pulled, gain = points.solve_friction(ds, flat, end, dt, c)
-    write_resistance(pulled, gain, q + 0.5 * dq, dt, c.flank, c.climb)
+    ds, flat, end = climb_flank(dq, q, dt, contact.flank, contact.climb)
+    pulled, gain = points.solve_friction(ds, flat, end, dt, contact)
+    write_resistance(pulled, gain, q + 0.5 * dq, dt, contact.flank, contact.climb)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_step(free, beta, q, v, dt, c, goal):
+def solve_step(free, beta, q, v, dt, contact, goal):
     """Solve a step with dq = free - beta force, as `interfaces.element_kernels.solve_step`.
 
     Returns
@@ -180,14 +180,14 @@ def solve_step(free, beta, q, v, dt, c, goal):
     iterations : int
         Below 0 where it failed.
     """
-    at = c.climb
+    at = contact.climb
     low = -np.inf
     high = np.inf
-    t = find_slope(c.flank, q)
-    points.start_step(c, v * sqrt(1 + t * t), dt)
+    t = find_slope(contact.flank, q)
+    points.start_step(contact, v * sqrt(1 + t * t), dt)
     dq = 2 * at[CLIMB.last_slide] - at[CLIMB.earlier_slide]
     for count in range(1, MAX_ITERATIONS):
-        write_mean_force(dq, q, dt, c)
+        write_mean_force(dq, q, dt, contact)
         miss = dq - free + beta * at[CLIMB.mean_force]
         digit = 4e-16 * (abs(free) + abs(dq) + beta * abs(at[CLIMB.mean_force]))
         if abs(miss) <= GOAL_FRACTION * goal * beta + digit:
@@ -205,7 +205,7 @@ def solve_step(free, beta, q, v, dt, c, goal):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def apply_increment(dq, q, v, dt, c, goal):
+def apply_increment(dq, q, v, dt, contact, goal):
     """Return the mean force over a prescribed increment; the memory stays as it is.
 
     Parameters
@@ -218,7 +218,7 @@ def apply_increment(dq, q, v, dt, c, goal):
         Relative velocity at the start of the step [m/s].
     dt : float
         Duration of the step [s].
-    c : ClimbingPoints
+    contact : ClimbingPoints
     goal : float
         Tolerance of the residual [N].
 
@@ -229,14 +229,14 @@ def apply_increment(dq, q, v, dt, c, goal):
     is_solved : bool
         Always true.
     """
-    t = find_slope(c.flank, q)
-    points.start_step(c, v * sqrt(1 + t * t), dt)
-    write_mean_force(dq, q, dt, c)
-    return c.climb[CLIMB.mean_force], True
+    t = find_slope(contact.flank, q)
+    points.start_step(contact, v * sqrt(1 + t * t), dt)
+    write_mean_force(dq, q, dt, contact)
+    return contact.climb[CLIMB.mean_force], True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit_step(dq, force, q, v0, v1, dt, c):
+def commit_step(dq, force, q, v0, v1, dt, contact):
     """Keep a solved step of mean force [N].
 
     Returns
@@ -245,14 +245,14 @@ def commit_step(dq, force, q, v0, v1, dt, c):
         Energy dissipated along the flank [J].
     is_solved : bool
     """
-    at = c.climb
-    t0 = find_slope(c.flank, q)
-    t1 = find_slope(c.flank, q + dq)
+    at = contact.climb
+    t0 = find_slope(contact.flank, q)
+    t1 = find_slope(contact.flank, q + dq)
     v0 = v0 * sqrt(1 + t0 * t0)
     v1 = v1 * sqrt(1 + t1 * t1)
     along = (force - at[CLIMB.trial_vertical] * at[CLIMB.mean_slope]) / at[CLIMB.path_ratio]
-    lost, fine = points.commit_friction(at[CLIMB.path_ratio] * dq, along, v0, v1, dt, c)
-    if c.flank[FLANK.lifted_mass] > 0.0:
+    lost, fine = points.commit_friction(at[CLIMB.path_ratio] * dq, along, v0, v1, dt, contact)
+    if contact.flank[FLANK.lifted_mass] > 0.0:
         at[CLIMB.rise_speed] = 2 * at[CLIMB.mean_slope] * dq / dt - at[CLIMB.rise_speed]
         at[CLIMB.has_lifted] = max(
             at[CLIMB.has_lifted], 0.0 if at[CLIMB.trial_vertical] > 0.0 else 1.0
@@ -261,12 +261,12 @@ def commit_step(dq, force, q, v0, v1, dt, c):
     at[CLIMB.earlier_slide] = at[CLIMB.last_slide]
     at[CLIMB.last_slide] = dq
     at[CLIMB.start_normal] = at[CLIMB.end_normal]
-    at[CLIMB.start_force] = points.read_friction(c, 0.0)[0]
+    at[CLIMB.start_force] = points.read_friction(contact, 0.0)[0]
     return lost, fine
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_state(c, q, v):
+def read_state(contact, q, v):
     """Return the state of the contact at q [m] and v [m/s].
 
     Returns
@@ -278,13 +278,13 @@ def read_state(c, q, v):
     slip : float
         [m].
     """
-    at = c.climb
-    t = find_slope(c.flank, q)
+    at = contact.climb
+    t = find_slope(contact.flank, q)
     length = sqrt(1 + t * t)
-    half = sin(0.5 * (c.flank[FLANK.wave_number] * q - c.flank[FLANK.phase]))
-    along, energy, kept = points.read_friction(c, q)
+    half = sin(0.5 * (contact.flank[FLANK.wave_number] * q - contact.flank[FLANK.phase]))
+    along, energy, kept = points.read_friction(contact, q)
     energy += (
-        2 * c.flank[FLANK.load] * c.flank[FLANK.amplitude] * half * half
-        + 0.5 * c.flank[FLANK.lifted_mass] * at[CLIMB.rise_speed] * at[CLIMB.rise_speed]
+        2 * contact.flank[FLANK.load] * contact.flank[FLANK.amplitude] * half * half
+        + 0.5 * contact.flank[FLANK.lifted_mass] * at[CLIMB.rise_speed] * at[CLIMB.rise_speed]
     )
     return at[CLIMB.vertical_force] * t + along * length, energy, q - (q - kept) / length

@@ -30,25 +30,25 @@ SHEAR_GOAL = 1e-13
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def start_step(c, v, dt):
+def start_step(contact, v, dt):
     """Start a step.
 
     Parameters
     ----------
-    c : ClimbingPoints
+    contact : ClimbingPoints
     v : float
         Velocity along the flank [m/s].
     dt : float
         Duration of the step [s].
     """
-    set_middle_length(v, dt, c)
+    set_middle_length(v, dt, contact)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_friction(ds, flat, end, dt, c):
+def solve_friction(ds, flat, end, dt, contact):
     """Solve for the friction over the path ds [m] in dt [s].
 
-    c.pressed become the loads at the end of the step.
+    contact.pressed become the loads at the end of the step.
 
     The normal force at the end is flat + f end, where f is the force there; secant steps find it.
 
@@ -57,7 +57,7 @@ def solve_friction(ds, flat, end, dt, c):
     ds : float
     flat, end : float
         Normal force without friction [N], and slope at the end [1].
-    dt, c
+    dt, contact
 
     Returns
     -------
@@ -66,25 +66,30 @@ def solve_friction(ds, flat, end, dt, c):
     stiffness : float
         Its derivative [N/m].
     """
-    kind = int(c.flank[FLANK.kind])
+    kind = int(contact.flank[FLANK.kind])
     force = 0.0
     gain = 0.0
-    at = c.climb
-    gives = c.kappa.size > 0
-    close = (1e-12 if gives else 1e-14) * c.flank[FLANK.load]
+    at = contact.climb
+    gives = contact.kappa.size > 0
+    close = (1e-12 if gives else 1e-14) * contact.flank[FLANK.load]
     tried = 0.0
     missed = 0.0
     for count in range(60):
         before = at[CLIMB.end_normal]
-        press_points(kind, c)
+        press_points(kind, contact)
         if gives:
-            c.y[0, 0] = ds
+            contact.y[0, 0] = ds
             force = minimise(
-                ds, 0.0, kind, False, c, SHEAR_GOAL * c.force[0] * c.flank[FLANK.load]
+                ds,
+                0.0,
+                kind,
+                False,
+                contact,
+                SHEAR_GOAL * contact.force[0] * contact.flank[FLANK.load],
             )[0]
         else:
-            force, gain = find_friction_force(ds, kind, c)
-        bound = c.force[0] * before
+            force, gain = find_friction_force(ds, kind, contact)
+        bound = contact.force[0] * before
         after = min(max(2 * force - at[CLIMB.start_force], -bound), bound)
         now = max(flat + after * end, 0.0)
         miss = now - before
@@ -95,40 +100,40 @@ def solve_friction(ds, flat, end, dt, c):
             and abs(missed - miss) > 0.1 * abs(before - tried)
         ):
             # secant: a solve is dear
-            set_normal_force(c, max(before - miss * (before - tried) / (miss - missed), 0.0))
+            set_normal_force(contact, max(before - miss * (before - tried) / (miss - missed), 0.0))
         else:
-            set_normal_force(c, now)
+            set_normal_force(contact, now)
         tried = before
         missed = miss
         if abs(miss) <= close:
             break
-    return force, find_stiffness(c) if gives else gain
+    return force, find_stiffness(contact) if gives else gain
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def set_normal_force(c, normal):
+def set_normal_force(contact, normal):
     """Distribute a normal force [N] over the points."""
-    c.climb[CLIMB.end_normal] = normal
-    for j in range(c.pressed.shape[1]):
-        c.pressed[1, j] = c.share[j] * normal
+    contact.climb[CLIMB.end_normal] = normal
+    for j in range(contact.pressed.shape[1]):
+        contact.pressed[1, j] = contact.share[j] * normal
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find_stiffness(c):
+def find_stiffness(contact):
     """Return the derivative [N/m] of the force over the slide of the holder."""
-    hess = c.hess[0]
-    p = c.workspace[STEP]
+    hess = contact.hess[0]
+    p = contact.workspace[STEP]
     total = 0.0
-    for j in range(int(c.count[0])):
-        total += c.points[SLOPE, j]
-    if c.ready[0] == 0.0:
-        write_hessian(0.0, False, c, hess)
+    for j in range(int(contact.count[0])):
+        total += contact.points[SLOPE, j]
+    if contact.ready[0] == 0.0:
+        write_hessian(0.0, False, contact, hess)
         if not factorise(hess):
             return total
-        c.ready[0] = 1.0
-    project_onto_modes(SLOPE, c.psi, c.points, int(c.count[0]), p)
+        contact.ready[0] = 1.0
+    project_onto_modes(SLOPE, contact.psi, contact.points, int(contact.count[0]), p)
     p[0] = 0.0
-    return max(total - find_inverse_form(hess, p, c.workspace[GRADIENT]), 0.01 * total)
+    return max(total - find_inverse_form(hess, p, contact.workspace[GRADIENT]), 0.01 * total)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -154,7 +159,7 @@ def find_inverse_form(hess, p, workspace):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit_friction(ds, along, v0, v1, dt, c):
+def commit_friction(ds, along, v0, v1, dt, contact):
     """Keep a step over the path ds [m] under a mean force [N].
 
     v0, v1: velocities along the flank [m/s].
@@ -166,19 +171,21 @@ def commit_friction(ds, along, v0, v1, dt, c):
     is_solved : bool
         Whether points and pieces agree.
     """
-    kind = int(c.flank[FLANK.kind])
+    kind = int(contact.flank[FLANK.kind])
     fine = True
-    lost = commit_points(ds, along, v0, v1, dt, kind, c)
-    if c.kappa.size:
-        more, count = relax_pieces(kind, c, c.force[0] * c.flank[FLANK.load] * 1e-11)
+    lost = commit_points(ds, along, v0, v1, dt, kind, contact)
+    if contact.kappa.size:
+        more, count = relax_pieces(
+            kind, contact, contact.force[0] * contact.flank[FLANK.load] * 1e-11
+        )
         lost = lost + more
         fine = count > 0
-    for j in range(c.pressed.shape[1]):
-        c.pressed[0, j] = c.pressed[1, j]
+    for j in range(contact.pressed.shape[1]):
+        contact.pressed[0, j] = contact.pressed[1, j]
     return lost, fine
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_friction(c, q):
+def read_friction(contact, q):
     """Return force along the flank [N], energy of the law [J] and slip [m] at q [m]."""
-    return read_points(int(c.flank[FLANK.kind]), c, q)
+    return read_points(int(contact.flank[FLANK.kind]), contact, q)

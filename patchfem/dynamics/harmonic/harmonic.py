@@ -409,7 +409,9 @@ class Balance:
             at += count
 
 
-def solve_damped(system, x, met, goal: float = 1e-10, most: int = 40) -> tuple | None:
+def solve_damped(
+    system, x, is_accepted, tolerance: float = 1e-10, max_steps: int = 40
+) -> tuple | None:
     """Solve equations by Newton's method with the natural monotonicity test.
 
     Parameters
@@ -418,12 +420,12 @@ def solve_damped(system, x, met, goal: float = 1e-10, most: int = 40) -> tuple |
         system(x) -> System.
     x : ndarray
         (N,) start.
-    met : callable
-        met(System, what its last step leaves of the residual, size of x) -> whether that is
+    is_accepted : callable
+        is_accepted(System, what its last step leaves of the residual, size of x) -> whether that is
         round-off.
-    goal : float, optional
+    tolerance : float, optional
         Step over x, below which it ends.
-    most : int, optional
+    max_steps : int, optional
         Steps.
 
     Returns
@@ -432,37 +434,43 @@ def solve_damped(system, x, met, goal: float = 1e-10, most: int = 40) -> tuple |
         Unknowns, System before the last step, and steps; None where it does not end.
     """
     here = system(x)
-    for count in range(1, most + 1):
+    for count in range(1, max_steps + 1):
         solve = solve_linear(here.jacobian)
         step = -solve(here.residual)
         length = float(np.linalg.norm(step))
         size = float(np.linalg.norm(x))
         if not np.isfinite(length):
             break
-        if length <= goal * max(size, 1e-300) or length < 1e-300:
+        if length <= tolerance * max(size, 1e-300) or length < 1e-300:
             return (
                 (x + step, here, count)
-                if met(here, here.residual + here.jacobian @ step, size)
+                if is_accepted(here, here.residual + here.jacobian @ step, size)
                 else None
             )
-        share = 1.0
+        fraction = 1.0
         best = None
         while True:
-            tried = x + share * step
-            there = system(tried)
-            left = float(np.linalg.norm(solve(there.residual)))
-            if best is None or left < best[0] or not np.isfinite(best[0]):
-                best = (left, tried, there)
+            trial = x + fraction * step
+            there = system(trial)
+            residual = float(np.linalg.norm(solve(there.residual)))
+            if best is None or residual < best[0] or not np.isfinite(best[0]):
+                best = (residual, trial, there)
             # natural monotonicity (Deuflhard): the next simplified step is shorter; a tiny step is taken as
             # it is
-            if left <= (1 - share / 4) * length or share < 0.02 or not length > 1e-8 * size:
+            if (
+                residual <= (1 - fraction / 4) * length
+                or fraction < 0.02
+                or not length > 1e-8 * size
+            ):
                 break
-            share /= 2
+            fraction /= 2
         _, x, here = best
     return None
 
 
-def solve_newton(balance: Balance, x, omega: float, level: float, harmonics: int, most: int = 40):
+def solve_newton(
+    balance: Balance, x, omega: float, level: float, harmonics: int, max_steps: int = 40
+):
     """Solve a balance by `solve_damped`.
 
     Parameters
@@ -473,7 +481,7 @@ def solve_newton(balance: Balance, x, omega: float, level: float, harmonics: int
     omega, level : float
         Frequency [rad/s] and amplitude [m s-2] of the drive.
     harmonics : int
-    most : int, optional
+    max_steps : int, optional
         Steps.
 
     Returns
@@ -487,14 +495,16 @@ def solve_newton(balance: Balance, x, omega: float, level: float, harmonics: int
         If the residual is not round-off by then.
     """
 
-    def met(here, left, size) -> bool:
+    def is_accepted(here, left, size) -> bool:
         return balance.is_rounding(here, left, omega, level, harmonics, size)
 
-    found = solve_damped(lambda v: balance.system(v, omega, level, harmonics), x, met, most=most)
+    found = solve_damped(
+        lambda v: balance.system(v, omega, level, harmonics), x, is_accepted, max_steps=max_steps
+    )
     if found is None:
         at = f"{harmonics} harmonics at {omega / (2 * np.pi):.6g} Hz"
         raise NotConverged(
-            f"accuracy.harmonics: harmonic balance with {at} did not converge in {most} iterations; "
+            f"accuracy.harmonics: harmonic balance with {at} did not converge in {max_steps} iterations; "
             "give a motion to start from, or begin at a lower drive level"
         )
     return found

@@ -38,13 +38,13 @@ class StaticLoops(NamedTuple):
 class StaticMotion(NamedTuple):
     """Static motion of a mode.
 
-    - share: part of the motion along the shape of the stuck mode [m]
+    - amplitude: of the motion along the shape of the stuck mode [m]
     - omega, zeta: frequency [rad/s] and damping ratio
     - z: (n,) coordinates [m]
     - loss: of the laws per cycle [J]
     """
 
-    share: float
+    amplitude: float
     omega: float
     zeta: float
     z: np.ndarray
@@ -100,7 +100,7 @@ def depends_on_speed(group: LawGroup, u: float) -> bool:
 
 
 def find_static_motions(
-    modes: ModalBasis, group: LawGroup, shares, held: tuple, samples: int = 4096, of=None
+    modes: ModalBasis, group: LawGroup, amplitudes, stuck_mode: tuple, samples: int = 4096, row=None
 ) -> list:
     """Return the static motions (k,) of a mode at amplitudes (k,) [m].
 
@@ -110,15 +110,15 @@ def find_static_motions(
         Without the contact.
     group : LawGroup
         Laws on the rows.
-    shares : array_like
-        (k,) parts of the motion along the shape, or of what `of` names [m].
-    held : tuple
+    amplitudes : array_like
+        (k,) amplitudes of the motion along the shape, or along `row` [m].
+    stuck_mode : tuple
         Frequency [rad/s] and shape (n,) of the stuck mode.
     samples : int, optional
         Of a cycle, for laws without a closed form.
-    of : ndarray, optional
-        (n,) what the shares are parts of, such as the motion of the output; the part along the
-        shape by default.
+    row : ndarray, optional
+        (n,) displacement per coordinate to which the amplitudes belong, such as that of the output;
+        the component along the shape by default.
 
     Returns
     -------
@@ -130,24 +130,26 @@ def find_static_motions(
     PatchfemError
         If a law depends on the velocity.
     """
-    if depends_on_speed(group, float(np.abs(group.rows).max()) * float(np.max(shares))):
+    if depends_on_speed(group, float(np.abs(group.rows).max()) * float(np.max(amplitudes))):
         raise PatchfemError(SPEED_MESSAGE)
-    omega, shape = held
+    omega, shape = stuck_mode
     out = []
     near = np.append(shape, 1.0)
-    of = shape / (shape @ shape) if of is None else of
-    for share in shares:
+    row = shape / (shape @ shape) if row is None else row
+    for amplitude in amplitudes:
         try:
-            near = _solve_equilibrium(modes, group, (*held, of), float(share), near, samples)
+            near = _solve_equilibrium(
+                modes, group, (*stuck_mode, row), float(amplitude), near, samples
+            )
         except NotConverged:
             out.append(
                 StaticMotion(
-                    float(share), np.nan, np.nan, np.full(modes.omega.size, np.nan), np.nan
+                    float(amplitude), np.nan, np.nan, np.full(modes.omega.size, np.nan), np.nan
                 )
             )
             continue
-        z = near[:-1] * share
-        alpha = float(near[-1]) * omega**2 * share
+        z = near[:-1] * amplitude
+        alpha = float(near[-1]) * omega**2 * amplitude
         loss = sum(
             find_loops(laws, abs(one), samples).area
             for one, laws in zip(group.rows @ z, group.laws)
@@ -156,7 +158,9 @@ def find_static_motions(
     return out
 
 
-def find_static_motions_from_loops(modes: ModalBasis, row, held: tuple, slides, found) -> list:
+def find_static_motions_from_loops(
+    modes: ModalBasis, row, stuck_mode: tuple, slides, loops
+) -> list:
     """Return the static motions of a mode whose one interface runs through known loops.
 
     Parameters
@@ -164,42 +168,44 @@ def find_static_motions_from_loops(modes: ModalBasis, row, held: tuple, slides, 
     modes : ModalBasis
     row : ndarray
         (n,) slide per coordinate.
-    held : tuple
+    stuck_mode : tuple
         As of `find_static_motions`.
     slides : array_like
         (k,) [m].
-    found : sequence of StaticLoops
+    loops : sequence of StaticLoops
         (k,).
 
     Returns
     -------
     list of StaticMotion
     """
-    shape = held[1]
+    shape = stuck_mode[1]
     n = modes.omega.size
     out = []
     matrix = np.zeros((n + 1, n + 1))
     matrix[:n, :n] = np.diag(modes.omega**2)
     matrix[:n, n] = -shape
     matrix[n, :n] = row
-    for slide, one in zip(slides, found):
-        x = np.linalg.solve(matrix, np.append(-np.asarray(row) * one.tip / modes.mass, slide))
-        out.append(_make_static(modes, shape, (x[:n], float(x[n]), one.area)))
+    for slide, loop in zip(slides, loops):
+        x = np.linalg.solve(matrix, np.append(-np.asarray(row) * loop.tip / modes.mass, slide))
+        out.append(_make_static(modes, shape, (x[:n], float(x[n]), loop.area)))
     return out
 
 
-def _solve_equilibrium(modes, group, held: tuple, share: float, near, samples: int) -> np.ndarray:
-    """Return z/share and alpha/(omega^2 share) at the equilibrium with amplitude `share` [m].
+def _solve_equilibrium(
+    modes, group, mode: tuple, amplitude: float, near, samples: int
+) -> np.ndarray:
+    """Return z/amplitude and alpha/(omega^2 amplitude) at the equilibrium of an amplitude [m].
 
-    held: frequency, shape and `of`.
+    mode: frequency [rad/s] and shape of the stuck mode, and the row of the amplitude.
     """
-    omega, shape, of = held
+    omega, shape, row = mode
     m = modes.mass
     n = modes.omega.size
     stiff = np.diag(modes.omega**2) / omega**2
 
-    def left(x):
-        u = group.rows @ x[:n] * share
+    def find_residual(x):
+        u = group.rows @ x[:n] * amplitude
         force = np.array(
             [
                 np.sign(one) * find_loops(laws, abs(one), samples).tip
@@ -207,22 +213,22 @@ def _solve_equilibrium(modes, group, held: tuple, share: float, near, samples: i
             ]
         )
         return np.append(
-            stiff @ x[:n] + group.rows.T @ force / (m * omega**2 * share) - x[n] * shape,
-            of @ x[:n] - 1,
+            stiff @ x[:n] + group.rows.T @ force / (m * omega**2 * amplitude) - x[n] * shape,
+            row @ x[:n] - 1,
         )
 
-    def slopes(x):
-        u = np.abs(group.rows @ x[:n] * share)
+    def find_slopes(x):
+        u = np.abs(group.rows @ x[:n] * amplitude)
         rise = [_find_tip_slope(laws, one, samples) for one, laws in zip(u, group.laws)]
         top = stiff + group.rows.T * rise @ group.rows / (m * omega**2)
-        return np.block([[top, -shape[:, None]], [of[None], np.zeros((1, 1))]])
+        return np.block([[top, -shape[:, None]], [row[None], np.zeros((1, 1))]])
 
     for start in (near, np.append(shape, 1.0)):
-        found = root(left, start, jac=slopes, tol=1e-13)
+        found = root(find_residual, start, jac=find_slopes, tol=1e-13)
         if np.abs(found.fun).max() < 1e-9:
             return found.x
     raise NotConverged(
-        f"backbone: no equilibrium was found at the amplitude {format_length(share, 3)} of the static curve"
+        f"backbone: no equilibrium was found at the amplitude {format_length(amplitude, 3)} of the static curve"
     )
 
 

@@ -11,7 +11,7 @@ from . import element_solve_kernels as solver
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_step(free, beta, q, v, dt, c, goal):
+def solve_step(free, beta, q, v, dt, contact, goal):
     """Solve a step with dq = free - beta force; the memory stays as it is.
 
     Parameters
@@ -22,7 +22,7 @@ def solve_step(free, beta, q, v, dt, c, goal):
         Relative displacement [m] and velocity [m/s] at the start.
     dt : float
         [s].
-    c : arrays.Element
+    contact : arrays.Element
     goal : float
         Of the residual [N].
 
@@ -35,15 +35,24 @@ def solve_step(free, beta, q, v, dt, c, goal):
     iterations : int
         Below 0 where it failed.
     """
-    c.eps[0] = law.step_bond_length(c.num[0], c.mem[0], v, dt)
-    guess = 2 * c.last[0] - c.last[1]
+    contact.eps[0] = law.step_bond_length(contact.num[0], contact.mem[0], v, dt)
+    guess = 2 * contact.last[0] - contact.last[1]
     return solver.solve_element(
-        free, beta, c.num[0], c.mem[0], q, c.eps[0], dt, guess, c.bound[0], goal
+        free,
+        beta,
+        contact.num[0],
+        contact.mem[0],
+        q,
+        contact.eps[0],
+        dt,
+        guess,
+        contact.bound[0],
+        goal,
     )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def apply_increment(dq, q, v, dt, c, goal):
+def apply_increment(dq, q, v, dt, contact, goal):
     """Return the mean force over a prescribed increment; the memory stays as it is.
 
     Parameters
@@ -56,7 +65,7 @@ def apply_increment(dq, q, v, dt, c, goal):
         Relative velocity at the start of the step [m/s].
     dt : float
         Duration of the step [s].
-    c : arrays.Element
+    contact : arrays.Element
     goal : float
         Tolerance of the residual [N].
 
@@ -67,12 +76,12 @@ def apply_increment(dq, q, v, dt, c, goal):
     is_solved : bool
         Always true.
     """
-    c.eps[0] = law.step_bond_length(c.num[0], c.mem[0], v, dt)
-    return law.mean_force(c.num[0], c.mem[0], q, dq, c.eps[0], dt)[0], True
+    contact.eps[0] = law.step_bond_length(contact.num[0], contact.mem[0], v, dt)
+    return law.mean_force(contact.num[0], contact.mem[0], q, dq, contact.eps[0], dt)[0], True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit_step(dq, force, q, v0, v1, dt, c):
+def commit_step(dq, force, q, v0, v1, dt, contact):
     """Move the memory by a solved step.
 
     Parameters
@@ -89,7 +98,7 @@ def commit_step(dq, force, q, v0, v1, dt, c):
         Velocity at the end of the step [m/s].
     dt : float
         Duration of the step [s].
-    c : arrays.Element
+    contact : arrays.Element
 
     Returns
     -------
@@ -98,18 +107,20 @@ def commit_step(dq, force, q, v0, v1, dt, c):
     is_solved : bool
         Always true.
     """
-    c.last[1] = c.last[0]
-    c.last[0] = dq
-    return law.update_memory(c.num[0], c.mem[0], dq, force, v0, v1, dt, c.eps[0]), True
+    contact.last[1] = contact.last[0]
+    contact.last[0] = dq
+    return law.update_memory(
+        contact.num[0], contact.mem[0], dq, force, v0, v1, dt, contact.eps[0]
+    ), True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_state(c, q, v):
+def read_state(contact, q, v):
     """Return force, stored energy and slip of the element.
 
     Parameters
     ----------
-    c : arrays.Element
+    contact : arrays.Element
     q : float
         Relative displacement [m].
     v : float
@@ -124,4 +135,4 @@ def read_state(c, q, v):
     slip : float
         [m].
     """
-    return law.read_memory(c.num[0], c.mem[0], q, v)
+    return law.read_memory(contact.num[0], contact.mem[0], q, v)

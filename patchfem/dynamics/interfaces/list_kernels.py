@@ -20,7 +20,7 @@ MAX_OWED_RATIO = 1e-4
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find_mean_and_slope(dq, c, v0, dt):
+def find_mean_and_slope(dq, contact, v0, dt):
     """Return the path-mean weight of a list and its slope.
 
     The slope of a form other than FORM_MOMENTS is that of a mean whose force depends on the displacement
@@ -30,7 +30,7 @@ def find_mean_and_slope(dq, c, v0, dt):
     ----------
     dq : float
         Increment of the relative displacement [m].
-    c : arrays.BondList
+    contact : arrays.BondList
     v0 : float
         Velocity at the start of the step [m/s].
     dt : float
@@ -42,25 +42,27 @@ def find_mean_and_slope(dq, c, v0, dt):
     slope : float
         [1/m].
     """
-    if c.law[LAW.form] == FORM_MOMENTS:
-        mean, slope = list_slope(dq, c, v0, dt)
+    if contact.law[LAW.form] == FORM_MOMENTS:
+        mean, slope = list_slope(dq, contact, v0, dt)
         return mean, slope
-    mean = list_mean(dq, c, v0, dt)
-    short = SLOPE_STEP * c.law[LAW.length]
+    mean = list_mean(dq, contact, v0, dt)
+    short = SLOPE_STEP * contact.law[LAW.length]
     if abs(dq) > short:
-        return mean, (list_force(dq, c, v0, dt) - mean) / dq
-    return mean, (list_force(short, c, v0, dt) - list_force(-short, c, v0, dt)) / (4 * short)
+        return mean, (list_force(dq, contact, v0, dt) - mean) / dq
+    return mean, (list_force(short, contact, v0, dt) - list_force(-short, contact, v0, dt)) / (
+        4 * short
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find_force_and_slope(dq, c, v0, dt):
+def find_force_and_slope(dq, contact, v0, dt):
     """Return the path-mean force of a list and its slope.
 
     Parameters
     ----------
     dq : float
         Increment of the relative displacement [m].
-    c : arrays.BondList
+    contact : arrays.BondList
     v0 : float
         Velocity at the start of the step [m/s].
     dt : float
@@ -73,15 +75,15 @@ def find_force_and_slope(dq, c, v0, dt):
     slope : float
         [N/m]; 0 where it is unknown.
     """
-    scale = c.force[0]
-    if c.law[LAW.form] == FORM_MOMENTS:
-        force, slope = list_slope(dq, c, v0, dt)
+    scale = contact.force[0]
+    if contact.law[LAW.form] == FORM_MOMENTS:
+        force, slope = list_slope(dq, contact, v0, dt)
         return scale * force, scale * slope
-    return scale * list_mean(dq, c, v0, dt), 0.0
+    return scale * list_mean(dq, contact, v0, dt), 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_step(free, beta, q, v, dt, c, goal):
+def solve_step(free, beta, q, v, dt, contact, goal):
     """Solve a step with dq = free - beta force by secants, as `element_kernels.solve_step`.
 
     Returns
@@ -91,16 +93,16 @@ def solve_step(free, beta, q, v, dt, c, goal):
     iterations : int
         Below 0 where it failed.
     """
-    here = 2 * c.last[0] - c.last[1]
-    gain = 1 + beta * c.force[0] / c.law[LAW.length]
+    here = 2 * contact.last[0] - contact.last[1]
+    gain = 1 + beta * contact.force[0] / contact.law[LAW.length]
     low = -np.inf
     high = np.inf
     last = here
     last_miss = 0.0
     for count in range(1, 300):
-        force = find_force_and_slope(here, c, v, dt)[0]
+        force = find_force_and_slope(here, contact, v, dt)[0]
         miss = here - free + beta * force
-        if abs(miss) <= goal * beta or high - low <= 4e-16 * (abs(free) + beta * c.bound[0]):
+        if abs(miss) <= goal * beta or high - low <= 4e-16 * (abs(free) + beta * contact.bound[0]):
             return here, force, count
         if count > 1:
             gain = (miss - last_miss) / (here - last) if here != last else 1.0
@@ -112,7 +114,7 @@ def solve_step(free, beta, q, v, dt, c, goal):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def apply_increment(dq, q, v, dt, c, goal):
+def apply_increment(dq, q, v, dt, contact, goal):
     """Return the mean force over a prescribed increment; the memory stays as it is.
 
     Parameters
@@ -125,7 +127,7 @@ def apply_increment(dq, q, v, dt, c, goal):
         Relative velocity at the start of the step [m/s].
     dt : float
         Duration of the step [s].
-    c : arrays.BondList
+    contact : arrays.BondList
     goal : float
         Tolerance of the residual [N].
 
@@ -136,11 +138,11 @@ def apply_increment(dq, q, v, dt, c, goal):
     is_solved : bool
         Always true.
     """
-    return find_force_and_slope(dq, c, v, dt)[0], True
+    return find_force_and_slope(dq, contact, v, dt)[0], True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit_step(dq, force, q, v0, v1, dt, c):
+def commit_step(dq, force, q, v0, v1, dt, contact):
     """Move the list by a solved step.
 
     The work that is not stored is dissipated where positive; the law as printed also creates
@@ -155,15 +157,15 @@ def commit_step(dq, force, q, v0, v1, dt, c):
     has_room : bool
         Whether the list had room.
     """
-    c.last[1] = c.last[0]
-    c.last[0] = dq
-    before = c.status[STATUS.energy]
-    ok = list_step(dq, c, v0, v1, dt)
-    return add_list_energies(force * dq, before, c.force[0], c), ok
+    contact.last[1] = contact.last[0]
+    contact.last[0] = dq
+    before = contact.status[STATUS.energy]
+    ok = list_step(dq, contact, v0, v1, dt)
+    return add_list_energies(force * dq, before, contact.force[0], contact), ok
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def add_list_energies(work, before, limit, c):
+def add_list_energies(work, before, limit, contact):
     """Add the work [J] of a step that is not stored to the energies of the list; return it.
 
     Parameters
@@ -174,27 +176,27 @@ def add_list_energies(work, before, limit, c):
         Energy in the status before the step.
     limit : float
         mu_s N [N].
-    c : BondList
+    contact : arrays.BondList
     """
-    net = work - limit * (c.status[STATUS.energy] - before)
-    if c.law[LAW.form] <= FORM_POWER and limit > 0:
-        owed = c.status[STATUS.owed] - net / limit
-        c.status[STATUS.owed] = min(max(owed, 0.0), MAX_OWED_RATIO * c.law[LAW.length])
-        net = limit * (c.status[STATUS.owed] - owed)
+    net = work - limit * (contact.status[STATUS.energy] - before)
+    if contact.law[LAW.form] <= FORM_POWER and limit > 0:
+        owed = contact.status[STATUS.owed] - net / limit
+        contact.status[STATUS.owed] = min(max(owed, 0.0), MAX_OWED_RATIO * contact.law[LAW.length])
+        net = limit * (contact.status[STATUS.owed] - owed)
     if net < 0:
-        c.status[STATUS.created] -= net
+        contact.status[STATUS.created] -= net
     else:
-        c.status[STATUS.dissipated] += net
+        contact.status[STATUS.dissipated] += net
     return net
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_state(c, q, v):
+def read_state(contact, q, v):
     """Return force, stored energy and slip of the list.
 
     Parameters
     ----------
-    c : arrays.BondList
+    contact : arrays.BondList
     q : float
         Relative displacement [m].
     v : float
@@ -209,9 +211,9 @@ def read_state(c, q, v):
     slip : float
         [m].
     """
-    force = c.force[0] * c.status[STATUS.force]
+    force = contact.force[0] * contact.status[STATUS.force]
     return (
         force,
-        c.force[0] * (c.status[STATUS.energy] - c.status[STATUS.owed]),
-        q - force * c.law[LAW.length] / c.force[0] if c.force[0] > 0 else q,
+        contact.force[0] * (contact.status[STATUS.energy] - contact.status[STATUS.owed]),
+        q - force * contact.law[LAW.length] / contact.force[0] if contact.force[0] > 0 else q,
     )

@@ -108,7 +108,7 @@ def find_friction_force(dq, kind, contact):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_step(free, beta, q, v, dt, c, goal):
+def solve_step(free, beta, q, v, dt, contact, goal):
     """Solve a step with dq = free - beta force under the mean load; dq = free for beta = 0.
 
     Returns
@@ -118,18 +118,18 @@ def solve_step(free, beta, q, v, dt, c, goal):
     iterations : int
         Below 0 where it failed.
     """
-    kind = int(c.force[LAW_KIND])
+    kind = int(contact.force[LAW_KIND])
     if kind == POINTS:
-        set_middle_length(v, dt, c)
-    press_points(kind, c)
+        set_middle_length(v, dt, contact)
+    press_points(kind, contact)
     if beta == 0.0:
-        c.y[0, 0] = free
-    force, count = minimise(free, beta, kind, False, c, GOAL_FRACTION * goal)
-    return c.y[0, 0], (free - c.y[0, 0]) / beta if beta > 0.0 else force, count
+        contact.y[0, 0] = free
+    force, count = minimise(free, beta, kind, False, contact, GOAL_FRACTION * goal)
+    return contact.y[0, 0], (free - contact.y[0, 0]) / beta if beta > 0.0 else force, count
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def apply_increment(dq, q, v, dt, c, goal):
+def apply_increment(dq, q, v, dt, contact, goal):
     """Return the mean force over a prescribed increment; the memory stays as it is.
 
     Parameters
@@ -142,7 +142,7 @@ def apply_increment(dq, q, v, dt, c, goal):
         Relative velocity at the start of the step [m/s].
     dt : float
         Duration of the step [s].
-    c : arrays.PressedPoints
+    contact : arrays.PressedPoints
     goal : float
         Tolerance of the residual [N].
 
@@ -153,12 +153,12 @@ def apply_increment(dq, q, v, dt, c, goal):
     is_solved : bool
         Whether it was found.
     """
-    _, force, count = solve_step(dq, 0.0, q, v, dt, c, goal)
+    _, force, count = solve_step(dq, 0.0, q, v, dt, contact, goal)
     return force, count >= 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit_step(dq, force, q, v0, v1, dt, c):
+def commit_step(dq, force, q, v0, v1, dt, contact):
     """Move points and pieces by a solved step.
 
     Returns
@@ -168,21 +168,21 @@ def commit_step(dq, force, q, v0, v1, dt, c):
     is_solved : bool
         Whether the pieces came to balance.
     """
-    kind = int(c.force[LAW_KIND])
-    lost = commit_points(dq, force, v0, v1, dt, kind, c)
-    if c.b.size == 0:
+    kind = int(contact.force[LAW_KIND])
+    lost = commit_points(dq, force, v0, v1, dt, kind, contact)
+    if contact.b.size == 0:
         return lost, True
-    more, count = relax_pieces(kind, c, c.force[RESIDUAL_GOAL])
+    more, count = relax_pieces(kind, contact, contact.force[RESIDUAL_GOAL])
     return lost + more, count >= 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_state(c, q, v):
+def read_state(contact, q, v):
     """Return force, stored energy and slip of points and pieces.
 
     Parameters
     ----------
-    c : arrays.PressedPoints
+    contact : arrays.PressedPoints
     q : float
         Relative displacement [m].
     v : float
@@ -197,7 +197,7 @@ def read_state(c, q, v):
     slip : float
         [m].
     """
-    return read_points(int(c.force[LAW_KIND]), c, q)
+    return read_points(int(contact.force[LAW_KIND]), contact, q)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

@@ -36,7 +36,7 @@ DRAG_TOL = 2e-15
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def solve_step(free, beta, q, v, dt, c, goal):
+def solve_step(free, beta, q, v, dt, contact, goal):
     """Solve a step with dq = free - beta force, as `element_kernels.solve_step`.
 
     Returns
@@ -46,16 +46,16 @@ def solve_step(free, beta, q, v, dt, c, goal):
     iterations : int
         0 where all points drag, below 0 where it failed.
     """
-    if c.flow[DRAG_DIRECTION] != 0.0 and solve_dragging_step(free, beta, c):
-        return c.y[0, 0], c.flow[DRAG_DIRECTION] * c.drag[DRAG_FORCE, 0], 0
-    c.flow[DRAG_DIRECTION] = 0.0
-    set_middle_length(v, dt, c)
-    force, count = minimise(free, beta, POINTS, False, c, goal)
-    return c.y[0, 0], force, count
+    if contact.flow[DRAG_DIRECTION] != 0.0 and solve_dragging_step(free, beta, contact):
+        return contact.y[0, 0], contact.flow[DRAG_DIRECTION] * contact.drag[DRAG_FORCE, 0], 0
+    contact.flow[DRAG_DIRECTION] = 0.0
+    set_middle_length(v, dt, contact)
+    force, count = minimise(free, beta, POINTS, False, contact, goal)
+    return contact.y[0, 0], force, count
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_dragging_step(free, beta, c):
+def solve_dragging_step(free, beta, contact):
     """Solve a step in which all points drag.
 
     The solution is that of kappa (b + db/2) = psi^T f.
@@ -66,20 +66,20 @@ def solve_dragging_step(free, beta, c):
         Increment without friction [m].
     beta : float
         Compliance of the modes in the step [m/N].
-    c : arrays.ShearedPoints
+    contact : arrays.ShearedPoints
 
     Returns
     -------
     bool
-        Whether all points drag on in this step; c.y[0] is then its solution.
+        Whether all points drag on in this step; contact.y[0] is then its solution.
     """
-    way = c.flow[DRAG_DIRECTION]
-    y = c.y[0]
+    way = contact.flow[DRAG_DIRECTION]
+    y = contact.y[0]
     least = 0.0
-    dq = free - beta * way * c.drag[DRAG_FORCE, 0]
-    for k in range(c.b.size):
-        y[k + 1] = 2 * (way * c.drag[DRAG_FORCE, k + 1] / c.kappa[k] - c.b[k])
-        least += c.drag[MAX_MODE_SLIDE, k + 1] * abs(y[k + 1])
+    dq = free - beta * way * contact.drag[DRAG_FORCE, 0]
+    for k in range(contact.b.size):
+        y[k + 1] = 2 * (way * contact.drag[DRAG_FORCE, k + 1] / contact.kappa[k] - contact.b[k])
+        least += contact.drag[MAX_MODE_SLIDE, k + 1] * abs(y[k + 1])
     if way * dq <= least:
         return False
     y[0] = dq
@@ -87,7 +87,7 @@ def solve_dragging_step(free, beta, c):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def apply_increment(dq, q, v, dt, c, goal):
+def apply_increment(dq, q, v, dt, contact, goal):
     """Return the mean force over a prescribed increment; the memory stays as it is.
 
     Parameters
@@ -100,7 +100,7 @@ def apply_increment(dq, q, v, dt, c, goal):
         Relative velocity at the start of the step [m/s].
     dt : float
         Duration of the step [s].
-    c : arrays.ShearedPoints
+    contact : arrays.ShearedPoints
     goal : float
         Tolerance of the residual [N].
 
@@ -111,15 +111,15 @@ def apply_increment(dq, q, v, dt, c, goal):
     is_solved : bool
         Whether it was found.
     """
-    c.flow[DRAG_DIRECTION] = 0.0
-    set_middle_length(v, dt, c)
-    c.y[0, 0] = dq
-    force, count = minimise(dq, 0.0, POINTS, False, c, goal)
+    contact.flow[DRAG_DIRECTION] = 0.0
+    set_middle_length(v, dt, contact)
+    contact.y[0, 0] = dq
+    force, count = minimise(dq, 0.0, POINTS, False, contact, goal)
     return force, count >= 0
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def commit_step(dq, force, q, v0, v1, dt, c):
+def commit_step(dq, force, q, v0, v1, dt, contact):
     """Move points and pieces by a solved step.
 
     Parameters
@@ -136,7 +136,7 @@ def commit_step(dq, force, q, v0, v1, dt, c):
         Velocity at the end of the step [m/s].
     dt : float
         Duration of the step [s].
-    c : arrays.ShearedPoints
+    contact : arrays.ShearedPoints
 
     Returns
     -------
@@ -145,34 +145,34 @@ def commit_step(dq, force, q, v0, v1, dt, c):
     is_solved : bool
         Always true.
     """
-    way = c.flow[DRAG_DIRECTION]
-    length = c.eps[1]
+    way = contact.flow[DRAG_DIRECTION]
+    length = contact.eps[1]
     lost = 0.0
-    c.flow[TOTAL_SLIDE] += dq
+    contact.flow[TOTAL_SLIDE] += dq
     if way != 0.0:
-        for k in range(c.y.shape[1]):
-            lost += way * c.drag[DRAG_FORCE, k] * c.y[0, k] * (1.0 if k == 0 else -1.0)
-        accept_step(c)
+        for k in range(contact.y.shape[1]):
+            lost += way * contact.drag[DRAG_FORCE, k] * contact.y[0, k] * (1.0 if k == 0 else -1.0)
+        accept_step(contact)
         return lost, True
-    loose = c.growth[5] * length
+    loose = contact.growth[5] * length
     lost = (
-        move_points_short(c, length)
-        if loose == 0.0 and are_slides_short(c, length)
-        else move_points(c, loose, length)
+        move_points_short(contact, length)
+        if loose == 0.0 and are_slides_short(contact, length)
+        else move_points(contact, loose, length)
     )
-    accept_step(c)
-    c.eps[0] = grow(c.eps[0], v0, v1, abs(dq), dt, c.growth)[0]
-    if c.growth[0] < 0.0 and loose == 0.0:
-        c.flow[DRAG_DIRECTION] = find_drag_direction(1.0 if dq > 0.0 else -1.0, c)
+    accept_step(contact)
+    contact.eps[0] = grow(contact.eps[0], v0, v1, abs(dq), dt, contact.growth)[0]
+    if contact.growth[0] < 0.0 and loose == 0.0:
+        contact.flow[DRAG_DIRECTION] = find_drag_direction(1.0 if dq > 0.0 else -1.0, contact)
     return lost / 2, True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find_drag_direction(way, c):
+def find_drag_direction(way, contact):
     """Return the direction if all points drag in it, else 0."""
-    points = c.points
-    length = c.eps[0]
-    for j in range(c.weight.size):
+    points = contact.points
+    length = contact.eps[0]
+    for j in range(contact.weight.size):
         load = points[LOAD, j]
         if not (
             abs(points[STRETCH, j] - way * length * load) <= DRAG_TOL * length * load
@@ -185,14 +185,14 @@ def find_drag_direction(way, c):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def move_points_short(c, length):
+def move_points_short(contact, length):
     """Move all points by slides below MAX_SHORT_PATH bond lengths.
 
     Returns twice the energy dissipated [J].
     """
-    points = c.points
+    points = contact.points
     lost = 0.0
-    for j in range(c.weight.size):
+    for j in range(contact.weight.size):
         xi = points[SLIDE, j]
         points[DENSITY, j], points[STRETCH, j], points[SQUARED_STRETCH, j], part = short_bond_step(
             points[DENSITY, j],
@@ -202,17 +202,17 @@ def move_points_short(c, length):
             points[LOAD, j],
             length,
         )
-        lost += c.weight[j] * part
+        lost += contact.weight[j] * part
     return lost
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def move_points(c, loose, length):
+def move_points(contact, loose, length):
     """Move all points by slides of any size.
 
     Parameters
     ----------
-    c : arrays.ShearedPoints
+    contact : arrays.ShearedPoints
     loose : float
         Half the elastic range of the bonds [m].
     length : float
@@ -223,9 +223,9 @@ def move_points(c, loose, length):
     float
         Twice the energy dissipated [J].
     """
-    points = c.points
+    points = contact.points
     lost = 0.0
-    for j in range(c.weight.size):
+    for j in range(contact.weight.size):
         m = points[DENSITY, j]
         z = points[STRETCH, j]
         s2 = points[SQUARED_STRETCH, j]
@@ -239,17 +239,17 @@ def move_points(c, loose, length):
         points[DENSITY, j] = m
         points[STRETCH, j] = z
         points[SQUARED_STRETCH, j] = s2
-        lost += c.weight[j] * part
+        lost += contact.weight[j] * part
     return lost
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def read_state(c, q, v):
+def read_state(contact, q, v):
     """Return force, stored energy and slip of points and pieces.
 
     Parameters
     ----------
-    c : arrays.ShearedPoints
+    contact : arrays.ShearedPoints
     q : float
         Relative displacement [m].
     v : float
@@ -264,39 +264,39 @@ def read_state(c, q, v):
     slip : float
         [m].
     """
-    way = c.flow[DRAG_DIRECTION]
+    way = contact.flow[DRAG_DIRECTION]
     energy = 0.0
-    slip = c.flow[TOTAL_SLIDE]
-    for k in range(c.b.size):
-        energy += 0.5 * c.kappa[k] * c.b[k] ** 2
-        slip -= c.drag[MEAN_SLIDE, k + 1] * c.b[k]
+    slip = contact.flow[TOTAL_SLIDE]
+    for k in range(contact.b.size):
+        energy += 0.5 * contact.kappa[k] * contact.b[k] ** 2
+        slip -= contact.drag[MEAN_SLIDE, k + 1] * contact.b[k]
     if way != 0.0:
         return (
-            way * c.drag[DRAG_FORCE, 0],
-            energy + c.eps[0] * c.drag[DRAG_FORCE, 0],
-            slip - way * c.eps[0],
+            way * contact.drag[DRAG_FORCE, 0],
+            energy + contact.eps[0] * contact.drag[DRAG_FORCE, 0],
+            slip - way * contact.eps[0],
         )
-    force, stored, stretch, total = sum_bonds(c)
+    force, stored, stretch, total = sum_bonds(contact)
     return force, energy + stored, slip - stretch / total if total > 0 else q
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def sum_bonds(c):
+def sum_bonds(contact):
     """Return the sums of force [N], energy [J], stretch [N m] and load [N] of the points.
 
     The stretch counts times the load.
     """
-    points = c.points
+    points = contact.points
     force = 0.0
     energy = 0.0
     stretch = 0.0
     total = 0.0
-    for j in range(c.weight.size):
+    for j in range(contact.weight.size):
         m = points[DENSITY, j]
         z = points[STRETCH, j]
-        share = c.weight[j] * points[LOAD, j]
-        force += c.weight[j] * z
-        energy += 0.5 * c.weight[j] * points[SQUARED_STRETCH, j]
+        share = contact.weight[j] * points[LOAD, j]
+        force += contact.weight[j] * z
+        energy += 0.5 * contact.weight[j] * points[SQUARED_STRETCH, j]
         stretch += share * (z / m) if m > 0.0 else 0.0
         total += share if m > 0.0 else 0.0
     return force, energy, stretch, total

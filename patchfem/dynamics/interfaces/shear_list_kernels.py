@@ -28,7 +28,7 @@ IS_FULL = 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_step(free, beta, q, v, dt, c, goal):
+def solve_step(free, beta, q, v, dt, contact, goal):
     """Solve a step with dq = free - beta force, as `element_kernels.solve_step`.
 
     Returns
@@ -38,15 +38,15 @@ def solve_step(free, beta, q, v, dt, c, goal):
     iterations : int
         Below 0 where it failed.
     """
-    start_step(dt, c)
+    start_step(dt, contact)
     if beta == 0.0:
-        c.y[0, 0] = free
-    force, count = solver.minimise(free, beta, 0, False, c, goal)
-    return c.y[0, 0], (free - c.y[0, 0]) / beta if beta > 0.0 else force, count
+        contact.y[0, 0] = free
+    force, count = solver.minimise(free, beta, 0, False, contact, goal)
+    return contact.y[0, 0], (free - contact.y[0, 0]) / beta if beta > 0.0 else force, count
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def apply_increment(dq, q, v, dt, c, goal):
+def apply_increment(dq, q, v, dt, contact, goal):
     """Return the mean force over a prescribed increment; the memory stays as it is.
 
     Parameters
@@ -59,7 +59,7 @@ def apply_increment(dq, q, v, dt, c, goal):
         Relative velocity at the start of the step [m/s].
     dt : float
         Duration of the step [s].
-    c : arrays.ShearedLists
+    contact : arrays.ShearedLists
     goal : float
         Tolerance of the residual [N].
 
@@ -70,14 +70,14 @@ def apply_increment(dq, q, v, dt, c, goal):
     is_solved : bool
         Whether it was found.
     """
-    start_step(dt, c)
-    c.y[0, 0] = dq
-    force, count = solver.minimise(dq, 0.0, 0, False, c, goal)
+    start_step(dt, contact)
+    contact.y[0, 0] = dq
+    force, count = solver.minimise(dq, 0.0, 0, False, contact, goal)
     return force, count >= 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit_step(dq, force, q, v0, v1, dt, c):
+def commit_step(dq, force, q, v0, v1, dt, contact):
     """Move lists and pieces by a solved step; the lists sum up what they dissipate and create.
 
     Returns
@@ -87,28 +87,28 @@ def commit_step(dq, force, q, v0, v1, dt, c):
     has_room : bool
         Whether every list had room.
     """
-    points = c.points
-    before = stored_energy(c)
+    points = contact.points
+    before = stored_energy(contact)
     fine = True
-    changes = has_changing_pressure(c)
-    c.flow[TOTAL_SLIDE] += dq
-    for j in range(int(c.count[0])):
-        load_list(j, c)
+    changes = has_changing_pressure(contact)
+    contact.flow[TOTAL_SLIDE] += dq
+    for j in range(int(contact.count[0])):
+        load_list(j, contact)
         xi = points[SLIDE, j]
-        energy = c.status[STATUS.energy]
+        energy = contact.status[STATUS.energy]
         speed = abs(xi) / dt
-        fine = list_step(xi, c, speed, speed, dt) and fine
+        fine = list_step(xi, contact, speed, speed, dt) and fine
         if changes:
-            c.nows[j, CLOCK.displacement] = c.now[CLOCK.displacement]
-            if find_pressure(j, c) <= 0.0:
-                break_bonds(c.status)
-        add_list_energies(points[FORCE, j] * xi, energy, c.weight[j], c)
-        store_list(j, c)
+            contact.nows[j, CLOCK.displacement] = contact.now[CLOCK.displacement]
+            if find_pressure(j, contact) <= 0.0:
+                break_bonds(contact.status)
+        add_list_energies(points[FORCE, j] * xi, energy, contact.weight[j], contact)
+        store_list(j, contact)
         points[GROWTH_SPEED, j] = max(1.5 * speed - 0.5 * points[LAST_SPEED, j], 0.0)
         points[LAST_SPEED, j] = speed
-    solver.accept_step(c)
-    c.flow[IS_FULL] = 0.0 if fine else 1.0
-    return force * dq - (stored_energy(c) - before), fine
+    solver.accept_step(contact)
+    contact.flow[IS_FULL] = 0.0 if fine else 1.0
+    return force * dq - (stored_energy(contact) - before), fine
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -120,23 +120,25 @@ def break_bonds(status):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def stored_energy(c):
+def stored_energy(contact):
     """Return the energy of lists and pieces [J]."""
     energy = 0.0
-    for k in range(c.b.size):
-        energy += 0.5 * c.kappa[k] * c.b[k] ** 2
-    for j in range(int(c.count[0])):
-        energy += c.weight[j] * (c.statuses[j, STATUS.energy] - c.statuses[j, STATUS.owed])
+    for k in range(contact.b.size):
+        energy += 0.5 * contact.kappa[k] * contact.b[k] ** 2
+    for j in range(int(contact.count[0])):
+        energy += contact.weight[j] * (
+            contact.statuses[j, STATUS.energy] - contact.statuses[j, STATUS.owed]
+        )
     return energy
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_state(c, q, v):
+def read_state(contact, q, v):
     """Return force, stored energy and slip of lists and pieces.
 
     Parameters
     ----------
-    c : arrays.ShearedLists
+    contact : arrays.ShearedLists
     q : float
         Relative displacement [m].
     v : float
@@ -153,22 +155,26 @@ def read_state(c, q, v):
     """
     force = 0.0
     total = 0.0
-    slip = c.flow[TOTAL_SLIDE]
-    if has_changing_pressure(c):
+    slip = contact.flow[TOTAL_SLIDE]
+    if has_changing_pressure(contact):
         slip = 0.0
-        for j in range(int(c.count[0])):
-            here = c.weight[j] * find_pressure(j, c)
-            force += c.weight[j] * c.statuses[j, STATUS.force]
-            slip += here * c.nows[j, CLOCK.displacement]
+        for j in range(int(contact.count[0])):
+            here = contact.weight[j] * find_pressure(j, contact)
+            force += contact.weight[j] * contact.statuses[j, STATUS.force]
+            slip += here * contact.nows[j, CLOCK.displacement]
             total += here
         return (
             force,
-            stored_energy(c),
-            (slip - c.law[LAW.length] * force) / total if total > 0 else q,
+            stored_energy(contact),
+            (slip - contact.law[LAW.length] * force) / total if total > 0 else q,
         )
-    for k in range(c.b.size):
-        slip -= c.drag[MEAN_SLIDE, k + 1] * c.b[k]
-    for j in range(int(c.count[0])):
-        force += c.weight[j] * c.statuses[j, STATUS.force]
-        total += c.weight[j]
-    return force, stored_energy(c), slip - c.law[LAW.length] * force / total if total > 0 else q
+    for k in range(contact.b.size):
+        slip -= contact.drag[MEAN_SLIDE, k + 1] * contact.b[k]
+    for j in range(int(contact.count[0])):
+        force += contact.weight[j] * contact.statuses[j, STATUS.force]
+        total += contact.weight[j]
+    return (
+        force,
+        stored_energy(contact),
+        slip - contact.law[LAW.length] * force / total if total > 0 else q,
+    )

@@ -39,21 +39,21 @@ __all__ = [
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def load_list(j, c):
+def load_list(j, contact):
     """Copy the numbers of the list of point j to `now` and `status`."""
-    for i in range(c.now.size):
-        c.now[i] = c.nows[j, i]
-    for i in range(c.status.size):
-        c.status[i] = c.statuses[j, i]
+    for i in range(contact.now.size):
+        contact.now[i] = contact.nows[j, i]
+    for i in range(contact.status.size):
+        contact.status[i] = contact.statuses[j, i]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def store_list(j, c):
+def store_list(j, contact):
     """Copy `now` and `status` to the numbers of the list of point j."""
-    for i in range(c.now.size):
-        c.nows[j, i] = c.now[i]
-    for i in range(c.status.size):
-        c.statuses[j, i] = c.status[i]
+    for i in range(contact.now.size):
+        contact.nows[j, i] = contact.now[i]
+    for i in range(contact.status.size):
+        contact.statuses[j, i] = contact.status[i]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -75,44 +75,49 @@ def interpolate_pressure(x, pattern):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def has_changing_pressure(c):
+def has_changing_pressure(contact):
     """Return whether the pressure of a point changes in a run."""
-    return c.pressed.shape[1] + c.pattern.shape[1] > 0
+    return contact.pressed.shape[1] + contact.pattern.shape[1] > 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find_pressure(j, c):
+def find_pressure(j, contact):
     """Return the relative pressure of point j, after the step where the load changes."""
-    if c.pattern.shape[1] > 0:
-        return interpolate_pressure(c.places[j] + c.nows[j, CLOCK.displacement], c.pattern)
-    return c.pressed[1, j] / c.points[LOAD, j] if c.pressed.shape[1] > 0 else 1.0
+    if contact.pattern.shape[1] > 0:
+        return interpolate_pressure(
+            contact.places[j] + contact.nows[j, CLOCK.displacement], contact.pattern
+        )
+    return contact.pressed[1, j] / contact.points[LOAD, j] if contact.pressed.shape[1] > 0 else 1.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def start_step(dt, c):
+def start_step(dt, contact):
     """Start a step of dt [s]; bonds form under the mean pressure of both its ends.
 
     On the lower piece that is the pressure half way along the slide of the step before.
     """
-    c.time[0] = dt
-    for j in range(c.points.shape[1]):
-        c.points[TRIAL_SLIDE, j] = np.nan
-    if c.pattern.shape[1] > 0:
-        for j in range(int(c.count[0])):
-            c.statuses[j, STATUS.pressure] = interpolate_pressure(
-                c.places[j] + c.nows[j, CLOCK.displacement] + 0.5 * c.points[SLIDE, j], c.pattern
+    contact.time[0] = dt
+    for j in range(contact.points.shape[1]):
+        contact.points[TRIAL_SLIDE, j] = np.nan
+    if contact.pattern.shape[1] > 0:
+        for j in range(int(contact.count[0])):
+            contact.statuses[j, STATUS.pressure] = interpolate_pressure(
+                contact.places[j]
+                + contact.nows[j, CLOCK.displacement]
+                + 0.5 * contact.points[SLIDE, j],
+                contact.pattern,
             )
-    elif c.pressed.shape[1] > 0:
-        for j in range(int(c.count[0])):
-            c.statuses[j, STATUS.pressure] = (
-                0.5 * (c.pressed[0, j] + c.pressed[1, j]) / c.points[LOAD, j]
+    elif contact.pressed.shape[1] > 0:
+        for j in range(int(contact.count[0])):
+            contact.statuses[j, STATUS.pressure] = (
+                0.5 * (contact.pressed[0, j] + contact.pressed[1, j]) / contact.points[LOAD, j]
             )
 
 
 @njit(
     error_model="numpy", forceinline=False, **NJIT_NO_REFCOUNT
 )  # without this option the caller's forced inlining would extend to all functions called here
-def write_forces(kind, ending, c):
+def write_forces(kind, ending, contact):
     """Write path-mean force [N] and slope [N/m] of every point at its slide.
 
     Parameters
@@ -121,33 +126,33 @@ def write_forces(kind, ending, c):
         Kind of the law of the points, PLASTIC or POINTS.
     ending : bool
         Whether the pieces spring back while the holder stands.
-    c : arrays.ShearedLists
+    contact : arrays.ShearedLists
 
     Returns
     -------
     float
         Friction force [N].
     """
-    points = c.points
-    dt = c.time[0]
+    points = contact.points
+    dt = contact.time[0]
     force = 0.0
-    for j in range(int(c.count[0])):
+    for j in range(int(contact.count[0])):
         xi = points[SLIDE, j]
-        status = c.statuses[j]
+        status = contact.statuses[j]
         is_empty = status[STATUS.head] == status[STATUS.end]
         is_unpressed = status[STATUS.pressure] == 0.0 and status[STATUS.initial_pressure] == 0.0
         if is_empty and is_unpressed:
             points[FORCE, j] = points[SLOPE, j] = 0.0
             continue
-        load_list(j, c)
-        f, s = find_mean_and_slope(xi, c, points[GROWTH_SPEED, j], dt)
+        load_list(j, contact)
+        f, s = find_mean_and_slope(xi, contact, points[GROWTH_SPEED, j], dt)
         # where many bonds have the same stretch, the mean force is steeper than its slope s, so the secant is used
         if xi != points[TRIAL_SLIDE, j]:
             steep = (f - points[TRIAL_FORCE, j]) / (xi - points[TRIAL_SLIDE, j])
             s = steep if steep > s else s
         points[TRIAL_SLIDE, j] = xi
         points[TRIAL_FORCE, j] = f
-        points[FORCE, j] = c.weight[j] * f
-        points[SLOPE, j] = c.weight[j] * s
+        points[FORCE, j] = contact.weight[j] * f
+        points[SLOPE, j] = contact.weight[j] * s
         force += points[FORCE, j]
     return force

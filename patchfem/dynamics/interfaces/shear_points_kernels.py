@@ -35,18 +35,18 @@ SLOPE = 7
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def are_slides_short(c, length):
+def are_slides_short(contact, length):
     """Return whether no point slides farther than MAX_SHORT_PATH bond lengths; false for nan."""
-    points = c.points
+    points = contact.points
     near = 0.0
-    for j in range(int(c.count[0])):
+    for j in range(int(contact.count[0])):
         # a sum, which unlike a maximum is vectorised
         near += 1.0 if abs(points[SLIDE, j]) <= MAX_SHORT_PATH * length else 0.0
-    return near == c.count[0]
+    return near == contact.count[0]
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def write_forces(kind, ending, c):
+def write_forces(kind, ending, contact):
     """Write force [N] and slope [N/m] >= 0 of every point at its slide.
 
     Parameters
@@ -55,19 +55,24 @@ def write_forces(kind, ending, c):
         Kind of the law of the points, PLASTIC or POINTS.
     ending : bool
         Whether the pieces spring back while the holder stands.
-    c : arrays.ShearedPoints
+    contact : arrays.ShearedPoints
 
     Returns
     -------
     float
         Friction force [N].
     """
-    points = c.points
-    weight = c.weight
-    length = c.eps[0 if ending else 1]
+    points = contact.points
+    weight = contact.weight
+    length = contact.eps[0 if ending else 1]
     force = 0.0
-    if kind == POINTS and not ending and c.growth[5] == 0.0 and are_slides_short(c, length):
-        for j in range(int(c.count[0])):
+    if (
+        kind == POINTS
+        and not ending
+        and contact.growth[5] == 0.0
+        and are_slides_short(contact, length)
+    ):
+        for j in range(int(contact.count[0])):
             f, s = short_bond_mean(
                 points[DENSITY, j], points[STRETCH, j], points[SLIDE, j], points[LOAD, j], length
             )
@@ -75,11 +80,11 @@ def write_forces(kind, ending, c):
             points[SLOPE, j] = weight[j] * max(s, 0.0)
             force += weight[j] * f
         return force
-    return write_general_forces(kind, ending, c, length)
+    return write_general_forces(kind, ending, contact, length)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def write_general_forces(kind, ending, c, length):
+def write_general_forces(kind, ending, contact, length):
     """Write the forces of `write_forces` for any law and slide.
 
     Parameters
@@ -88,7 +93,7 @@ def write_general_forces(kind, ending, c, length):
         Kind of the law of the points, PLASTIC or POINTS.
     ending : bool
         Whether the pieces spring back while the holder stands.
-    c : arrays.ShearedPoints
+    contact : arrays.ShearedPoints
     length : float
         Bond length [m].
 
@@ -97,11 +102,11 @@ def write_general_forces(kind, ending, c, length):
     float
         Friction force [N].
     """
-    points = c.points
-    weight = c.weight
-    loose = c.growth[5] * length
+    points = contact.points
+    weight = contact.weight
+    loose = contact.growth[5] * length
     force = 0.0
-    for j in range(int(c.count[0])):
+    for j in range(int(contact.count[0])):
         m = points[DENSITY, j]
         z = points[STRETCH, j]
         load = points[LOAD, j]

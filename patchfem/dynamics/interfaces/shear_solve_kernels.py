@@ -11,7 +11,7 @@ as a force grows with the slide.
 Both are minima of convex functions where no slope of a point is below 0; Newton's method with a
 line search finds them. The forces of some laws may decrease as their points slide, and then several
 minima exist: the one found lies downhill from where the last steps lead, to which pieces without
-mass would jump. c is an `arrays.ShearedPoints`, or a tuple with its fields from `weight` on. `law`
+mass would jump. `contact` is an `arrays.ShearedPoints`, or a tuple with its fields from `weight` on. `law`
 has the forces of the points; `march.instances` compiles this text for each.
 """
 
@@ -41,7 +41,7 @@ MAX_ITERATIONS = 1000 if FORCE_MAY_FALL else 200
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def set_middle_length(v, dt, c):
+def set_middle_length(v, dt, contact):
     """Set the bond length in the middle of a step.
 
     Parameters
@@ -50,13 +50,13 @@ def set_middle_length(v, dt, c):
         Relative velocity at the start of the step [m/s].
     dt : float
         Duration of the step [s].
-    c : arrays.ShearedPoints
+    contact : arrays.ShearedPoints
     """
-    c.eps[1] = grow(c.eps[0], v, v, abs(v) * dt / 2, dt / 2, c.growth)[0]
+    contact.eps[1] = grow(contact.eps[0], v, v, abs(v) * dt / 2, dt / 2, contact.growth)[0]
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def set_slides(q, moved, c):
+def set_slides(q, moved, contact):
     """Write the slides of the points [m].
 
     Parameters
@@ -65,11 +65,11 @@ def set_slides(q, moved, c):
         Slide of the holder [m].
     moved : ndarray
         (r,) increments of the coordinates [m].
-    c : arrays.ShearedPoints
+    contact : arrays.ShearedPoints
     """
-    psi = c.psi
-    points = c.points
-    count = int(c.count[0])
+    psi = contact.psi
+    points = contact.points
+    count = int(contact.count[0])
     r = moved.size
     for j in range(count):
         points[SLIDE, j] = q
@@ -129,7 +129,7 @@ def project_onto_modes(row, psi, points, count, out):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def write_gradient(y, free, beta, kind, ending, c, out):
+def write_gradient(y, free, beta, kind, ending, contact, out):
     """Write the residual of a step.
 
     With beta = 0 or `ending` the slide of the holder is prescribed.
@@ -146,7 +146,7 @@ def write_gradient(y, free, beta, kind, ending, c, out):
         Kind of the law of the points, PLASTIC or POINTS.
     ending : bool
         Whether the pieces spring back while the holder stands.
-    c : arrays.ShearedPoints
+    contact : arrays.ShearedPoints
     out : ndarray
         (1 + r,) residual [N], which is written.
 
@@ -157,12 +157,13 @@ def write_gradient(y, free, beta, kind, ending, c, out):
     """
     part = 1.0 if ending else 0.5
     calm = 0.0 if ending else STEP_DAMPING
-    set_slides(y[0], y[1:], c)
-    force = law.write_forces(kind, ending, c)
-    project_onto_modes(FORCE, c.psi, c.points, int(c.count[0]), out)
-    for k in range(c.kappa.size):
+    set_slides(y[0], y[1:], contact)
+    force = law.write_forces(kind, ending, contact)
+    project_onto_modes(FORCE, contact.psi, contact.points, int(contact.count[0]), out)
+    for k in range(contact.kappa.size):
         out[k + 1] = (
-            c.kappa[k] * (c.b[k] + part * y[k + 1] + calm * (y[k + 1] - c.last[0, k + 1]))
+            contact.kappa[k]
+            * (contact.b[k] + part * y[k + 1] + calm * (y[k + 1] - contact.last[0, k + 1]))
             - out[k + 1]
         )
     out[0] = 0.0 if ending or beta == 0.0 else (y[0] - free) / beta + force
@@ -170,7 +171,7 @@ def write_gradient(y, free, beta, kind, ending, c, out):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def write_hessian(beta, ending, c, hess):
+def write_hessian(beta, ending, contact, hess):
     """Write the Hessian of a step from the slopes of the points.
 
     It overwrites the forces of the points.
@@ -181,19 +182,19 @@ def write_hessian(beta, ending, c, hess):
         Compliance of the modes in the step [m/N].
     ending : bool
         Whether the pieces spring back while the holder stands.
-    c : arrays.ShearedPoints
+    contact : arrays.ShearedPoints
     hess : ndarray
         (1 + r, 1 + r), of which the lower triangle is written.
     """
-    psi = c.psi
-    points = c.points
-    count = int(c.count[0])
+    psi = contact.psi
+    points = contact.points
+    count = int(contact.count[0])
     given = ending or beta == 0.0
     total = 0.0
     for j in range(count):
         total += points[SLOPE, j]
     project_onto_modes(SLOPE, psi, points, count, hess[0])
-    for k in range(c.kappa.size):
+    for k in range(contact.kappa.size):
         hess[k + 1, 0] = 0.0 if given else -hess[0, k + 1]
         for j in range(count):
             points[FORCE, j] = points[SLOPE, j] * psi[k, j]
@@ -218,7 +219,7 @@ def write_hessian(beta, ending, c, hess):
             for j in range(count):
                 dot += points[FORCE, j] * psi[l, j]
             hess[k + 1, l + 1] = dot
-        hess[k + 1, k + 1] += c.kappa[k] * (1.0 if ending else 0.5 + STEP_DAMPING)
+        hess[k + 1, k + 1] += contact.kappa[k] * (1.0 if ending else 0.5 + STEP_DAMPING)
     hess[0, 0] = 1.0 if given else 1 / beta + total
 
 
@@ -235,7 +236,7 @@ def find_largest_residual(out, scale):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def is_last_step(p, c):
+def is_last_step(p, contact):
     """Return whether a Newton step (1 + r,) moves all points by very little.
 
     The limit is LAST_STEP_RATIO bond lengths.
@@ -245,13 +246,13 @@ def is_last_step(p, c):
     """
     way = abs(p[0])
     for k in range(1, p.size):
-        way += c.drag[1, k] * abs(p[k])
-    return way <= LAST_STEP_RATIO * c.eps[1] and c.drag[0, 0] > 0.0
+        way += contact.drag[1, k] * abs(p[k])
+    return way <= LAST_STEP_RATIO * contact.eps[1] and contact.drag[0, 0] > 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def minimise(free, beta, kind, ending, c, goal):
-    """Minimise over c.y[ending] = (dq, db) in place, from the guess in it.
+def minimise(free, beta, kind, ending, contact, goal):
+    """Minimise over contact.y[ending] = (dq, db) in place, from the guess in it.
 
     The factor of a Hessian serves all solves of a step of the march, until an iteration with it
     gains less than a factor of ten. No residual is computed after a Newton step that is short
@@ -265,7 +266,7 @@ def minimise(free, beta, kind, ending, c, goal):
         Of the law of the points.
     ending : bool
         Whether the pieces spring back while the holder stands.
-    c : arrays.ShearedPoints
+    contact : arrays.ShearedPoints
     goal : float
         Of the residual [N].
 
@@ -277,11 +278,11 @@ def minimise(free, beta, kind, ending, c, goal):
         Below 0 where it failed.
     """
     which = 1 if ending else 0
-    y = c.y[which]
-    hess = c.hess[which]
-    g = c.workspace[GRADIENT]
-    p = c.workspace[STEP]
-    trial = c.workspace[TRIAL]
+    y = contact.y[which]
+    hess = contact.hess[which]
+    g = contact.workspace[GRADIENT]
+    p = contact.workspace[STEP]
+    trial = contact.workspace[TRIAL]
     noise = 4e-16 * abs(free) / beta if beta > 0.0 else 0.0
     size = np.inf
     least = np.inf
@@ -295,25 +296,25 @@ def minimise(free, beta, kind, ending, c, goal):
         MAX_ITERATIONS
     ):  # the first pass evaluates the guess, so that the code contains the gradient once
         if count > 0:
-            if c.ready[which] == 0.0:
-                write_hessian(beta, ending, c, hess)
+            if contact.ready[which] == 0.0:
+                write_hessian(beta, ending, contact, hess)
                 if not factorise(hess):
                     if not FORCE_MAY_FALL:
                         return force, -count
-                    for j in range(int(c.count[0])):
-                        c.points[SLOPE, j] = max(c.points[SLOPE, j], 0.0)
-                    write_hessian(beta, ending, c, hess)
+                    for j in range(int(contact.count[0])):
+                        contact.points[SLOPE, j] = max(contact.points[SLOPE, j], 0.0)
+                    write_hessian(beta, ending, contact, hess)
                     if not factorise(hess):
                         return force, -count
-                c.ready[which] = 1.0
+                contact.ready[which] = 1.0
                 stale = False
             for i in range(y.size):
                 p[i] = -g[i]
             fall = -solve_factorised(hess, p)
-            if not stale and not ending and beta > 0.0 and is_last_step(p, c):
+            if not stale and not ending and beta > 0.0 and is_last_step(p, contact):
                 for i in range(y.size):
                     y[i] += p[i]
-                set_slides(y[0], y[1:], c)
+                set_slides(y[0], y[1:], contact)
                 return (free - y[0]) / beta, count
         part = 1.0
         low = 0.0
@@ -321,7 +322,7 @@ def minimise(free, beta, kind, ending, c, goal):
         for _ in range(40):
             for i in range(y.size):
                 trial[i] = y[i] + part * p[i]
-            force = write_gradient(trial, free, beta, kind, ending, c, g)
+            force = write_gradient(trial, free, beta, kind, ending, contact, g)
             rise = 0.0
             for i in range(y.size):
                 rise += g[i] * p[i]
@@ -331,14 +332,14 @@ def minimise(free, beta, kind, ending, c, goal):
             part = safe_point(low, high, max(0.1, -fall / (rise - fall)) * part)
         for i in range(y.size):
             y[i] = trial[i]
-        new = find_largest_residual(g, c.scale)
+        new = find_largest_residual(g, contact.scale)
         if new <= max(goal, noise + 4e-16 * abs(force)):
             return force, count + 1
         if count > 0:
             if new > 0.1 * size or part < 1.0:
-                c.ready[which] = 0.0
+                contact.ready[which] = 0.0
             stall = stall + 1 if new >= 0.5 * least and not stale else 0
-            stale = c.ready[which] == 1.0
+            stale = contact.ready[which] == 1.0
             if stall >= 4 and new <= GOAL_SLACK * goal:
                 return force, count
         size = new
@@ -347,15 +348,15 @@ def minimise(free, beta, kind, ending, c, goal):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def accept_step(c):
+def accept_step(contact):
     """Move the pieces by a solved step, and extrapolate the next guess from three steps."""
-    y = c.y[0]
-    last = c.last
-    for k in range(c.b.size):
-        c.b[k] += y[k + 1]
+    y = contact.y[0]
+    last = contact.last
+    for k in range(contact.b.size):
+        contact.b[k] += y[k + 1]
     for k in range(y.size):
         here = y[k]
         y[k] = 3 * (here - last[0, k]) + last[1, k]
         last[1, k] = last[0, k]
         last[0, k] = here
-    c.ready[:] = 0.0
+    contact.ready[:] = 0.0

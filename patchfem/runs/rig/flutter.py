@@ -53,13 +53,13 @@ def find_limit_cycles(run) -> tuple:
         if run.raw.outcome is Outcome.EXCEEDS_TRAVEL and model.rig.springs.travel == MAX_TRAVEL
         else []
     )
-    edges = [one for one in found if not one.lasts]
+    edges = [one for one in found if not one.is_stable]
     if not edges:
         return {NAME: Measure(None, unit, None, floor, reason=reason)}, far
     edge = edges[-1]
-    below = [one for one in found if one.lasts and one.amplitude < edge.amplitude][-1:]
+    below = [one for one in found if one.is_stable and one.amplitude < edge.amplitude][-1:]
     least = [
-        one for one in found if not one.lasts and below and one.amplitude < below[0].amplitude
+        one for one in found if not one.is_stable and below and one.amplitude < below[0].amplitude
     ][-1:]
     # a rigid interface with a single mode does not vibrate during stick
     alone = law_has_trait(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1

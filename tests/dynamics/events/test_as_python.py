@@ -56,7 +56,7 @@ def motion_of(seed: int, n_modes: int, n_interfaces: int, kind: str, drive) -> d
     run = histories.simulate(modes, drive, groups, 12.0, window=5)
     names = ("time", "modal", "modal_rate", "force", "slip")
     return {
-        "events": (run.events, run.log.count, run.log.what.tolist()),
+        "events": (run.events, run.log.count, run.log.kind.tolist()),
         "histories": {name: getattr(run.response, name) for name in names},
         "readings": (run.reading.run, run.reading.faces),
     }

@@ -103,7 +103,7 @@ def test_exact_many_stops_below_resonance(level, ratio, wanted):
     modes, drive = basis_of(1.0, 0.0005), SineDrive(level, ratio)
     found = steady(modes, drive, 1.0, 1.0)
     done = simulate(modes, drive, 1.0, 1.0, 80, 10)
-    stops = np.count_nonzero((done.log.what == 0) & (done.log.time > 70 * drive.period)) / 10
+    stops = np.count_nonzero((done.log.kind == 0) & (done.log.time > 70 * drive.period)) / 10
     assert found.stops == (stops,) == (wanted,) and found.regime == f"{wanted} stops"
     low, high = done.amplitudes[-1]
     assert found.amplitude == pytest.approx((high - low) / 2, rel=1e-10)

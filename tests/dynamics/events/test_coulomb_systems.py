@@ -86,7 +86,7 @@ def test_exact_steps_and_sines_in_turn_against_dop853():
         np.testing.assert_allclose([s(0.0) for s in found[k].modal], z, atol=1e-9)
     done = simulate(modes, drive, static, static, 5.0, 2)
     assert energy_balance(done.ledger) < 1e-10
-    assert np.count_nonzero(done.log.what == BORDER) == 3
+    assert np.count_nonzero(done.log.kind == BORDER) == 3
 
 
 def test_order_dependent_interfaces_against_a_march():
@@ -154,7 +154,7 @@ def test_exact_slides_do_not_move_in_stick():
     )
     stuck = 0
     for c in range(3):
-        mine = np.flatnonzero((log.interface == c) & (log.what == STOP))
+        mine = np.flatnonzero((log.interface == c) & (log.kind == STOP))
         for k in mine:
             later = np.flatnonzero((log.interface == c) & (log.time > log.time[k]))
             end = log.time[later[0]] if later.size else np.inf
@@ -297,7 +297,7 @@ def test_exact_belt():
     modes = basis_of([1.0, 0.0], 0.0, [[1.0, -tiny]], (0, 0), (1, 0))
     begin = InitialState(np.zeros(2), np.array([speed, speed / tiny]))
     done = simulate(modes, drives.make_release(2 * pi), 1.0, 0.6, 30.0, 10, start=begin)
-    releases = done.log.time[np.abs(done.log.what) == RELEASE]
+    releases = done.log.time[np.abs(done.log.kind) == RELEASE]
     np.testing.assert_allclose(np.diff(releases)[2:], 8 + 2 * (pi - atan(4)), atol=1e-9)
     assert 8 + 2 * (pi - atan(4)) == pytest.approx(11.6315499798, abs=1e-10)
     assert done.amplitudes[-5:, 1].max() == pytest.approx(0.6 + sqrt(0.17), abs=1e-10)
@@ -355,7 +355,7 @@ def test_exact_force_drive_leaves_the_frame_at_rest():
 
 def test_table_check_9_waveform():
     done = simulate(basis_of(1.0, 0.003), SineDrive(1.0, 1.0), 0.82802, 0.82802, 200)
-    stops = done.log.phase[-9:][done.log.what[-9:] == STOP] % pi
+    stops = done.log.phase[-9:][done.log.kind[-9:] == STOP] % pi
     np.testing.assert_allclose(np.degrees(starts(done)), 42.69, atol=0.03)
     np.testing.assert_allclose(np.degrees(stops), 164.09, atol=0.03)
     w = done.window

@@ -124,7 +124,7 @@ def columns(one, drive, point, half, step):
     for k in range(point.numbers.size):
         move = step * np.eye(point.numbers.size)[k]
         ends = [
-            one(drive, point.moved(point.numbers + side * move), half, False).end.numbers
+            one(drive, point.with_numbers(point.numbers + side * move), half, False).end.numbers
             for side in (1, -1)
         ]
         out.append((ends[0] - ends[1]) / (2 * step))

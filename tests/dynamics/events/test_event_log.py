@@ -36,7 +36,7 @@ def one_mode(zeta=0.003, slide=1.0):
 def test_exact_borders_of_levels_are_listed():
     modes, drive = one_mode(0.05), make_levels([1.0, 2.0, 0.5, 1.5], 0.9, 3)
     log = event_run.simulate(modes, drive, 0.6, 0.6, 12, 2).log
-    assert log.time[log.what == event_list.BORDER] == pytest.approx(
+    assert log.time[log.kind == event_list.BORDER] == pytest.approx(
         2 * np.pi / 0.9 * np.array([3, 6, 9])
     )
 
@@ -65,7 +65,7 @@ def test_exact_the_last_events_are_kept_and_all_counted():
     first_kept = log.count - event_list.MAX_EVENTS
     assert log.time[0] == pytest.approx(drive.period * first_kept / 4, abs=50 * drive.period)
     assert cycles - 1 < log.time[-1] / drive.period <= cycles
-    np.testing.assert_array_equal(log.what[-4:], log.what[-8:-4])
+    np.testing.assert_array_equal(log.kind[-4:], log.kind[-8:-4])
 
 
 def test_exact_events_of_the_drive_at_the_onset():

@@ -131,7 +131,7 @@ def test_exact_stiff_face_slides_once_a_record_passes_its_limit():
 
 def test_exact_the_end_of_a_record_is_a_border_where_it_jumps():
     done = simulate(basis_of([1.0]), record(4), 5.0, 5.0, 8.0, 2)
-    assert list(done.log.what) == [BORDER] and done.log.time[0] == pytest.approx(30.0)
+    assert list(done.log.kind) == [BORDER] and done.log.time[0] == pytest.approx(30.0)
 
 
 def test_always_the_energy_of_a_sweep_and_a_record_balances():

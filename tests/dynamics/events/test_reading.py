@@ -134,7 +134,7 @@ def test_exact_releases_are_those_of_the_log():
     """Mean phase modulo pi of the releases of the first interface within the window."""
     modes, groups = basis(1.0, 0.05), [make_elements([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])]
     _, rows, done = run_of(modes, SineDrive(1.5, 1.3), groups)
-    late = (done.log.time > rows[0, 0]) & (np.abs(done.log.what) == 1)
+    late = (done.log.time > rows[0, 0]) & (np.abs(done.log.kind) == 1)
     assert late.sum() == done.reading.run[RUN.n_releases] > 4
     wanted = np.angle(np.mean(np.exp(2j * done.log.phase[late]))) / 2 % np.pi
     assert done.reading.start == pytest.approx(wanted, abs=1e-12)

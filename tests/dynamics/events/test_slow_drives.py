@@ -34,7 +34,7 @@ def same(one, two, share=2e-12, fewer=1 / 2):
     size = np.abs(two.amplitudes).max()
     np.testing.assert_allclose(one.amplitudes, two.amplitudes, rtol=0, atol=1e-12 * size)
     np.testing.assert_allclose(one.phasors, two.phasors, rtol=0, atol=1e-11 * size)
-    np.testing.assert_array_equal(one.log.what, two.log.what)
+    np.testing.assert_array_equal(one.log.kind, two.log.kind)
     np.testing.assert_allclose(one.log.time, two.log.time, rtol=0, atol=share * two.reading.period)
     np.testing.assert_array_equal(one.log.interface, two.log.interface)
     for name in ("work_in", "viscous", "friction", "stored"):

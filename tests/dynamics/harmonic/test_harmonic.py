@@ -345,4 +345,4 @@ def test_refuses_to_call_an_unbalanced_motion_steady():
     group = LawGroup(modes, Jenkins([10.0], [0.08]), 256)
     balance = make_balance(modes, group, 256)
     with pytest.raises(NotConverged, match="did not converge in"):
-        solve_newton(balance, np.full(15, 3.0), 1.0, 1.0, 7, most=2)
+        solve_newton(balance, np.full(15, 3.0), 1.0, 1.0, 7, max_steps=2)

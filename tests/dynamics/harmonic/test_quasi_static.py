@@ -98,7 +98,7 @@ def test_exact_two_modes_hold_at_the_least_energy():
         lambda x: 1e3 * energy(share * shape + x[0] * share * across), [0.0], tol=1e-14
     )
     assert found.z == pytest.approx(share * (shape + least.x[0] * across), rel=1e-5)
-    assert found.share == pytest.approx(share, rel=1e-12)
+    assert found.amplitude == pytest.approx(share, rel=1e-12)
 
 
 def test_refuses_friction_that_follows_the_speed():
