@@ -43,16 +43,13 @@ class Branch:
     @property
     def values(self) -> np.ndarray:
         """Value of the parameter at every point (k,) [Hz] or [m s-2]."""
-        return np.array(
-            [
-                p.omega / (2 * np.pi) if self.parameter == "frequency" else p.level
-                for p in self.points
-            ]
-        )
+        if self.parameter == "frequency":
+            return np.array([point.omega / (2 * np.pi) for point in self.points])
+        return np.array([point.level for point in self.points])
 
     def amplitudes(self, row) -> np.ndarray:
         """Return half the range [m] of row @ coordinates at every point (k,)."""
-        return np.array([p.amplitude(row) for p in self.points])
+        return np.array([point.amplitude(row) for point in self.points])
 
 
 def trace_over_frequency(
@@ -77,10 +74,8 @@ def trace_over_frequency(
     -------
     Branch
     """
-    drives = [
-        replace(drive, omega=2 * np.pi * f)
-        for f in _check_values(frequencies, "drive.frequency: a frequency response", "frequencies")
-    ]
+    checked = _check_values(frequencies, "drive.frequency: a frequency response", "frequencies")
+    drives = [replace(drive, omega=2 * np.pi * frequency) for frequency in checked]
     return _trace("frequency", modes, drives, group, CurveNumerics(**how), stability)
 
 
@@ -92,7 +87,7 @@ def trace_over_level(
     Parameters
     ----------
     modes, drive, group, stability, **how
-        As of `response`.
+        As of `trace_over_frequency`.
     accelerations : sequence of float
         As `frequencies` there [m s-2].
 
@@ -100,12 +95,10 @@ def trace_over_level(
     -------
     Branch
     """
-    drives = [
-        replace(drive, acceleration=float(a))
-        for a in _check_values(
-            accelerations, "drive.acceleration: a sweep of the drive level", "amplitudes"
-        )
-    ]
+    checked = _check_values(
+        accelerations, "drive.acceleration: a sweep of the drive level", "amplitudes"
+    )
+    drives = [replace(drive, acceleration=float(acceleration)) for acceleration in checked]
     return _trace("level", modes, drives, group, CurveNumerics(**how), stability)
 
 
@@ -132,14 +125,12 @@ def _check_values(given, what: str, noun: str) -> np.ndarray:
 
 
 def _trace(parameter: str, modes, drives, group, how: CurveNumerics, stability: bool) -> Branch:
-    found = (_solve_curve if len(drives) == 2 else _solve_each)(
-        modes, drives, make_group(modes, group), parameter, how
-    )
-    return (
-        replace(found, points=tuple(add_stability(p, modes) for p in found.points))
-        if stability
-        else found
-    )
+    """Return the branch through the drives, with its stability if that is requested."""
+    solve = _solve_curve if len(drives) == 2 else _solve_each
+    branch = solve(modes, drives, make_group(modes, group), parameter, how)
+    if not stability:
+        return branch
+    return replace(branch, points=tuple(add_stability(point, modes) for point in branch.points))
 
 
 def _solve_each(modes, drives, group, parameter, how: CurveNumerics) -> Branch:
@@ -196,27 +187,23 @@ def _follow_harmonics(modes, drives, group, parameter, h, first, longest) -> tup
 
         settings = PathSettings(first_step=longest / 4, max_step=longest)
         path = follow_curve(system, x, ends[0], (min(ends), max(ends)), ends[1] > ends[0], settings)
+        key = "omega" if frequency else "acceleration"
         made = [
-            make_point(
-                balance,
-                v,
-                replace(drives[0], **{"omega" if frequency else "acceleration": float(p)}),
-                h,
-            )
+            make_point(balance, v, replace(drives[0], **{key: float(p)}), h)
             for v, p in zip(path.x, path.p)
         ]
-        widest = np.max(
-            [
-                np.ptp(evaluate_series(p.coefficients, 2 ** (h + 64).bit_length()), axis=1) / 2
-                for p, _ in made
-            ],
-            axis=0,
-        )
+        widest = np.max([_find_amplitude(p.coefficients, h + 64) for p, _ in made], axis=0)
         want = group.samples or group.samples_for(h, widest)
         if want <= samples:
             break
         samples = want
     return tuple(p for p, _ in made), max(a for _, a in made), path, 2 * np.pi if frequency else 1.0
+
+
+def _find_amplitude(coefficients, min_samples: int):
+    """Return half the range (...) of slides with harmonics (..., H + 1), from samples of a cycle."""
+    samples = evaluate_series(coefficients, 2 ** min_samples.bit_length())
+    return np.ptp(samples, axis=-1) / 2
 
 
 def measure_distance(one: SteadyMotion, other: SteadyMotion, width: float) -> float:
@@ -389,9 +376,7 @@ def find_backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -
     found = trace_free_motions(FreeBalance(balance, mode, harmonics, omega), wanted, omega, shape)
     k = np.arange(harmonics + 1)
     loss = [np.pi * float(np.sum(k * (np.conj(f.slides) * f.forces).imag)) for f in found]
-    slide = [
-        np.ptp(evaluate_series(f.slides[0], 2 ** (harmonics + 128).bit_length())) / 2 for f in found
-    ]
+    slide = [_find_amplitude(f.slides[0], harmonics + 128) for f in found]
     return Backbone(
         wanted,
         np.array([f.omega for f in found]) / (2 * np.pi),

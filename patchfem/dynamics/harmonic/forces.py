@@ -57,15 +57,13 @@ class LawGroup:
         change: (stiffness (t,) [N/m], yield slide (t,) [m]) -> the same of other elements.
         """
         other = self.with_samples(self.samples)
-        other.laws = [
-            tuple(
-                Jenkins(*change(one.stiffness, one.limit_slide))
-                if isinstance(one, Jenkins)
-                else one
-                for one in laws
-            )
-            for laws in self.laws
-        ]
+
+        def replace_elements(law):
+            if isinstance(law, Jenkins):
+                return Jenkins(*change(law.stiffness, law.limit_slide))
+            return law
+
+        other.laws = [tuple(map(replace_elements, laws)) for laws in self.laws]
         return other
 
     def samples_for(self, harmonics: int, amplitudes=None) -> int:
@@ -76,25 +74,18 @@ class LawGroup:
         What aliases is the corner of a law, so a law counts by the root of its fraction of all
         corners.
         """
-        want = max(MIN_SAMPLES, 12 * harmonics)
+        samples = max(MIN_SAMPLES, 12 * harmonics)
+        corners = []
         if amplitudes is not None:
-            found = [
-                (law.total * a, law.count_samples(a))
-                for a, laws in zip(amplitudes, self.laws)
-                for law in laws
-            ]
-            whole = sum(corner for corner, sharp in found if sharp)
-            want = max(
-                [
-                    want,
-                    *(
-                        sharp * np.sqrt(corner / whole)
-                        for corner, sharp in found
-                        if sharp and whole > 0
-                    ),
-                ]
-            )
-        return int(min(2 ** int(np.ceil(np.log2(want))), MAX_SAMPLES))
+            for amplitude, laws in zip(amplitudes, self.laws):
+                for law in laws:
+                    if n_samples := law.count_samples(amplitude):
+                        corners.append((law.total * amplitude, n_samples))
+        total = sum(size for size, _ in corners)
+        if total > 0:
+            for size, n_samples in corners:
+                samples = max(samples, n_samples * np.sqrt(size / total))
+        return int(min(2 ** int(np.ceil(np.log2(samples))), MAX_SAMPLES))
 
     def stiffness(self) -> np.ndarray:
         """Return the tangent stiffness of every row at rest (i,) [N/m]."""
@@ -135,11 +126,9 @@ class LawGroup:
         -------
         ndarray
         """
+        tracks = self.tracks(q, omega, samples)
         return np.array(
-            [
-                sum(law.sample(track).force for law in laws)
-                for track, laws in zip(self.tracks(q, omega, samples), self.laws)
-            ]
+            [sum(law.sample(track).force for law in laws) for track, laws in zip(tracks, self.laws)]
         )
 
     def force(self, q, omega: float, harmonics: int, samples: int) -> np.ndarray:
@@ -159,9 +148,8 @@ class LawGroup:
 
     def __call__(self, q, omega: float) -> ContactResponse:
         tracks = self.tracks(q, omega)
-        return find_response(
-            tracks, [[law.sample(track) for law in laws] for track, laws in zip(tracks, self.laws)]
-        )
+        sampled = [[law.sample(track) for law in laws] for track, laws in zip(tracks, self.laws)]
+        return find_response(tracks, sampled)
 
 
 def find_response(tracks: list, sampled: list) -> ContactResponse:
@@ -177,22 +165,12 @@ def find_response(tracks: list, sampled: list) -> ContactResponse:
     rows = len(tracks)
     h = x.shape[1] - 1
 
-    def added(name):
-        return [
-            _add_arrays(
-                [
-                    getattr(s, name)
-                    for s in laws
-                    if getattr(s, name) is not None and (s.tangent is None or name == "force")
-                ]
-            )
-            for laws in sampled
-        ]
-
-    rates = added("by_rate")
-    holds = added("hold")
+    rates = [_sum_laws(laws, "by_rate") for laws in sampled]
+    holds = [_sum_laws(laws, "hold") for laws in sampled]
+    forces = [_sum_laws(laws, "force") for laws in sampled]
+    slopes = [_sum_laws(laws, "slope") for laws in sampled]
     moving = any(one is not None for one in rates)
-    lines = [*added("force"), *added("slope"), *(rates if moving else ())]
+    lines = [*forces, *slopes, *(rates if moving else ())]
     lines = [np.zeros(samples) if line is None else line for line in lines]
     found = find_harmonics(
         np.concatenate([np.array(lines), *(hold for hold in holds if hold is not None)]), 2 * h
@@ -228,8 +206,18 @@ def find_response(tracks: list, sampled: list) -> ContactResponse:
     return ContactResponse(found[:rows, : h + 1], slope, rate if turns else None)
 
 
-def _add_arrays(arrays: list):
-    return None if not arrays else arrays[0] if len(arrays) == 1 else sum(arrays)
+def _sum_laws(laws: list, name: str) -> np.ndarray | None:
+    """Return the sum of a field over the SampledForces of a row, None where no law has it.
+
+    A law with a tangent counts by its force alone.
+    """
+    total = None
+    for sampled in laws:
+        values = getattr(sampled, name)
+        if values is None or (sampled.tangent is not None and name != "force"):
+            continue
+        total = values if total is None else total + values
+    return total
 
 
 @lru_cache(maxsize=16)
