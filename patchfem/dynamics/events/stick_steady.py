@@ -231,7 +231,7 @@ def map_period(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Cou
 
     Returns
     -------
-    PeriodMapping
+    CoulombPeriodMapping
         Its slope is the product of those of the phases and of the saltation matrices of the
         events.
     """

@@ -52,7 +52,7 @@ def test_exact_the_last_cycles_after_a_million_others():
     for name in ("output_amplitude", "acceleration_peak"):
         assert getattr(many.fine, name) == pytest.approx(getattr(few.fine, name), rel=1e-7)
     for name in ("max_force", "work", "displacement_harmonic"):
-        one, other = (abs(getattr(run.fine.loops[0], name)) for run in (many, few))
+        one, other = (abs(getattr(run.integrated.loops[0], name)) for run in (many, few))
         assert one == pytest.approx(other, rel=1e-7)
 
 

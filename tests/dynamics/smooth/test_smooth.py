@@ -154,7 +154,7 @@ def test_exact_a_stuck_contact_is_a_spring():
     small = SineDrive(1e-4, OMEGA)
     done = simulate(ONE, small, element(SHORT), 40, 1e-10, 1)
     stiff = OMEGA**2 + 0.3 * LOAD / SHORT.length / MASS
-    ratio = done.fine.loops[0].displacement_harmonic / done.fine.loops[0].force_harmonic
+    ratio = done.integrated.loops[0].displacement_harmonic / done.integrated.loops[0].force_harmonic
     assert ratio == pytest.approx(SHORT.length / (0.3 * LOAD), rel=1e-4)
     decay, time = ONE.zeta[0] * ONE.omega[0], done.response.time
     turn = np.sqrt(stiff - decay**2)
