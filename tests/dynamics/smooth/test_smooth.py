@@ -107,15 +107,15 @@ def test_exact_breakaway_is_the_march_at_many_steps():
     for steps in (1600, 6400):
         done = march(ONE, SINE, points_model(law, [1.0], [LOAD]), 4, steps, 1)
         errors.append(
-            abs(np.ptp(done.window.output) / 2 - fine.fine.output_amplitude)
-            / fine.fine.output_amplitude
+            abs(np.ptp(done.window.output) / 2 - fine.integrated.output_amplitude)
+            / fine.integrated.output_amplitude
         )
     assert errors[1] < 2e-5 and errors[1] < 0.2 * errors[0]
 
 
 def test_order_of_the_error_follows_the_tolerance():
     found = [
-        simulate(ONE, SINE, element(SHORT), 6, tolerance, 1).fine.output_amplitude
+        simulate(ONE, SINE, element(SHORT), 6, tolerance, 1).integrated.output_amplitude
         for tolerance in (1e-6, 1e-9, 1e-13)
     ]
     coarse, fine = (abs(value - found[-1]) / found[-1] for value in found[:2])
