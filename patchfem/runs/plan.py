@@ -159,14 +159,12 @@ def compile_words(seconds: float) -> str:
     return f" (and {seconds:.0f} s once for compiling)" if seconds else ""
 
 
-def plan(asked, per_point: bool = False) -> Plan:
+def plan(asked) -> Plan:
     """Return the Plan of a Scene or a Model from its numbers, without a mesh or a solution.
 
     Parameters
     ----------
     asked : Scene or Model
-    per_point : bool
-        Whether bonds are followed at every node although a single point would do.
 
     Raises
     ------
@@ -175,10 +173,10 @@ def plan(asked, per_point: bool = False) -> Plan:
     """
     model = asked if isinstance(asked, Model) else build(asked)
     with locate_errors(model.source):
-        return _make_plan(model, per_point)
+        return _make_plan(model)
 
 
-def _make_plan(model: Model, per_point: bool) -> Plan:
+def _make_plan(model: Model) -> Plan:
     """Return the Plan of a Model."""
     if model.measured is not None:
         try:
@@ -199,7 +197,7 @@ def _make_plan(model: Model, per_point: bool) -> Plan:
     if model.rig is not None:
         chain = of_rig.chain(model.rig) | chain
         groups |= of_rig.groups(model) if model.kind == "rig" else {}
-        on_motion += engines.unused_settings(model, engines.choose_engine(model, per_point).name)
+        on_motion += engines.unused_settings(model, engines.choose_engine(model).name)
     if model.patch is not None:
         chain |= patch_plan.chain(model.patch)
         groups |= patch_plan.groups(model)
@@ -212,7 +210,7 @@ def _make_plan(model: Model, per_point: bool) -> Plan:
                 if link != "rigid"
             }
             on_patch += patch_plan.face_words(model.rig.friction.names[number], one)
-    cost = _cost(model, per_point)
+    cost = _cost(model)
     on_law += cost.words
     if model.kind == "bench":
         groups = of_bench.groups(model) | groups
@@ -247,7 +245,7 @@ def _make_plan(model: Model, per_point: bool) -> Plan:
     )
 
 
-def _cost(model: Model, per_point: bool) -> Cost:
+def _cost(model: Model) -> Cost:
     """Return the cost of all steps of a run, its memory from the largest part to the smallest."""
     pressing = (
         patch_plan.cost(model) if model.patch is not None or model.has_interface_patches else Cost()
@@ -255,7 +253,7 @@ def _cost(model: Model, per_point: bool) -> Cost:
     points = pressing.sizes.get("interface_points", 1)
     motion = Cost()
     if model.rig is not None:
-        motion = of_rig.cost(model, per_point, points)
+        motion = of_rig.cost(model, points)
     elif model.kind == "bench":
         motion = of_bench.cost(model, points)
     total = (

@@ -58,7 +58,6 @@ def run(
     what,
     say=None,
     progress=None,
-    per_point: bool = False,
     estimate: bool = True,
     fresh: bool = False,
     kept: StateFile | None = None,
@@ -72,8 +71,6 @@ def run(
         Callback for a line of text when code has to be compiled.
     progress : callable, optional
         Callback for the completed fraction: of all passes of a rig, of the main pass of a bench.
-    per_point : bool
-        Whether every interface point is followed although a single point would do.
     estimate : bool
         If False, there are no coarse runs and the errors are None.
     fresh : bool
@@ -92,15 +89,13 @@ def run(
     Missing
         If the scene cannot be run.
     """
-    what = what if isinstance(what, Plan) else plan(what, per_point)
+    what = what if isinstance(what, Plan) else plan(what)
     with locate_errors(what.model.source):
         refuse_size(what)
-        return _run(what, say, progress, per_point, estimate, fresh, kept)
+        return _run(what, say, progress, estimate, fresh, kept)
 
 
-def _run(
-    what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool, kept: StateFile | None
-) -> Result:
+def _run(what: Plan, say, progress, estimate: bool, fresh: bool, kept: StateFile | None) -> Result:
     """Run a plan whose size was accepted; the parameters are those of `run`."""
     begin, model = perf_counter(), what.model
     seconds, warnings, notes = {}, list(model.source.remarks), list(model.source.notes)
@@ -167,9 +162,7 @@ def _run(
         solve = getattr(import_module(f"patchfem.runs.{module}"), function)
         try:
             with _saving_context(kept, what, patch):
-                result = solve(
-                    here, patch, coarse, seconds, warnings, say, progress, per_point, estimate
-                )
+                result = solve(here, patch, coarse, seconds, warnings, say, progress, estimate)
         except NotConverged as error:
             if patch is not None and what.kind != "patch":
                 at_rest = patch_result.static(what, patch, coarse, seconds, [*warnings, AT_REST])

@@ -43,9 +43,7 @@ MAX_EXTRA_CYCLES = 4  # further cycles in which a steady loop is searched for
 MOST_TRIED = 2e6  # most evaluations (points times samples) of this search
 
 
-def run_prescribed(
-    what, patch, coarse, seconds, warnings, say, progress, per_point, estimate
-) -> Result:
+def run_prescribed(what, patch, coarse, seconds, warnings, say, progress, estimate) -> Result:
     """Run a plan of kind bench; the parameters are those of `run.run`."""
     model, f = what.model, what.model.friction
     if law_has_trait(f.law, "bonds"):

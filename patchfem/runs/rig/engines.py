@@ -489,23 +489,17 @@ def describe_balance_error(engine: Engine, measures: dict) -> str:
 
 
 @lru_cache(8)
-def choose_engine(model: Model, per_point: bool = False) -> Engine:
+def choose_engine(model: Model) -> Engine:
     """Return the engine of a model.
 
     It is the one that the scene names (of several with this name the first that can compute the
     model), else the first of AUTOMATIC that can compute it and is not more expensive than the next
     one.
-
-    per_point: whether bonds are followed at every node, which the smooth engine cannot do.
     """
     named = [one for one in ENGINES.values() if one.method == model.accuracy.method]
     if named:
         return next((one for one in named if len(named) > 1 and not one.lacks(model)), named[-1])
-    return next(
-        one
-        for one in AUTOMATIC
-        if not (one.lacks(model) or one.why_not_cheapest(model) or (per_point and one is SMOOTH))
-    )
+    return next(one for one in AUTOMATIC if not (one.lacks(model) or one.why_not_cheapest(model)))
 
 
 def unused_settings(model: Model, engine: str) -> list:

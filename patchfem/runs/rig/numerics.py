@@ -71,14 +71,12 @@ class Numerics:
         )
 
 
-def choose(model: Model, per_point: bool = False) -> Numerics:
+def choose(model: Model) -> Numerics:
     """Return engine and numerical settings of a coupled run, from the scene or its tolerance.
 
     Parameters
     ----------
     model : Model
-    per_point : bool
-        Whether bonds are followed at every node.
 
     Raises
     ------
@@ -86,7 +84,7 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
         For a method that cannot do it.
     """
     accuracy, rig = model.accuracy, model.rig
-    engine = choose_engine(model, per_point)
+    engine = choose_engine(model)
     window = int(max(1, min(10, (rig.drive.cycles + WHOLE_CYCLE_TOL) // 10)))
     # the window is the whole record except the transient at its start
     if rig.drive.waveform.is_random:
@@ -112,7 +110,7 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
         rig.drive.cycles,
         window,
         accuracy.shear_modes,
-        per_point or model.side == "lower",
+        model.side == "lower",
         frozenset(pinned),
     )
     return engine.call("choose_numerics", model, found) or found

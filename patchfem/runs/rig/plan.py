@@ -144,18 +144,16 @@ def mode_frequencies(rig, chain: dict) -> list:
     return out
 
 
-def cost(model: Model, per_point: bool, points: int) -> Cost:
+def cost(model: Model, points: int) -> Cost:
     """Return the cost of a coupled run.
 
     Parameters
     ----------
     model : Model
-    per_point : bool
-        Whether bonds are followed at every node.
     points : int
         Nodes of the interface; 1 without a patch.
     """
-    rig, numerics = model.rig, choose(model, per_point)
+    rig, numerics = model.rig, choose(model)
     engine = ENGINES[numerics.engine]
     count = len(rig.structure.frequencies)
     rows = len(getattr(rig.drive.signal, "breaks", ())) if not rig.drive.signal.segments else 0

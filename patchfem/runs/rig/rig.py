@@ -66,9 +66,7 @@ class Coupled:
         return self.model.friction is not None
 
 
-def run_coupled(
-    what, patch, coarse, seconds, warnings, say, progress, per_point, estimate
-) -> Result:
+def run_coupled(what, patch, coarse, seconds, warnings, say, progress, estimate) -> Result:
     """Run a plan of kind rig or linear.
 
     The parameters are those of `run.run`; patch and coarse belong to its [contact].
@@ -79,7 +77,7 @@ def run_coupled(
             "the drive excites no mode, so nothing moves; give a mode the key `base` or `output`",
             "drive.kind",
         )
-    numerics = choose(model, per_point)
+    numerics = choose(model)
     engine = ENGINES[numerics.engine]
     engine.call("refuse", model, numerics)
     raw, numerics, measures = _solve(
