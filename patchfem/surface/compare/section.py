@@ -18,9 +18,10 @@ from .robust import MAX_NOISE, MAX_OUTLIER, MAX_UNWORN
 FALSE_POSITIVE_RATE = 1e-3
 N_TESTS = 4  # number of tests of each height: by itself, and by means of 4, 16 and 64 samples
 # standard deviations of the depth to which a flank is fitted; up to 10 of them, a straight flank
-# cannot be told from one that runs out flat
+# cannot be told from one that runs out flat; above half of the depth, the floor begins
 FLANK_HEIGHT = 25.0
-MIN_CLIFF = 10.0  # standard deviations of the depth that a cliff reaches at least
+# standard deviations of the depth that a cliff reaches at least, and to which all flanks are fitted
+MIN_CLIFF = 10.0
 MIN_FLANK_SAMPLES = 12  # samples of a flank, and of the unworn heights beside it
 # largest number of samples that are tried as the first worn one, which limits the time
 MAX_CANDIDATES = 160
@@ -198,7 +199,9 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
         First sample that is known as worn.
     """
     relative = depth / noise
-    deep = np.flatnonzero(relative[worn:] > FLANK_HEIGHT)
+    half_depth = float(relative[worn:].max(initial=0.0)) / 2
+    height = min(FLANK_HEIGHT, max(half_depth, MIN_CLIFF))
+    deep = np.flatnonzero(relative[worn:] > height)
     reach = max(int(deep[0]) if deep.size else depth.size - worn, MIN_FLANK_SAMPLES)
     high = min(worn + reach, depth.size)
     is_certain = relative > noise_threshold(depth.size)
