@@ -8,6 +8,7 @@ and the steps.
 
 from dataclasses import dataclass
 from math import ceil, inf, sqrt
+from typing import NamedTuple
 
 from ... import cost_model
 from .list_forms_kernels import (
@@ -98,14 +99,25 @@ def unsupported_reason(engine: str, reading: str, order: float) -> str:
     return ""
 
 
+class RequestedEngine(NamedTuple):
+    """Engine and settings that a scene prescribes.
+
+    - name: name of the engine, or "auto"
+    - tail: fraction of the friction limit that the cut-off may lose, None if it is not prescribed
+    - merge: width [eps_0] up to which strips are merged, None if it is not prescribed
+    """
+
+    name: str = "auto"
+    tail: float | None = None
+    merge: float | None = None
+
+
 def choose_engine(
     law: Bonds,
     tolerance: float,
     stroke: float,
     steps: float,
-    engine: str = "auto",
-    tail: float | None = None,
-    merge: float | None = None,
+    requested: RequestedEngine | None = None,
 ) -> EngineChoice:
     """Choose the cheapest engine whose error bound meets a tenth of the tolerance.
 
@@ -116,10 +128,8 @@ def choose_engine(
         Relative tolerance of the run.
     stroke, steps : float
         Path between two reversals [eps_0], and steps on it.
-    engine : str
-        Engine that must be used, or "auto".
-    tail, merge : float, optional
-        Settings that must be used.
+    requested : RequestedEngine, optional
+        Engine and settings that must be used.
 
     Returns
     -------
@@ -130,6 +140,7 @@ def choose_engine(
     ValueError
         If the engine cannot sum the law.
     """
+    engine, tail, merge = requested or RequestedEngine()
     reason = unsupported_reason(engine, law.reading, law.order)
     if reason:
         raise ValueError(f"{engine} {reason}")

@@ -451,12 +451,12 @@ def _gauss_path_ratios(path, mature, bonds, k):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _sum_gauss_growing(displacement, path, mature, bonds, first, end, p):
+def _sum_gauss_growing(displacement, path, mature, bonds, strips, p):
     """Sum W/2 f(R/eps) sgn u, and this times |u|, over both Gauss points of growing strips."""
     force = 0.0
     energy = 0.0
     if p == 1.0:
-        for k in range(uint64(first), uint64(end)):
+        for k in range(uint64(strips.first), uint64(strips.end)):
             u_1, u_2 = _gauss_stretches(displacement, bonds, k)
             x_1, x_2 = _gauss_path_ratios(path, mature, bonds, k)
             force_1 = bonds[STRIP.weight, k] * x_1 * fast_exp(-x_1)
@@ -464,7 +464,7 @@ def _sum_gauss_growing(displacement, path, mature, bonds, first, end, p):
             force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
             energy += force_1 * abs(u_1) + force_2 * abs(u_2)
     else:
-        for k in range(uint64(first), uint64(end)):
+        for k in range(uint64(strips.first), uint64(strips.end)):
             u_1, u_2 = _gauss_stretches(displacement, bonds, k)
             x_1, x_2 = _gauss_path_ratios(path, mature, bonds, k)
             force_1 = bonds[STRIP.weight, k] * fast_exp(p * fast_log(x_1) - x_1)
@@ -563,7 +563,7 @@ def _spread_growing_strip(displacement, path, mature, bonds, k, p):
     average = average_spread(displacement, low, high, 0.0)
     # outside the strip all bonds have the same direction, so the sum is what they carry
     beyond = high + bonds[STRIP.clock_width, k]
-    carried = _sum_gauss_growing(beyond, path, mature, bonds, k, k + 1, p).force
+    carried = _sum_gauss_growing(beyond, path, mature, bonds, StripRange(k, k, k + 1), p).force
     return BondSum(average.force * carried, average.energy * carried)
 
 
@@ -589,7 +589,7 @@ def sum_growing(displacement, path, mature, bonds, strips, law):
     """
     p = law[LAW.order]
     merge_width = law[LAW.merge_width] * law[LAW.length]
-    total = _sum_gauss_growing(displacement, path, mature, bonds, strips.first, strips.end, p)
+    total = _sum_gauss_growing(displacement, path, mature, bonds, strips, p)
     force = total.force
     energy = total.energy
     for k in range(strips.first, strips.end):
@@ -600,7 +600,8 @@ def sum_growing(displacement, path, mature, bonds, strips, law):
         is_young = _is_steep(p) and near <= 3 * width
         if from_start * from_end >= 0 and not is_young:
             continue
-        gauss = _sum_gauss_growing(displacement, path, mature, bonds, k, k + 1, p)
+        strip = StripRange(k, k, k + 1)
+        gauss = _sum_gauss_growing(displacement, path, mature, bonds, strip, p)
         is_narrow = width <= merge_width * fast_exp(near / (3 * mature.length))
         if not is_young and is_narrow and near > mature.length:
             exact = _spread_growing_strip(displacement, path, mature, bonds, k, p)

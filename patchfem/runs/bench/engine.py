@@ -147,9 +147,8 @@ def choose_bond_sum(model, slide) -> "bond_engines.EngineChoice":
     stroke = max(stroke / law.length, 1e-9)
     goal = accuracy.tolerance * min(1.0, stroke)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
-    return bond_engines.choose_engine(
-        law, goal, stroke, steps, requested_engine(model), tail, accuracy.merge
-    )
+    requested = bond_engines.RequestedEngine(requested_engine(model), tail, accuracy.merge)
+    return bond_engines.choose_engine(law, goal, stroke, steps, requested)
 
 
 def requested_engine(model) -> str:

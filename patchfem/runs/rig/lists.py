@@ -93,9 +93,8 @@ def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine:
         1e-9,
     )
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
-    return engines.choose_engine(
-        law, accuracy.tolerance, stroke, numerics.steps / 2, engine, tail, accuracy.merge
-    )
+    requested = engines.RequestedEngine(engine, tail, accuracy.merge)
+    return engines.choose_engine(law, accuracy.tolerance, stroke, numerics.steps / 2, requested)
 
 
 def _stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:

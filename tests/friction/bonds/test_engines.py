@@ -12,7 +12,12 @@ from patchfem import build, plan
 from patchfem.core import SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import list_model, points_model
-from patchfem.friction.bonds.engines import ENGINES, choose_engine, unsupported_reason
+from patchfem.friction.bonds.engines import (
+    ENGINES,
+    RequestedEngine,
+    choose_engine,
+    unsupported_reason,
+)
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.runs.rig.interface import contact_model
@@ -71,14 +76,14 @@ def test_exact_choice_follows_the_cost(stroke, steps, want):
         1e-3,
         stroke,
         steps,
-        {"merged": "truncated", "truncated": "merged"}[want],
+        RequestedEngine({"merged": "truncated", "truncated": "merged"}[want]),
     )
     assert got.seconds <= other.seconds
 
 
 def test_always_tighter_tolerances_tighten_the_engine():
     found = [
-        choose_engine(Bonds(1.0, 1.0, 0.5), tolerance, 1.0, 500, "merged")
+        choose_engine(Bonds(1.0, 1.0, 0.5), tolerance, 1.0, 500, RequestedEngine("merged"))
         for tolerance in (1e-2, 1e-3, 1e-4)
     ]
     assert (
@@ -89,14 +94,18 @@ def test_always_tighter_tolerances_tighten_the_engine():
         choice.error <= 0.1 * tolerance * 1.01
         for choice, tolerance in zip(found, (1e-2, 1e-3, 1e-4))
     )
-    pinned = choose_engine(Bonds(1.0, 1.0, 0.5), 1e-3, 1.0, 500, "merged", 1e-4, 0.1)
+    pinned = choose_engine(
+        Bonds(1.0, 1.0, 0.5), 1e-3, 1.0, 500, RequestedEngine("merged", 1e-4, 0.1)
+    )
     assert (pinned.tail, pinned.merge) == (1e-4, 0.1)
 
 
 def test_refuses_a_recursion_of_any_other_law():
     for reading, order in (("report", 1.0), ("stretch", 2.0)):
         with pytest.raises(ValueError, match="order = 1"):
-            choose_engine(Bonds(1.0, 1.0, order, reading), 1e-3, 1.0, 100, "recursion")
+            choose_engine(
+                Bonds(1.0, 1.0, order, reading), 1e-3, 1.0, 100, RequestedEngine("recursion")
+            )
         assert unsupported_reason("recursion", reading, order) and not unsupported_reason(
             "merged", reading, order
         )

@@ -6,7 +6,7 @@ from friction_paths import pulled, random_walk, sum_by_hand, triangle, upper_pre
 from list_paths import STATUS, energy_by_hand, follow_list
 from scipy.special import gammainc
 
-from patchfem.friction.bonds.engines import choose_engine
+from patchfem.friction.bonds.engines import RequestedEngine, choose_engine
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.recursion import FirstOrderBonds
@@ -267,7 +267,7 @@ def test_always_merging_of_growing_bonds_keeps_its_bound_at_small_strokes(order,
     """Bonds that ripen over many strokes of a tenth of a bond length: strips joined by width alone, however much their
     bonds differed in length, were 4e-3 off where 1e-4 was claimed."""
     law = Bonds(1.0, 1.0, order, "report", 0.5, 0.05 * rest, slip, 5e-5, 0.0)
-    chosen = choose_engine(law, 1e-3, 0.1, steps / 2, "merged")
+    chosen = choose_engine(law, 1e-3, 0.1, steps / 2, RequestedEngine("merged"))
     path, dt = 0.05 * np.sin(2 * np.pi * np.arange(2 * steps + 1) / steps), 2 * np.pi / steps
     got, whole = follow_list(law, path, dt, chosen.merge), follow_list(law, path, dt)
     assert np.abs(got.after - whole.after).max() <= chosen.error

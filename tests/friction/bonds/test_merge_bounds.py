@@ -6,9 +6,10 @@ import pytest
 from friction_paths import random_walk
 from list_paths import STATUS, follow_list
 
-from patchfem.friction.bonds.engines import choose_engine
+from patchfem.friction.bonds.engines import RequestedEngine, choose_engine
 from patchfem.friction.bonds.parameters import Bonds
 
+MERGED = RequestedEngine("merged")
 GROWN = {"ratio": 0.54, "rest_growth": 0.145, "slip_growth": 7.64, "rest_speed": 4.55e-4}
 
 
@@ -18,7 +19,7 @@ def share(law, path, steps, tolerance):
     way = np.sign(moves[moves != 0])
     strokes, dt = 1 + np.count_nonzero(way[1:] != way[:-1]), 2 * np.pi / steps
     chosen = choose_engine(
-        law, tolerance, np.abs(moves).sum() / strokes, max(way.size / strokes, 1), "merged"
+        law, tolerance, np.abs(moves).sum() / strokes, max(way.size / strokes, 1), MERGED
     )
     whole, got = follow_list(law, path, dt), follow_list(law, path, dt, chosen.merge, chosen.tail)
     moved = np.abs(moves) > 1e-9 * np.abs(moves).max()
