@@ -3,6 +3,8 @@
 The law determines the form (`list_numbers.sum_form`).
 """
 
+from math import sqrt
+
 FORM_MOMENTS = 0.0  # reading="stretch" with p = 1: three moments of the strips, exact
 FORM_POWER = 1.0  # reading="stretch" with any order p: two Gauss points per strip
 FORM_REPORT = (
@@ -10,10 +12,9 @@ FORM_REPORT = (
 )
 FORM_REPORT_GROWING = 3.0  # reading="report" with growing bonds: two Gauss points per strip
 
-GAUSS_POINT_1 = (
-    0.21132486540518713  # first of two Gauss points, as a fraction of the strip from its end
-)
-GAUSS_POINT_2 = 0.7886751345948129  # second of two Gauss points
+# two Gauss points of a strip, as fractions of its length from its end
+GAUSS_POINT_1 = 0.5 - sqrt(1 / 12)
+GAUSS_POINT_2 = 0.5 + sqrt(1 / 12)
 N_TABLE_STEPS = 32  # number of entries of the table of P(p + 1, x) per unit of x
 MAX_STRIP_LENGTH = 0.25  # longest strip in bond lengths
 
