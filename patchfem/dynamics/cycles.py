@@ -39,7 +39,7 @@ def select_cycle_samples(rows, run, n_equidistant: int = 0) -> list:
     output = run.modes.output
     n_cycles, n_samples = rows.shape[:2]
     flat = rows.reshape(-1, rows.shape[2])
-    speeds, slips = run.watched(flat)
+    speeds, slips = run.read_rates_and_slips(flat)
     speeds = np.concatenate([speeds.T, (flat[:, n : 2 * n] @ output)[None]])
     speeds = speeds.reshape(-1, n_cycles, n_samples)
     max_speed = np.maximum(speeds.max(axis=(0, 2)), -speeds.min(axis=(0, 2)))

@@ -12,12 +12,17 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 import today
 
-from patchfem.dynamics.march.models import jenkins_model, list_model, load_kernels, points_model
+from patchfem.dynamics.march.models import (
+    bond_list_model,
+    jenkins_model,
+    load_instances,
+    points_model,
+)
 from patchfem.friction.bonds.list_kernels import list_mean, list_step
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import cutoff_age
 
-loop_kernels = load_kernels()
+loop_kernels = load_instances()
 
 HERTZ, LENGTH, RATIO = 143.0, 2e-6, 0.7
 GROWTH = {"ratio": RATIO, "rest_growth": 10.0, "slip_growth": 0.05 * LENGTH, "rest_speed": 1e-4}
@@ -82,7 +87,7 @@ def printed(amplitude: float, order: float, steps: int, **growth) -> Cycle:
     """The law as printed, every bond of its own length, by the compiled list merged to 0.01 bond lengths (1e-4 of
     the limit); the means of the steps are asked for in the last cycle only."""
     law = bonds(order=order, reading="report", **growth)
-    c = list_model(law, 1.0, cutoff_age(order, 1e-5), 0.01).build()
+    c = bond_list_model(law, 1.0, cutoff_age(order, 1e-5), 0.01).build()
     path, dt, force = LENGTH * harmonic(amplitude, steps), 1 / (HERTZ * steps), []
     for i, dq in enumerate(np.diff(path)):
         if i >= path.size - 1 - steps:

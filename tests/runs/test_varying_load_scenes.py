@@ -5,7 +5,7 @@ import pytest
 from scene_texts import BENCH, RIG, STRUCTURE, only
 
 from patchfem.contact.unilateral import solve_forces
-from patchfem.dynamics.march.varying_load import contact_sets_of
+from patchfem.dynamics.march.varying_load import make_contact_sets
 from patchfem.export.histories import collect_histories
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -57,7 +57,7 @@ def test_exact_the_spring_of_the_holder_is_in_series_with_the_pitch():
     """Forces at a turn of the holder: the piece turns by the moment over the spring less than the holder."""
     words = ["contact.tilt.angle=0.01 mrad", "contact.holder.rotational_stiffness=2e4 N m/rad"]
     patch = result_of(PITCH, *FEW, *words, "drive.cycles=1").patch
-    found, x, turn, spring = contact_sets_of(patch, 2e4), patch.x, 2e-6, 2e4
+    found, x, turn, spring = make_contact_sets(patch, 2e4), patch.x, 2e-6, 2e4
     force = solve_forces(found.c, found.x, found.opening + turn * found.x, np.zeros(0))[0]
     own = turn + (force @ x - patch.pressure.moment) / spring
     before = patch.pressure.sigma_n * patch.pieces.interface.weight

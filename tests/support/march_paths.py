@@ -5,7 +5,7 @@ import numpy as np
 from patchfem.core import ModalBasis
 from patchfem.dynamics.march.joints import JointsModel
 from patchfem.dynamics.march.march import GOAL
-from patchfem.dynamics.march.models import element_model, load_kernels
+from patchfem.dynamics.march.models import element_model, load_instances
 from patchfem.friction.laws.tanh import TanhLaw
 
 OMEGA = 2 * np.pi * 143
@@ -36,7 +36,7 @@ def one_mode(omega, zeta, mass):
 
 def follow(model, path, dt=0.3):
     """(force at the samples, step means, slip), (dissipated, stored), unconverged, contact of loops.follow_path."""
-    loops = load_kernels()
+    loops = load_instances()
     contact = model.build()
     energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
     bad = loops.follow_path(

@@ -15,12 +15,12 @@ from patchfem.response.measures import energy_balance
 
 MASS, LOAD, STILL = 0.884, 116.0, SineDrive(0.0, 2 * np.pi * 143)
 LAWS = {
-    "coulomb": varying_load.coulomb(0.3),
-    "weaker": varying_load.coulomb(0.3, 0.2),
-    "tanh": varying_load.rate(0.3, 1e-3),
-    "plastic": varying_load.plastic(0.3, 1e-6),
-    "bonds": varying_load.bonds(Bonds(0.3, 1e-6)),
-    "growing": varying_load.bonds(Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5)),
+    "coulomb": varying_load.make_coulomb_law(0.3),
+    "weaker": varying_load.make_coulomb_law(0.3, 0.2),
+    "tanh": varying_load.make_tanh_law(0.3, 1e-3),
+    "plastic": varying_load.make_elastic_plastic_law(0.3, 1e-6),
+    "bonds": varying_load.make_bonds_law(Bonds(0.3, 1e-6)),
+    "growing": varying_load.make_bonds_law(Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5)),
 }
 
 

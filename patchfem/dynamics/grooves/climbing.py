@@ -12,7 +12,12 @@ from ..integrated import find_accelerations
 from ..interfaces.arrays import ClimbingPoints
 from ..ledger import LEDGER
 from ..march.march import Run
-from ..march.varying_load import PLASTIC, Rubbing, plastic, rub_of
+from ..march.varying_load import (
+    PLASTIC,
+    VaryingLoadLaw,
+    make_elastic_plastic_law,
+    make_pressed_fields,
+)
 from .arrays import CLIMB
 
 CONTACT_MODULE = "dynamics.grooves.contact_kernels"
@@ -56,7 +61,7 @@ def lift_message(grooves: Grooves, time: float) -> str:
     )
 
 
-def make_model(grooves: Grooves, load: float, law: Rubbing, modes) -> "ClimbingModel":
+def make_model(grooves: Grooves, load: float, law: VaryingLoadLaw, modes) -> "ClimbingModel":
     """Return the model of a law with memory along flanks.
 
     Coulomb's law at the points of pieces that deform in shear is elastic-plastic with length 0;
@@ -67,7 +72,7 @@ def make_model(grooves: Grooves, load: float, law: Rubbing, modes) -> "ClimbingM
     grooves : Grooves
     load : float
         [N].
-    law : Rubbing
+    law : VaryingLoadLaw
         Of `march.varying_load.plastic` or `bonds`.
     modes : ModalBasis or None
         None for a bench, where no mass is checked.
@@ -115,7 +120,7 @@ def with_shear_modes(
     length = law.length
     if not length:
         reach = limit.sum() / tangential_stiffness(patch.giving, force > 0)
-        law = plastic(law.static, COULOMB_LENGTH_RATIO * tolerance * reach)
+        law = make_elastic_plastic_law(law.static, COULOMB_LENGTH_RATIO * tolerance * reach)
         length = max(COULOMB_LENGTH_RATIO * tolerance, MIN_LENGTH_RATIO) * reach
     if law.growth[0] >= 0:
         weakening = law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf
@@ -153,7 +158,7 @@ class FlankModel:
         """Whether the law holds without any stretch; it does not."""
         return False
 
-    def shown(self, contact) -> dict:
+    def picture_fields(self, contact) -> dict:
         """Return an empty dict, because all points have the same stretch."""
         return {}
 
@@ -172,7 +177,7 @@ class ClimbingModel(FlankModel):
 
     grooves: Grooves
     load: float
-    law: Rubbing
+    law: VaryingLoadLaw
     shear: object = None
     share: tuple = (1.0,)
 
@@ -211,10 +216,13 @@ class ClimbingModel(FlankModel):
             normal,
         )
         return ClimbingPoints(
-            flank, climb, share, *rub_of(self.law, normal * share, self.shear, self.limit)
+            flank,
+            climb,
+            share,
+            *make_pressed_fields(self.law, normal * share, self.shear, self.limit),
         )
 
-    def shown(self, contact) -> dict:
+    def picture_fields(self, contact) -> dict:
         """Return fields of the points (3, a), nothing for one point.
 
         They are friction along the flank [N], elastic stretch [m] and the fraction of the vertical
@@ -246,9 +254,9 @@ class ClimbingModel(FlankModel):
 class GroovesRun(Run):
     """Arrays and time of a march over grooves."""
 
-    def response(self, rows, number) -> Response:
+    def make_response(self, rows, number) -> Response:
         """Return histories; with a lifted mass `extra` has normal_load [N], the vertical force."""
-        out = super().response(rows, number)
+        out = super().make_response(rows, number)
         g = self.model.grooves
         modes = self.modes
         if not g.lifted_mass:
@@ -288,16 +296,16 @@ class ClimbingRun(GroovesRun):
         contact.memory[:] *= normal / climb[CLIMB.end_normal]
         contact.pressed[:] *= normal / climb[CLIMB.end_normal]
         climb[[CLIMB.rise_speed, CLIMB.start_normal, CLIMB.end_normal]] = slope * v, normal, normal
-        self.ledger[LEDGER.drive_work] += self.strained()
+        self.ledger[LEDGER.drive_work] += self.find_interface_energy()
 
-    def placed(self, place, rate) -> None:
+    def move_to(self, place, rate) -> None:
         """Set the state as a Run does; the lifted mass has the velocity of the flank there."""
-        super().placed(place, rate)
+        super().move_to(place, rate)
         self.contact.climb[CLIMB.rise_speed] = (
             float(self.model.grooves.slope(self.modes.slide @ place)) * self.modes.slide @ rate
         )
 
-    def _judge(self, status: int) -> None:
-        super()._judge(status)
+    def _set_outcome(self, status: int) -> None:
+        super()._set_outcome(status)
         if self.contact.climb[CLIMB.has_lifted] and self.outcome is None:
             self._leaves()

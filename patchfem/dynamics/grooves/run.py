@@ -108,7 +108,7 @@ class SampledRun(GroovesRun):
         super().__init__(modes, drive, model, steps_per_cycle, travel, loops, start)
         self.width += 1
         self._begin()
-        self.ledger[LEDGER.drive_work] += self.strained()
+        self.ledger[LEDGER.drive_work] += self.find_interface_energy()
 
     def _begin(self) -> None:
         """Start the motion from the present state, at the start of the drive."""
@@ -157,10 +157,10 @@ class SampledRun(GroovesRun):
         twin.smooth_motion = self.smooth_motion.fork(drive)
         return twin
 
-    def _slid(self, path) -> None:
+    def _slide_contact(self, path) -> None:
         """Do nothing: there is no memory."""
 
-    def _steps(self, count: int, rows) -> tuple:
+    def _march_steps(self, count: int, rows) -> tuple:
         """Fill rows as a Run does, from samples of the motion.
 
         They also have the friction loss of each step.
@@ -212,25 +212,25 @@ class SampledRun(GroovesRun):
         self.booked = sums
         return last, status
 
-    def _sampled(self, rows) -> np.ndarray:
+    def _sampled_works(self, rows) -> np.ndarray:
         n = 2 * self.modes.omega.size
         after = rows[:-1, n + 4] if self.model.set_valued else None
         return sampled_work(rows[:, n], rows[:, n + 2], after)
 
-    def _parts(self, rows) -> np.ndarray:
+    def _step_energies(self, rows) -> np.ndarray:
         """Return the energies of the steps as a Run does.
 
         Friction dissipates its own work along the flank.
         """
         n = 2 * self.modes.omega.size
-        return np.stack([self._works(rows), rows[:-1, n + 7], np.zeros(len(rows) - 1)])
+        return np.stack([self._step_works(rows), rows[:-1, n + 7], np.zeros(len(rows) - 1)])
 
-    def _judge(self, status: int) -> None:
-        super()._judge(status)
+    def _set_outcome(self, status: int) -> None:
+        super()._set_outcome(status)
         if status == 5:
             self._leaves()
 
-    def check(self) -> None:
+    def check_steps(self) -> None:
         """Set the outcome not_converged where steps did not meet their error."""
         if self.ledger[LEDGER.n_unconverged]:
             self.outcome = Outcome.NOT_CONVERGED
@@ -239,7 +239,7 @@ class SampledRun(GroovesRun):
                 "accuracy.steps_per_cycle"
             )
 
-    def strained(self) -> float:
+    def find_interface_energy(self) -> float:
         """Return the energy of the height of the load and of the lifted mass [J]."""
         g = self.model.grooves
         z, v = self.state

@@ -9,7 +9,7 @@ extrapolation that did not help, the next one waits.
 
 import numpy as np
 
-from ..march.march import ends_of, mark_of
+from ..march.march import make_mark, read_output_extremes
 
 # cycles from the start to the first extrapolation
 FIRST_CYCLES = 6
@@ -56,7 +56,7 @@ def march_to_periodic(run) -> float:
     while done < MAX_CYCLES and run.outcome is None:
         kept = [before]
         for _ in range((FIRST_CYCLES if done == 0 else MEMORY_CYCLES) + size):
-            run.cycle(run.prop.steps, 0, [])
+            run.march_cycle(run.prop.steps, 0, [])
             done += 1
             kept.append(_state(run))
             if run.outcome is not None:
@@ -73,7 +73,7 @@ def march_to_periodic(run) -> float:
         if before is None:
             before = kept[-1]
         else:
-            run.placed(*_split_state(run, before))
+            run.move_to(*_split_state(run, before))
     return float(change)
 
 
@@ -82,11 +82,11 @@ def march_cycle(run, frames: int = 0) -> tuple:
 
     The energies of the Mark are those of this cycle.
     """
-    run.books_anew()
+    run.reset_balance()
     snapshots = []
-    part = run.cycle(run.prop.steps, frames, snapshots)
-    run.check()
-    return mark_of(run, [part], ends_of([part], run)), snapshots
+    part = run.march_cycle(run.prop.steps, frames, snapshots)
+    run.check_steps()
+    return make_mark(run, [part], read_output_extremes([part], run)), snapshots
 
 
 def estimate_multipliers(run) -> np.ndarray:
@@ -104,10 +104,10 @@ def estimate_multipliers(run) -> np.ndarray:
         twin = run.fork(run.drive)
         there = here.copy()
         there[k] += nudge if k >= 0 else 0.0
-        twin.placed(*_split_state(run, there))
+        twin.move_to(*_split_state(run, there))
         states = []
         for _ in range(N_DISTURBED_CYCLES):
-            twin.cycle(twin.prop.steps, 0, [])
+            twin.march_cycle(twin.prop.steps, 0, [])
             states.append(_state(twin))
         found.append(states)
     # (cycles, 2 n, 2 n)

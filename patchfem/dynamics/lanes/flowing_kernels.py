@@ -17,6 +17,7 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws import tanh_kernels as friction
 from .rigid_kernels import (
     PROOF_TOL,
+    AngleStep,
     LaneState,
     StepOutcome,
     StickReading,
@@ -117,6 +118,26 @@ class FirstEvent(NamedTuple):
 
     fraction: float
     is_reversal: bool
+
+
+class LayerPlan(NamedTuple):
+    """How a step passes through a layer of speeds.
+
+    - `flies`: whether the other forces drive the speed one way whatever the friction is; the parts are then equal in
+      speed, otherwise equal in angle.
+    - `side`: sign of the acceleration without friction.
+    - `n_parts`: largest number of parts.
+    - `edge_speed`: speed at the edge of the layer.
+    - `width`: change of the speed in a part.
+    - `angle`: angle of the step [rad].
+    """
+
+    flies: bool
+    side: float
+    n_parts: int
+    edge_speed: float
+    width: float
+    angle: float
 
 
 class LayerPart(NamedTuple):
@@ -668,12 +689,82 @@ def count_layer_parts(workspace, lane, state, s0, s1, angle):
     return int(min(abs(end.speed - v) / width, MAX_LAYER_PARTS - 1.0)) + 1
 
 
+@njit(**NJIT_INLINE)
+def plan_layer_step(workspace, lane, state, step):
+    """Return the `LayerPlan` of a step.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    state : FlowState
+        State at the start of the step.
+    step : AngleStep
+
+    Returns
+    -------
+    LayerPlan
+    """
+    numbers = law_numbers(workspace, lane)
+    drive = workspace[DRIVE * LANES + lane]
+    damping = workspace[DAMPING * LANES + lane]
+    stiffness = workspace[STIFFNESS * LANES + lane]
+    edge_speed, width = speed_layer(numbers, step.angle)
+    free = drive * step.s0 - damping * state.speed - stiffness * state.slide
+    side = 1.0 if free > 0.0 else -1.0
+    free_rate = drive * step.c0 - damping * (free - state.friction) - stiffness * state.speed
+    change = step.angle * abs(free_rate)
+    flies = side * free > FREE_FLIGHT_FACTOR * numbers[1] + change
+    n_parts = MAX_LAYER_PARTS
+    if not flies:
+        n_parts = count_layer_parts(workspace, lane, state, step.s0, step.s1, step.angle)
+    return LayerPlan(flies, side, n_parts, edge_speed, width, step.angle)
+
+
+@njit(**NJIT_INLINE)
+def next_layer_part(workspace, lane, state, rest, plan, is_last):
+    """Compute the next part of a step through a layer of speeds.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    state : FlowState
+        State at the start of the part.
+    rest : AngleStep
+        Remainder of the step.
+    plan : LayerPlan
+    is_last : bool
+        Whether this is the last part that the plan allows.
+
+    Returns
+    -------
+    LayerPart
+    bool
+        Whether the part ends the step.
+    """
+    v = state.speed
+    side = plan.side
+    if plan.flies and not is_last and side * v < plan.edge_speed:
+        end_speed = v + side * plan.width
+        if side * v < -plan.edge_speed:
+            end_speed = -side * plan.edge_speed
+        part = step_in_speed(workspace, lane, state, rest.s0, rest.c0, end_speed)
+        if 0.0 < part.angle < rest.angle:
+            return part, False
+    is_last = plan.flies or is_last
+    t = rest.angle if is_last else plan.angle / plan.n_parts
+    end_sine = rest.s1 if is_last else advance_angle(rest.s0, rest.c0, t)[0]
+    sines = (rest.s0, advance_angle(rest.s0, rest.c0, t / 2)[0], end_sine)
+    end, work = runge_kutta_step(workspace, lane, state, SIGN_IN_LAYER, sines, t)
+    return LayerPart(t, end, work), is_last
+
+
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def resolve_layer_step(workspace, lane, step):
     """Compute a step of a law with a layer of speeds in parts that follow the layer.
 
-    Where the other forces drive the speed one way whatever the friction is, the parts are equal in speed, otherwise equal
-    in angle. The function adds to the sums of the step what the trapezoidal rule between its ends leaves out.
+    The function adds to the sums of the step what the trapezoidal rule between its ends leaves out.
 
     Parameters
     ----------
@@ -684,21 +775,11 @@ def resolve_layer_step(workspace, lane, step):
     -------
     StepOutcome
     """
-    numbers = law_numbers(workspace, lane)
     state = flow_state(workspace, lane)
-    drive = workspace[DRIVE * LANES + lane]
-    damping = workspace[DAMPING * LANES + lane]
-    stiffness = workspace[STIFFNESS * LANES + lane]
-    edge_speed, width = speed_layer(numbers, step.angle)
+    plan = plan_layer_step(workspace, lane, state, step)
+    angle = step.angle
     start_speed = state.speed
-    free = drive * step.s0 - damping * start_speed - stiffness * state.slide
-    start_rate = free - state.friction
-    side = 1.0 if free > 0.0 else -1.0
-    change = step.angle * abs(drive * step.c0 - damping * start_rate - stiffness * start_speed)
-    flies = side * free > FREE_FLIGHT_FACTOR * numbers[1] + change
-    n_parts = MAX_LAYER_PARTS
-    if not flies:
-        n_parts = count_layer_parts(workspace, lane, state, step.s0, step.s1, step.angle)
+    start_rate = flow_acceleration(workspace, lane, state, step.s0)
     s = step.s0
     c = step.c0
     a = start_rate
@@ -708,36 +789,23 @@ def resolve_layer_step(workspace, lane, step):
     event_slide = nan
     work_sum = 0.0
     loss_sum = 0.0
-    for n in range(n_parts):
-        v = state.speed
-        rest = step.angle - done
-        is_last = n == n_parts - 1
-        part = LayerPart(0.0, state, 0.0)
-        follows = flies and not is_last and side * v < edge_speed
-        if follows:
-            end_speed = -side * edge_speed if side * v < -edge_speed else v + side * width
-            part = step_in_speed(workspace, lane, state, s, c, end_speed)
-            follows = 0.0 < part.angle < rest
-        if not follows:
-            is_last = flies or is_last
-            t = rest if is_last else step.angle / n_parts
-            end_sine = step.s1 if is_last else advance_angle(s, c, t)[0]
-            sines = (s, advance_angle(s, c, t / 2)[0], end_sine)
-            end, part_work = runge_kutta_step(workspace, lane, state, SIGN_IN_LAYER, sines, t)
-            part = LayerPart(t, end, part_work)
+    for n in range(plan.n_parts):
+        rest = AngleStep(s, c, step.s1, step.c1, angle - done)
+        part, is_last = next_layer_part(workspace, lane, state, rest, plan, n == plan.n_parts - 1)
         t = part.angle
         end = part.end
         s2 = step.s1
         c2 = step.c1
         if not is_last:
             s2, c2 = advance_angle(s, c, t)
+        v = state.speed
         v1 = end.speed
         a1 = flow_acceleration(workspace, lane, end, s2)
         if workspace[IS_OBSERVED * LANES + lane] > 0.0:
             add_part_readings(workspace, lane, state, (s, c, a), end, (s2, c2, a1), t)
         if v * v1 <= 0.0 and v != 0.0:
             place = hermite_root(v, v1, t * a, t * a1)
-            event = (done + place * t) / step.angle
+            event = (done + place * t) / angle
             event_slide = hermite_cubic(state.slide, end.slide, t * v, t * v1, place)
         # Hermite's rule of the integrals of sin x' and x'^2 over the part.
         work_sum += t * (s * v + s2 * v1 + t / 6 * (c * v + s * a - c2 * v1 - s2 * a1)) / 2
@@ -753,12 +821,12 @@ def resolve_layer_step(workspace, lane, step):
     v = start_speed
     v1 = state.speed
     # The trapezoidal rule over the run adds the ends of this step, and its correction the ends of the run.
-    work_ends = step.angle / 12 * (step.c1 * v1 + step.s1 * a - step.c0 * v - step.s0 * start_rate)
-    loss_ends = step.angle / 6 * (v1 * a - v * start_rate)
+    work_ends = angle / 12 * (step.c1 * v1 + step.s1 * a - step.c0 * v - step.s0 * start_rate)
+    loss_ends = angle / 6 * (v1 * a - v * start_rate)
     workspace[WORK_SUM * LANES + lane] += (
-        work_sum / step.angle + work_ends - (step.s0 * v + step.s1 * v1) / 2
+        work_sum / angle + work_ends - (step.s0 * v + step.s1 * v1) / 2
     )
-    workspace[LOSS_SUM * LANES + lane] += loss_sum / step.angle + loss_ends - (v * v + v1 * v1) / 2
+    workspace[LOSS_SUM * LANES + lane] += loss_sum / angle + loss_ends - (v * v + v1 * v1) / 2
     workspace[FRICTION * LANES + lane] = state.friction
     workspace[STRETCH_SQUARE * LANES + lane] = state.square
     workspace[STEP_WORK * LANES + lane] = work

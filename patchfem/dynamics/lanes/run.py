@@ -248,7 +248,7 @@ def step_coefficients(cases: Cases, spring, angle: float) -> np.ndarray:
     ----------
     cases : Cases
     spring : (n,) array
-        Stiffness of the spring over that of the mode.
+        Stiffness of the spring in the unit of `Cases.stiffness`.
     angle : float
         Angle of the step [rad].
 

@@ -43,7 +43,7 @@ MAX_STEP = (
     0.25  # longest step, over YIELD_LENGTH; Newton's method finds the end of a longer one badly
 )
 LOOKS_AHEAD = True  # whether `prepare_lookup` has something to do
-# Where the numbers of the curve are: in the table, looked up by `prepare`, or those of the start of the step.
+# Where the numbers of the curve are: in the table, looked up by `prepare_lookup`, or those of the start of the step.
 IN_TABLE = 0
 PREPARED = 1
 AT_START = 2

@@ -13,10 +13,10 @@ from ...friction.bonds.list_rows_kernels import N_ROWS, STATUS
 
 MAX_ENTRIES = 2_000_000  # number of entries of a list of bonds beyond which a run is refused
 ENTRY_BYTES = 8 * N_ROWS
-CURE = 'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
+REMEDY = 'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
 
 
-class Kept(NamedTuple):
+class SavedState(NamedTuple):
     """Copies of arrays of a run, from which a step is repeated.
 
     - `entries`: entries in use of every list of bonds.
@@ -29,7 +29,7 @@ class Kept(NamedTuple):
     others: tuple
 
 
-def copy_state(contact, *others) -> Kept | None:
+def copy_state(contact, *others) -> SavedState | None:
     """Return copies of a contact with a list of bonds and of other arrays.
 
     The result is None for a contact without a list.
@@ -41,7 +41,7 @@ def copy_state(contact, *others) -> Kept | None:
         contact.bondlist[:, head:end].copy()
         for head, end in _statuses(contact)[:, [STATUS.head, STATUS.end]].astype(int)
     ]
-    return Kept(entries, fields, tuple(array.copy() for array in others))
+    return SavedState(entries, fields, tuple(array.copy() for array in others))
 
 
 def _statuses(contact) -> np.ndarray:
@@ -57,21 +57,21 @@ def is_full(contact) -> bool:
     return hasattr(contact, "bondlist") and (not hasattr(contact, "flow") or contact.flow[0] == 1.0)
 
 
-def enlarge_list(contact, kept: Kept, place: str, *others):
+def enlarge_list(contact, kept: SavedState, place: str, *others):
     """Restore a contact with twice the capacity of its list; other arrays are restored in place.
 
     Parameters
     ----------
     contact : tuple
         Arrays of a contact with a list of bonds.
-    kept : Kept
+    kept : SavedState
     place : str
         Where the run is, for the message.
     """
     rows, have = contact.bondlist.shape
     if have >= MAX_ENTRIES:
         raise Missing(
-            f"the bond list grew beyond {have} entries ({have * ENTRY_BYTES / 1e6:.0f} MB) {place}; {CURE}",
+            f"the bond list grew beyond {have} entries ({have * ENTRY_BYTES / 1e6:.0f} MB) {place}; {REMEDY}",
             "",
         )
     for array, old in zip(others, kept.others):
@@ -88,6 +88,6 @@ def enlarge_list(contact, kept: Kept, place: str, *others):
     return found._replace(bondlist=wider)
 
 
-def max_bytes(strips: float) -> float:
+def list_bytes(strips: float) -> float:
     """Return the memory [bytes] of a list of so many entries; while it is enlarged the old one is there too."""
     return 3 * ENTRY_BYTES * min(strips, MAX_ENTRIES)

@@ -5,10 +5,10 @@ import numpy as np
 from ..interfaces import arrays
 from ..interfaces.dispatch import COULOMB_LAW, number_laws
 
-GOAL = 1e-11  # residual of the step solve over the friction limit
+STEP_TOL = 1e-11  # residual of the step solve over the friction limit
 
 
-def faces_of(model, prop, modal_system, mass: float):
+def make_faces(model, prop, modal_system, mass: float):
     """Return the arrays of the elements of a march at its start; `arrays.SingleContact` for a model without elements.
 
     Parameters
@@ -24,21 +24,17 @@ def faces_of(model, prop, modal_system, mass: float):
     interfaces.arrays.PortElements or SingleContact
     """
     if not model.joints:
-        return arrays.SingleContact(np.array([GOAL * model.limit]))
-    elements, (p, n), numbers = (
-        [one.element for one in model.joints],
-        prop.rows.shape,
-        number_laws(model.laws),
-    )
+        return arrays.SingleContact(np.array([STEP_TOL * model.limit]))
+    elements = [joint.element for joint in model.joints]
+    p, n = prop.rows.shape
+    law_numbers = number_laws(model.laws)
     e = len(elements)
-    num, mem = (
-        np.zeros((e, max(1, *(len(part) for part in parts))))
-        for parts in ([one.numbers for one in elements], [one.memory for one in elements])
-    )
-    for k, one in enumerate(elements):
-        num[k, : one.numbers.size] = one.numbers
-        mem[k, : one.memory.size] = one.memory
-        num[k, 0] = numbers[one.kernels or COULOMB_LAW]
+    num = np.zeros((e, max(element.numbers.size for element in elements)))
+    mem = np.zeros((e, max(1, *(element.memory.size for element in elements))))
+    for k, element in enumerate(elements):
+        num[k, : element.numbers.size] = element.numbers
+        mem[k, : element.memory.size] = element.memory
+        num[k, 0] = law_numbers[element.kernels or COULOMB_LAW]
     there = getattr(model, "patch", None) is not None
     scale = getattr(model, "scale", 0.0)
     ports = np.array([one.port for one in model.joints], np.int64)
@@ -63,7 +59,7 @@ def faces_of(model, prop, modal_system, mass: float):
     )
     each = np.zeros((10, e))
     each[6] = [one.limit if one.is_bounded else np.inf for one in elements]
-    each[7] = [GOAL * (one.limit or max(scale, 1e-300)) for one in elements]
+    each[7] = [STEP_TOL * (one.limit or max(scale, 1e-300)) for one in elements]
     modal = np.zeros((5, n))
     modal[0] = modal_system.push[0] / mass
     return arrays.PortElements(
@@ -73,7 +69,7 @@ def faces_of(model, prop, modal_system, mass: float):
         num,
         mem,
         each,
-        np.array([0.0, 0.0, 0.0, GOAL * (model.patch.limit if there else model.limit), 0.0]),
+        np.array([0.0, 0.0, 0.0, STEP_TOL * (model.patch.limit if there else model.limit), 0.0]),
         np.zeros((2, p)),
         modal,
         np.zeros((e, e)),

@@ -12,9 +12,9 @@ from ..interfaces.dispatch import COULOMB_LAW, load_law
 FOLDER = "dynamics.march"
 SHEARED_LISTS = "dynamics.interfaces.shear_list_kernels"  # lists of bonds behind shear modes
 # Kinds of loads: constant, varying on the whole interface, varying on each point.
-STEADY = ""
-WHOLE = "whole"
-POINTS = "points"
+CONSTANT_LOAD = ""
+COMMON_LOAD = "whole"
+POINT_LOADS = "points"
 
 
 @cache
@@ -42,10 +42,11 @@ def load_contact(kind: tuple):
 def load_loop(
     kind: tuple,
     laws: tuple = (),
-    load: str = STEADY,
-    there: bool = True,
-    several: bool = False,
-    plane: bool = False,
+    load: str = CONSTANT_LOAD,
+    *,
+    has_contact: bool = True,
+    is_coupled: bool = False,
+    has_planes: bool = False,
 ):
     """Return the loop of a rig, with its functions `march` and `follow`.
 
@@ -56,12 +57,12 @@ def load_loop(
     laws : tuple of str
         Modules of the laws of the elements.
     load : str
-        STEADY, WHOLE or POINTS.
-    there : bool
+        CONSTANT_LOAD, COMMON_LOAD or POINT_LOADS.
+    has_contact : bool
         Whether there is a contact.
-    several : bool
+    is_coupled : bool
         Whether more than one element or contact rubs.
-    plane : bool
+    has_planes : bool
         Whether an element slides in a plane.
 
     Returns
@@ -74,11 +75,11 @@ def load_loop(
         "HAS_ELEMENTS": bool(laws),
         "HAS_STOPS": COULOMB_LAW in laws,
         "HAS_SLOPES": {*laws} > {COULOMB_LAW} or COULOMB_LAW not in laws,
-        "HAS_CONTACT": there,
-        "IS_COUPLED": several,
-        "HAS_PLANES": plane,
-        "LOAD_VARIES": load != STEADY,
-        "HAS_POINTS": load == POINTS,
+        "HAS_CONTACT": has_contact,
+        "IS_COUPLED": is_coupled,
+        "HAS_PLANES": has_planes,
+        "LOAD_VARIES": load != CONSTANT_LOAD,
+        "HAS_POINTS": load == POINT_LOADS,
         "HAS_LISTS": kind[0] == SHEARED_LISTS,
     }
     text = '"""Parts of a loop, written by patchfem.dynamics.march.instances."""\n\n' + "".join(
@@ -101,7 +102,7 @@ def load_loop(
                 ),
             },
         )
-    if load != STEADY:
+    if load != CONSTANT_LOAD:
         named["pressing"] = compiled.instantiate(
             f"{FOLDER}.pressing_kernels", {"contact": contact, "parts": parts} | named
         )
@@ -112,11 +113,17 @@ def load_loop(
 
 def march(model, *arguments) -> tuple:
     """March a model by `loop_kernels.march`; return the number of steps done and the status."""
-    there = not model.joints or getattr(model, "patch", None) is not None
-    # a loop of several laws is one text
-    several = len(model.joints) + there > 1 or len(model.laws) > 1
-    plane = any(one.mate for one in model.joints)
-    return load_loop(model.kind, model.laws, model.loading, there, several, plane).march(*arguments)
+    has_contact = not model.joints or getattr(model, "patch", None) is not None
+    loop = load_loop(
+        model.kind,
+        model.laws,
+        model.loading,
+        has_contact=has_contact,
+        # a loop of several laws is one text
+        is_coupled=len(model.joints) + has_contact > 1 or len(model.laws) > 1,
+        has_planes=any(joint.mate for joint in model.joints),
+    )
+    return loop.march(*arguments)
 
 
 def follow_path(path, dt, kind, contact, goal, energies, forces) -> int:

@@ -6,15 +6,15 @@ import numpy as np
 
 from ...friction.protocol import Element
 from ..interfaces.dispatch import COULOMB_LAW
-from .models import IDLE, ContactModel, Joint, free_model
+from .models import IDLE_KIND, ContactModel, Joint, frictionless_model
 
 
-def cubic(port: int, stiffness: float) -> Joint:
+def make_cubic_spring(port: int, stiffness: float) -> Joint:
     """Return a spring on a port with the restoring force k_3 q^3 [N]; stiffness is k_3 [N/m3]."""
-    return _spring(port, [0.0, stiffness, 0.0, 1.0], lambda q: 0.25 * stiffness * q**4)
+    return _make_spring(port, [0.0, stiffness, 0.0, 1.0], lambda q: 0.25 * stiffness * q**4)
 
 
-def interlock(port: int, stiffness: float, wavelength: float) -> Joint:
+def make_interlocking_spring(port: int, stiffness: float, wavelength: float) -> Joint:
     """Return a spring on a port with the force k lambda/(2 pi) sin(2 pi q/lambda) [N] of interlocking peaks.
 
     Parameters
@@ -30,19 +30,19 @@ def interlock(port: int, stiffness: float, wavelength: float) -> Joint:
     Joint
     """
     turn = 2 * np.pi / wavelength
-    return _spring(
+    return _make_spring(
         port,
         [0.0, 0.0, stiffness, wavelength],
         lambda q: 2 * stiffness * (np.sin(0.5 * turn * q) / turn) ** 2,
     )
 
 
-def _spring(port: int, numbers, potential) -> Joint:
+def _make_spring(port: int, numbers, potential) -> Joint:
     law = "dynamics.interfaces.spring_kernels"
     return Joint(port, Element(law, np.array(numbers), np.zeros(0), 0.0, 0.0, False), potential)
 
 
-def in_planes(joints, planes) -> list:
+def pair_plane_joints(joints, planes) -> list:
     """Return joints of interfaces (i,) with those of the second directions of the ones that slide in a plane.
 
     They act on the ports of their numbers, and the second directions on ports from i on; planes (i,) says
@@ -121,12 +121,12 @@ class JointsModel:
     @property
     def kind(self) -> tuple:
         """Kind of the patch's contact (`ContactModel.kind`); that of an idle contact without a patch."""
-        return self.patch.kind if self.patch is not None else IDLE
+        return self.patch.kind if self.patch is not None else IDLE_KIND
 
-    def shown(self, contact) -> dict:
-        """Return the fields of the patch's memory for pictures (`ContactModel.shown`)."""
-        return self.patch.shown(contact) if self.patch is not None else {}
+    def picture_fields(self, contact) -> dict:
+        """Return the fields of the patch's memory for pictures (`ContactModel.picture_fields`)."""
+        return self.patch.picture_fields(contact) if self.patch is not None else {}
 
     def build(self):
         """Return the contact of the patch with newly allocated arrays; an idle point without a patch."""
-        return (self.patch or free_model()).build()
+        return (self.patch or frictionless_model()).build()

@@ -9,10 +9,25 @@ from ...compiled import load
 from ...core import ModalBasis, SineDrive
 from ..propagator import make_propagator
 
-KERNELS = "dynamics.march.lanes_kernels"
+LANES_KERNELS = "dynamics.march.lanes_kernels"
 
 
-class Points(NamedTuple):
+# Row of `lanes_kernels` of each sum of a run.
+LEDGER_ROWS = {
+    "work_in": "WORK_IN",
+    "viscous": "VISCOUS_SUM",
+    "power": "DRIVE_WORK_SIZE",
+    "lost": "FRICTION_LOSS",
+    "peak": "MAX_STORED",
+    "booked": "FRICTION_WORK",
+    "sampled": "SAMPLED_WORK",
+    "passed": "FRICTION_WORK_SIZE",
+    "gone": "INTERFACE_LOSS",
+    "created": "INTERFACE_GAIN",
+}
+
+
+class PointsCase(NamedTuple):
     """Points of a case.
 
     - `limit` (p,): friction limits [N].
@@ -29,7 +44,7 @@ class Points(NamedTuple):
     amplitude: float
 
 
-class Marched(NamedTuple):
+class MarchedCases(NamedTuple):
     """n cases after their march.
 
     - `extremes` (n, c, 2), `phasors` (n, c): of the output in each cycle [m].
@@ -52,12 +67,12 @@ class Marched(NamedTuple):
     bad: np.ndarray
 
 
-def fits(modes: ModalBasis) -> bool:
+def can_march(modes: ModalBasis) -> bool:
     """Return whether lanes can march a rig."""
-    return modes.omega.size <= load(KERNELS).N_RIG_MODES and modes.damping is None
+    return modes.omega.size <= load(LANES_KERNELS).N_RIG_MODES and modes.damping is None
 
 
-def _rig(kernels, modes: ModalBasis, prop) -> np.ndarray:
+def _rig_rows(kernels, modes: ModalBasis, prop) -> np.ndarray:
     """Return the rows of a rig as the kernels take them.
 
     Parameters
@@ -89,7 +104,7 @@ def _rig(kernels, modes: ModalBasis, prop) -> np.ndarray:
     return out
 
 
-def _table(kernels, modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
+def _step_table(kernels, modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
     """Return the table of the steps of a cycle under a drive of 1 m s-2.
 
     Parameters
@@ -121,7 +136,7 @@ def _table(kernels, modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
     return out
 
 
-def _room(kernels, cases: list) -> np.ndarray:
+def _make_workspace(kernels, cases: list) -> np.ndarray:
     """Return the workspace of cases at rest; the last case fills lanes that are left over."""
     out = np.zeros((kernels.N_NUMBERS, kernels.LANES))
     points = kernels.N_POINTS
@@ -148,7 +163,7 @@ def _room(kernels, cases: list) -> np.ndarray:
 
 def march(
     modes: ModalBasis, drive: SineDrive, cases: list, cycles: int, steps: int, window: int
-) -> Marched:
+) -> MarchedCases:
     """March cases over cycles of a drive from rest, each under its own amplitude.
 
     Parameters
@@ -166,14 +181,14 @@ def march(
     -------
     Marched
     """
-    kernels = load(KERNELS)
+    kernels = load(LANES_KERNELS)
     prop = make_propagator(modes, drive, steps)
-    rig = _rig(kernels, modes, prop)
-    table = _table(kernels, modes, drive, steps, prop)
+    rig = _rig_rows(kernels, modes, prop)
+    table = _step_table(kernels, modes, drive, steps, prop)
     n = len(cases)
     parts = []
     for first in range(0, n, kernels.LANES):
-        workspace = _room(kernels, cases[first : first + kernels.LANES])
+        workspace = _make_workspace(kernels, cases[first : first + kernels.LANES])
         few = min(kernels.LANES, n - first)
         history = np.zeros((cycles, 4, kernels.LANES))
         work = np.zeros(kernels.LANES)
@@ -183,25 +198,13 @@ def march(
     workspace, history, samples, work = (np.concatenate(one, axis=-1) for one in zip(*parts))
     m = modes.omega.size
     r = kernels.N_RIG_MODES
-    names = (
-        "WORK_IN",
-        "VISCOUS",
-        "POWER",
-        "LOST",
-        "PEAK",
-        "BOOKED",
-        "SAMPLED",
-        "PASSED",
-        "GONE",
-        "CREATED",
-    )
-    book = {name.lower(): workspace[getattr(kernels, name)] for name in names}
+    book = {name: workspace[getattr(kernels, row)] for name, row in LEDGER_ROWS.items()}
     moving = (
         workspace[kernels.RIG_RATE : kernels.RIG_RATE + m] ** 2
         + (modes.omega[:, None] * workspace[:m]) ** 2
     ).sum(axis=0)
     book["stored"] = 0.5 * modes.mass * moving + workspace[kernels.INTERFACE_ENERGY]
-    return Marched(
+    return MarchedCases(
         history[:, :2].transpose(2, 0, 1),
         (history[:, 2] + 1j * history[:, 3]).T,
         book,

@@ -56,17 +56,17 @@ SHAPES = POINT_LIMITS + N_POINTS  # slides of the points per coordinate of the p
 STIFFNESSES = SHAPES + N_PIECE_MODES * N_POINTS  # stiffness of the coordinates of the pieces [N/m]
 MAX_SHAPES = STIFFNESSES + N_PIECE_MODES  # largest absolute slide of a point per coordinate
 MEAN_SHAPES = MAX_SHAPES + N_PIECE_MODES  # mean slide of the points per coordinate
-# These rows are the sums of the run [J], which `lanes.Marched` names.
+# These rows are the sums of the run [J], which `lanes.LEDGER_ROWS` names.
 WORK_IN = MEAN_SHAPES + N_PIECE_MODES
-VISCOUS = WORK_IN + 1
-POWER = WORK_IN + 2
-LOST = WORK_IN + 3
-PEAK = WORK_IN + 4
-BOOKED = WORK_IN + 5
-SAMPLED = WORK_IN + 6
-PASSED = WORK_IN + 7
-GONE = WORK_IN + 8
-CREATED = WORK_IN + 9
+VISCOUS_SUM = WORK_IN + 1
+DRIVE_WORK_SIZE = WORK_IN + 2
+FRICTION_LOSS = WORK_IN + 3
+MAX_STORED = WORK_IN + 4
+FRICTION_WORK = WORK_IN + 5
+SAMPLED_WORK = WORK_IN + 6
+FRICTION_WORK_SIZE = WORK_IN + 7
+INTERFACE_LOSS = WORK_IN + 8
+INTERFACE_GAIN = WORK_IN + 9
 # These rows are the extremes and the phasor of the output in a cycle [m].
 MIN_OUTPUT = WORK_IN + 10
 MAX_OUTPUT = WORK_IN + 11
@@ -378,12 +378,14 @@ def commit_step(workspace, lane, beta, far):
     workspace[PIECE_POSITION * LANES + lane] = b1
     workspace[(PIECE_POSITION + 1) * LANES + lane] = b2
     workspace[MEAN_FORCE * LANES + lane] = used
-    workspace[LOST * LANES + lane] += worked - 0.5 * length * rise
-    workspace[BOOKED * LANES + lane] += work
-    workspace[PASSED * LANES + lane] += abs(work)
-    workspace[SAMPLED * LANES + lane] += 0.5 * (workspace[FRICTION * LANES + lane] + force) * y0
-    workspace[GONE * LANES + lane] += gone if gone > -noise else 0.0
-    workspace[CREATED * LANES + lane] -= gone if gone < -noise else 0.0
+    workspace[FRICTION_LOSS * LANES + lane] += worked - 0.5 * length * rise
+    workspace[FRICTION_WORK * LANES + lane] += work
+    workspace[FRICTION_WORK_SIZE * LANES + lane] += abs(work)
+    workspace[SAMPLED_WORK * LANES + lane] += (
+        0.5 * (workspace[FRICTION * LANES + lane] + force) * y0
+    )
+    workspace[INTERFACE_LOSS * LANES + lane] += gone if gone > -noise else 0.0
+    workspace[INTERFACE_GAIN * LANES + lane] -= gone if gone < -noise else 0.0
     workspace[FRICTION * LANES + lane] = force
     workspace[INTERFACE_ENERGY * LANES + lane] = energy
     # the next guess is a quadratic extrapolation of the last three steps
@@ -498,13 +500,13 @@ def finish_sums(workspace, lane, half_mass):
     out = workspace[OUTPUT * LANES + lane]
     work = workspace[DRIVE_WORK * LANES + lane]
     workspace[WORK_IN * LANES + lane] += work
-    workspace[POWER * LANES + lane] += abs(work)
-    workspace[VISCOUS * LANES + lane] += workspace[VISCOUS_LOSS * LANES + lane]
+    workspace[DRIVE_WORK_SIZE * LANES + lane] += abs(work)
+    workspace[VISCOUS_SUM * LANES + lane] += workspace[VISCOUS_LOSS * LANES + lane]
     held = (
         workspace[INTERFACE_ENERGY * LANES + lane]
         + half_mass * workspace[RATE_SQUARES * LANES + lane]
     )
-    workspace[PEAK * LANES + lane] = max(workspace[PEAK * LANES + lane], held)
+    workspace[MAX_STORED * LANES + lane] = max(workspace[MAX_STORED * LANES + lane], held)
     workspace[MAX_SLIDE * LANES + lane] = max(workspace[MAX_SLIDE * LANES + lane], abs(place))
     workspace[MIN_OUTPUT * LANES + lane] = min(workspace[MIN_OUTPUT * LANES + lane], out)
     workspace[MAX_OUTPUT * LANES + lane] = max(workspace[MAX_OUTPUT * LANES + lane], out)
@@ -717,7 +719,7 @@ def march(workspace, rig, table, history, samples, work):
             ]
             workspace[COS_SUM * LANES + lane] = workspace[SIN_SUM * LANES + lane] = 0.0
             if c == first:
-                work[lane] = workspace[BOOKED * LANES + lane]
+                work[lane] = workspace[FRICTION_WORK * LANES + lane]
         for s in range(steps):
             if c >= first:
                 store_samples(workspace, samples[(c - first) * steps + s])

@@ -3,7 +3,6 @@
 from collections import deque
 from copy import copy
 from dataclasses import dataclass, replace
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -29,17 +28,19 @@ from ..periodicity import (
 )
 from ..propagator import make_propagator
 from .capacity import copy_state, enlarge_list
-from .faces import GOAL, faces_of
-from .models import ContactModel, free_model, load_kernels
+from .faces import STEP_TOL, make_faces
+from .models import ContactModel, frictionless_model, load_instances
 
 # Status of `loop_kernels.march` if a list of bonds is full, and if no contact set fits the motion.
-FULL = 2
-UNFIT = 4
-FLUNG = 10.0  # times beyond the travel at which a step cannot have followed the motion
+MEMORY_FULL = 2
+NO_CONTACT_SET = 4
+DIVERGED_FACTOR = (
+    10.0  # displacement over the travel that no step can reach which follows the motion
+)
 ELEMENT_COLUMNS = 5  # columns of an element in a row, as in `faces_kernels`
 MAX_PIECE_STEPS = 8000  # number of steps of a piece of a march
 MAX_PIECE_CYCLES = 16  # number of cycles of a piece of a march
-PASSING = "dynamics.march.passing_kernels"
+FOLDED_KERNELS = "dynamics.march.passing_kernels"
 PERIODIC_TOL = 1e-12  # change of a periodic motion in all cycles that are left, over its size
 # Positions in the ledger that grow from cycle to cycle.
 SUMS = [
@@ -61,7 +62,7 @@ class MarchResult:
     - `window`, `step_force`, `window_work`: samples of the last cycles, mean forces of their steps [N] and
       friction work [J].
     - `amplitudes` (c, 2), `phasors` (c,): extremes and phasor of the output in each cycle [m].
-    - `ledger`: energies [J] by name, as `Run.book` returns them.
+    - `ledger`: energies [J] by name, as `Run.energy_balance` returns them.
     - `outcome`, `message`: how the march ended, None and "" if it reached its last step.
     - `snapshots`: states of the interface in the last cycle.
     - `cycles_done`: number of cycles.
@@ -98,7 +99,7 @@ class Mark:
     after: object = None
 
 
-def _response(rows, number, dt, modes, drive) -> Response:
+def _make_response(rows, number, dt, modes, drive) -> Response:
     """Return the histories of samples.
 
     Parameters
@@ -124,7 +125,7 @@ def _response(rows, number, dt, modes, drive) -> Response:
     )
 
 
-def modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
+def make_modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
     """Return the `ModalArrays` of a basis and its propagator."""
     damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
     own = (
@@ -146,7 +147,7 @@ def modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
     return ModalArrays(*arrays, *numbers, np.zeros((3, modes.omega.size)))
 
 
-def _runner(model):
+def _run_class(model):
     """Return the class that marches a model: `Run`, or the one that the model names."""
     return getattr(model, "runner", None) or Run
 
@@ -162,28 +163,22 @@ def warm_up(modes: ModalBasis, drive: SineDrive, model: ContactModel, say=None) 
     say : callable or None
         Callback that is told before the loop is compiled.
     """
-    runner = _runner(model)
-    kind = (
-        (
-            model.kind,
-            model.laws,
-            model.loading,
-            modes.damping is None,
-            any(one.mate for one in model.joints),
-        )
-        if runner is Run
-        else None
-    )
-    if kind not in _WARM:
-        run = runner(modes, drive, model, 4, np.inf, load_kernels(say))
-        run.cycle(0, 0, [])
-        _WARM.update({kind} - {None})
+    runner = _run_class(model)
+    kind = None
+    if runner is Run:
+        slides_in_plane = any(joint.mate for joint in model.joints)
+        is_damping_diagonal = modes.damping is None
+        kind = model.kind, model.laws, model.loading, is_damping_diagonal, slides_in_plane
+    if kind not in _LOADED_KINDS:
+        run = runner(modes, drive, model, 4, np.inf, load_instances(say))
+        run.march_cycle(0, 0, [])
+        _LOADED_KINDS.update({kind} - {None})
 
 
-_WARM = set()  # kinds of patches that have marched, so that their compiled code is loaded
+_LOADED_KINDS = set()  # kinds of patches that have marched, so that their compiled code is loaded
 
 
-def fresh(
+def start_run(
     modes: ModalBasis, drive, model, steps_per_cycle: int, travel: float = np.inf, start=None
 ):
     """Return the march of a model at its start.
@@ -203,7 +198,7 @@ def fresh(
     -------
     Run
     """
-    return _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(), start)
+    return _run_class(model)(modes, drive, model, steps_per_cycle, travel, load_instances(), start)
 
 
 def march(
@@ -219,9 +214,9 @@ def march(
     progress=None,
     start=None,
     marks=(),
-    whole: bool = True,
-    folds: bool = False,
     *,
+    keeps_samples: bool = True,
+    keeps_extremes: bool = False,
     even: bool = False,
 ) -> MarchResult:
     """March a model over cycles of its drive, from rest or from an initial state.
@@ -248,11 +243,11 @@ def march(
     start : core.InitialState or None
     marks : sequence of float
         Numbers of whole cycles after which a `Mark` is kept.
-    whole : bool
+    keeps_samples : bool
         Whether samples and extremes from before the last cycles are kept; always true with marks.
-    folds : bool
-        Whether extremes and phasors of all cycles are kept for bonds behind shear modes although `whole` is false,
-        and the sample of the largest slide.
+    keeps_extremes : bool
+        Whether extremes and phasors of all cycles are kept for bonds behind shear modes although `keeps_samples`
+        is false, and the sample of the largest slide.
     even : bool
         The argument `needs_history` of `choose_samples_per_cycle`.
 
@@ -266,30 +261,37 @@ def march(
     Missing
         If a list of bonds becomes too long.
     """
-    run = _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(say), start)
+    run = _run_class(model)(
+        modes, drive, model, steps_per_cycle, travel, load_instances(say), start
+    )
     n_last = max(window, 2)
     mark_steps = sorted({round(mark * steps_per_cycle) for mark in marks})
     plan = _Plan(round(cycles * steps_per_cycle), steps_per_cycle, window, frames, mark_steps)
     samples = MarchSamples(deque(maxlen=n_last))
 
     def restart():
-        return fresh(modes, drive, model, steps_per_cycle, travel, start)
+        return start_run(modes, drive, model, steps_per_cycle, travel, start)
 
     checkpoint = open_checkpoint(
-        run, (plan.n_steps, steps_per_cycle, window, frames, whole, *mark_steps), samples, restart
+        run,
+        (plan.n_steps, steps_per_cycle, window, frames, keeps_samples, *mark_steps),
+        samples,
+        restart,
     )
     before_last = plan.n_steps - n_last * steps_per_cycle
-    keeps_samples = whole or bool(mark_steps)
-    keeps_folded = folds and run.folds and not mark_steps
+    keeps_samples = keeps_samples or bool(mark_steps)
+    keeps_folded = keeps_extremes and run.can_fold and not mark_steps
     if keeps_folded:
-        if not run.folded(before_last, samples):
+        if not run.march_folded(before_last, samples):
             # The march ends before its last cycles, so it is repeated cycle by cycle with all samples.
             run = restart()
             samples = MarchSamples(samples.last)
             keeps_folded = False
             keeps_samples = True
     elif not keeps_samples and not samples.is_restarted:
-        if not run.passed(before_last, lambda: checkpoint.write_if_due(run, samples)):
+        if not run.march_without_samples(
+            before_last, lambda: checkpoint.write_if_due(run, samples)
+        ):
             run = restart()
             samples.is_restarted = True
     n_even = choose_samples_per_cycle(drive, cycles, needs_history=even)
@@ -300,14 +302,16 @@ def march(
         keeps_extremes=keeps_samples or keeps_folded,
     )
     snapshots = _march_recorded(run, recorder, plan, checkpoint, progress)
-    run.check()
-    extremes = samples.extremes if recorder.keeps_extremes else ends_of(samples.last, run)
+    run.check_steps()
+    extremes = (
+        samples.extremes if recorder.keeps_extremes else read_output_extremes(samples.last, run)
+    )
     phasors = samples.phasors if recorder.keeps_extremes else []
-    end = mark_of(run, list(samples.last)[-window:], extremes)
+    end = make_mark(run, list(samples.last)[-window:], extremes)
     rows, first = _join_cycles(list(samples.last))
     number = np.concatenate([*samples.early_numbers, first + np.arange(len(rows))])
     return MarchResult(
-        response=run.response(np.concatenate([*samples.early_rows, rows]), number),
+        response=run.make_response(np.concatenate([*samples.early_rows, rows]), number),
         window=end.window,
         step_force=end.step_force,
         amplitudes=end.amplitudes,
@@ -318,7 +322,7 @@ def march(
         window_work=end.work,
         cycles_done=run.done / steps_per_cycle,
         message=run.message,
-        marks=tuple(mark_of(*mark, mark[0]) for mark in samples.marks),
+        marks=tuple(make_mark(*mark, mark[0]) for mark in samples.marks),
     )
 
 
@@ -379,7 +383,7 @@ class _Recorder:
 def _march_recorded(run, recorder: _Recorder, plan: _Plan, checkpoint, progress) -> list:
     """March to the end of a plan and record the cycles; return the snapshots of the last cycle.
 
-    A motion that has become periodic is not marched on; see `Run.repeats`.
+    A motion that has become periodic is not marched on; see `Run.is_periodic`.
     """
     samples = recorder.samples
     snapshots = []
@@ -388,14 +392,14 @@ def _march_recorded(run, recorder: _Recorder, plan: _Plan, checkpoint, progress)
     while run.done < plan.n_steps and run.outcome is None:
         stop = plan.next_mark(run.done)
         frames = plan.frames if stop == plan.n_steps else 0
-        for first, rows, works in run.cycles(size, stop, frames, snapshots):
+        for first, rows, works in run.march_cycles(size, stop, frames, snapshots):
             recorder.add(run, first, rows, works)
         if run.done in plan.mark_steps:
             cycles = list(samples.last)[-plan.window :]
             samples.marks.append((run.fork(run.drive), cycles, samples.extremes[-plan.window :]))
         size = plan.steps_per_cycle
         n_left = (plan.next_mark(run.done) - run.done) // size - samples.last.maxlen
-        if recorder.keeps_samples and run.repeats(n_left):
+        if recorder.keeps_samples and run.is_periodic(n_left):
             recorder.repeat_last(run, n_left)
         if run.done < plan.n_steps:
             checkpoint.write_if_due(run, samples)
@@ -439,11 +443,11 @@ def _repeat_last_cycle(samples: MarchSamples, run, count: int) -> int:
     later = np.tile(rows[pick], (len(shown), 1))
     later[:, sums] += np.repeat(shown * (rows[-1, sums] - rows[0, sums]), len(pick), axis=0)
     samples.keep_early(later, (first + pick + run.prop.steps * shown).ravel())
-    run.leave_out(count)
+    run.skip_cycles(count)
     return samples.capacity
 
 
-def ends_of(cycles, run) -> list:
+def read_output_extremes(cycles, run) -> list:
     """Return the smallest and largest output [m] of each of the cycles (first step, rows, work)."""
     return [
         one
@@ -452,7 +456,7 @@ def ends_of(cycles, run) -> list:
     ]
 
 
-def mark_of(run, cycles, extremes, after=None) -> Mark:
+def make_mark(run, cycles, extremes, after=None) -> Mark:
     """Return the `Mark` of the cycles (first step, rows, work [J]) that end here.
 
     Parameters
@@ -470,11 +474,11 @@ def mark_of(run, cycles, extremes, after=None) -> Mark:
     """
     rows, first = _join_cycles(cycles)
     return Mark(
-        run.response(rows, first + np.arange(len(rows))),
+        run.make_response(rows, first + np.arange(len(rows))),
         rows[:-1, 2 * run.modes.omega.size + 4].copy(),
         sum(work for _, _, work in cycles),
         np.array(extremes),
-        run.book(),
+        run.energy_balance(),
         after,
     )
 
@@ -515,22 +519,23 @@ class Run:
         # friction work from the samples, and energy exchanged in both directions [J]
         self.second = np.zeros(2)
         self.ledger[LEDGER.drive_work] = (
-            self.motion()
+            self.find_modal_energy()
         )  # energy that is stored at the start counts as work input
-        self.modal_system = modal_arrays(modes, self.prop)
+        self.modal_system = make_modal_arrays(modes, self.prop)
         self.faces, self.load = (
-            faces_of(model, self.prop, self.modal_system, modes.mass),
-            self._pressing(),
+            make_faces(model, self.prop, self.modal_system, modes.mass),
+            self._initial_load(),
         )
         self.width = (
             2 * modes.omega.size + 7 + ELEMENT_COLUMNS * len(model.joints) + 5 * bool(model.loading)
         )
         if model.joints or model.loading:
-            self.ledger[LEDGER.drive_work] += self.strained()
+            self.ledger[LEDGER.drive_work] += self.find_interface_energy()
         self.periodic = (
             self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, SineDrive) else None
         )
-        # used by `repeats`: states at the last check and one cycle before the next, their sizes, and energies a cycle before
+        # `is_periodic` uses the states at the last check and one cycle before the next one, their sizes, and the
+        # energies one cycle before.
         self.looks = np.zeros((3, sum(map(len, self._carried_state()))))
         self.books = np.zeros(14)
         self.change = np.inf
@@ -555,26 +560,21 @@ class Run:
         memories. The list is empty if no period brings the state back.
         """
         model = self.model
-        rubs = arrays.split_memory(
-            self.contact, getattr(model, "element", None) or free_model().element
-        )
-        if self.periodic is None or rubs is None or getattr(model, "load", None) is not None:
+        element = getattr(model, "element", None) or frictionless_model().element
+        memories = arrays.split_memory(self.contact, element)
+        if self.periodic is None or memories is None or getattr(model, "load", None) is not None:
             return []
-        beside = (
-            [
-                arrays.split_element_memory(one.element, row[: one.element.memory.size])
-                for one, row in zip(model.joints, self.faces.mem)
-            ]
-            if model.joints
-            else []
-        )
-        return [np.append(self.state[0], self.state[1] / self.drive.omega), *rubs, *chain(*beside)]
+        rows = [np.append(self.state[0], self.state[1] / self.drive.omega), *memories]
+        for k, joint in enumerate(model.joints):
+            memory = self.faces.mem[k, : joint.element.memory.size]
+            rows += arrays.split_element_memory(joint.element, memory)
+        return rows
 
     def _sums_so_far(self) -> np.ndarray:
         """Return the ledger, the totals and the second energies, (14,)."""
         return np.concatenate([self.ledger, self.totals, self.second])
 
-    def repeats(self, left: int) -> bool:
+    def is_periodic(self, left: int) -> bool:
         """Return whether the motion has become periodic, so that `left` more cycles may be skipped.
 
         It is to be called at the end of every cycle, or of those that `dynamics.periodicity.cycles_to_next_check` names.
@@ -607,63 +607,63 @@ class Run:
             and bound_remaining_change(change, before, left, number) <= PERIODIC_TOL
         )
 
-    def leave_out(self, count: int) -> None:
-        """Skip `count` cycles that are equal to the last one, directly after `repeats`."""
+    def skip_cycles(self, count: int) -> None:
+        """Skip `count` cycles that are equal to the last one, directly after `is_periodic`."""
         grown = count * (self._sums_so_far() - self.books)
         self.ledger[SUMS] += grown[SUMS]
         self.totals += grown[9:12]
         self.second += grown[12:]
         self.done += count * self.prop.steps
 
-    def placed(self, place, rate) -> None:
+    def move_to(self, place, rate) -> None:
         """Move the march to coordinates and rates (n,) at the start of a cycle.
 
         The contact slides there slowly.
         """
         path = np.array([self.modes.slide @ self.state[0], self.modes.slide @ place])
         if path[0] != path[1]:
-            self._slid(path)
+            self._slide_contact(path)
         self.state[:] = (place, rate)
         self.done = 0
 
-    def _slid(self, path) -> None:
+    def _slide_contact(self, path) -> None:
         """Move the memory of the contact along a slide path (2,) [m] in a second."""
         self.loops.follow_path(
             path,
             1.0,
             self.model.kind,
             self.contact,
-            GOAL * self.model.limit,
+            STEP_TOL * self.model.limit,
             np.zeros((2, 2)),
             np.zeros((2, 3)),
         )
 
-    def books_anew(self) -> None:
+    def reset_balance(self) -> None:
         """Start the energy balance here, with the present energies, at the start of a cycle."""
         self.ledger[:] = 0.0
         self.totals[:] = 0.0
         self.second[:] = 0.0
         self.done = 0
-        self.ledger[LEDGER.drive_work] = self.motion() + self.strained()
+        self.ledger[LEDGER.drive_work] = self.find_modal_energy() + self.find_interface_energy()
 
-    def mark(self, cycles: int, window: int) -> Mark:
+    def march_to_mark(self, cycles: int, window: int) -> Mark:
         """March more cycles and return the `Mark` of the last `window` of them."""
         parts = deque(maxlen=window)
         for _ in range(cycles):
-            parts.append(self.cycle(self.prop.steps, 0, []))
+            parts.append(self.march_cycle(self.prop.steps, 0, []))
             if self.outcome is not None:
                 break
-        return mark_of(self, list(parts), ends_of(parts, self))
+        return make_mark(self, list(parts), read_output_extremes(parts, self))
 
-    def table(self, count: int) -> tuple:
+    def step_table(self, count: int) -> tuple:
         """Return a table of `propagator.tables` for the next steps, and the row of the first of them."""
         if self.periodic is not None:
             return self.periodic, self.done % len(self.periodic)
         return self.prop.tables(self.drive, self.done, max(count, 1)), 0
 
-    def response(self, rows, number) -> Response:
+    def make_response(self, rows, number) -> Response:
         """Return the histories of the samples with step numbers `number` (k,)."""
-        out = _response(rows, number, self.prop.dt, self.modes, self.drive)
+        out = _make_response(rows, number, self.prop.dt, self.modes, self.drive)
         return self._add_elements(out, rows) if hasattr(self.model, "patch") else out
 
     def _add_elements(self, out, rows) -> Response:
@@ -674,7 +674,7 @@ class Run:
         """
         modes = self.modes
         faces = self.faces
-        parts, (ports, rubs, mates) = self._elements(rows), faces.of
+        parts, (ports, rubs, mates) = self._element_columns(rows), faces.of
         second = mates < np.arange(mates.size)
         rubs = (rubs == 1) & ~second
         push = -np.einsum("ke,en->kn", parts[:, :, 2], faces.rows[ports]) / modes.mass
@@ -690,7 +690,7 @@ class Run:
             column[:, mates[second]] = parts[:, second, k]
         return replace(out, acceleration=out.acceleration + push @ modes.output, extra=extra)
 
-    def _elements(self, rows) -> np.ndarray:
+    def _element_columns(self, rows) -> np.ndarray:
         """Return the columns of the elements (k, e, ELEMENT_COLUMNS) of samples."""
         count = len(self.model.joints)
         begin = 2 * self.modes.omega.size + 7 + rows.shape[1] - self.width
@@ -698,10 +698,10 @@ class Run:
             len(rows), count, ELEMENT_COLUMNS
         )
 
-    def passed(self, steps: int, tell=None) -> bool:
+    def march_without_samples(self, steps: int, tell=None) -> bool:
         """March to a step in long pieces without keeping samples.
 
-        Returns whether the march got there.
+        Returns whether the march reached the step.
 
         `tell` is called after each piece.
         """
@@ -711,30 +711,30 @@ class Run:
             rows = self._march_rows(
                 min(steps - self.done, MAX_PIECE_STEPS, MAX_PIECE_CYCLES * size, look), 0, []
             )
-            self.totals += self._parts(rows).sum(axis=1)
+            self.totals += self._step_energies(rows).sum(axis=1)
             left = (steps - self.done) // size
-            if self.done % size == 0 and self.outcome is None and self.repeats(left):
-                self.leave_out(left)
+            if self.done % size == 0 and self.outcome is None and self.is_periodic(left):
+                self.skip_cycles(left)
             if tell is not None:
                 tell()
         return self.outcome is None
 
     @property
-    def folds(self) -> bool:
-        """Whether `folded` can march it: bonds behind shear modes alone, under a constant load."""
+    def can_fold(self) -> bool:
+        """Whether `march_folded` can march it: bonds behind shear modes alone, under a constant load."""
         return (
             type(self) is Run
             and self.model.tuple_of is arrays.ShearedPoints
             and not self.model.joints
         )
 
-    def folded(self, steps: int, samples: MarchSamples) -> bool:
-        """March to a step as `passed` does, and keep extremes and phasors of all cycles and the largest slide.
+    def march_folded(self, steps: int, samples: MarchSamples) -> bool:
+        """March to a step without samples, and keep extremes and phasors of all cycles.
 
-        Return whether the march got there.
+        The sample of the largest slide is kept too. Returns whether the march reached the step.
         """
         around = self.prop.steps
-        kernels = load(PASSING)
+        kernels = load(FOLDED_KERNELS)
         n_rows = 2 * kernels.N_BLOCK_ROWS
         largest = arrays.LargestSlide(
             row=np.zeros(2 * self.modes.omega.size + 7),
@@ -743,7 +743,7 @@ class Run:
         )
         folded = arrays.FoldedCycles(
             bounds=arrays.StepBounds(
-                goal=GOAL * self.model.limit,
+                goal=STEP_TOL * self.model.limit,
                 force=float(self.model.limit),
                 travel=float(self.travel),
             ),
@@ -762,7 +762,7 @@ class Run:
             count = 1
             if size == around:
                 count = min((steps - self.done) // size, cycles_to_next_check(self.done // around))
-            rows, first_row = self.table(size * count)
+            rows, first_row = self.step_table(size * count)
             is_new_size = folded.trace.shape[1] != size + 1
             if is_new_size:
                 folded = folded._replace(trace=self._drive_trace(size))
@@ -780,12 +780,12 @@ class Run:
             self.done += did
             self.totals += folded.sums[:3]
             self.second += folded.sums[3:]
-            self._judge(status)
+            self._set_outcome(status)
             samples.extremes += [*zip(*cycles[:, :2].T.tolist())]
             samples.phasors += (cycles[:, 2] + 1j * cycles[:, 3]).tolist()
             n_left = (steps - self.done) // around
-            if self.done % around == 0 and self.outcome is None and self.repeats(n_left):
-                self.leave_out(n_left)
+            if self.done % around == 0 and self.outcome is None and self.is_periodic(n_left):
+                self.skip_cycles(n_left)
                 samples.extremes += samples.extremes[-1:] * n_left
                 samples.phasors += samples.phasors[-1:] * n_left
         if largest_at >= 0:
@@ -798,10 +798,10 @@ class Run:
         phase = 2 * np.pi * (self.done % around + np.arange(size + 1)) / around
         return np.array([0 * phase, 0 * phase, np.cos(phase), np.sin(phase)])
 
-    def cycles(self, size: int, stop: int, frames: int, snapshots: list) -> list:
+    def march_cycles(self, size: int, stop: int, frames: int, snapshots: list) -> list:
         """March a cycle, or several whole cycles at once.
 
-        No cycle goes beyond the step `stop` or the next look of `repeats`. With frames the last cycle is
+        No cycle goes beyond the step `stop` or the next look of `is_periodic`. With frames the last cycle is
         marched by itself, in as many pieces, with a snapshot after each.
 
         Parameters
@@ -835,31 +835,19 @@ class Run:
             together -= 1
         count = max(1, together) if size == whole else 1
         rows = self._march_rows(count * size, frames if first + size == stop else 0, snapshots)
-        works = self._works(rows)
-        booked = np.concatenate([rows[:, :n], self._sums(rows).T, rows[:, n:]], axis=1)
+        works = self._step_works(rows)
+        booked = np.concatenate([rows[:, :n], self._running_sums(rows).T, rows[:, n:]], axis=1)
         done = (len(rows) - 1) // size if size else 0
-        out = (
-            [
-                (
-                    first,
-                    sliding_window_view(booked, size + 1, axis=0)[::size].swapaxes(1, 2),
-                    works[: done * size].reshape(done, size).sum(axis=1),
-                )
-            ]
-            if done
-            else []
-        )
-        if done * size < len(rows) - 1 or not done:
-            out.append(
-                (
-                    first + done * size,
-                    booked[None, done * size :],
-                    works[None, done * size :].sum(axis=1),
-                )
-            )
-        return out
+        end = done * size
+        parts = []
+        if done:
+            cycle_rows = sliding_window_view(booked, size + 1, axis=0)[::size].swapaxes(1, 2)
+            parts.append((first, cycle_rows, works[:end].reshape(done, size).sum(axis=1)))
+        if end < len(rows) - 1 or not done:
+            parts.append((first + end, booked[None, end:], works[None, end:].sum(axis=1)))
+        return parts
 
-    def cycle(self, size: int, frames: int, snapshots: list) -> tuple:
+    def march_cycle(self, size: int, frames: int, snapshots: list) -> tuple:
         """March `size` steps as one cycle: return first step, rows (steps + 1, width) and friction work [J].
 
         Parameters
@@ -871,13 +859,13 @@ class Run:
         snapshots : list
             Snapshots, which are appended.
         """
-        ((first, rows, works),) = self.cycles(size, self.done + size, frames, snapshots)
+        ((first, rows, works),) = self.march_cycles(size, self.done + size, frames, snapshots)
         return first, rows[0], works[0]
 
     def _march_rows(self, size: int, frames: int, snapshots: list) -> np.ndarray:
         """Return the rows (steps + 1, width) of `size` steps as the loop writes them.
 
-        The arguments are those of `cycles`.
+        The arguments are those of `march_cycles`.
 
         Parameters
         ----------
@@ -894,17 +882,17 @@ class Run:
             rows = np.empty((piece + 1, self.width))
             rows[-1] = 0.0  # the entries of the step that follows the last one are not known yet
             kept = copy_state(self.contact, *self._changing_arrays())
-            begin = self._before_a_fling()
-            did, status = self._steps(int(piece), rows)
-            while status == FULL:
+            begin = self._copy_before_piece()
+            did, status = self._march_steps(int(piece), rows)
+            while status == MEMORY_FULL:
                 self.contact = enlarge_list(
                     self.contact, kept, f"at step {self.done + did}", *self._changing_arrays()
                 )
-                did, status = self._steps(int(piece), rows)
-            if begin and self._is_flung(rows[: did + 1]):
+                did, status = self._march_steps(int(piece), rows)
+            if begin and self._has_diverged(rows[: did + 1]):
                 for array, old in zip((*self.contact, *self._changing_arrays()), begin):
                     array[...] = old
-                did = self._steps(did - 1, rows)[0]
+                did = self._march_steps(did - 1, rows)[0]
                 status = 1
                 distance = format_length(self._output_distance(rows[did]), 3)
                 self.message = (
@@ -913,32 +901,28 @@ class Run:
                 )
             self.done += did
             parts.append(rows[: did + 1])
-            self._judge(status)
+            self._set_outcome(status)
             if frames:
                 snapshots.append(self._snapshot(rows[did]))
             if self.outcome is not None:
                 break
-        rows = (
-            np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:])
-            if len(parts) > 1
-            else parts[0]
-        )
-        self.second += self._sampled(rows).sum(), np.abs(self._works(rows)).sum()
+        rows = parts[0]
+        if len(parts) > 1:
+            rows = np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:])
+        self.second += self._sampled_works(rows).sum(), np.abs(self._step_works(rows)).sum()
         return rows
 
-    def _before_a_fling(self) -> tuple:
+    def _copy_before_piece(self) -> tuple:
         """Return copies of all that steps change, if a spring is nonlinear."""
-        springs = any(one.potential is not None for one in self.model.joints)
-        return (
-            tuple(array.copy() for array in (*self.contact, *self._changing_arrays()))
-            if springs
-            else ()
-        )
+        if all(joint.potential is None for joint in self.model.joints):
+            return ()
+        return tuple(array.copy() for array in (*self.contact, *self._changing_arrays()))
 
-    def _is_flung(self, rows) -> bool:
+    def _has_diverged(self, rows) -> bool:
         """Return whether the last step ends FLUNG times beyond the travel, or is not finite."""
         return len(rows) > 1 and not (
-            self._output_distance(rows[-1]) <= FLUNG * self.travel and np.isfinite(rows[-1]).all()
+            self._output_distance(rows[-1]) <= DIVERGED_FACTOR * self.travel
+            and np.isfinite(rows[-1]).all()
         )
 
     def _output_distance(self, row) -> float:
@@ -946,12 +930,12 @@ class Run:
         with np.errstate(invalid="ignore", over="ignore"):
             return abs(float(self.modes.output @ row[: self.modes.omega.size]))
 
-    def _steps(self, count: int, rows) -> tuple:
+    def _march_steps(self, count: int, rows) -> tuple:
         """March `count` steps into rows (count + 1, width).
 
         Returns the number of steps done and the status.
         """
-        table, row = self.table(count)
+        table, row = self.step_table(count)
         return self.loops.march(
             self.model,
             row,
@@ -961,26 +945,26 @@ class Run:
             table,
             self.contact,
             self.faces,
-            self._load(count),
+            self._load_of_steps(count),
             float(self.travel),
             self.ledger,
             rows,
         )
 
-    def _pressing(self):
+    def _initial_load(self):
         """Return the load at the start; here it is constant."""
         return arrays.ConstantLoad(np.zeros(0))
 
-    def _load(self, count: int):
+    def _load_of_steps(self, count: int):
         """Return the arrays of the load in the next steps."""
         return self.load
 
-    def _sums(self, rows) -> np.ndarray:
+    def _running_sums(self, rows) -> np.ndarray:
         """Return friction work, dissipated and created energy since the start at the rows (3, steps + 1) [J].
 
-        `cycles` inserts them into the rows as further columns.
+        `march_cycles` inserts them into the rows as further columns.
         """
-        parts = self._parts(rows)
+        parts = self._step_energies(rows)
         sums = np.empty((3, parts.shape[1] + 1))
         sums[:, 0] = self.totals
         np.cumsum(parts, axis=1, out=sums[:, 1:])
@@ -988,14 +972,14 @@ class Run:
         self.totals = sums[:, -1].copy()
         return sums
 
-    def _parts(self, rows) -> np.ndarray:
+    def _step_energies(self, rows) -> np.ndarray:
         """Return the friction work, the dissipated and the created energy of the steps between the rows (3, steps) [J].
 
         The dissipated energy is the work less the increase of the energy of the interface.
         """
         n = 2 * self.modes.omega.size
         parts = np.zeros((3, len(rows) - 1))
-        parts[0] = self._works(rows)
+        parts[0] = self._step_works(rows)
         lost = parts[0] - np.diff(rows[:, n + 5])
         if lost.min(initial=0.0) == 0.0:
             parts[1] = lost
@@ -1008,11 +992,11 @@ class Run:
         np.copyto(parts[2], -lost, where=lost < -noise)
         return parts
 
-    def _works(self, rows) -> np.ndarray:
+    def _step_works(self, rows) -> np.ndarray:
         """Return the friction work of the steps between the rows [J]."""
         return rows[:-1, 2 * self.modes.omega.size + 6]
 
-    def _sampled(self, rows) -> np.ndarray:
+    def _sampled_works(self, rows) -> np.ndarray:
         """Return the friction work of the steps between the rows [J] from slides and forces alone.
 
         Blows at the end of a step, of slides that stop, have no slide from which their work could be read;
@@ -1023,7 +1007,7 @@ class Run:
         smooth = not model.joints or getattr(model, "patch", None) is not None
         out = sampled_work(rows[:, n], rows[:, n + 2]) if smooth else np.zeros(len(rows) - 1)
         blows = rows[:-1, n + 6].copy()
-        for one, part in zip(model.joints, self._elements(rows).transpose(1, 2, 0)):
+        for one, part in zip(model.joints, self._element_columns(rows).transpose(1, 2, 0)):
             if one.potential is None:
                 slide, _, force, _, mean = part
                 steady = bool(one.element.kernels)
@@ -1037,7 +1021,7 @@ class Run:
         faces = self.faces
         return self.state, self.ledger, *faces[:-1], *(faces.stops if self.model.joints else ())
 
-    def _judge(self, status: int) -> None:
+    def _set_outcome(self, status: int) -> None:
         if status == 1:
             self.outcome = Outcome.EXCEEDS_TRAVEL
         if status == 3:
@@ -1046,7 +1030,7 @@ class Run:
                 f"at step {self.done} the computed motion is not a finite number; raise "
                 "accuracy.steps_per_cycle"
             )
-        if status == UNFIT:
+        if status == NO_CONTACT_SET:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
                 f"at step {self.done} the method could not determine which points are in contact; raise "
@@ -1061,26 +1045,26 @@ class Run:
             "rate": row[n + 1],
             "force": row[n + 2],
             "slip": row[n + 3],
-        } | self.model.shown(self.contact)
+        } | self.model.picture_fields(self.contact)
 
-    def check(self) -> None:
+    def check_steps(self) -> None:
         """Set the outcome to not_converged if a step missed its residual; the samples are kept."""
         if self.ledger[LEDGER.n_unconverged]:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
                 f"{int(self.ledger[LEDGER.n_unconverged])} of {self.done} time steps have an error of the friction force "
-                f"above the permitted {GOAL:.0e} of the friction limit; raise accuracy.steps_per_cycle"
+                f"above the permitted {STEP_TOL:.0e} of the friction limit; raise accuracy.steps_per_cycle"
             )
 
-    def watched(self, rows) -> tuple:
-        """Return slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in the rows of `cycles`."""
+    def read_rates_and_slips(self, rows) -> tuple:
+        """Return slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in the rows of `march_cycles`."""
         n = 2 * self.modes.omega.size
-        parts = self._elements(rows)
+        parts = self._element_columns(rows)
         return np.column_stack([rows[:, n + 1], parts[:, :, 1]]), np.column_stack(
             [rows[:, n + 3], parts[:, :, 3]]
         )
 
-    def motion(self) -> float:
+    def find_modal_energy(self) -> float:
         """Return the kinetic and elastic energy of the modes [J]."""
         return (
             0.5
@@ -1088,7 +1072,7 @@ class Run:
             * float(np.sum(self.state[1] ** 2 + (self.modes.omega * self.state[0]) ** 2))
         )
 
-    def strained(self) -> float:
+    def find_interface_energy(self) -> float:
         """Return the energy in what rubs, in springs and in the normal contact [J]."""
         n = 2 * self.modes.omega.size
         rows = np.zeros((1, self.width))
@@ -1101,21 +1085,20 @@ class Run:
             np.zeros((1, 4 * n + 3)),
             self.contact,
             self.faces,
-            self._load(0),
+            self._load_of_steps(0),
             np.inf,
             np.zeros(9),
             rows,
         )
-        springs = [
-            one.potential(part[0])
-            for one, part in zip(self.model.joints, self._elements(rows)[0])
-            if one.potential is not None
-        ]
-        # normal energy of the preloaded contact
-        normal = rows[0, -3] if self.model.loading else 0.0
-        return float(rows[0, n + 5] + normal + sum(springs))
+        energy = rows[0, n + 5]
+        if self.model.loading:
+            energy += rows[0, -3]  # normal energy of the preloaded contact
+        for joint, columns in zip(self.model.joints, self._element_columns(rows)[0]):
+            if joint.potential is not None:
+                energy += joint.potential(columns[0])
+        return float(energy)
 
-    def book(self) -> dict:
+    def energy_balance(self) -> dict:
         """Return the energy balance [J] and the counters by name."""
         names = (
             "work_in",
@@ -1127,7 +1110,7 @@ class Run:
             "worst_iterations",
         )
         book = dict(zip(names, map(float, self.ledger))) | {
-            "stored": self.motion() + self.strained()
+            "stored": self.find_modal_energy() + self.find_interface_energy()
         }
         book |= {
             "booked": float(self.ledger[LEDGER.friction_work]),

@@ -16,17 +16,17 @@ from ...friction.protocol import Element
 from ..interfaces import arrays
 from ..interfaces.dispatch import COULOMB_LAW
 
-HERE = "dynamics.interfaces"
-ELEMENTS = f"{HERE}.element_kernels"
-MOST_AT_FIRST = 256  # initial entries of the list of a point, in addition to those of one step
+INTERFACES_FOLDER = "dynamics.interfaces"
+ELEMENT_KERNELS = f"{INTERFACES_FOLDER}.element_kernels"
+N_FIRST_ENTRIES = 256  # initial entries of the list of a point, in addition to those of one step
 # width [bond lengths] over which the initial bonds of a point are distributed, so that their force has no jump
-WIDE = 1e-6
-LANES = 16  # number of points that compiled loops take at once; points are filled up to a multiple of it
+FIRST_BOND_WIDTH = 1e-6
+POINTS_MULTIPLE = 16  # number of points that compiled loops take at once; points are filled up to a multiple of it
 # kind of a contact that is never evaluated
-IDLE = ELEMENTS, "friction.laws.elastic_plastic_kernels"
+IDLE_KIND = ELEMENT_KERNELS, "friction.laws.elastic_plastic_kernels"
 
 
-def load_kernels(say=None):
+def load_instances(say=None):
     """Load the module `instances`; `say` is called if its loops have to be compiled first."""
     return load("dynamics.march.instances", say)
 
@@ -92,7 +92,7 @@ class ContactModel:
         """Elements in place of the contact: a set-valued one, because all of them are solved together."""
         return (Joint(0, self.element),) if self.set_valued else ()
 
-    def shown(self, contact) -> dict:
+    def picture_fields(self, contact) -> dict:
         """Return what a picture needs of the memory: "stretch" (t,) of elements, or "bonds" (5, m)."""
         form = self.element.form if self.element is not None else ""
         if form == "parallel":
@@ -141,7 +141,7 @@ def element_model(element: Element, reduction=None) -> ContactModel:
         "bound": [bound],
     }
     return ContactModel(
-        ELEMENTS,
+        ELEMENT_KERNELS,
         element.limit,
         fields,
         element.length,
@@ -152,7 +152,7 @@ def element_model(element: Element, reduction=None) -> ContactModel:
 
 
 @cache
-def free_model() -> ContactModel:
+def frictionless_model() -> ContactModel:
     """Return a contact without friction."""
     return jenkins_model([0.0], [1.0])
 
@@ -208,17 +208,24 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
         growth_numbers(law),
         np.asarray(shear.shape),
         shear.stiffness,
-        LANES,
+        POINTS_MULTIPLE,
         sigma,
     )
     fields["points"][0, : area.size] = law.initial * sigma
     limit = law.static * float(area @ sigma)
     return ContactModel(
-        f"{HERE}.shear_kernels", limit, fields, law.length, "", shear, None, arrays.ShearedPoints
+        f"{INTERFACES_FOLDER}.shear_kernels",
+        limit,
+        fields,
+        law.length,
+        "",
+        shear,
+        None,
+        arrays.ShearedPoints,
     )
 
 
-def lists_model(
+def point_lists_model(
     law, limit, sigma, shear, reach: float, merge: float, under: dict | None = None
 ) -> ContactModel:
     """Return lists of bonds behind shear modes, one per point, of any order and either reading.
@@ -237,7 +244,7 @@ def lists_model(
     merge : float
         Widest merged strip in bond lengths at zero age; 0 merges nothing.
     under : dict or None
-        Result of `under_the_lower` or `under_loads` for a pressure that changes; `limit` and `sigma` are then a
+        Result of `lower_pressure_fields` or `nodal_load_fields` for a pressure that changes; `limit` and `sigma` are then a
         measure of it.
 
     Returns
@@ -252,7 +259,7 @@ def lists_model(
     )
     capacity = min(
         numbers.list_capacity(law, reach, merge),
-        MOST_AT_FIRST + numbers.MAX_STRIPS_PER_LENGTH * int(min(reach, numbers.MAX_DAMAGE)),
+        N_FIRST_ENTRIES + numbers.MAX_STRIPS_PER_LENGTH * int(min(reach, numbers.MAX_DAMAGE)),
     )
     fields = arrays.make_sheared_fields(limit, law.length, growth_numbers(law), shape, stiffness)
     fields["points"][4], fields["drag"][2, 1:] = sigma, shape.T @ limit / limit.sum()
@@ -264,7 +271,7 @@ def lists_model(
         "now": numbers.make_clocks(law),
         "nows": np.tile(numbers.make_clocks(law), (limit.size, 1)),
         "table": numbers.gamma_table(law),
-        "law": numbers.law_numbers(law, reach, merge, WIDE),
+        "law": numbers.law_numbers(law, reach, merge, FIRST_BOND_WIDTH),
         "pressed": np.zeros((2, 0)),
         "pattern": np.zeros((2, 0)),
         "places": np.zeros(0),
@@ -276,7 +283,7 @@ def lists_model(
         fields["statuses"][:, STATUS.initial_pressure] = at_first
         limit = limit * at_first
     return ContactModel(
-        f"{HERE}.shear_list_kernels",
+        f"{INTERFACES_FOLDER}.shear_list_kernels",
         float(limit.sum()),
         fields,
         law.length,
@@ -287,8 +294,8 @@ def lists_model(
     )
 
 
-def under_the_lower(x, sigma, measure: float) -> dict:
-    """Return what `lists_model` needs for points under a pressure that stays on the lower piece.
+def lower_pressure_fields(x, sigma, measure: float) -> dict:
+    """Return what `point_lists_model` needs for points under a pressure that stays on the lower piece.
 
     Parameters
     ----------
@@ -310,8 +317,11 @@ def under_the_lower(x, sigma, measure: float) -> dict:
     }
 
 
-def under_loads(force, measure) -> dict:
-    """Return what `lists_model` needs for points under nodal forces (m,) [N] that change, and those of their limits."""
+def nodal_load_fields(force, measure) -> dict:
+    """Return what `point_lists_model` needs for points under nodal forces that change.
+
+    Both arguments are (m,) arrays [N]; `measure` has the forces of the friction limits.
+    """
     return {"pressed": np.stack([force, force]), "at first": force / measure}
 
 
@@ -329,7 +339,7 @@ def point_pressures(contact) -> np.ndarray:
     )
 
 
-def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
+def bond_list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
     """Return one list of bonds for a rigid slide, of any order and either reading.
 
     Parameters
@@ -358,4 +368,6 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
         "last": np.zeros(2),
         "bound": [(1 + law.initial) * limit],
     }
-    return ContactModel(f"{HERE}.list_kernels", limit, fields, law.length, tuple_of=arrays.BondList)
+    return ContactModel(
+        f"{INTERFACES_FOLDER}.list_kernels", limit, fields, law.length, tuple_of=arrays.BondList
+    )

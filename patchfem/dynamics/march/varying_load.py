@@ -22,11 +22,11 @@ from ...friction.laws.tanh import TanhLaw
 from ...slip.shear_modes import N_SHEAR_MODES, enough_modes, shear_modes
 from ..interfaces import arrays
 from ..interfaces.dispatch import COULOMB_LAW
-from .faces import GOAL
-from .instances import SHEARED_LISTS
+from .faces import STEP_TOL
+from .instances import COMMON_LOAD, POINT_LOADS, SHEARED_LISTS
 from .march import Run
 from .march import march as run
-from .models import IDLE, Joint, element_model, lists_model, under_loads
+from .models import IDLE_KIND, Joint, element_model, nodal_load_fields, point_lists_model
 
 # Kinds of laws.
 COULOMB = 0
@@ -35,12 +35,12 @@ POINTS = 2
 LISTS = 3
 RATE = 4
 LIST_TOL_FACTOR = 1e4  # residual that sums over bonds can reach, over the tolerance of other laws
-FLOOR = 1.0  # smallest pressure of a node in the weights of the shear modes, over the mean of the preload
+MIN_PRESSURE_FRACTION = 1.0  # smallest pressure of a node in the weights of the shear modes, over the mean of the preload
 PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Rubbing:
+class VaryingLoadLaw:
     """A friction law under a load that varies.
 
     - `kind`: COULOMB, PLASTIC, POINTS, LISTS or RATE.
@@ -48,7 +48,7 @@ class Rubbing:
     - `force`: first numbers of `interfaces.arrays.PressedPoints`, with v_0 of a rate law in place of mu_k.
     - `growth`: numbers of the growth of bonds.
     - `length`: bond length [m].
-    - `summed`: the Bonds of a list with its cut-off and its merge width, as `models.list_model` takes them.
+    - `list_options`: the Bonds of a list with its cut-off and its merge width, as `models.bond_list_model` takes them.
     """
 
     kind: int
@@ -56,25 +56,27 @@ class Rubbing:
     force: tuple
     growth: tuple = (-1.0, 1.0, 1.0, 1.0, 1.0, 0.0)
     length: float = 0.0
-    summed: tuple = ()
+    list_options: tuple = ()
 
 
-def coulomb(static: float, kinetic: float | None = None) -> Rubbing:
+def make_coulomb_law(static: float, kinetic: float | None = None) -> VaryingLoadLaw:
     """Return set-valued Coulomb friction on the resultant load."""
-    return Rubbing(COULOMB, static, (static, static if kinetic is None else kinetic, 0.0, 1.0))
+    return VaryingLoadLaw(
+        COULOMB, static, (static, static if kinetic is None else kinetic, 0.0, 1.0)
+    )
 
 
-def rate(static: float, speed: float) -> Rubbing:
+def make_tanh_law(static: float, speed: float) -> VaryingLoadLaw:
     """Return the law mu N tanh(v/v_0) of eq. 2.4, v_0 in m/s."""
-    return Rubbing(RATE, static, (static, speed, 0.0, 1.0))
+    return VaryingLoadLaw(RATE, static, (static, speed, 0.0, 1.0))
 
 
-def plastic(static: float, length: float) -> Rubbing:
-    """Return the elastic-plastic law of eq. 3.12 at every point under its own load, with a length [m]."""
-    return Rubbing(PLASTIC, static, (static, static, length, 1.0), length=length)
+def make_elastic_plastic_law(static: float, length: float) -> VaryingLoadLaw:
+    """Return the elastic-plastic law of eq. 3.12 at every point under its own load."""
+    return VaryingLoadLaw(PLASTIC, static, (static, static, length, 1.0), length=length)
 
 
-def bonds(law) -> Rubbing:
+def make_bonds_law(law) -> VaryingLoadLaw:
     """Return the stretch reading of bonds with order 1 at every point.
 
     PatchfemError is raised for other bonds.
@@ -88,7 +90,7 @@ def bonds(law) -> Rubbing:
             )
         )
 
-    return Rubbing(
+    return VaryingLoadLaw(
         POINTS,
         law.static,
         (law.static, law.static, law.length, law.initial),
@@ -97,7 +99,7 @@ def bonds(law) -> Rubbing:
     )
 
 
-def lists(law, reach: float, merge: float) -> Rubbing:
+def make_bond_lists_law(law, reach: float, merge: float) -> VaryingLoadLaw:
     """Return the printed reading of bonds, a list of bonds at every point.
 
     PatchfemError is raised for the stretch reading.
@@ -107,7 +109,7 @@ def lists(law, reach: float, merge: float) -> Rubbing:
 
     Parameters
     ----------
-    law : Rubbing
+    law : VaryingLoadLaw
     reach : float
         Cut-off in bond lengths.
     merge : float
@@ -121,7 +123,7 @@ def lists(law, reach: float, merge: float) -> Rubbing:
                 "recursion",
             )
         )
-    return Rubbing(
+    return VaryingLoadLaw(
         LISTS,
         law.static,
         (law.static, law.static, law.length, law.initial),
@@ -131,7 +133,7 @@ def lists(law, reach: float, merge: float) -> Rubbing:
     )
 
 
-def contact_sets_of(patch, spring: float = 0.0) -> ContactSets:
+def make_contact_sets(patch, spring: float = 0.0) -> ContactSets:
     """Return the contact sets around the solved state of a patch.
 
     `spring` is the rotational stiffness of the holder [N m/rad], 0 for a rigid one. PatchfemError for a nonlinear asperity
@@ -166,12 +168,12 @@ def port_rows(modes: ModalBasis) -> np.ndarray:
     )
 
 
-def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
+def make_pressed_fields(law: VaryingLoadLaw, normal, shear, limit: float) -> tuple:
     """Return the fields of a fresh `interfaces.arrays.PressedPoints` for points under nodal forces.
 
     Parameters
     ----------
-    law : Rubbing
+    law : VaryingLoadLaw
     normal : (m,) array
         Nodal forces [N].
     shear : ShearModes or None
@@ -190,7 +192,7 @@ def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
     psi, kappa = (np.zeros((size, 0)), ()) if shear is None else (shear.shape, shear.stiffness)
     weight = np.full(size, law.static / (1.0 if plastic else law.length))
     return (
-        np.array([*law.force, law.kind, GOAL * limit]),
+        np.array([*law.force, law.kind, STEP_TOL * limit]),
         memory,
         np.stack([normal, normal]),
         np.array(psi.T, order="C"),
@@ -207,10 +209,10 @@ class VaryingLoadModel:
     - `sets`: contact sets.
     - `rows` (3, n): slide, heave and pitch per coordinate.
     - `load`: function of times (k,) [s] to a prescribed load [N] on one point, in place of the contact.
-    - `shear`: ShearModes on every node, from `shear_of`.
+    - `shear`: ShearModes on every node, from `choose_shear_modes`.
     """
 
-    law: Rubbing
+    law: VaryingLoadLaw
     sets: ContactSets | None
     rows: np.ndarray
     load: object = None
@@ -247,14 +249,14 @@ class VaryingLoadModel:
         return VaryingLoadRun
 
     @property
-    def pointed(self) -> bool:
+    def has_point_loads(self) -> bool:
         """Whether points bear their own fraction of the load."""
         return self.law.kind in (PLASTIC, POINTS, LISTS)
 
     @property
     def loading(self) -> str:
         """How the load is borne, as `instances` names it."""
-        return "points" if self.pointed else "whole"
+        return POINT_LOADS if self.has_point_loads else COMMON_LOAD
 
     @property
     def laws(self) -> tuple:
@@ -275,14 +277,14 @@ class VaryingLoadModel:
         """Contact and law without the joints, for which `instances` makes a loop."""
         if self.law.kind == LISTS:
             return SHEARED_LISTS, ""
-        if self.pointed:
+        if self.has_point_loads:
             return "dynamics.interfaces.pressed_points_kernels", ""
-        return IDLE if self.set_valued else (IDLE[0], "friction.laws.tanh_kernels")
+        return IDLE_KIND if self.set_valued else (IDLE_KIND[0], "friction.laws.tanh_kernels")
 
     def build(self):
         """Return the contact with newly allocated arrays, under the preload."""
         law = self.law
-        if self.pointed:
+        if self.has_point_loads:
             return self.points(
                 np.full(1 if self.load is not None else self.sets.x.size, self.preload)
             )
@@ -294,24 +296,24 @@ class VaryingLoadModel:
         """Return fresh points under the nodal forces (m,) [N] of the preload."""
         law = self.law
         if law.kind != LISTS:
-            return arrays.PressedPoints(*rub_of(law, force, self.shear, self.limit))
-        measure = force + FLOOR * force.mean()
-        return lists_model(
-            law.summed[0],
+            return arrays.PressedPoints(*make_pressed_fields(law, force, self.shear, self.limit))
+        measure = force + MIN_PRESSURE_FRACTION * force.mean()
+        return point_lists_model(
+            law.list_options[0],
             law.static * measure,
             measure,
             self.shear,
-            *law.summed[1:],
-            under_loads(force, measure),
+            *law.list_options[1:],
+            nodal_load_fields(force, measure),
         ).build()
 
-    def shown(self, contact) -> dict:
+    def picture_fields(self, contact) -> dict:
         """Return nothing: the memory of the interface is that of the run."""
         return {}
 
 
-def shear_of(
-    giving, law: Rubbing, force, weight, count: int | None = None, tolerance: float = 1e-3
+def choose_shear_modes(
+    giving, law: VaryingLoadLaw, force, weight, count: int | None = None, tolerance: float = 1e-3
 ):
     """Return the ShearModes of pieces whose contact set changes.
 
@@ -322,7 +324,7 @@ def shear_of(
     ----------
     giving : (m, m) array
         Tangential compliance on every node [m/N].
-    law : Rubbing
+    law : VaryingLoadLaw
     force : (m,) array
         Nodal forces of the preload [N].
     weight : (m,) array
@@ -335,7 +337,7 @@ def shear_of(
     -------
     ShearModes
     """
-    limit = law.static * (force + FLOOR * force.sum() * weight / weight.sum())
+    limit = law.static * (force + MIN_PRESSURE_FRACTION * force.sum() * weight / weight.sum())
     # a patch that could jump without a change of the drive is refused, by its preload as under a constant load
     if law.growth[0] >= 0:
         shear_modes(
@@ -350,15 +352,15 @@ def shear_of(
     return enough_modes(giving, limit, law.length, N_SHEAR_MODES, 0.1 * tolerance)
 
 
-def model_of(
-    modes: ModalBasis, law: Rubbing, sets: ContactSets | None, load=None, shear=None
+def make_model(
+    modes: ModalBasis, law: VaryingLoadLaw, sets: ContactSets | None, load=None, shear=None
 ) -> VaryingLoadModel:
     """Return the model of a basis on contact sets, or under a prescribed load on one point.
 
     Parameters
     ----------
     modes : ModalBasis
-    law : Rubbing
+    law : VaryingLoadLaw
     sets : ContactSets or None
         What touches at each load and tilt; None where the load of a point is prescribed.
     load : callable or None
@@ -397,7 +399,7 @@ def model_of(
 class VaryingLoadRun(Run):
     """The arrays of a march under a load that varies, and how far it is."""
 
-    def _pressing(self) -> arrays.VaryingLoad:
+    def _initial_load(self) -> arrays.VaryingLoad:
         """Return the load at the start, and set what rubs under it.
 
         The contact sets are kept apart, because other runs may ask them.
@@ -408,7 +410,7 @@ class VaryingLoadRun(Run):
         if model.load is None:
             self.sets = model.sets.make_arrays()
         else:
-            self.sets = _one_point(model.preload)
+            self.sets = _make_point_sets(model.preload)
         x = self.sets.x
         now = np.full(x.size, model.preload)
         if model.load is None:
@@ -416,9 +418,9 @@ class VaryingLoadRun(Run):
             name = name_set(self.sets, model.sets.reference.in_contact)
             slot = press.find_set(self.sets, press.build_first_set(self.sets, name), -heave, turn)
             press.press_state(self.sets, slot, -heave, turn, now)
-        if model.pointed:
+        if model.has_point_loads:
             self.contact = model.points(now)
-        goal = GOAL * model.limit * (LIST_TOL_FACTOR if model.law.kind == LISTS else 1.0)
+        goal = STEP_TOL * model.limit * (LIST_TOL_FACTOR if model.law.kind == LISTS else 1.0)
         return arrays.VaryingLoad(
             (),
             np.ascontiguousarray(model.rows, float),
@@ -437,7 +439,7 @@ class VaryingLoadRun(Run):
         press = self.load
         return *super()._changing_arrays(), press.now, press.slot, press.mean, press.few
 
-    def _load(self, count: int) -> arrays.VaryingLoad:
+    def _load_of_steps(self, count: int) -> arrays.VaryingLoad:
         loads = self.load.loads
         if self.model.load is not None:
             loads = np.array(
@@ -445,15 +447,15 @@ class VaryingLoadRun(Run):
             )
         return self.load._replace(sets=self.sets, loads=loads)
 
-    def _parts(self, rows) -> np.ndarray:
-        """Return the same as `Run._parts`, with the noise of a load that varies.
+    def _step_energies(self, rows) -> np.ndarray:
+        """Return the same as `Run._step_energies`, with the noise of a load that varies.
 
         The noise is that of the largest force, of the mean force, which is computed from the slide that it
         takes (2e-16 of it over `beta`, which is much if the modes hardly slide), of the last digit of the
         slide, and of the stored energy.
         """
         n = 2 * self.modes.omega.size
-        work = self._works(rows)
+        work = self._step_works(rows)
         lost = work - np.diff(rows[:, n + 5])
         size = np.maximum(self.model.limit, np.abs(rows[:-1, n + 4]))
         digit = np.abs(rows[:, : n // 2]) @ np.abs(self.modes.slide)
@@ -481,22 +483,22 @@ class VaryingLoadRun(Run):
                 "memory": np.stack([nodal, law.length / law.static * force, 0 * nodal]),
                 "bend": c.b @ c.psi,
             }
-        elif self.model.pointed:
+        elif self.model.has_point_loads:
             found = {"b": c.b.copy(), "memory": c.memory.copy(), "bend": c.b @ c.modes}
         return super()._snapshot(row) | {"heave": row[-2], "turn": row[-1], "nodal": nodal} | found
 
-    def book(self) -> dict:
+    def energy_balance(self) -> dict:
         """Return the energy balance [J], and the numbers of contact sets, pivots and new tableaus."""
-        return super().book() | dict(
+        return super().energy_balance() | dict(
             zip(("contact_sets", "pivots", "renewed"), map(int, self.sets.counters[N_BUILT:]))
         )
 
-    def response(self, rows, number) -> Response:
+    def make_response(self, rows, number) -> Response:
         """Return the histories.
 
         `extra` has normal_load [N], normal_moment [N m], normal_energy [J], heave [m] and turn [rad].
         """
-        out = super().response(rows, number)
+        out = super().make_response(rows, number)
         modes = self.modes
         model = self.model
         extra = out.extra | dict(zip(PRESS_COLUMNS, rows[:, -5:].T))
@@ -510,7 +512,7 @@ class VaryingLoadRun(Run):
         )
 
 
-def _one_point(load: float) -> SetArrays:
+def _make_point_sets(load: float) -> SetArrays:
     """Return arrays of contact sets that no kernel reads, for a prescribed load on one point."""
     point = np.zeros(1)
     reference = (load, 0.0, 0.0, 1.0, 1.0)
@@ -521,7 +523,7 @@ def march(
     modes: ModalBasis,
     drive,
     sets: ContactSets | None,
-    law: Rubbing,
+    law: VaryingLoadLaw,
     cycles: float,
     steps_per_cycle: int,
     window: int = 10,
@@ -543,7 +545,7 @@ def march(
     drive
     sets : ContactSets or None
         What touches at each load and tilt; None where the load of a point is prescribed.
-    law : Rubbing
+    law : VaryingLoadLaw
     cycles
     steps_per_cycle
     window
@@ -561,7 +563,7 @@ def march(
     -------
     march.MarchResult
     """
-    model = model_of(modes, law, sets, load, shear)
+    model = make_model(modes, law, sets, load, shear)
     return run(
         modes, drive, model, cycles, steps_per_cycle, window, travel, frames, say, progress, start
     )

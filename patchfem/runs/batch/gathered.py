@@ -69,8 +69,8 @@ class _PressedCase(NamedTuple):
     - numerics: as of a single run.
     """
 
-    fine: lanes.Points
-    coarse: lanes.Points
+    fine: lanes.PointsCase
+    coarse: lanes.PointsCase
     error: float
     measures: dict
     warnings: list
@@ -154,7 +154,7 @@ def no_lanes(model: Model) -> str:
             "the case has [friction.temperature] or accuracy.shear_modes, or its table of measured responses "
             "cannot be read"
         )
-    return "" if lanes.fits(rig.modes) else "the case has too many modes"
+    return "" if lanes.can_march(rig.modes) else "the case has too many modes"
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
@@ -199,7 +199,7 @@ def _side_by_side(models: list, held: list, steps: int) -> tuple:
     found, lost, many = (
         CaseResults.blank(len(models)),
         np.zeros(len(models), bool),
-        load(lanes.KERNELS).LANES,
+        load(lanes.LANES_KERNELS).LANES,
     )
     order = np.argsort([one.fine.amplitude / one.fine.limit.sum() for one in held], kind="stable")
     size = max(1, SAMPLES // (steps * held[0].numerics.window * many)) * many
@@ -231,7 +231,7 @@ def _press_case(model: Model) -> _PressedCase | None:
                 or choose_quadrature(model, numerics).engine != "recursion"
             ):
                 return None
-            kernels, tolerance = load(lanes.KERNELS), SHARE * model.accuracy.tolerance
+            kernels, tolerance = load(lanes.LANES_KERNELS), SHARE * model.accuracy.tolerance
             found = [
                 few_points(one, model.bonds, tolerance, kernels.N_POINTS, kernels.N_PIECE_MODES)
                 for one in (patch, coarse[0])
@@ -239,7 +239,7 @@ def _press_case(model: Model) -> _PressedCase | None:
             if None in found:
                 return None
             points = [
-                lanes.Points(
+                lanes.PointsCase(
                     limit,
                     few.shape,
                     few.stiffness,
@@ -323,7 +323,7 @@ class _Read(NamedTuple):
     lost: np.ndarray
 
 
-def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None) -> _Read:
+def _read(models: list, held: list, done: lanes.MarchedCases, steps: int, asked=None) -> _Read:
     """Evaluate a march with `steps` per cycle.
 
     asked: which cases (n,) are searched for ringing; None: all.
@@ -383,7 +383,7 @@ def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None)
     return _Read(values, book, done.extremes, done.phasors, done.reach, own, lost)
 
 
-def _has_other_modes(model: Model, done: lanes.Marched) -> np.ndarray:
+def _has_other_modes(model: Model, done: lanes.MarchedCases) -> np.ndarray:
     """Return whether modes other than the first contribute to the slide (n,)."""
     return np.array(
         [
@@ -442,7 +442,7 @@ def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple
 
 
 def _left_out(
-    values: dict, fraction: float, static: float, points: lanes.Points, work: float
+    values: dict, fraction: float, static: float, points: lanes.PointsCase, work: float
 ) -> dict:
     """Return `friction_errors` of the error by few modes and points.
 

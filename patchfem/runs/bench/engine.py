@@ -276,7 +276,7 @@ def cost(model, points: int) -> Cost:
     if engine.choice is not None and engine.choice.strips:
         strips = int(engine.choice.strips)
         sizes = {"bond_list_about": strips}
-        lists = (MemoryPart(capacity.max_bytes(strips), "the list of bonds", "accuracy.tail"),)
+        lists = (MemoryPart(capacity.list_bytes(strips), "the list of bonds", "accuracy.tail"),)
     motion = Cost(
         {"motion": steps * engine.seconds}, (samples, *lists), (), steps, sizes, engine.name
     )

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from ...dynamics.march.capacity import copy_state, enlarge_list, is_full
-from ...dynamics.march.march import GOAL
-from ...dynamics.march.models import load_kernels
+from ...dynamics.march.faces import STEP_TOL
+from ...dynamics.march.models import load_instances
 from .ledger import BLOCK, PassOptions, frame_numbers, make_ledger
 
 
@@ -73,7 +73,7 @@ def follow_path(
     Missing
         If a list of bonds exceeds its memory.
     """
-    loops = load_kernels(watch.say)
+    loops = load_instances(watch.say)
     contact = model.build()
     at = frame_numbers(slide.size, frames)
     turns = _new_pace(time) if paced else np.zeros(0, int)
@@ -92,7 +92,7 @@ def follow_path(
                 dt,
                 model.kind,
                 contact,
-                GOAL * model.limit,
+                STEP_TOL * model.limit,
                 energies[a : b + 1],
                 forces[a : b + 1],
             )
@@ -103,7 +103,7 @@ def follow_path(
             failed = slid(contact)
         missed += failed
         if b in at:
-            states.append((slide[b], next(iter(model.shown(contact).values()), None)))
+            states.append((slide[b], next(iter(model.picture_fields(contact).values()), None)))
         if b == last or b - told >= BLOCK:
             watch.tell(b / last)
             told = b

@@ -13,7 +13,7 @@ import numpy as np
 from ...dynamics.events.elements import CELL_MERGES, join_cells
 from ...dynamics.grooves import climbing as flank_climbing
 from ...dynamics.march import varying_load
-from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
+from ...dynamics.march.models import ContactModel, bond_list_model, element_model, points_model
 from ...effects import law_has_trait
 from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.record import make_law
@@ -85,9 +85,9 @@ def climbing(model, load: float, patch=None, count: int | None = None):
     """
     f = model.friction
     if law_has_trait(f.law, "bonds"):
-        law = varying_load.bonds(model.bonds)
+        law = varying_load.make_bonds_law(model.bonds)
     else:
-        law = varying_load.plastic(f.static, f.bond_length or 0.0)
+        law = varying_load.make_elastic_plastic_law(f.static, f.bond_length or 0.0)
     if model.rig is None:
         found = flank_climbing.make_model(replace(model.grooves, lifted_mass=0.0), load, law, None)
     else:
@@ -122,7 +122,7 @@ def one_point(model, load: float, engine: BenchEngine, springs=None) -> ContactM
     law, found = model.bonds, engine.choice
     if found.engine == "recursion":
         return points_model(law, [1.0], [load])
-    return list_model(law, f.static * load, found.reach(law.order), found.merge)
+    return bond_list_model(law, f.static * load, found.reach(law.order), found.merge)
 
 
 def coarser_cells(few) -> CoarserRuns:

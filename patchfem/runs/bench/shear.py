@@ -7,7 +7,12 @@ passes that show the error of the mesh of elements.
 import numpy as np
 
 from ...core import NotConverged
-from ...dynamics.march.models import jenkins_model, lists_model, points_model, under_the_lower
+from ...dynamics.march.models import (
+    jenkins_model,
+    lower_pressure_fields,
+    point_lists_model,
+    points_model,
+)
 from ...effects import law_has_trait
 from ...friction.record import make_law
 from ...response.coarser import CoarserRuns
@@ -196,14 +201,14 @@ def lists_on_lower_piece(model, patch, found, shear):
         Modes on every node; None for pieces that are rigid in shear.
     """
     law, sigma, mean = model.bonds, patch.pressure.sigma_n, mean_pressure(patch)
-    return lists_model(
+    return point_lists_model(
         law,
         law.static * mean * patch.pieces.interface.weight,
         np.full(sigma.size, mean),
         shear,
         found.reach(law.order),
         found.merge,
-        under_the_lower(patch.x, sigma, mean),
+        lower_pressure_fields(patch.x, sigma, mean),
     )
 
 
@@ -223,7 +228,9 @@ def sheared_lists(patch, law, shear, found, force=None):
     """
     sigma = patch.pressure.sigma_n[shear.points] if force is None else np.ones_like(force)
     force = patch.pieces.interface.weight[shear.points] * sigma if force is None else force
-    return lists_model(law, law.static * force, sigma, shear, found.reach(law.order), found.merge)
+    return point_lists_model(
+        law, law.static * force, sigma, shear, found.reach(law.order), found.merge
+    )
 
 
 def coarser_elements(count: int, few) -> CoarserRuns:

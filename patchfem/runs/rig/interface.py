@@ -62,12 +62,14 @@ def make_contact(model: Model, numerics: Numerics, patch):
             joints.Joint(k, one) for k, one in enumerate(_side_by_side(model, numerics, patch))
         ]
     if second is not None:
-        found = joints.in_planes(found, [bool(one.lateral) for one in rig.friction.interfaces])
+        found = joints.pair_plane_joints(
+            found, [bool(one.lateral) for one in rig.friction.interfaces]
+        )
         rows += [row for row, one in zip(second, rig.friction.interfaces) if one.lateral]
     if rig.springs.interlock is not None:
-        found.append(joints.interlock(0, *rig.springs.interlock))
+        found.append(joints.make_interlocking_spring(0, *rig.springs.interlock))
     if rig.springs.cubic is not None:
-        found.append(joints.cubic(len(rows), rig.springs.cubic))
+        found.append(joints.make_cubic_spring(len(rows), rig.springs.cubic))
         rows.append(rig.modes.output)
     size = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
     beside = alone if alone is not None and alone.limit > 0 else None
@@ -144,7 +146,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
     """
     f, soft = model.friction, model.partial_slip
     if f is None:
-        return models.free_model()
+        return models.frictionless_model()
     if model.rig.friction.load_varies:
         return varying_load.varying_load_model(model, numerics, patch)
     if model.rig.friction.has_partial_slip:
@@ -189,7 +191,7 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
             else None,
         )
     if found.engine != "recursion" and not model.partial_slip:
-        return models.list_model(law, limit, found.reach(law.order), found.merge)
+        return models.bond_list_model(law, limit, found.reach(law.order), found.merge)
     if model.partial_slip:
         reduced, force = _shear_modes(patch, law, numerics.shear_modes, model)
         if found.engine != "recursion":

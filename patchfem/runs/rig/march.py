@@ -64,9 +64,8 @@ def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None
     # strips have no common shear stress, so no frames are kept
     frames = 0 if rig.friction.strips_slide_apart else frames
     progress = ListGuard(progress) if has_list(model, numerics) else progress
-    folds = (
-        model.patch is not None and model.patch.mesh.can_gather_points
-    )  # the histories of this run are not used
+    # the histories of a run for gathered points are not used
+    keeps_extremes = model.patch is not None and model.patch.mesh.can_gather_points
     done = engine.march(
         rig.modes,
         rig.drive.signal,
@@ -80,8 +79,8 @@ def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None
         progress,
         rig.start,
         rig_levels.level_ends(rig),
-        numerics.whole and not folds,
-        folds,
+        keeps_samples=numerics.whole and not keeps_extremes,
+        keeps_extremes=keeps_extremes,
         even=bool(NEEDS_RUN),
     )
     seconds = perf_counter() - begin
@@ -248,11 +247,11 @@ class MarchReader(Reader):
             run = (
                 done.marks[number].after.fork(other)
                 if number >= 0
-                else engine.fresh(
+                else engine.start_run(
                     rig.modes, other, self.contact, numerics.steps, rig.springs.travel, rig.start
                 )
             )
-            mark = run.mark(round(rig.drive.levels.cycles), numerics.window)
+            mark = run.march_to_mark(round(rig.drive.levels.cycles), numerics.window)
             return self.level(
                 level,
                 strips.mark_as_one(mark, self.patch) if rig.friction.strips_slide_apart else mark,

@@ -185,7 +185,7 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
         entries, seconds = lists.list_cost(model, numerics)
         each, sizes["bond_list_about"] = seconds / steps, int(entries)
         parts.append(
-            MemoryPart(capacity.max_bytes(int(entries)), "the list of bonds", "accuracy.tail")
+            MemoryPart(capacity.list_bytes(int(entries)), "the list of bonds", "accuracy.tail")
         )
     elif soft and (is_bonds or model.grooves is not None or rig.friction.load_varies):
         sizes["shear_modes"] = modes = numerics.shear_modes or shear_modes.N_SHEAR_MODES

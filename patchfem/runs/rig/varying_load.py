@@ -12,18 +12,18 @@ from .numerics import Numerics
 
 
 def make_rubbing(model: Model, numerics: Numerics):
-    """Return the friction law of a model as a `dynamics.march.varying_load.Rubbing`."""
+    """Return the friction law of a model as a `dynamics.march.varying_load.VaryingLoadLaw`."""
     f = model.friction
     if f.law == "coulomb":
-        return march.coulomb(f.static, f.kinetic)
+        return march.make_coulomb_law(f.static, f.kinetic)
     if f.law == "tanh":
-        return march.rate(f.static, f.reference_speed)
+        return march.make_tanh_law(f.static, f.reference_speed)
     if f.law == "elastic-plastic":
-        return march.plastic(f.static, f.bond_length)
+        return march.make_elastic_plastic_law(f.static, f.bond_length)
     if not is_bond_list(f):
-        return march.bonds(model.bonds)
+        return march.make_bonds_law(model.bonds)
     found = choose_quadrature(model, numerics)
-    return march.lists(model.bonds, found.reach(f.order), found.merge)
+    return march.make_bond_lists_law(model.bonds, found.reach(f.order), found.merge)
 
 
 def varying_load_model(model: Model, numerics: Numerics, patch):
@@ -39,12 +39,12 @@ def varying_load_model(model: Model, numerics: Numerics, patch):
     load, sets = (
         (model.point.evaluate, None)
         if patch is None
-        else (None, march.contact_sets_of(patch, model.patch.loading.rotational_stiffness))
+        else (None, march.make_contact_sets(patch, model.patch.loading.rotational_stiffness))
     )
     law, shear = make_rubbing(model, numerics), None
     if model.partial_slip:
         weight = patch.pieces.interface.weight
-        shear = march.shear_of(
+        shear = march.choose_shear_modes(
             patch.giving,
             law,
             patch.pressure.sigma_n * weight,
@@ -52,4 +52,4 @@ def varying_load_model(model: Model, numerics: Numerics, patch):
             numerics.shear_modes,
             model.accuracy.tolerance,
         )
-    return march.model_of(model.rig.modes, law, sets, load, shear)
+    return march.make_model(model.rig.modes, law, sets, load, shear)

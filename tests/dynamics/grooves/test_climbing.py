@@ -11,7 +11,7 @@ from patchfem.dynamics.grooves.run import make_model
 from patchfem.dynamics.march.instances import follow_path
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import element_model, points_model
-from patchfem.dynamics.march.varying_load import bonds, plastic
+from patchfem.dynamics.march.varying_load import make_bonds_law, make_elastic_plastic_law
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import FirstOrderBonds
 from patchfem.friction.grooves import Grooves
@@ -24,11 +24,11 @@ BASIS = ModalBasis(("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), O
 DRIVE = SineDrive(49.0, 2 * np.pi * 143)
 LAWS = {
     "elastic-plastic": (
-        lambda length: plastic(MU, length),
+        lambda length: make_elastic_plastic_law(MU, length),
         lambda length: ElasticPlastic(MU, length),
     ),
     "bonds": (
-        lambda length: bonds(Bonds(MU, length)),
+        lambda length: make_bonds_law(Bonds(MU, length)),
         lambda length: FirstOrderBonds(Bonds(MU, length)),
     ),
 }
@@ -119,7 +119,9 @@ def test_order_two_in_the_step(law, lifted):
 
 
 def test_always_a_lifted_mass_that_leaves_the_grooves_is_said():
-    model = ClimbingModel(Grooves(80e-6, 7.5e-6, 0.0, 3.0), 20.0, plastic(MU, 1e-6))
+    model = ClimbingModel(
+        Grooves(80e-6, 7.5e-6, 0.0, 3.0), 20.0, make_elastic_plastic_law(MU, 1e-6)
+    )
     done = march(BASIS, SineDrive(400.0, 2 * np.pi * 143), model, 5, 100)
     assert done.outcome is Outcome.LEAVES_GROOVES and "leaves the grooves" in done.message
 
@@ -139,7 +141,7 @@ def test_order_two_a_lifted_mass_that_starts_with_a_speed():
             march(
                 BASIS,
                 still,
-                ClimbingModel(grooves, LOAD, plastic(1e-9, 1e-6)),
+                ClimbingModel(grooves, LOAD, make_elastic_plastic_law(1e-9, 1e-6)),
                 1,
                 100 * part,
                 start=start,

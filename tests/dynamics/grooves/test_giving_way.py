@@ -13,7 +13,7 @@ from patchfem.dynamics.grooves.climbing import ClimbingModel
 from patchfem.dynamics.march.instances import follow_path
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import jenkins_model
-from patchfem.dynamics.march.varying_load import bonds, plastic
+from patchfem.dynamics.march.varying_load import make_bonds_law, make_elastic_plastic_law
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.grooves import Grooves
 from patchfem.response.measures import energy_balance
@@ -23,7 +23,10 @@ LOAD, MU, LENGTH, COUNT = 115.65, 0.4, 1e-6, 12
 PLACES = np.linspace(-1, 1, COUNT)
 SHARE = np.exp(PLACES) / np.exp(PLACES).sum()
 GIVING = 5e-9 * np.exp(-2 * np.abs(PLACES[:, None] - PLACES))
-LAWS = {"elastic-plastic": plastic(MU, LENGTH), "bonds": bonds(Bonds(MU, LENGTH))}
+LAWS = {
+    "elastic-plastic": make_elastic_plastic_law(MU, LENGTH),
+    "bonds": make_bonds_law(Bonds(MU, LENGTH)),
+}
 GROOVES = Grooves(80e-6, 7.5e-6, 0.3)
 
 
@@ -104,7 +107,10 @@ def coulomb(grooves, tolerance, compliance=GIVING):
         pressure=SimpleNamespace(sigma_n=LOAD * SHARE), pieces=ones, giving=compliance
     )
     return climbing.with_shear_modes(
-        climbing.make_model(grooves, LOAD, plastic(MU, 0.0), None), patch, None, tolerance
+        climbing.make_model(grooves, LOAD, make_elastic_plastic_law(MU, 0.0), None),
+        patch,
+        None,
+        tolerance,
     )
 
 

@@ -9,7 +9,7 @@ from scipy.special import ellipk
 
 from patchfem.core import InitialState, ModalBasis, Outcome, PatchfemError, SineDrive
 from patchfem.dynamics.grooves.run import make_model
-from patchfem.dynamics.march.march import fresh, march
+from patchfem.dynamics.march.march import march, start_run
 from patchfem.friction.grooves import Grooves
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import make_levels, make_step
@@ -217,10 +217,10 @@ def test_always_a_fork_goes_on_as_the_march_does():
         None,
         basis,
     )
-    run = fresh(basis, drive, model, 40)
-    run.cycle(60, 0, [])
+    run = start_run(basis, drive, model, 40)
+    run.march_cycle(60, 0, [])
     twin = run.fork(drive)
-    rows = [one.cycle(100, 0, [])[1] for one in (run, twin)]
+    rows = [one.march_cycle(100, 0, [])[1] for one in (run, twin)]
     np.testing.assert_array_equal(*rows)
     assert abs(rows[0][-1, 1]) < 1e-9  # at rest on its flank without a drive
 

@@ -7,7 +7,7 @@ from event_run import steady
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.grooves.run import make_model
 from patchfem.dynamics.harmonic import orbits
-from patchfem.dynamics.march.march import fresh
+from patchfem.dynamics.march.march import start_run
 from patchfem.dynamics.march.models import element_model
 from patchfem.friction.grooves import Grooves
 from patchfem.friction.laws.elastic_plastic import parallel_element
@@ -20,7 +20,7 @@ BASIS = ModalBasis(("axial",), np.array([OMEGA]), np.array([ZETA]), ONE, ONE, ON
 def test_exact_a_spring_beside_a_mode():
     """An element that never slips: amplitude, multipliers and books of a linear oscillator."""
     spring, drive = 2e5, SineDrive(10.0, 2 * np.pi * 120)
-    run = fresh(BASIS, drive, element_model(parallel_element([spring], [1.0])), 400)
+    run = start_run(BASIS, drive, element_model(parallel_element([spring], [1.0])), 400)
     left = orbits.march_to_periodic(run)
     assert left < orbits.PERIODIC_TOL and run.outcome is None
     own = OMEGA**2 + spring / BASIS.mass
@@ -42,7 +42,7 @@ def test_exact_coulombs_law_on_flanks_of_no_height_is_the_map_of_events(level):
     """States and multipliers of a motion with stops, and of one that slides all the time."""
     drive, limit = SineDrive(level, OMEGA * 1.03), 0.35 * 115.65
     true = steady(BASIS, drive, np.array([limit]), np.array([limit]))
-    run = fresh(
+    run = start_run(
         BASIS, drive, make_model(Grooves(80e-6, 1e-17), 115.65, 0.35, 0.35, None, BASIS), 64
     )
     assert orbits.march_to_periodic(run) < orbits.PERIODIC_TOL

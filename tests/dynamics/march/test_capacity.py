@@ -9,9 +9,9 @@ from march_paths import OMEGA, one_mode
 from patchfem import build
 from patchfem.core import Missing, SineDrive
 from patchfem.dynamics.march import capacity
-from patchfem.dynamics.march.joints import JointsModel, cubic
+from patchfem.dynamics.march.joints import JointsModel, make_cubic_spring
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import list_model
+from patchfem.dynamics.march.models import bond_list_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.runs.bench import bench
 
@@ -23,7 +23,7 @@ LIMIT = 0.4 * 98.0665
 
 
 def model_of(law, entries):
-    made = list_model(law, LIMIT, np.inf, 0.0)
+    made = bond_list_model(law, LIMIT, np.inf, 0.0)
     return replace(
         made, fields=made.fields | {"bondlist": np.zeros((len(made.fields["bondlist"]), entries))}
     )
@@ -49,7 +49,11 @@ def test_exact_a_march_whose_list_grows_is_that_with_room_from_the_start(law, be
 
     def model(entries):
         alone = model_of(LAWS[law], entries)
-        return JointsModel(alone, (cubic(1, 1e10),), np.ones((2, 1)), LIMIT) if beside else alone
+        return (
+            JointsModel(alone, (make_cubic_spring(1, 1e10),), np.ones((2, 1)), LIMIT)
+            if beside
+            else alone
+        )
 
     few, many = (
         marched(model(entries), frames=4) for entries in (3 if law == "printed" else 40, 20_000)

@@ -10,9 +10,19 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from patchfem.core import InitialState, ModalBasis, SineDrive
-from patchfem.dynamics.march.joints import Joint, JointsModel, cubic, interlock
+from patchfem.dynamics.march.joints import (
+    Joint,
+    JointsModel,
+    make_cubic_spring,
+    make_interlocking_spring,
+)
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import coulomb_model, jenkins_model, list_model, points_model
+from patchfem.dynamics.march.models import (
+    bond_list_model,
+    coulomb_model,
+    jenkins_model,
+    points_model,
+)
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
@@ -85,7 +95,7 @@ PAIRS = {
     "bonds": (points_model(LAW, [1.0], [98.0]), lambda: bonds(0, LAW, 98.0)),
     "tanh": (rate_model(39.0, 1e-3), lambda: rate(0, 39.0, 1e-3)),
     "list": (
-        list_model(Bonds(0.4, 2e-6, 1.0, "report"), 39.0, np.inf, 0.0),
+        bond_list_model(Bonds(0.4, 2e-6, 1.0, "report"), 39.0, np.inf, 0.0),
         None,
     ),  # which is a patch alone
 }
@@ -115,7 +125,7 @@ def test_exact_one_element_is_the_contact_of_its_own_loop(law, beside):
     if beside:
         patch = JointsModel(
             model,
-            (interlock(0, 1e-9, 1.0),),
+            (make_interlocking_spring(0, 1e-9, 1.0),),
             np.ones((1, 1)),
             49.0,
             ALL if law == "coulomb" else (),
@@ -139,8 +149,8 @@ def test_exact_one_element_is_the_contact_of_its_own_loop(law, beside):
 @pytest.mark.parametrize(
     "element, period",
     [
-        (cubic(0, 1.0), 4 * ellipk(0.5)),
-        (interlock(0, 1.0, 2 * np.pi), 4 * ellipk(np.sin(0.5) ** 2)),
+        (make_cubic_spring(0, 1.0), 4 * ellipk(0.5)),
+        (make_interlocking_spring(0, 1.0, 2 * np.pi), 4 * ellipk(np.sin(0.5) ** 2)),
     ],
     ids=["duffing", "pendulum"],
 )
@@ -246,8 +256,8 @@ def march_random_chain(seed):
     }
     elements = [makers[kind](p) for p, kind in enumerate(kinds)]
     elements += [
-        cubic(0, rng.uniform(0, 3)),
-        interlock(n - 1, rng.uniform(0, 3), rng.uniform(0.5, 5)),
+        make_cubic_spring(0, rng.uniform(0, 3)),
+        make_interlocking_spring(n - 1, rng.uniform(0, 3), rng.uniform(0.5, 5)),
     ]
     drive = SineDrive(1.0, rng.uniform(0.3, 3.0))
     joints = JointsModel(None, tuple(elements), modes.interfaces, 1.0, ALL)

@@ -52,7 +52,7 @@ def both(basis, cycles: int = CYCLES) -> tuple:
     """(lanes of a case per push, march of each by itself)."""
     area, sigma, modes = patch()
     cases = [
-        lanes.Points(LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, push)
+        lanes.PointsCase(LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, push)
         for push in PUSHES
     ]
     return lanes.march(basis, DRIVE, cases, cycles, STEPS, WINDOW), [
@@ -103,7 +103,7 @@ def test_exact_lanes_take_the_steps_of_a_march(basis):
 def test_exact_a_case_does_not_hang_on_those_beside_it():
     area, sigma, modes = patch()
     cases = [
-        lanes.Points(LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, push)
+        lanes.PointsCase(LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, push)
         for push in np.geomspace(5.0, 300.0, 40)
     ]
     many, one = (lanes.march(TWO, DRIVE, part, 4, STEPS, 1) for part in (cases, cases[17:18]))

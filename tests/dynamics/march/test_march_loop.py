@@ -7,8 +7,8 @@ from march_paths import OMEGA, follow, one_mode
 from scipy.integrate import solve_ivp
 
 from patchfem.core import InitialState, ModalBasis, Outcome, SineDrive
-from patchfem.dynamics.march.march import fresh, march
-from patchfem.dynamics.march.models import jenkins_model, list_model, points_model
+from patchfem.dynamics.march.march import march, start_run
+from patchfem.dynamics.march.models import bond_list_model, jenkins_model, points_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.recursion import FirstOrderBonds, advance_bonds
@@ -47,7 +47,7 @@ def test_exact_prescribed_path_of_points_is_the_recursion(growth):
 def test_exact_prescribed_path_of_a_list_is_the_quadrature(order):
     law = Bonds(0.4, 1.0, order, "report", initial=0.0)
     path = random_walk(2, 40, 0.6)
-    forces, _, _, _ = follow(list_model(law, 0.4 * 3.0, 1e9, 0.0), path)
+    forces, _, _, _ = follow(bond_list_model(law, 0.4 * 3.0, 1e9, 0.0), path)
     run = walk(Quadrature(law, tail=0.0), path, upper_pressure([3.0]), 0.3)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-10)
     fine = np.interp(np.linspace(0, 40, 321), np.arange(41), path)
@@ -121,12 +121,12 @@ def test_exact_points_that_drag_move_as_their_bonds_say(size):
         law, area, sigma, shear_modes(compliance, law.static * area * sigma, law.length, 8)
     )
     modes, drive = one_mode(OMEGA, 0.05, 1.0), SineDrive(size * 9.80665, OMEGA)
-    quick, plain = (fresh(modes, drive, model, 200) for _ in range(2))
-    rows = quick.cycle(600, 0, [])[1]
+    quick, plain = (start_run(modes, drive, model, 200) for _ in range(2))
+    rows = quick.march_cycle(600, 0, [])[1]
     dragged, every = 0, []
     for _ in range(600):
         plain.contact.flow[0] = 0.0
-        every.append(plain.cycle(1, 0, [])[1][0])
+        every.append(plain.march_cycle(1, 0, [])[1][0])
         dragged += plain.contact.flow[0] != 0.0
     assert dragged > 100 and quick.ledger[5] < plain.ledger[5] - dragged / 2
     scale = np.abs(rows).max(axis=0)
@@ -287,7 +287,7 @@ def test_exact_a_run_without_histories_has_the_same_last_cycles(cycles, travel):
     if np.isfinite(travel):  # of the amplitude that the run would reach
         travel *= march(one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2).amplitudes.max()
     one, other = (
-        march(one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2, travel, whole=whole)
+        march(one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2, travel, keeps_samples=whole)
         for whole in (True, False)
     )
     assert one.outcome is other.outcome is (Outcome.EXCEEDS_TRAVEL if np.isfinite(travel) else None)

@@ -45,7 +45,7 @@ CASES = {
     "two faces": lambda: pair(coulomb(0, 12.0, 10.0), elastic_plastic(1, 8.0, 1e-6)),
     "a changing load": lambda: (
         PITCHES,
-        varying_load.model_of(
+        varying_load.make_model(
             PITCHES, LAWS["plastic"], crowned(), None, reduced(crowned(), LAWS["plastic"], 4)
         ),
     ),
@@ -78,10 +78,10 @@ def alike(one, other, within: float) -> None:
 def test_exact_cycles_that_are_left_out_are_as_the_last_one(case, whole, monkeypatch):
     """Histories, extremes, phasors, sums, works and fields."""
     left, share = marched(
-        case, monkeypatch, True, whole=whole, frames=3, marks=(60, CYCLES) if whole else ()
+        case, monkeypatch, True, keeps_samples=whole, frames=3, marks=(60, CYCLES) if whole else ()
     )
     every, all_of_it = marched(
-        case, monkeypatch, False, whole=whole, frames=3, marks=(60, CYCLES) if whole else ()
+        case, monkeypatch, False, keeps_samples=whole, frames=3, marks=(60, CYCLES) if whole else ()
     )
     assert share < 0.75 and all_of_it == 1.0
     for name in ("time", "modal", "modal_rate", "slide", "force", "slip", "acceleration"):
@@ -110,7 +110,7 @@ def test_always_a_hundred_times_the_cycles_cost_little_more():
     (basis, model), seconds = CASES["bonds"](), {}
     for cycles in (200, 20_000):
         begin = process_time()
-        done = march(basis, DRIVE, model, cycles, STEPS, 5, whole=False)
+        done = march(basis, DRIVE, model, cycles, STEPS, 5, keeps_samples=False)
         seconds[cycles] = process_time() - begin
         assert done.cycles_done == cycles
     assert seconds[20_000] < 3 * seconds[200]
@@ -163,12 +163,12 @@ def test_always_what_creeps_beats_or_has_another_period_does_not_repeat(
     motion, periodic, monkeypatch
 ):
     """Of a state that goes as a formula over 1024 cycles with 1e5 to come."""
-    run = marching.fresh(BASIS, DRIVE, rate_model(20.0, 5e-3), STEPS)
+    run = marching.start_run(BASIS, DRIVE, rate_model(20.0, 5e-3), STEPS)
     monkeypatch.setattr(
         run, "_carried_state", lambda: [np.array([1.0 + motion(run.done // STEPS), 1.0])]
     )
     run.looks, found = np.zeros((3, 2)), False
     for number in range(1, 1025):
         run.done = number * STEPS
-        found = found or run.repeats(100_000)
+        found = found or run.is_periodic(100_000)
     assert found == periodic

@@ -46,7 +46,7 @@ def both(basis, push: float, cycles: float, steps: int = 80, **more) -> tuple:
     """A march that keeps every sample worth it, and one that folds."""
     drive, model = SineDrive(push, OMEGA), sheared()
     return march(basis, drive, model, cycles, steps, 5, **more), march(
-        basis, drive, model, cycles, steps, 5, whole=False, folds=True, **more
+        basis, drive, model, cycles, steps, 5, keeps_samples=False, keeps_extremes=True, **more
     )
 
 
@@ -108,7 +108,16 @@ def test_exact_a_motion_that_repeats_leaves_the_rest_of_its_cycles_out():
     seconds = {}
     for cycles in (600, 600_000):
         begin = process_time()
-        march(BASIS, SineDrive(49.0, OMEGA), sheared(), cycles, 80, 5, whole=False, folds=True)
+        march(
+            BASIS,
+            SineDrive(49.0, OMEGA),
+            sheared(),
+            cycles,
+            80,
+            5,
+            keeps_samples=False,
+            keeps_extremes=True,
+        )
         seconds[cycles] = process_time() - begin
     # a thousand times as many cycles; 3 was seen, and a march of all cycles takes above 1000
     assert seconds[600_000] < 50 * seconds[600]

@@ -14,7 +14,12 @@ from varying_load_cases import modes
 
 from patchfem.core import SineDrive
 from patchfem.dynamics.march import varying_load
-from patchfem.dynamics.march.models import list_model, lists_model, load_kernels, under_the_lower
+from patchfem.dynamics.march.models import (
+    bond_list_model,
+    load_instances,
+    lower_pressure_fields,
+    point_lists_model,
+)
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 
@@ -35,7 +40,7 @@ PRINTED = [
 def follow(model, path, dt=1e-3):
     """(forces (k, 3), energies (k, 2), failed steps, contact) of a model along a path."""
     contact, energies, forces = model.build(), np.zeros((path.size, 2)), np.zeros((path.size, 3))
-    bad = load_kernels().follow_path(
+    bad = load_instances().follow_path(
         path, dt, model.kind, contact, 1e-11 * model.limit, energies, forces
     )
     return forces, energies, bad, contact
@@ -57,8 +62,8 @@ def turning(steps: int) -> np.ndarray:
 @pytest.mark.parametrize(("reading", "order"), PRINTED)
 def test_exact_points_of_rigid_pieces_are_one_list(reading, order):
     law, path = Bonds(0.4, 1e-6, order, reading), turning(80)
-    one = follow(list_model(law, LIMIT.sum(), 25.0, 0.02), path)[0]
-    model = lists_model(law, LIMIT, np.ones(4), RIGID, 25.0, 0.02)
+    one = follow(bond_list_model(law, LIMIT.sum(), 25.0, 0.02), path)[0]
+    model = point_lists_model(law, LIMIT, np.ones(4), RIGID, 25.0, 0.02)
     forces, _, bad, _ = follow(model, path)
     away = np.abs(path) > 1e-8  # of the place of the first bonds, which have a width behind shear
     assert bad == 0 and np.allclose(forces[away, 0], one[away, 0], rtol=0, atol=2e-5 * LIMIT.sum())
@@ -77,7 +82,9 @@ def test_exact_a_point_behind_a_spring_is_loaded_by_the_virgin_curve(order, virg
     """With full first bonds the print is P(p, s/eps), by P(p + 1, x) + x^p exp(-x)/Gamma(p + 1) = P(p, x); p = 0 is
     Coulomb's law. The holder's slide is s + force/stiffness; to the second order of the step."""
     law, stiffness, path = Bonds(0.4, 1e-6, order, "report"), 3e6, np.linspace(0, 4e-6, 1601)
-    forces, _, bad, _ = follow(lists_model(law, [2.0], [1.0], spring(stiffness), 745.0, 0.0), path)
+    forces, _, bad, _ = follow(
+        point_lists_model(law, [2.0], [1.0], spring(stiffness), 745.0, 0.0), path
+    )
 
     def force(q):
         if order == 0.0:
@@ -110,7 +117,7 @@ def test_exact_the_ledger_closes(reading, order, grows):
         points=np.arange(4),
     )
     forces, energies, bad, contact = follow(
-        lists_model(law, LIMIT, np.ones(4), shape, 25.0, 0.02), path
+        point_lists_model(law, LIMIT, np.ones(4), shape, 25.0, 0.02), path
     )
     work = np.cumsum(forces[:-1, 1] * np.diff(path))
     lost = np.cumsum(energies[:-1, 0])
@@ -143,7 +150,7 @@ def test_always_points_follow_the_sum_by_hand(reading, order, grows):
     )
     steps = 900
     path, dt = turning(steps), 0.05 / steps
-    model = lists_model(law, limit, np.ones(5), modes, 40.0, 0.01)
+    model = point_lists_model(law, limit, np.ones(5), modes, 40.0, 0.01)
     forces, _, bad, _ = follow(model, path, dt)
     keys = SimpleNamespace(
         static=law.static,
@@ -169,7 +176,7 @@ def test_always_a_step_has_the_balance_downhill_where_bonds_weaken():
     closes, and what the jump loses is dissipated, not created."""
     law = Bonds(0.4, 1e-6, 1.0, "stretch", 0.1, 1e-3, 1e-7, 1e-6, 1.0)
     path = np.linspace(0, 6e-6, 301)
-    model = lists_model(law, [2.0], [1.0], spring(2e5), 30.0, 0.01)
+    model = point_lists_model(law, [2.0], [1.0], spring(2e5), 30.0, 0.01)
     forces, energies, bad, contact = follow(model, path, 1e-4)
     work, lost = np.cumsum(forces[:-1, 1] * np.diff(path)), np.cumsum(energies[:-1, 0])
     assert bad == 0 and np.abs(work - lost - energies[1:, 1]).max() < 1e-12 * work[-1]
@@ -184,8 +191,14 @@ def test_order_points_under_the_pressure_of_the_lower_piece_are_the_numpy_sum(re
     x, sigma = np.linspace(0, 12e-6, 5), np.array([0.0, 0.6, 1.2, 0.7, 0.0])
     steps = 300
     path = turning(steps)
-    model = lists_model(
-        law, 0.4 * LIMIT[:1].repeat(5), np.ones(5), None, 40.0, 0.01, under_the_lower(x, sigma, 1.0)
+    model = point_lists_model(
+        law,
+        0.4 * LIMIT[:1].repeat(5),
+        np.ones(5),
+        None,
+        40.0,
+        0.01,
+        lower_pressure_fields(x, sigma, 1.0),
     )
     forces, energies, bad, contact = follow(model, path)
     twin, weight = Quadrature(law, 0.0), LIMIT[0]
@@ -230,7 +243,7 @@ def test_order_two_a_prescribed_load_is_that_of_the_numpy_sum(order, grows):
             basis,
             SineDrive(30.0, 2 * np.pi * 143),
             None,
-            varying_load.lists(law, 30.0, 0.01),
+            varying_load.make_bond_lists_law(law, 30.0, 0.01),
             2,
             steps,
             2,

@@ -298,4 +298,4 @@ def test_refuses_heave_on_one_rigid_point():
 
 def test_refuses_laws_that_do_not_know_a_changing_load():
     with pytest.raises(PatchfemError, match="not supported yet"):
-        varying_load.bonds(Bonds(0.3, 1e-6, 0.0))
+        varying_load.make_bonds_law(Bonds(0.3, 1e-6, 0.0))

@@ -29,7 +29,7 @@ def reduced(sets, law, count=None, depth: float = 3e-8, tolerance: float = 1e-3)
     """Shear modes on the nodes of contact sets, as many as there are nodes where no count is given."""
     force = sets.reference.forces(0.0, 0.0)
     count = sets.x.size if count is None else count
-    return varying_load.shear_of(
+    return varying_load.choose_shear_modes(
         giving(sets.x, depth), law, force, np.ones(force.size), count or None, tolerance
     )
 
@@ -221,10 +221,12 @@ def test_exact_a_fork_goes_on_by_itself(count):
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
     law, drive = LAWS["bonds"], SineDrive(60.0, 2 * np.pi * 143)
     shear = reduced(crowned(), law, count) if count else None
-    run = plain.fresh(basis, drive, varying_load.model_of(basis, law, crowned(), None, shear), 200)
-    run.cycle(200, 0, [])
+    run = plain.start_run(
+        basis, drive, varying_load.make_model(basis, law, crowned(), None, shear), 200
+    )
+    run.march_cycle(200, 0, [])
     twin = run.fork(drive)
-    first, second = run.cycle(200, 0, [])[1], twin.cycle(200, 0, [])[1]
+    first, second = run.march_cycle(200, 0, [])[1], twin.march_cycle(200, 0, [])[1]
     assert np.abs(first - second).max() <= 1e-13 * np.abs(first).max() and np.ptp(first[:, 0]) > 0
 
 
@@ -232,7 +234,7 @@ def test_refuses_shear_beside_a_set_valued_law():
     law = LAWS["plastic"]
     for other in ("coulomb", "tanh"):
         with pytest.raises(PatchfemError, match="elastic-plastic"):
-            varying_load.model_of(
+            varying_load.make_model(
                 modes([100.0], [1.0], [1.0], [0.0]),
                 LAWS[other],
                 crowned(),
@@ -240,7 +242,7 @@ def test_refuses_shear_beside_a_set_valued_law():
             )
     few = shear_modes(giving(crowned().x), 0.3 * crowned().reference.forces(0.0, 0.0), 1e-6, 4)
     with pytest.raises(PatchfemError, match="include every node"):
-        varying_load.model_of(modes([100.0], [1.0], [1.0], [0.0]), law, crowned(), shear=few)
+        varying_load.make_model(modes([100.0], [1.0], [1.0], [0.0]), law, crowned(), shear=few)
 
 
 @pytest.mark.parametrize("name", ["plastic", "bonds"])

@@ -11,7 +11,7 @@ from scene_texts import DRIVE, KILOGRAM
 from patchfem import build, plan
 from patchfem.core import SineDrive
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import list_model, points_model
+from patchfem.dynamics.march.models import bond_list_model, points_model
 from patchfem.friction.bonds.engines import (
     ENGINES,
     RequestedEngine,
@@ -128,7 +128,7 @@ def test_exact_reading_report_creates_energy_in_the_loop():
     assert path[0] == path[-1] == 0
     for reading, want in (("report", -3.9761e-4), ("stretch", 2.1858e-5)):
         law = Bonds(1.0, 1.0, 1.0, reading, initial=0.0)
-        forces, energies, bad, contact = follow(list_model(law, 1.0, np.inf, 0.0), path, 1.0)
+        forces, energies, bad, contact = follow(bond_list_model(law, 1.0, np.inf, 0.0), path, 1.0)
         work = forces[:-1, 1] @ np.diff(path)
         assert bad == 0 and work / (4 * 0.01 * 20) == pytest.approx(want, rel=1e-3)
         created, dissipated = contact.status[6:8]
@@ -155,7 +155,7 @@ def test_always_the_stretch_reading_creates_next_to_nothing(order, initial, size
     of the work in the last rows, where the force jumps or has a cusp inside a step; the mean from the energy none."""
     path = random_walk(8, 400, size)
     _, _, bad, contact = follow(
-        list_model(Bonds(1.0, 1.0, order, initial=initial), 1.0, np.inf, 0.0), path, 1.0
+        bond_list_model(Bonds(1.0, 1.0, order, initial=initial), 1.0, np.inf, 0.0), path, 1.0
     )
     assert bad == 0 and contact.status[6] <= 1e-7 * contact.status[7]
 
@@ -166,7 +166,7 @@ def test_order_of_negative_orders_converges(order):
     law = Bonds(0.4, 1.0, order, "report", initial=0.0)
     path = random_walk(2, 20, 0.6)
     fine = np.interp(np.linspace(0, 20, 81), np.arange(21), path)
-    got = follow(list_model(law, 1.2, np.inf, 0.0), fine)[0]
+    got = follow(bond_list_model(law, 1.2, np.inf, 0.0), fine)[0]
     run = pulled(Quadrature(law, tail=0.0), path, upper_pressure([3.0]), 0.3)
     assert got[4::4, 0] == pytest.approx(run.traction[:, 0], abs=1e-7)
 
@@ -184,7 +184,7 @@ def test_exact_march_of_a_list_replayed_by_the_numpy_law(reading, order):
     got = march(
         one_mode(OMEGA, 0.01, 1.0),
         SineDrive(5 * 9.80665, OMEGA),
-        list_model(law, limit, np.inf, 0.0),
+        bond_list_model(law, limit, np.inf, 0.0),
         2,
         100,
         window=2,
@@ -205,7 +205,7 @@ def test_exact_march_of_direct_stretch_is_the_recursion():
         march(
             one_mode(OMEGA, 0.003, 1.0), SineDrive(5 * 9.80665, OMEGA), model, 3, 100, window=2
         ).window
-        for model in (list_model(law, limit, np.inf, 0.0), points_model(law, [1e-4], [98.0665e4]))
+        for model in (bond_list_model(law, limit, np.inf, 0.0), points_model(law, [1e-4], [98.0665e4]))
     ]
     assert runs[0].slide == pytest.approx(runs[1].slide, abs=1e-10 * np.ptp(runs[1].slide))
     assert runs[0].force == pytest.approx(runs[1].force, abs=1e-10 * limit)

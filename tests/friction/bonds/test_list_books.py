@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from march_paths import follow
 
-from patchfem.dynamics.march.models import list_model
+from patchfem.dynamics.march.models import bond_list_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import cutoff_age
 
@@ -43,7 +43,7 @@ def books_close(seed, count, reading, order, engine):
     rng, (tail, merge) = np.random.default_rng(seed), ENGINES[engine]
     for _ in range(count):
         law, path = drawn(rng, reading, order)
-        model = list_model(law, 1.0, cutoff_age(order, tail) if tail else np.inf, merge)
+        model = bond_list_model(law, 1.0, cutoff_age(order, tail) if tail else np.inf, merge)
         forces, energies, bad, _ = follow(model, path, 10 ** rng.uniform(-2, 1))
         work, lost = forces[:-1, 1] * np.diff(path), energies[:-1, 0]
         passed = np.abs(work).sum()
@@ -70,7 +70,7 @@ def test_order_of_the_work_check_of_a_list_is_two(reading, order, engine):
     """Trapezoid of the force against the work of the path means, with growth; order -0.5 is steep at every turn."""
     tail, merge = ENGINES[engine]
     law = Bonds(1.0, 1.0, order, reading, 0.6, 0.3, 0.4, 1e-2, 0.0)
-    model, gaps = list_model(law, 1.0, cutoff_age(order, tail) if tail else np.inf, merge), []
+    model, gaps = bond_list_model(law, 1.0, cutoff_age(order, tail) if tail else np.inf, merge), []
     for steps in (100, 400):
         path = 1.7 * np.sin(2 * np.pi * np.arange(2 * steps + 1) / steps)
         forces, _, _, _ = follow(model, path, 2 * np.pi / steps)

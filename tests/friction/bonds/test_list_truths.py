@@ -9,7 +9,7 @@ from march_paths import OMEGA, one_mode
 
 from patchfem.core import SineDrive
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import list_model
+from patchfem.dynamics.march.models import bond_list_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import cutoff_age
 
@@ -79,7 +79,7 @@ def test_exact_marches_of_every_list_agree(order, growth):
         march(
             one_mode(OMEGA, 0.01, 1.0),
             SineDrive(5 * 9.80665, OMEGA),
-            list_model(law, limit, reach, merge),
+            bond_list_model(law, limit, reach, merge),
             3,
             200,
             window=3,

@@ -51,7 +51,7 @@ def left_grooves(model, numerics, patch, drive, contact) -> Solution | None:
     rig = model.rig.with_signal(drive, levels=DriveLevels(), waveform=SINE_WAVEFORM)
     for steps in (START_STEPS, START_STEPS // 2):
         done = engine.march(
-            rig.modes, drive, contact, LEAD, steps, 1, rig.springs.travel, whole=False
+            rig.modes, drive, contact, LEAD, steps, 1, rig.springs.travel, keeps_samples=False
         )
         if done.outcome is not Outcome.LEAVES_GROOVES:
             return None
@@ -82,13 +82,13 @@ class MarchFinder(Followed):
 
     def _run(self, drive, near, steps: int):
         """Return a Run that repeats, started from the Run `near` or from rest, and its residual."""
-        run = engine.fresh(
+        run = engine.start_run(
             self.model.rig.modes, drive, self.contact, steps, self.model.rig.springs.travel
         )
         if near is not None:
             run.contact = type(near.contact)(*(array.copy() for array in near.contact))
             run.state[:] = near.state
-            run.placed(*near.state)
+            run.move_to(*near.state)
         left = orbits.march_to_periodic(run)
         if run.outcome is not None and run.outcome is not Outcome.EXCEEDS_TRAVEL:
             raise NotConverged(run.message)
