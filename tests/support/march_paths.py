@@ -3,8 +3,8 @@
 import numpy as np
 
 from patchfem.core import ModalBasis
+from patchfem.dynamics.march.faces import STEP_TOL
 from patchfem.dynamics.march.joints import JointsModel
-from patchfem.dynamics.march.march import GOAL
 from patchfem.dynamics.march.models import element_model, load_instances
 from patchfem.friction.laws.tanh import TanhLaw
 
@@ -44,7 +44,7 @@ def follow(model, path, dt=0.3):
         dt,
         model.kind,
         contact,
-        GOAL * model.limit,
+        STEP_TOL * model.limit,
         energies,
         forces,
     )

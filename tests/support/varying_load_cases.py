@@ -20,7 +20,9 @@ LAWS = {
     "tanh": varying_load.make_tanh_law(0.3, 1e-3),
     "plastic": varying_load.make_elastic_plastic_law(0.3, 1e-6),
     "bonds": varying_load.make_bonds_law(Bonds(0.3, 1e-6)),
-    "growing": varying_load.make_bonds_law(Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5)),
+    "growing": varying_load.make_bonds_law(
+        Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5)
+    ),
 }
 
 

@@ -454,7 +454,7 @@ def _left_out(
         Error over the friction limit [1].
     static : float
         Coefficient of friction [1].
-    points : lanes.Points
+    points : lanes.PointsCase
     work : float
         Work that friction exchanged [J].
     """

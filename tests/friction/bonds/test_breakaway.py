@@ -63,7 +63,9 @@ def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
     model = points_model(law, [1.0], [1.0])
     contact = model.build()
     energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
-    assert load_instances().follow_path(path, 1.0, model.kind, contact, 1e-12, energies, forces) == 0
+    assert (
+        load_instances().follow_path(path, 1.0, model.kind, contact, 1e-12, energies, forces) == 0
+    )
     run = walk(FirstOrderBonds(law), path, ONE)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-12)
     assert forces[:-1, 1] == pytest.approx(run.mean[:, 0], abs=1e-12)

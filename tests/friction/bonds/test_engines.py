@@ -205,7 +205,10 @@ def test_exact_march_of_direct_stretch_is_the_recursion():
         march(
             one_mode(OMEGA, 0.003, 1.0), SineDrive(5 * 9.80665, OMEGA), model, 3, 100, window=2
         ).window
-        for model in (bond_list_model(law, limit, np.inf, 0.0), points_model(law, [1e-4], [98.0665e4]))
+        for model in (
+            bond_list_model(law, limit, np.inf, 0.0),
+            points_model(law, [1e-4], [98.0665e4]),
+        )
     ]
     assert runs[0].slide == pytest.approx(runs[1].slide, abs=1e-10 * np.ptp(runs[1].slide))
     assert runs[0].force == pytest.approx(runs[1].force, abs=1e-10 * limit)
