@@ -448,14 +448,14 @@ def test_exact_a_run_that_misses_its_residual_is_kept_and_marked(written, tmp_pa
     from patchfem.dynamics.march import march as marching
 
     out = tmp_path / "out"
-    steps = marching.Run._steps
+    steps = marching.Run._march_steps
 
     def missing(self, count, rows):  # the loop books one step that missed
         done = steps(self, count, rows)
         self.ledger[7] += 1
         return done
 
-    monkeypatch.setattr(marching.Run, "_steps", missing)
+    monkeypatch.setattr(marching.Run, "_march_steps", missing)
     failed = cli("run", written(SCENES["rig patch"]), "-o", out, "-q", "--set", "drive.cycles=5")
     assert failed.code == 3 and "above the permitted" in failed.err
     summary = json.loads((out / "summary.json").read_text("utf-8"))

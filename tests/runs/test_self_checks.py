@@ -126,10 +126,10 @@ def test_a_wrong_participation_ends_as_not_converged(monkeypatch):
 
 def test_a_wrong_energy_balance_ends_as_not_converged(monkeypatch):
     """A sum with a millionth too much of the friction loss; no setting is known to mend it, so none is named."""
-    balance = march.Run.book
+    balance = march.Run.energy_balance
     monkeypatch.setattr(
         march.Run,
-        "book",
+        "energy_balance",
         lambda run: balance(run) | {"friction": (1 + 1e-6) * balance(run)["friction"]},
     )
     result = pf.run(SCENES["march"].replace("8 g", "8.1 g"))
