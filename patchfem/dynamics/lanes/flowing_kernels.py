@@ -89,13 +89,11 @@ MAX_PARTS = 4  # a step has at most a reversal, and a kink on either side of it
 N_CORRECTIONS = 2
 MAX_LAYER_PARTS = 64  # number of parts of a step through a layer
 LAYER_EDGE = 5.0  # speed over that of the layer beyond which the force is taken as constant
-LAYER_STEP = (
-    20.0  # change of the speed in a part, over the speed of the layer and the angle of the step
-)
+# Change of the speed in a part of a step, over the speed of the layer and the angle of the step.
+LAYER_STEP = 20.0
 MIN_LAYER_STEP = 0.25  # smallest change of the speed in a part, over the speed of the layer
-FREE_FLIGHT_FACTOR = (
-    2.0  # the speed goes one way while the other forces exceed the friction by this factor
-)
+# The speed goes one way while the other forces exceed the friction by this factor
+FREE_FLIGHT_FACTOR = 2.0
 SLIP_FRACTION = 0.5  # an interface slips while more than this fraction of the slide is irreversible
 N_HALVINGS = 24  # bisections for the start of a slip, which leave 6e-8 of a segment
 SIGN_IN_LAYER = 1.0  # a law with a layer of speeds does not depend on the sign of the slip

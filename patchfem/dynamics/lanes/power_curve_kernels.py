@@ -16,17 +16,15 @@ from .rows_kernels import LANES, LAW_NUMBERS, NJIT_INLINE
 EXPONENT = LAW_NUMBERS  # chi + 1
 FRACTION = LAW_NUMBERS + 1  # q
 N_CURVE_STATE = 0  # number of rows that the curve has in the state of the law
-MAX_STEP = (
-    1e300  # longest step, over YIELD_LENGTH; the curve bends so little that no step is too long
-)
+# Longest step, over YIELD_LENGTH: the curve bends so little that no step is too long.
+MAX_STEP = 1e300
 LOOKS_AHEAD = False  # whether `prepare_lookup` has something to do
 # The numbers of the curve are everywhere the same; see `table_curve_kernels`.
 IN_TABLE = 0
 PREPARED = 0
 AT_START = 0
-ROUND_TO_WHOLE = (
-    6755399441055744.0  # 1.5 * 2^52: after adding it the last bits are the nearest whole number
-)
+# 1.5 * 2^52: after adding it the last bits are the nearest whole number
+ROUND_TO_WHOLE = 6755399441055744.0
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)

@@ -38,9 +38,8 @@ from .rows_kernels import (
 
 STICK_IS_RIGID = True  # whether nothing moves in a stick
 EVENT_KEEPS_STICK = False  # whether a stick may go on after an event
-PROOF_TOL = (
-    0.0  # accepted error of an extrapolated cycle, as a fraction of its range; 0 asks for no proof
-)
+# Accepted error of an extrapolated cycle, as a fraction of its range; 0 asks for no proof
+PROOF_TOL = 0.0
 N_KEPT = 0  # number of numbers of the state of the law that follow the map of a cycle
 N_NEWTON = 3  # Newton steps from the secant; the cubic of a step is then solved to round-off
 N_CROSSING = 4  # Newton steps from a guess that is worse than the secant

@@ -19,9 +19,8 @@ NJIT_INLINE = {
 
 LANES = 32  # number of cases that march side by side
 GROUP_BITS = 3  # lanes march in groups of two to this power while a lane of the group has a case
-PERIODIC_TOL = (
-    1e-9  # two cycles are equal if their ends differ by less than this fraction of their range
-)
+# Two cycles are equal if their ends differ by less than this fraction of their range
+PERIODIC_TOL = 1e-9
 
 # These rows are the motion: its state, then the sums of the run, then the extremes and the phasor of the cycle.
 SLIDE = 0  # relative displacement x [m]
@@ -36,9 +35,8 @@ MAX_SLIDE = 8  # largest slide of the cycle [m]
 MIN_SLIDE = 9  # smallest slide of the cycle [m]
 COS_SUM = 10  # sum of x * cos over the steps of the cycle
 SIN_SUM = 11  # sum of x * sin over the steps of the cycle
-HAS_EVENT = (
-    12  # 1 if an event lies inside the present step, which is then computed by `resolve_step`
-)
+# 1 if an event lies inside the present step, which is then computed by `resolve_step`
+HAS_EVENT = 12
 N_STATE = 13
 
 # These rows are the numbers of the case. First come the coefficients of an exact step: x1 and v1 after a step are linear

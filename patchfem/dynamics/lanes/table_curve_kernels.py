@@ -39,9 +39,8 @@ PARTS_PER_SLIDE = PART_STARTS + N_PARTS + 1
 TABLE_SIZE = PART_STARTS + N_PARTS + 2
 TABLE_START = N_ROWS * LANES  # index of the first table in the workspace
 N_CURVE_STATE = N_ROWS - CURVE_STATE  # number of rows that the curve has in the state of the law
-MAX_STEP = (
-    0.25  # longest step, over YIELD_LENGTH; Newton's method finds the end of a longer one badly
-)
+# Longest step, over YIELD_LENGTH; Newton's method finds the end of a longer one badly
+MAX_STEP = 0.25
 LOOKS_AHEAD = True  # whether `prepare_lookup` has something to do
 # Where the numbers of the curve are: in the table, looked up by `prepare_lookup`, or those of the start of the step.
 IN_TABLE = 0

@@ -2,10 +2,13 @@
 
 import numpy as np
 
+from ...compiled import load
 from ..interfaces import arrays
 from ..interfaces.dispatch import COULOMB_LAW, number_laws
 
 STEP_TOL = 1e-11  # residual of the step solve over the friction limit
+TINY_FORCE = 1e-300  # [N]; keeps the tolerance of a spring above 0 if the scale of the model is 0
+ROWS_KERNELS = "dynamics.march.stops_kernels"  # names the rows of the arrays
 
 
 def make_faces(model, prop, modal_system, mass: float):
@@ -25,6 +28,7 @@ def make_faces(model, prop, modal_system, mass: float):
     """
     if not model.joints:
         return arrays.SingleContact(np.array([STEP_TOL * model.limit]))
+    kernels = load(ROWS_KERNELS)
     elements = [joint.element for joint in model.joints]
     p, n = prop.rows.shape
     law_numbers = number_laws(model.laws)
@@ -35,44 +39,69 @@ def make_faces(model, prop, modal_system, mass: float):
         num[k, : element.numbers.size] = element.numbers
         mem[k, : element.memory.size] = element.memory
         num[k, 0] = law_numbers[element.kernels or COULOMB_LAW]
-    there = getattr(model, "patch", None) is not None
-    scale = getattr(model, "scale", 0.0)
-    ports = np.array([one.port for one in model.joints], np.int64)
-    mates = [k + one.mate for k, one in enumerate(model.joints)]
-    holds = np.array(
-        [k for k, one in enumerate(elements) if (one.kernels or COULOMB_LAW) == COULOMB_LAW],
-        np.int64,
-    )
-    quick = prop.rows * prop.push[1] if not prop.dense.size else prop.rows @ prop.dense[n:, 2 * n :]
-    gamma = quick @ prop.rows.T / mass
-    m = holds.size
-    at = ports[holds]
-    gives = [give[np.ix_(at, at)] for give in (prop.beta, gamma, prop.rows @ prop.rows.T / mass)]
-    stops = arrays.SetValuedElements(
-        holds,
-        np.zeros(m, np.int64),
-        np.tile(num[holds, 1:3].T, (2, 1)),
-        np.array(gives),
-        np.ascontiguousarray(prop.rows[at]),
-        np.zeros((m, m)),
-        np.zeros((18, m)),
-    )
-    each = np.zeros((10, e))
-    each[6] = [one.limit if one.is_bounded else np.inf for one in elements]
-    each[7] = [STEP_TOL * (one.limit or max(scale, 1e-300)) for one in elements]
-    modal = np.zeros((5, n))
-    modal[0] = modal_system.push[0] / mass
+    of = np.zeros((3, e), np.int64)
+    of[kernels.PORT] = [joint.port for joint in model.joints]
+    of[kernels.IS_FRICTION] = [joint.potential is None for joint in model.joints]
+    of[kernels.MATE] = [k + joint.mate for k, joint in enumerate(model.joints)]
+    each = np.zeros((kernels.N_ELEMENT_ROWS, e))
+    scale = max(getattr(model, "scale", 0.0), TINY_FORCE)
+    for k, element in enumerate(elements):
+        each[kernels.MAX_FORCE, k] = element.limit if element.is_bounded else np.inf
+        each[kernels.FORCE_TOL, k] = STEP_TOL * (element.limit or scale)
+    own = np.zeros(kernels.N_OWN)
+    has_contact = getattr(model, "patch", None) is not None
+    own[kernels.CONTACT_TOL] = STEP_TOL * (model.patch.limit if has_contact else model.limit)
+    modal = np.zeros((kernels.N_MODAL_ROWS, n))
+    modal[kernels.COORDINATE_GIVE] = modal_system.push[0] / mass
+    # rows of the rates under a constant force
+    rate_rows = prop.rows * prop.push[1]
+    if prop.dense.size:
+        rate_rows = prop.rows @ prop.dense[n:, 2 * n :]
+    gamma = rate_rows @ prop.rows.T / mass
+    stops = _make_set_valued(elements, of[kernels.PORT], num, (prop.beta, gamma), prop.rows, mass)
     return arrays.PortElements(
-        np.ascontiguousarray(prop.rows, float),
-        np.array([prop.beta, gamma]),
-        np.array([ports, [one.potential is None for one in model.joints], mates], np.int64),
-        num,
-        mem,
-        each,
-        np.array([0.0, 0.0, 0.0, STEP_TOL * (model.patch.limit if there else model.limit), 0.0]),
-        np.zeros((2, p)),
-        modal,
-        np.zeros((e, e)),
-        np.zeros((n, n)),
-        stops,
+        rows=np.ascontiguousarray(prop.rows, float),
+        gives=np.array([prop.beta, gamma]),
+        of=of,
+        num=num,
+        mem=mem,
+        each=each,
+        own=own,
+        port=np.zeros((2, p)),
+        modal=modal,
+        system=np.zeros((e, e)),
+        hess=np.zeros((n, n)),
+        stops=stops,
+    )
+
+
+def _make_set_valued(elements, ports, num, gives, rows, mass: float) -> arrays.SetValuedElements:
+    """Return the arrays of the set-valued elements.
+
+    Parameters
+    ----------
+    elements : list of Element
+    ports : (e,) array
+        Their ports.
+    num : (e, k) array
+        Numbers of their laws.
+    gives : tuple of (p, p) arrays
+        What port forces take from the displacements [m/N] and velocities [m/(s N)] of the ports.
+    rows : (p, n) array
+        Displacement of every port per coordinate.
+    mass : float
+        [kg]
+    """
+    laws = [element.kernels or COULOMB_LAW for element in elements]
+    numbers = np.array([k for k, law in enumerate(laws) if law == COULOMB_LAW], np.int64)
+    at = ports[numbers]
+    m = numbers.size
+    return arrays.SetValuedElements(
+        element=numbers,
+        names=np.zeros(m, np.int64),
+        limit=np.tile(num[numbers, 1:3].T, (2, 1)),
+        gives=np.array([give[np.ix_(at, at)] for give in (*gives, rows @ rows.T / mass)]),
+        rows=np.ascontiguousarray(rows[at]),
+        system=np.zeros((m, m)),
+        field=np.zeros((load(ROWS_KERNELS).N_FIELDS, m)),
     )

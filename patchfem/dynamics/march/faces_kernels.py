@@ -64,16 +64,14 @@ HAS_SLOPES = parts.HAS_SLOPES
 HAS_CONTACT = parts.HAS_CONTACT
 IS_COUPLED = parts.IS_COUPLED
 HAS_PLANES = parts.HAS_PLANES
-MAX_TURNS = 1000  # sweeps over all elements after which a step has failed
-MAX_EVENT_TURNS = (
-    60  # the same with stops and releases inside the step; the first half settles which they are
-)
+MAX_TURNS = 1000  # block descent has failed after this number of turns over all elements
+# Largest number of turns if stops and releases lie inside the step; the first half of the turns decides which.
+MAX_EVENT_TURNS = 60
 FIRST_NEWTON_TURN = 5  # turn after which a Newton step on all forces is worth its cost
-# smallest residual that can be reached, as a fraction of a free slide over its compliance, and of a force
+# Round-off limits the residual to this fraction of a force and of a free slide over its compliance.
 ROUND_OFF = 4e-15
-ELEMENT_COLUMNS = (
-    5  # slide, speed, force, slip, and mean force of the step that follows, of an element in a row
-)
+# A row has these columns of an element: slide, speed, force, slip, and mean force of the step that follows.
+ELEMENT_COLUMNS = 5
 
 
 class NewtonPace(NamedTuple):
@@ -547,7 +545,7 @@ def set_free_motion(faces):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def take_stop_forces(faces):
-    """Take the forces of the stops into faces.each.
+    """Copy the mean forces of the set-valued elements into faces.each.
 
     Returns their largest change over the tolerance.
     """
@@ -621,8 +619,8 @@ def rests_in_step(motion, modal_system, table, at, faces):
 def solve_with_events(q, v, motion, modal_system, table, at, interface, faces):
     """Solve the step with the stops and releases of the set-valued elements inside it, and their blows.
 
-    Which of them stop and go is settled in the first half of the turns; then the slides that follow from it are
-    kept.
+    The first half of the turns decides which elements stop and slip. The other half keeps their slides and finds
+    the forces of the other elements.
 
     Parameters
     ----------
@@ -806,11 +804,9 @@ def friction_work(dq, row, faces):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def strike_modes(motion, mass, faces):
-    """Strike the modes by the blows of set-valued elements.
+    """Change the speeds of the modes by the blows of set-valued elements; return the energy lost [J].
 
-    Returns the energy that they take [J].
-
-    If no stops are known, the elements that do not slide are brought to rest.
+    If no stops are known, the blows bring the elements that do not slide to rest.
 
     Parameters
     ----------

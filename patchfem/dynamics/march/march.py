@@ -34,9 +34,8 @@ from .models import ContactModel, frictionless_model, load_instances
 # Status of `loop_kernels.march` if a list of bonds is full, and if no contact set fits the motion.
 MEMORY_FULL = 2
 NO_CONTACT_SET = 4
-DIVERGED_FACTOR = (
-    10.0  # displacement over the travel that no step can reach which follows the motion
-)
+# A step has not followed the motion if its displacement exceeds the travel by this factor.
+DIVERGED_FACTOR = 10.0
 ELEMENT_COLUMNS = 5  # columns of an element in a row, as in `faces_kernels`
 MAX_PIECE_STEPS = 8000  # number of steps of a piece of a march
 MAX_PIECE_CYCLES = 16  # number of cycles of a piece of a march

@@ -34,12 +34,10 @@ from .stops_kernels import (
 # Numba leaves out the branches of flags that are False.
 HAS_STOPS = parts.HAS_STOPS
 HAS_POINTS = parts.HAS_POINTS
-COUPLING_FACTOR = (
-    0.01  # tolerance of the agreement of friction and normal contact, over that of the friction
-)
-MAX_GUESSES = (
-    80  # guesses of the force on which both agree; the bracket of the secant closes within 60
-)
+# Tolerance of the force on which friction and normal contact agree, over the tolerance of the friction.
+COUPLING_FACTOR = 0.01
+# Largest number of guesses of this force; the bracket of the secant closes within 60.
+MAX_GUESSES = 80
 BISECT_EVERY = 8  # guesses after which the secant method takes the middle of its bracket
 BRACKET_TOL = 4e-16  # width of a bracket over its ends below which it is closed
 MAX_ITERATIONS = 100  # Newton steps for heave and pitch
@@ -426,7 +424,6 @@ def next_guess(secant, guess, used, turn):
     """Take a secant step inside the bracket.
 
     Every eighth step is a bisection, because jumps can make the secant steps alternate.
-
 
     Parameters
     ----------

@@ -36,6 +36,7 @@ MATE = 2
 COORDINATE_GIVE = 0
 OTHER_ACCELERATION = 1
 MODAL_SCRATCH = 2
+N_MODAL_ROWS = 5
 # `own`: of the contact its mean force, increment of slide, force at the sample and tolerance of the force; then 1 if the
 # stops of the step are known.
 CONTACT_FORCE = 0
@@ -43,6 +44,7 @@ CONTACT_INCREMENT = 1
 CONTACT_SAMPLE = 2
 CONTACT_TOL = 3
 STOPS_KNOWN = 4
+N_OWN = 5
 # `each`: of an element its mean force [N], slide, speed, bond length, increment of slide, residual, largest force (if
 # it is set-valued, of a step by mean forces alone), tolerance of the force, and increments of the last two steps.
 ELEMENT_FORCE = 0
@@ -55,6 +57,7 @@ MAX_FORCE = 6
 FORCE_TOL = 7
 LAST_INCREMENT = 8
 INCREMENT_BEFORE = 9
+N_ELEMENT_ROWS = 10
 # `gives`: reduction of slides [m/N], speeds [m/(s N)] and accelerations [1/kg] in a step per constant force.
 BETA = 0
 GAMMA = 1
@@ -75,9 +78,8 @@ SPEED = 7  # speed now [m/s]
 MEAN_FORCE = 8  # mean force so far [N]
 FORCE_NOW = 9  # force now [N]
 FORCE_SLOPE = 10  # slope of the force over the step [N]
-SLIP_STATE = (
-    11  # 0: it rests; +-1: it slides; +-2: it carries its static friction while others hold it
-)
+# A face rests (0), slides (+-1), or carries its static friction while others hold it (+-2).
+SLIP_STATE = 11
 SLIDES_ON = 12  # 1 if it slides in one direction through the whole step
 RIGHT_SIDE = 13  # right-hand side of the equations that are solved
 SOLUTION = 14  # solution of these equations
@@ -86,9 +88,8 @@ FACE_INCREMENT = 16  # increment of slide of the step [m]
 BLOW = 17  # impulse at the end of the step [N s]
 N_FIELDS = 18
 
-DIAGONAL_SHIFT = (
-    1e-10  # relative shift of the diagonal that makes equations of dependent faces regular
-)
+# Relative shift of the diagonal, which makes the equations of dependent faces regular.
+DIAGONAL_SHIFT = 1e-10
 # compliance of a face while the others are held, over its compliance; below it the others hold the face
 DEPENDENT_TOL = 1e-7
 OVERLOAD_TOL = 1e-9  # fraction by which a force may exceed the static friction
