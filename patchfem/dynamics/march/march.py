@@ -302,27 +302,7 @@ def march(
     )
     snapshots = _march_recorded(run, recorder, plan, checkpoint, progress)
     run.check_steps()
-    extremes = (
-        samples.extremes if recorder.keeps_extremes else read_output_extremes(samples.last, run)
-    )
-    phasors = samples.phasors if recorder.keeps_extremes else []
-    end = make_mark(run, list(samples.last)[-window:], extremes)
-    rows, first = _join_cycles(list(samples.last))
-    number = np.concatenate([*samples.early_numbers, first + np.arange(len(rows))])
-    return MarchResult(
-        response=run.make_response(np.concatenate([*samples.early_rows, rows]), number),
-        window=end.window,
-        step_force=end.step_force,
-        amplitudes=end.amplitudes,
-        phasors=np.array(phasors),
-        ledger=end.ledger,
-        outcome=run.outcome,
-        snapshots=snapshots,
-        window_work=end.work,
-        cycles_done=run.done / steps_per_cycle,
-        message=run.message,
-        marks=tuple(make_mark(*mark, mark[0]) for mark in samples.marks),
-    )
+    return _make_result(run, recorder, plan, snapshots)
 
 
 class _Plan(NamedTuple):
@@ -405,6 +385,32 @@ def _march_recorded(run, recorder: _Recorder, plan: _Plan, checkpoint, progress)
         if progress is not None:
             progress(run.done / plan.n_steps)
     return snapshots
+
+
+def _make_result(run, recorder: _Recorder, plan: _Plan, snapshots: list) -> MarchResult:
+    """Return the result of a march that is done."""
+    samples = recorder.samples
+    extremes = (
+        samples.extremes if recorder.keeps_extremes else read_output_extremes(samples.last, run)
+    )
+    phasors = samples.phasors if recorder.keeps_extremes else []
+    end = make_mark(run, list(samples.last)[-plan.window :], extremes)
+    rows, first = _join_cycles(list(samples.last))
+    number = np.concatenate([*samples.early_numbers, first + np.arange(len(rows))])
+    return MarchResult(
+        response=run.make_response(np.concatenate([*samples.early_rows, rows]), number),
+        window=end.window,
+        step_force=end.step_force,
+        amplitudes=end.amplitudes,
+        phasors=np.array(phasors),
+        ledger=end.ledger,
+        outcome=run.outcome,
+        snapshots=snapshots,
+        window_work=end.work,
+        cycles_done=run.done / plan.steps_per_cycle,
+        message=run.message,
+        marks=tuple(make_mark(*mark, mark[0]) for mark in samples.marks),
+    )
 
 
 def _keep_samples(samples: MarchSamples, run, cycle, pick=None) -> int:
