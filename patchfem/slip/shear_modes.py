@@ -434,7 +434,7 @@ def _factorise(c: np.ndarray) -> np.ndarray:
 
 
 def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return the order of `_Sequence` by eliminating each node from the inverse of c when it yields.
+    """Return the order of `_YieldOrder` by eliminating each node from the inverse of c when it yields.
 
     This takes n^3 products in all.
     """
