@@ -267,7 +267,7 @@ def add_errors(
     min_relative_error : float
         Fraction of the value that is added [1].
     size : float
-        Displacement that the drive itself causes [m], as in `floor_of`.
+        Displacement that the drive itself causes [m], as in `rows.error_floor`.
     """
     out, amplitude = {}, values.get("relative_displacement_amplitude", 0.0)
     for name, value in values.items():

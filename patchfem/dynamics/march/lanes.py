@@ -170,7 +170,7 @@ def march(
     ----------
     modes : ModalBasis
     drive : SineDrive
-    cases : list of Points
+    cases : list of PointsCase
     cycles : int
     steps : int
         Number of steps of a cycle.
