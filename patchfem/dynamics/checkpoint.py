@@ -113,7 +113,7 @@ class MarchSamples:
         }
 
     def restore(self, arrays: dict, start_march) -> None:
-        """Restore the samples from what `to_arrays` returned; start_march() returns a new march."""
+        """Restore the samples from the arrays of `to_arrays`; `start_march` returns a new march."""
         cycles, self.extremes = _cycles_from_arrays("last", arrays)
         self.last.extend(cycles)
         if "kept" in arrays:
@@ -278,7 +278,7 @@ def load_checkpoint(path: Path, key: str, run, samples: MarchSamples, start_marc
     Parameters
     ----------
     path, key, run, samples
-        As of `save_checkpoint`; `run` and `samples` are overwritten.
+        See `save_checkpoint`; `run` and `samples` are overwritten.
     start_march : callable
         start_march() -> another march at its start.
 

@@ -73,7 +73,7 @@ def find_coarse_intervals(abscissas, values, tolerance: float) -> np.ndarray:
     abscissas, values : ndarray
         (n,); values may be nan.
     tolerance : float
-        As of `sample_adaptively`.
+        See `sample_adaptively`.
 
     Returns
     -------

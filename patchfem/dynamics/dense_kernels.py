@@ -8,11 +8,11 @@ from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def factorise(a):
-    """Compute the Cholesky factor of a (n, n) in its lower triangle; False if not positive.
+    """Compute the Cholesky factor of a (n, n) in its lower triangle.
 
     Returns False if it is not positive definite.
 
-    The diagonal has one over that of the factor.
+    The diagonal holds the reciprocals of the diagonal of the factor.
     """
     n = a.shape[0]
     for j in range(n):
@@ -33,7 +33,7 @@ def factorise(a):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def solve_factorised(a, b):
-    """Solve (l l^T) x = b in place of b (n,), with a as `factorise` left it; returns b . x >= 0.
+    """Solve (l l^T) x = b in place of b (n,), with the factor of `factorise`; return b . x.
 
     By columns, so that the unknowns below one do not wait for each other.
     """

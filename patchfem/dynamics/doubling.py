@@ -91,7 +91,7 @@ def double_step(step: StepMap, halves) -> StepMap:
 
 
 def split_step(step: StepMap) -> tuple:
-    """Return parts and quadratic form of a Step, as `propagator._drive_weights` for coupled modes."""
+    """Return parts and quadratic form of a Step, like `propagator._drive_weights` for coupled modes."""
     n = step.push.shape[1]
     cut = 3 * n
     parts = {

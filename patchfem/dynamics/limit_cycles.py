@@ -150,7 +150,7 @@ def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode
     modes : ModalBasis
     row : ndarray
     forces : tuple
-        Friction in slip and in stick [N], as of `find_relay_cycles`.
+        Friction in slip and in stick [N], see `find_relay_cycles`.
     amplitudes : array_like
         (k,) [m].
     mode : int

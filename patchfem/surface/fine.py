@@ -39,7 +39,7 @@ class WaveSpectrum(NamedTuple):
 
 
 def wave_spectrum(profile: Profile) -> WaveSpectrum:
-    """Compute the spectrum of a levelled trace by cosines of multiples of half a wave.
+    """Compute the spectrum of a levelled trace by a discrete cosine transform.
 
     The mirror image of the trace continues it without a jump, so the ends add no false short waves,
     as those of a Fourier series do. The mean squares add up to that of the trace by the trapezoidal

@@ -219,7 +219,7 @@ def multiply_by_squared_frequency(kind, omega, slope, top, waves):
     Parameters
     ----------
     kind, omega, slope, top, waves
-        As of `expand_sweep`.
+        See `expand_sweep`.
     """
     series = waves[0]
     square = waves[2]

@@ -146,7 +146,7 @@ def join_cells(count: int, first: int, stiffness, yield_displacement) -> tuple:
     Parameters
     ----------
     count, first : int
-        As of `merge_elements`.
+        See `merge_elements`.
     stiffness, yield_displacement : ndarray
         (t,) of the elements, in increasing order of the yield slide.
 

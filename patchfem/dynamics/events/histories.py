@@ -201,7 +201,9 @@ def start_event_run(
     start: InitialState | None = None,
     memory=None,
 ) -> "_Run":
-    """Return a run before its first piece; parameters as of `simulate`.
+    """Return a run at its start, before any motion is computed.
+
+    The parameters are those of `simulate`.
 
     Its `run` computes it to the end, its `run_to` for some cycles at a time.
 
@@ -290,7 +292,7 @@ def simulate_batch(cases, cycles: int, window: int) -> list:
     cases : sequence of tuple
         (modes, drive, groups, start) of every case.
     cycles, window : int
-        As of `simulate`.
+        See `simulate`.
 
     Returns
     -------
@@ -317,7 +319,7 @@ def evaluate_motion(
     Parameters
     ----------
     modes, drive, groups, cycles, start
-        As of `simulate`.
+        See `simulate`.
     times : array_like
         (k,) [s].
 
@@ -641,7 +643,7 @@ class _Run:
     def run(self, frames: int, progress, *, even: bool = False) -> PieceRun | None:
         """Run to the end.
 
-        Returns None where the output passed the travel. Parameters as of `simulate`.
+        Returns None where the output passed the travel. The parameters are those of `simulate`.
         """
         end = self.cycles
         wide = []
@@ -875,7 +877,7 @@ class _Run:
         Returns
         -------
         ndarray
-            (k, c) columns as of `dense_kernels.evaluate_rows`.
+            (k, c) columns, see `dense_kernels.evaluate_rows`.
         """
         out = np.empty((owner.size, 2 * self.modes.omega.size + 1 + 6 * len(self.groups)))
         self.dense.evaluate_rows(

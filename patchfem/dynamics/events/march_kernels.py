@@ -278,7 +278,7 @@ def move_state(u, h, top, motion, modal_system, table, memory, time_state, run_s
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def widen_extremes(out, time_state, run_sums):
-    """Widen the extremes of the present cycle by an output.
+    """Include a value of the output in the extremes of the present cycle.
 
     Parameters
     ----------
@@ -488,7 +488,7 @@ def expand_piece(h, rate, slow_rate, motion, force, modal_system, time_state, wo
     rate : float
         Fastest rate [1/s].
     slow_rate : float
-        As of `find_slow_rate`, whose series is in the workspace where it is not 0.
+        See `find_slow_rate`, whose series is in the workspace where it is not 0.
     motion : ndarray
         (2, n) modal coordinates [m] and rates [m/s].
     force : ndarray
@@ -760,7 +760,7 @@ def is_before(now, stop):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def is_idle(progress, time_state, run_sums):
-    """Count the events without progress in time.
+    """Count events without progress in time, and return whether there are too many.
 
     Parameters
     ----------
@@ -783,7 +783,7 @@ def is_idle(progress, time_state, run_sums):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def next_begin(kind, changes_stick, drive_changes):
-    """Return what begins the row that follows an event.
+    """Return the reason for which a row begins after an event.
 
     Parameters
     ----------
@@ -831,7 +831,7 @@ def move_over_piece(
     piece : Piece
     event : NextEvent
     stop, motion, modal_system, table, memory, previous, time_state, run_sums, workspace
-        As of `march`.
+        See `march`.
 
     Returns
     -------

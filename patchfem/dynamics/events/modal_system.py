@@ -13,7 +13,7 @@ from .positions_kernels import CONSTRAINT, KIND, LEDGER, LIMIT, PREVIOUS, SEGMEN
 MAX_SLOW_RATE_RATIO = 0.02
 # revolutions per cycle closer to a whole number than this many times their size count as that number [1]
 WHOLE_TOL = 4e-15
-# positions of the first part of the revolutions per cycle, so that its product with a number of cycles is exact [bits]
+# bits of the leading part of the revolutions per cycle; its product with a number of cycles is then exact
 TURN_BITS = 24
 
 series_kernels = get_kernel_module("dynamics.events.series_kernels")

@@ -38,7 +38,8 @@ class PeriodicMotionFinder:
     """Periodic motions of modes behind elements that change sign after half a period.
 
     A call with a drive (core.SineDrive) and a Point near its motion, or None for rest, returns a
-    PeriodicMotion; it raises as `steady.solve_steady`. A Point of other elements is ignored.
+    PeriodicMotion; it raises the errors of `steady.solve_steady`. A Point of other elements is
+    ignored.
     """
 
     def __init__(self, modes: ModalBasis, groups):

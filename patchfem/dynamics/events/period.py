@@ -35,7 +35,7 @@ class Point(NamedTuple):
 
     - motion: (2 n,) modal coordinates [m] and rates [m/s]
     - memory: of the elements
-    - known: turning places, where they are known
+    - known: turning points, None where they are not computed yet
     """
 
     motion: np.ndarray

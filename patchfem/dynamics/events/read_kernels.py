@@ -212,7 +212,7 @@ def add_integrals(
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def add_row_state(row, modal_system, run_values, interface_values):
-    """Widen the ranges by the state where a row begins.
+    """Include the state at the start of a row in the ranges of the measures.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def add_row_state(row, modal_system, run_values, interface_values):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def add_forces(rows, j, top, modal_system, workspace, interface_values):
-    """Widen the ranges of the forces by the piece of a row, and add the work of its ends.
+    """Update the largest forces with the piece of a row, and add its work by the trapezoidal rule.
 
     Parameters
     ----------

@@ -238,7 +238,7 @@ def find_stop(interface, direction, poly, top, workspace):
     ----------
     interface : int
     direction, poly, top, workspace
-        As of `find_speed_root`.
+        See `find_speed_root`.
 
     Returns
     -------

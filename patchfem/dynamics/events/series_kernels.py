@@ -119,12 +119,14 @@ def bound_modal_rate(modal_system, workspace):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def expand_single_mode(coordinates, rate, force, spring, modal_system, drive, h, top, coefs):
-    """Write the series of one mode with one interface, as `expand_motion`, three times as fast.
+    """Write the series of one mode with one interface, like `expand_motion` but faster.
+
+    It takes a third of the time.
 
     Parameters
     ----------
     coordinates, rate, modal_system, drive, h, top, coefs
-        As of `expand_motion`.
+        See `expand_motion`.
     force, spring : float
         Of the interface [N], [N/m].
     """
@@ -157,12 +159,12 @@ def expand_single_mode(coordinates, rate, force, spring, modal_system, drive, h,
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def expand_two_modes(coordinates, rate, force, spring, modal_system, drive, h, top, coefs):
-    """Write the series of two uncoupled modes with one interface, as `expand_motion`.
+    """Write the series of two uncoupled modes with one interface, like `expand_motion`.
 
     Parameters
     ----------
     coordinates, rate, modal_system, drive, h, top, coefs
-        As of `expand_motion`.
+        See `expand_motion`.
     force, spring : float
         Of the interface [N], [N/m].
     """
@@ -214,7 +216,7 @@ def expand_immobile(coordinates, force, modal_system, drive, top, coefs, workspa
     Parameters
     ----------
     coordinates, force, modal_system, drive, top, coefs, workspace
-        As of `expand_motion`.
+        See `expand_motion`.
     """
     constraint = workspace.constraint
     n_interfaces = len(modal_system.inverse_mass)
@@ -251,7 +253,7 @@ def remove_sticking_motion(k, scale, modal_system, coefs, workspace):
     scale : float
         Ratio of the coefficient to the acceleration [s2].
     modal_system, coefs, workspace
-        As of `expand_motion`.
+        See `expand_motion`.
     """
     constraint = workspace.constraint
     n = len(modal_system.omega_squared)
@@ -384,7 +386,7 @@ def evaluate_with_slope(poly, low, top, u):
     Parameters
     ----------
     poly, low, top, u
-        As of `evaluate_polynomial`.
+        See `evaluate_polynomial`.
 
     Returns
     -------
@@ -421,7 +423,7 @@ def refine_root(poly, low, top, left, right, u):
     Parameters
     ----------
     poly, low, top
-        As of `evaluate_polynomial`.
+        See `evaluate_polynomial`.
     left, right : float
         Interval of the root.
     u : float
@@ -461,7 +463,7 @@ def fill_bernstein(poly, low, top, hull):
     Parameters
     ----------
     poly, low, top
-        As of `evaluate_polynomial`.
+        See `evaluate_polynomial`.
     hull : ndarray
         Bernstein coefficients on [0, 1], which are written.
     """
@@ -486,7 +488,7 @@ def find_possible_root(poly, low, top, hull):
     Parameters
     ----------
     poly, low, top
-        As of `evaluate_polynomial`.
+        See `evaluate_polynomial`.
     hull : ndarray
         Workspace.
 
@@ -524,7 +526,7 @@ def prove_first_root(poly, low, top, u, workspace):
     Parameters
     ----------
     poly, low, top
-        As of `evaluate_polynomial`.
+        See `evaluate_polynomial`.
     u : float
         Start of Newton's method.
     workspace : ndarray
@@ -544,7 +546,7 @@ def prove_first_root(poly, low, top, u, workspace):
         step = abs(step)
         if not 0.0 < u <= 1.0:
             return NO_ROOT
-        # as `refine_root`
+        # the same step as in `refine_root`
         done = step <= 2 * EPS * u or (
             step < 0.01 * last and step * (step / last) ** 2 <= 0.1 * EPS * u
         )

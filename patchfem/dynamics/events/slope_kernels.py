@@ -98,7 +98,7 @@ def store_turning_slope(interface, slopes, turning_slopes, modal_system, memory)
     ----------
     interface : int
     slopes, turning_slopes : ndarray
-        As of `move_slopes`; turning_slopes is written.
+        See `move_slopes`; turning_slopes is written.
     modal_system : ModalSystem
     memory : Memory
     """
@@ -111,7 +111,7 @@ def store_turning_slope(interface, slopes, turning_slopes, modal_system, memory)
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def count_elements(memory, counts):
-    """Widen the range of the numbers of slipping elements and of groups, see `march_with_slopes`."""
+    """Update the largest numbers of slipping elements and the smallest numbers of groups."""
     for f in range(counts.shape[1]):
         counts[0, f] = max(counts[0, f], memory.n_slipping[f])
         counts[1, f] = min(counts[1, f], memory.n_groups[f])
@@ -145,7 +145,7 @@ def march_with_slopes(
         to s numbers.
     modal_system, table, memory, time_state, run_sums, workspace
     scratch : tuple
-        As of `move_slopes`.
+        See `move_slopes`.
     counts : ndarray
         (2, i) becomes the largest number of slipping elements and the smallest number of groups.
 

@@ -93,7 +93,7 @@ def solve_equilibrium(force, coordinates, springs, modal_system, imbalance, work
     Parameters
     ----------
     force, springs, modal_system
-        As of `find_imbalance`.
+        See `find_imbalance`.
     coordinates : ndarray
         (n,) [m], which become K^-1 force.
     imbalance : ndarray
@@ -134,7 +134,7 @@ def expand_slow_motion(coordinates, rate, force, springs, modal_system, h, top, 
     coordinates, rate : ndarray
         (n,) coordinates [m] and rates [m/s] at the start.
     force, springs, modal_system, h, top, workspace
-        As of `expand_motion`; workspace.drive[0] is the series of the drive.
+        See `expand_motion`; workspace.drive[0] is the series of the drive.
 
     Returns
     -------
@@ -203,16 +203,16 @@ def expand_slow_motion(coordinates, rate, force, springs, modal_system, h, top, 
 def expand_slow_piece(
     segment, cycle, offset, period, coordinates, rate, force, modal_system, workspace
 ):
-    """Expand a piece as long as the drive allows.
+    """Expand a slow motion over the longest piece that the rate of the drive allows.
 
     It is compiled once for all callers, because it runs rarely.
 
     Parameters
     ----------
     segment, cycle, offset, period
-        As of `drive_kernels.expand_drive`.
+        See `drive_kernels.expand_drive`.
     coordinates, rate, force, modal_system, workspace
-        As of `expand_slow_motion`.
+        See `expand_slow_motion`.
 
     Returns
     -------

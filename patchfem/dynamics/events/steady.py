@@ -99,7 +99,7 @@ def find_steady_state_from(
     Parameters
     ----------
     modes, drive, groups
-        As of `solve_steady`.
+        See `solve_steady`.
     start : InitialState
         State at phase 0 of the drive.
     memory : Memory

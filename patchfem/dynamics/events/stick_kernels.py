@@ -220,7 +220,7 @@ def estimate_round_off(motion, force, springs, modal_system, h, workspace):
     Parameters
     ----------
     motion, force, springs, modal_system, h
-        As of `expand_motion`.
+        See `expand_motion`.
     workspace : Workspace
         choice.motion_sizes (MAX_ORDER + 2, n) and choice.reaction_sizes (i, MAX_ORDER) are
         written.

@@ -62,7 +62,7 @@ class CoulombPeriodMapping(NamedTuple):
     - sizes: (2n,) sizes of the state on the way
     - first: (n, n) projector of the first phase onto motions that leave the sticking interfaces
     alone
-    - alone: as of `SteadyState`
+    - alone: see `SteadyState`
     """
 
     end: np.ndarray
@@ -76,7 +76,7 @@ class CoulombPeriodMapping(NamedTuple):
 
 
 class LinearPhase:
-    """Motion from one event to the next, in which the same interfaces are held.
+    """Motion from one event to the next, in which the same interfaces stick.
 
     run: the run; row, after: first row of the phase and of the next one, None at the end; span:
     duration [s].
@@ -290,7 +290,7 @@ def solve_steady(
     drive
         One segment, a sine.
     groups : sequence of Elements
-        As of `map_period`.
+        See `map_period`.
     start : InitialState, optional
         At rest by default.
     cycles : int, optional
@@ -327,7 +327,7 @@ def solve_steady(
 
 
 class CoulombShooting(Shooting):
-    """Shooting with the map from event to event over periods, as `solve_steady`."""
+    """Shooting with the map from event to event over periods, see `solve_steady`."""
 
     def __init__(self, modes: ModalBasis, drive, groups, periods: int = 1):
         self.modes = modes

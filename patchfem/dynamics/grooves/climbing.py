@@ -299,7 +299,7 @@ class ClimbingRun(GroovesRun):
         self.ledger[LEDGER.drive_work] += self.find_interface_energy()
 
     def move_to(self, place, rate) -> None:
-        """Set the state as a Run does; the lifted mass has the velocity of the flank there."""
+        """Set the state, like `Run.move_to`; the lifted mass has the velocity of the flank there."""
         super().move_to(place, rate)
         self.contact.climb[CLIMB.rise_speed] = (
             float(self.model.grooves.slope(self.modes.slide @ place)) * self.modes.slide @ rate

@@ -169,7 +169,7 @@ def write_mean_force(dq, q, dt, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(free, beta, q, v, dt, contact, goal):
-    """Solve a step with dq = free - beta force, as `interfaces.element_kernels.solve_step`.
+    """Solve a step with dq = free - beta force, like `interfaces.element_kernels.solve_step`.
 
     Returns
     -------

@@ -161,7 +161,7 @@ def state_rates(numbers, memory, turn, dq, v, y, out):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_memory(numbers, memory, q, v):
-    """Return the last force, the energy of height and lifted mass, and the relative displacement.
+    """Return the last force, energy of load and lifted mass, and relative displacement.
 
     Parameters
     ----------

@@ -99,7 +99,7 @@ def solve_friction(ds, flat, end, dt, contact):
             and abs(miss) > close
             and abs(missed - miss) > 0.1 * abs(before - tried)
         ):
-            # secant: a solve is dear
+            # secant method, because every solution is expensive
             set_normal_force(contact, max(before - miss * (before - tried) / (miss - missed), 0.0))
         else:
             set_normal_force(contact, now)
@@ -138,7 +138,7 @@ def find_stiffness(contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_inverse_form(hess, p, workspace):
-    """Return p . hess^-1 p.
+    """Return the quadratic form p . hess^-1 p of the inverse of a matrix.
 
     Parameters
     ----------

@@ -152,7 +152,7 @@ class SampledRun(GroovesRun):
         return np.array([y[-3], y[-2], own[COUNT.drive_power], y[n], own[COUNT.accepted], y[-1]])
 
     def fork(self, drive):
-        """Return an independent copy, as a Run does."""
+        """Return an independent copy, like `Run.fork`."""
         twin = super().fork(drive)
         twin.smooth_motion = self.smooth_motion.fork(drive)
         return twin
@@ -161,7 +161,7 @@ class SampledRun(GroovesRun):
         """Do nothing: there is no memory."""
 
     def _march_steps(self, count: int, rows) -> tuple:
-        """Fill rows as a Run does, from samples of the motion.
+        """Fill rows like `Run._march_steps`, from samples of the motion.
 
         They also have the friction loss of each step.
         """
@@ -218,7 +218,7 @@ class SampledRun(GroovesRun):
         return sampled_work(rows[:, n], rows[:, n + 2], after)
 
     def _step_energies(self, rows) -> np.ndarray:
-        """Return the energies of the steps as a Run does.
+        """Return the energies of the steps, like `Run._step_energies`.
 
         Friction dissipates its own work along the flank.
         """
@@ -240,7 +240,7 @@ class SampledRun(GroovesRun):
             )
 
     def find_interface_energy(self) -> float:
-        """Return the energy of the height of the load and of the lifted mass [J]."""
+        """Return the potential energy of the load and the kinetic energy of the lifted mass [J]."""
         g = self.model.grooves
         z, v = self.state
         q = float(self.modes.slide @ z)

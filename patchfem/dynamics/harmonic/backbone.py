@@ -133,7 +133,7 @@ class FreeBalance:
         )
 
     def towards(self, x, done: float, target: float) -> np.ndarray:
-        """Return unknowns (N,) at an amplitude `target` [m] from x (N,) at `done`.
+        """Follow the motion from unknowns x (N,) at amplitude `done` [m] to the amplitude `target`.
 
         Raises
         ------

@@ -31,7 +31,7 @@ class Branch:
     - points: tuple of SteadyMotion
     - parameter: "frequency" [Hz] or "level" [m s-2]
     - folds, crossings: values of the parameter there; at a crossing another branch meets
-    - ended: as of `continuation.CurvePath`, or "listed" for given values
+    - ended: see `continuation.CurvePath`, or "listed" for given values
     """
 
     points: tuple
@@ -87,7 +87,7 @@ def trace_over_level(
     Parameters
     ----------
     modes, drive, group, stability, **how
-        As of `trace_over_frequency`.
+        See `trace_over_frequency`.
     accelerations : sequence of float
         As `frequencies` there [m s-2].
 
@@ -107,7 +107,7 @@ class CurveNumerics(NamedTuple):
 
     - harmonics: exactly so many; None for as many as the tolerance needs
     - tolerance
-    - start: as of `point.point`
+    - start: see `point.find_point`
     - longest: longest step of the arc
     """
 
@@ -207,7 +207,7 @@ def _find_amplitude(coefficients, min_samples: int):
 
 
 def measure_distance(one: SteadyMotion, other: SteadyMotion, width: float) -> float:
-    """Return the distance between two points of a branch over the size of the motion.
+    """Return the distance between two points of a branch relative to the size of the motion.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def find_point_between(
     share : float
         Fraction of the way.
     width : float
-        As of `distance`.
+        See `measure_distance`.
 
     Returns
     -------

@@ -210,7 +210,7 @@ def correct_point(
     Parameters
     ----------
     system : callable
-        As of `follow_curve`.
+        See `follow_curve`.
     guess : tuple
         Solution (N,) and parameter.
     tangent : ndarray

@@ -96,7 +96,7 @@ class JenkinsGroups(NamedTuple):
 
 
 class JenkinsSamples(NamedTuple):
-    """What a kernel writes of Jenkins elements along N samples.
+    """Results of a kernel for Jenkins elements along N samples.
 
     - force: (N,) [N]
     - slope: (N,) stiffness of the elements that stick [N/m]
@@ -172,7 +172,7 @@ class Law:
         return 0
 
     def sample(self, track: "SampledSlide") -> "SampledForce":
-        """Return its periodic state along a slide, that of a virgin contact where there are several."""
+        """Return the periodic state along a slide that a virgin contact reaches."""
         raise NotImplementedError
 
 
@@ -261,7 +261,7 @@ class Spring(Law):
         return self.stiffness
 
     def sample(self, track: SampledSlide) -> SampledForce:
-        """Force and slope at the samples."""
+        """Return force and slope at the samples."""
         q = track.q
         return SampledForce(
             q * (self.stiffness + self.cubic * q * q), self.stiffness + 3 * self.cubic * q * q
@@ -285,7 +285,7 @@ class Interlock(Law):
         return int(16 * min(2 * np.pi * amplitude / self.wavelength, 1000.0))
 
     def sample(self, track: SampledSlide) -> SampledForce:
-        """Force and slope at the samples."""
+        """Return force and slope at the samples."""
         angle = 2 * np.pi / self.wavelength * track.q
         return SampledForce(
             self.stiffness * self.wavelength / (2 * np.pi) * np.sin(angle),
@@ -300,7 +300,7 @@ class SpeedLaw(Law):
     element: Element
 
     def sample(self, track: SampledSlide) -> SampledForce:
-        """Force and slope at the samples."""
+        """Return force and slope at the samples."""
         force = np.empty(track.samples)
         slope = np.empty(track.samples)
         load_speed_kernels(self.element.kernels).sample_forces(
@@ -326,7 +326,7 @@ class FlowLaw(Law):
         return self.element.limit / self.element.length
 
     def count_samples(self, amplitude: float) -> int:
-        """Samples of a cycle that resolve a reversal at a slide amplitude [m]."""
+        """Return the samples of a cycle that resolve a reversal at a slide amplitude [m]."""
         return _count_samples(self.length / max(amplitude, 1e-300))
 
     def find_periodic_state(self, track: SampledSlide) -> "FlowNodes":
@@ -383,7 +383,7 @@ class FlowLaw(Law):
         )
 
     def _tangent(self, track: SampledSlide, one: "FlowNodes") -> tuple:
-        """Return the derivatives of the force at the samples, as `SampledForce.tangent`."""
+        """Return the derivatives of the force at the samples, see `SampledForce.tangent`."""
         k = np.arange(track.x.size)
         own = one.own
         turned = np.exp(1j * np.outer(one.angle, k))

@@ -33,7 +33,7 @@ DEFAULT_TOLERANCE = 1e-3
 
 
 class _Unbounded(NotConverged):
-    """More harmonics would not help."""
+    """Error: no bounded motion was found at the resonance of an undamped mode."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -83,7 +83,7 @@ class SteadyMotion:
         return (find_peak(y) + find_peak(-y)) / 2
 
     def turns(self) -> tuple:
-        """Return slide [m], force [N] and slip [m] of the first row at both turns.
+        """Return slide [m], force [N] and slip [m] of the first row at both reversals.
 
         It is () for a row at rest.
         """
@@ -123,7 +123,7 @@ def friction_force(laws: tuple, sampled: list) -> np.ndarray:
 
 
 def find_slip(track: SampledSlide, found: list) -> np.ndarray:
-    """Return the slip (N,) [m] of a row from the laws sampled along it; 0 where nothing rubs."""
+    """Return the slip (N,) [m] of a row from the laws sampled along it; 0 without friction."""
     limit = sum(one.limit for one in found)
     stretch = sum(one.stretch for one in found if one.stretch is not None)
     return track.q - stretch / limit if limit > 0 else np.zeros(track.samples)
@@ -293,7 +293,7 @@ def refine_point(found: SteadyMotion, modes, drive) -> SteadyMotion:
 def _solve_harmonics(
     modes, drive, group, h, x, wider, tolerance=DEFAULT_TOLERANCE, near=0
 ) -> SteadyMotion:
-    """Solve the balance with h harmonics; those up to wider h follow.
+    """Solve the balance with h harmonics, and then add the harmonics up to `wider` times h.
 
     The samples resolve the shortest stick.
 
@@ -385,12 +385,12 @@ def _follow_levels(balance, omega, level, h: int) -> np.ndarray:
 
 
 def evaluate_by_level(balance, x, omega, level, h) -> tuple:
-    """Return residual, Jacobian and derivative over the drive level, for `continuation`.
+    """Return residual, Jacobian and derivative by the drive level, for `continuation`.
 
     Parameters
     ----------
     balance, x, omega, level, h
-        As of `Balance.system`.
+        See `Balance.system`.
 
     Returns
     -------
@@ -401,12 +401,12 @@ def evaluate_by_level(balance, x, omega, level, h) -> tuple:
 
 
 def evaluate_by_omega(balance, x, omega, level, h) -> tuple:
-    """Return residual, Jacobian and derivative over omega, for `continuation`.
+    """Return residual, Jacobian and derivative by omega, for `continuation`.
 
     Parameters
     ----------
     balance, x, omega, level, h
-        As of `Balance.system`.
+        See `Balance.system`.
 
     Returns
     -------
@@ -498,7 +498,7 @@ def _add_harmonics(balance, start: SweepStart, drive, h, wider, tolerance) -> St
 
 
 def _make_diverged(balance, start: SweepStart, drive, h, samples) -> SteadyMotion:
-    """Return the balance alone where the harmonics above h do not follow; its error is unknown."""
+    """Return the motion of h harmonics if those above h diverge; its error is unknown."""
     x, here, count, _ = start
     q = balance.slides(x, drive.omega, h)
     z = balance.motion(x, drive.omega, drive.acceleration, h, here.fold.force)

@@ -169,7 +169,7 @@ def find_static_motions_from_loops(
     row : ndarray
         (n,) slide per coordinate.
     stuck_mode : tuple
-        As of `find_static_motions`.
+        See `find_static_motions`.
     slides : array_like
         (k,) [m].
     loops : sequence of StaticLoops

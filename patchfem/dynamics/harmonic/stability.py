@@ -33,7 +33,7 @@ def find_motion_monodromy(periodic, modes, cells: int = 0) -> np.ndarray:
     Parameters
     ----------
     periodic, modes, cells
-        As of `add_stability`; the slopes of the laws are constant in a cell.
+        See `add_stability`; the slopes of the laws are constant in a cell.
 
     Returns
     -------

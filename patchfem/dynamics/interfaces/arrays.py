@@ -193,7 +193,7 @@ class ShearedLists(
 
     - bondlist: (9, m capacity) the lists beside each other
     - nows, statuses: (m, 6), (m, 16) of each list; now, status: those of the present one
-    - law, table: as of `BondList`
+    - law, table: see `BondList`
     - time: (1,) duration of the step [s]
     - pressed: (2, m) nodal forces at both ends of the step [N], over the row LOAD of points; (2,
       0) where they are constant
@@ -302,7 +302,7 @@ class ConstantLoad(NamedTuple):
 
 
 def split_memory(contact, element=None) -> list | None:
-    """Return what a contact carries from step to step, as rows of numbers of one kind each.
+    """Return the memory that a contact carries from step to step, as rows of numbers of one kind.
 
     It is None for a list of bonds, whose sums grow without end. element: the law of an `Element`.
     """
@@ -386,7 +386,7 @@ class LargestSlide(NamedTuple):
 
 
 class FoldedCycles(NamedTuple):
-    """What `march.passing_kernels` keeps of cycles without their samples.
+    """Sums and output that `march.passing_kernels` records of cycles without samples.
 
     - bounds, largest: as above
     - ledger: (9,) of `march.loop_kernels.march`

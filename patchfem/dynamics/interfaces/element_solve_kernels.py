@@ -13,7 +13,7 @@ def solve_element(free, beta, numbers, memory, q, eps, dt, guess, bound, goal):
     Parameters
     ----------
     free, beta : float
-        As of `element_kernels.solve_step`.
+        See `element_kernels.solve_step`.
     numbers, memory : ndarray
         Of the law.
     q, eps, dt : float

@@ -84,7 +84,7 @@ def find_force_and_slope(dq, contact, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(free, beta, q, v, dt, contact, goal):
-    """Solve a step with dq = free - beta force by secants, as `element_kernels.solve_step`.
+    """Solve a step with dq = free - beta force by secants, like `element_kernels.solve_step`.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def commit_step(dq, force, q, v0, v1, dt, contact):
     Returns
     -------
     work : float
-        That is not stored [J].
+        Work that is not stored [J].
     has_room : bool
         Whether the list had room.
     """
@@ -166,12 +166,15 @@ def commit_step(dq, force, q, v0, v1, dt, contact):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def add_list_energies(work, before, limit, contact):
-    """Add the work [J] of a step that is not stored to the energies of the list; return it.
+    """Return the loss [J] of a step, and add it to the dissipated energy of the list.
+
+    The loss is the work of the step minus the increase of the stored energy; a negative loss is
+    added to the created energy. Gains of the stretch reading are owed, see `commit_step`.
 
     Parameters
     ----------
     work : float
-        Of the step [J].
+        Work of the step [J].
     before : float
         Energy in the status before the step.
     limit : float

@@ -60,7 +60,7 @@ def gather_loaded_points(part, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def press_points(kind, contact):
-    """Write the memory after half of the change of load, and the mean load, into the points."""
+    """Put the points under the load at the middle of the step, and write their memory there."""
     gather_loaded_points(0.5, contact)
     memory = contact.memory
     points = contact.points

@@ -37,7 +37,7 @@ DRAG_TOL = 2e-15
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def solve_step(free, beta, q, v, dt, contact, goal):
-    """Solve a step with dq = free - beta force, as `element_kernels.solve_step`.
+    """Solve a step with dq = free - beta force, like `element_kernels.solve_step`.
 
     Returns
     -------

@@ -29,7 +29,7 @@ IS_FULL = 0
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(free, beta, q, v, dt, contact, goal):
-    """Solve a step with dq = free - beta force, as `element_kernels.solve_step`.
+    """Solve a step with dq = free - beta force, like `element_kernels.solve_step`.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def commit_step(dq, force, q, v0, v1, dt, contact):
     Returns
     -------
     work : float
-        That is not stored [J].
+        Work that is not stored [J].
     has_room : bool
         Whether every list had room.
     """

@@ -130,7 +130,7 @@ def project_onto_modes(row, psi, points, count, out):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def write_gradient(y, free, beta, kind, ending, contact, out):
-    """Write the residual of a step.
+    """Write the gradient of the function that a step minimises: the residual of the step.
 
     With beta = 0 or `ending` the slide of the holder is prescribed.
 

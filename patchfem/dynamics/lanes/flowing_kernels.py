@@ -77,7 +77,7 @@ __all__ = [
 STICK_IS_RIGID = False
 EVENT_KEEPS_STICK = False
 # These rows are the state of the law.
-FRICTION = LAW_STATE  # friction [m]
+FRICTION = LAW_STATE  # friction over the mass [m]
 STRETCH_SQUARE = LAW_STATE + 1  # mean square of the stretches [m^2]
 STEP_WORK = LAW_STATE + 2  # friction work of the last step [m^2]
 IS_OBSERVED = LAW_STATE + 3  # 1 if the step is read
@@ -102,7 +102,7 @@ AT_END = 3
 
 
 class FlowState(NamedTuple):
-    """Slide, its derivative, friction, stretch [m], and mean square of the stretches [m^2]."""
+    """Slide, its derivative, friction over the mass and stretch [m]; mean square stretch [m^2]."""
 
     slide: float
     speed: float
@@ -119,7 +119,7 @@ class FirstEvent(NamedTuple):
 
 
 class LayerPlan(NamedTuple):
-    """How a step passes through a layer of speeds.
+    """Division into parts of a step that passes through a layer of speeds.
 
     - `flies`: whether the other forces drive the speed one way whatever the friction is; the parts are then equal in
       speed, otherwise equal in angle.

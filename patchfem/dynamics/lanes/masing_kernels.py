@@ -84,7 +84,7 @@ EVENT_KEEPS_STICK = True
 DIRECTION = LAW_STATE  # sign of the speed
 BRANCH_SCALE = LAW_STATE + 1  # m of Masing's rule
 TURN_SLIDE = LAW_STATE + 2  # slide at the last reversal [m]
-TURN_FORCE = LAW_STATE + 3  # friction at the last reversal [m]
+TURN_FORCE = LAW_STATE + 3  # friction over the mass at the last reversal [m]
 TURN_SLIP = LAW_STATE + 4  # irreversible slide at the last reversal [m]
 TURN_ENERGY = LAW_STATE + 5  # elastic energy at the last reversal [m^2]
 NEXT_EVENT = LAW_STATE + 6  # slide of the next event [m]
@@ -96,7 +96,7 @@ TANGENT_END = LAW_STATE + 11  # the same at the end of the step
 STEP_SLIP = LAW_STATE + 12  # path of slip in the step [m]
 REVERSAL_FORCE = (
     LAW_STATE + 13
-)  # friction at the last reversal that happened, also if its loop has closed [m]
+)  # friction over the mass at the last reversal that happened, also if its loop has closed [m]
 EVER_SLIPPED = LAW_STATE + 14  # 1 once half of the friction has slipped
 KEEPS_FIRST_LOADING = (
     LAW_STATE + 15
@@ -143,7 +143,7 @@ class BranchState(NamedTuple):
 
 
 class FirstEvent(NamedTuple):
-    """Fraction of a step at which its first event happens, and the kind of the event; 1 and NO_EVENT without one."""
+    """Fraction of a step at which its first event happens, and the kind of the event; 1 and NO_EVENT if none."""
 
     fraction: float
     kind: int
@@ -151,7 +151,7 @@ class FirstEvent(NamedTuple):
 
 @njit(**NJIT_INLINE)
 def set_derived_state(workspace, lane):
-    """Set what follows from the numbers of the case and from its branch."""
+    """Set the rows that follow from the numbers of the case and from its branch."""
     length = workspace[YIELD_LENGTH * LANES + lane]
     branch_length = workspace[BRANCH_SCALE * LANES + lane] * length
     full_force = workspace[SPRING * LANES + lane] * length
@@ -174,7 +174,7 @@ def can_extrapolate(workspace, lane):
 
 @njit(**NJIT_INLINE)
 def restore_derived_state(workspace, lane):
-    """Set what follows from an extrapolated motion."""
+    """Set the rows that follow from an extrapolated motion."""
     set_derived_state(workspace, lane)
     curve.start_lookup(
         clamped_place(workspace[SLIDE * LANES + lane], workspace, lane), workspace, lane
@@ -256,7 +256,7 @@ def irreversible_slide(x, memory, workspace, lane, when=curve.IN_TABLE):
     Parameters
     ----------
     x, memory : float
-        Slide and friction [m].
+        Slide and friction over the mass [m].
     workspace, lane
         See `rigid_kernels.friction_force`.
     when : int
@@ -286,7 +286,7 @@ def slider_energy(x, memory, slip, workspace, lane):
     Parameters
     ----------
     x, memory : float
-        Slide and friction [m].
+        Slide and friction over the mass [m].
     slip : float
         Irreversible slide [m].
     workspace, lane
@@ -685,7 +685,7 @@ def start_branch(x, friction, slip, workspace, lane):
     Parameters
     ----------
     x, friction, slip : float
-        Slide, friction and irreversible slide at the new reversal [m].
+        Slide, friction over the mass and irreversible slide at the new reversal [m].
     workspace, lane
         See `rigid_kernels.friction_force`.
     """

@@ -76,7 +76,7 @@ class Instant(NamedTuple):
 
 
 class Peaks(NamedTuple):
-    """Largest absolute output acceleration [m s-2] and absolute friction [m] in a segment."""
+    """Largest absolute output acceleration [m s-2] and friction over the mass [m] in a segment."""
 
     acceleration: float
     friction: float
@@ -139,7 +139,7 @@ def output_jerk(workspace, lane, instant, friction_rate):
         See `rigid_kernels.friction_force`.
     instant : Instant
     friction_rate : float
-        Rate of the friction [m].
+        Rate of the friction over the mass [m].
 
     Returns
     -------
@@ -346,7 +346,7 @@ def add_peaks(workspace, lane, acceleration, friction):
     acceleration : float
         Absolute acceleration of the output [m s-2].
     friction : float
-        Absolute friction [m].
+        Absolute friction over the mass [m].
     """
     workspace[MAX_ACCELERATION * LANES + lane] = max(
         workspace[MAX_ACCELERATION * LANES + lane], acceleration
@@ -424,7 +424,7 @@ def add_sticks(workspace, lane, first, second, event, angle):
 
 @njit(**NJIT_INLINE)
 def lane_friction(lane, workspace, sine):
-    """Return the friction of a lane [m] at a sine of the drive.
+    """Return the friction over the mass of a lane [m] at a sine of the drive.
 
     Parameters
     ----------

@@ -153,12 +153,12 @@ def loading_work(w, force, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def prepare_lookup(workspace, lane):
-    """Look up the curve of a lane; there is nothing to look up."""
+    """Do nothing: a power is evaluated without a table."""
 
 
 @njit(**NJIT_INLINE)
 def finish_step(workspace, lane, event):
-    """Store what the step looked up; there is nothing to store.
+    """Do nothing: a power is evaluated without a table.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def finish_step(workspace, lane, event):
 
 @njit(**NJIT_INLINE)
 def start_lookup(w, workspace, lane):
-    """Look up the curve at the start of a step; there is nothing to look up.
+    """Do nothing: a power is evaluated without a table.
 
     Parameters
     ----------

@@ -112,7 +112,7 @@ def _free_acceleration(law: str, cases: Cases, motion) -> np.ndarray:
 
 
 def _friction(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the friction (n,) of a motion where the drive passes 0 [m]."""
+    """Return the friction over the mass (n,) [m] of a motion where the drive passes 0."""
     x = motion[:, rows.SLIDE]
     memory = motion[:, rows.MEMORY]
     slip_sign = motion[:, rows.SLIP_SIGN]

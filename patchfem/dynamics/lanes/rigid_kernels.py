@@ -40,7 +40,7 @@ STICK_IS_RIGID = True  # whether nothing moves in a stick
 EVENT_KEEPS_STICK = False  # whether a stick may go on after an event
 # Accepted error of an extrapolated cycle, as a fraction of its range; 0 asks for no proof
 PROOF_TOL = 0.0
-N_KEPT = 0  # number of numbers of the state of the law that follow the map of a cycle
+N_KEPT = 0  # numbers of the state of the law that follow the map of a cycle
 N_NEWTON = 3  # Newton steps from the secant; the cubic of a step is then solved to round-off
 N_CROSSING = 4  # Newton steps from a guess that is worse than the secant
 
@@ -69,7 +69,7 @@ class AngleStep(NamedTuple):
 
 
 class TriedStep(NamedTuple):
-    """State after a step without an event, and whether the step has one, which makes the state useless."""
+    """State after a step computed without events, and whether an event makes it invalid."""
 
     slide: float
     speed: float

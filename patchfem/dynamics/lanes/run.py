@@ -20,7 +20,7 @@ class Cases(NamedTuple):
     """n cases of x'' + D x' + W x = P sin - f in the angle of their drive; x is the slide [m].
 
     - `damping`, `stiffness`, `drive` (n,): D, W and P.
-    - `kinetic`, `static` (n,): friction in a slip and largest friction in a stick [m].
+    - `kinetic`, `static` (n,): friction over the mass in a slip, and its maximum in a stick [m].
     - `spring` (n,): slope of the friction over the slide in a stick, 0 for a rigid contact.
     - `yield_length` (n,): elastic slide at which the interface slips [m].
     - `output_gain`, `base_gain` (n,) [m s-2]: acceleration of the output per x'', and of the base per sine.
@@ -45,7 +45,7 @@ class Cases(NamedTuple):
 
 
 class Marched(NamedTuple):
-    """n cases after their march.
+    """Results of n cases that were marched.
 
     - `start`, `observed_start`, `motion` (n, N_STATE and the state of the law): motion at the start, at the start of the
       observed cycles, and at the end.
@@ -209,7 +209,9 @@ def taylor_step(damping, stiffness, angle: float, start: tuple, forces: tuple) -
 
 
 def case_numbers(law: str, cases: Cases, steps: int) -> np.ndarray:
-    """Return the rows `rows_kernels.FIRST_NUMBER` and following of cases, and then their tables.
+    """Return the numbers of cases in the order of their rows in the workspace, and their tables.
+
+    The first number belongs in row `rows_kernels.FIRST_NUMBER`.
 
     Parameters
     ----------

@@ -90,7 +90,7 @@ TINY = 1e-300  # keeps a divisor above 0
 
 
 class SpeedCurve(NamedTuple):
-    """The step as if it had no event: the speed is v + u (m0 + u (c2 + u c3)) over 0 <= u <= 1."""
+    """Step without an event: its speed is v + u (m0 + u (c2 + u c3)) for 0 <= u <= 1."""
 
     x: float
     v: float

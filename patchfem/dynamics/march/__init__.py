@@ -10,10 +10,10 @@ dq of the slide. The modes then move exactly (`dynamics.propagator`), so the inc
 
 where `free` are the increments without friction and beta is the give of the ports in a step. The mean force times dq is
 exactly the work of the law, so the sum of all energies never grows by itself, for any step. The method is of second order.
-The table says who solves the equation.
+The table lists the module that solves the equation.
 
 ========================================= ============================ ==============================================
-what rubs                                 module                       method
+interface                                 module                       method
 ========================================= ============================ ==============================================
 one contact under a constant load         `interfaces`                 Newton's method, by the law
 several elements, or elements and contact `faces_kernels`              block descent, then Newton on all forces

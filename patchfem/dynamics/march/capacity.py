@@ -89,5 +89,5 @@ def enlarge_list(contact, kept: SavedState, place: str, *others):
 
 
 def list_bytes(strips: float) -> float:
-    """Return the memory [bytes] of a list of so many entries; while it is enlarged the old one is there too."""
+    """Return the memory [bytes] of a list of bonds, with the copy that exists while it is enlarged."""
     return 3 * ENTRY_BYTES * min(strips, MAX_ENTRIES)

@@ -87,7 +87,9 @@ class NewtonPace(NamedTuple):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def sample_elements(q, v, motion, row, interface, faces):
-    """Sample the contact, or else the first element, and write all elements into the row.
+    """Write the state of all elements into the row, and return that of the interface.
+
+    Force and slip are those of the contact, or without a contact those of the first element.
 
     Parameters
     ----------
@@ -315,7 +317,7 @@ def solve_one_element(e, turn, faces, dt):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def solve_plane_element(e, turn, faces):
-    """Solve both directions of an element in a plane, as `solve_one_element`.
+    """Solve both directions of an element in a plane, like `solve_one_element`.
 
     Parameters
     ----------
@@ -529,7 +531,10 @@ def speed_up_turns(turn, worst, last_worst, pace, modal_system, faces):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def set_free_motion(faces):
-    """Write the slides and speeds under the forces of all other elements into faces.stops.field."""
+    """Write the slides and speeds of set-valued elements without their forces into the field.
+
+    The forces of the contact and of all other elements act.
+    """
     stops = faces.stops
     for i in range(stops.names.size):
         p = faces.of[PORT, stops.element[i]]

@@ -61,7 +61,7 @@ def load_loop(
     has_contact : bool
         Whether there is a contact.
     is_coupled : bool
-        Whether more than one element or contact rubs.
+        Whether there is more than one element or contact.
     has_planes : bool
         Whether an element slides in a plane.
 

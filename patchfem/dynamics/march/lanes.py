@@ -45,7 +45,7 @@ class PointsCase(NamedTuple):
 
 
 class MarchedCases(NamedTuple):
-    """n cases after their march.
+    """Results of n cases that were marched.
 
     - `extremes` (n, c, 2), `phasors` (n, c): of the output in each cycle [m].
     - `book`: sums of the run by name, (n,) [J].

@@ -1,10 +1,10 @@
 """The compiled loop of the march, and its counterpart for a prescribed slide.
 
 Over a step the modes move exactly under the path means of the friction forces along the straight increments of slide,
-which do exactly the work of the laws: the sum of all energies never grows by itself. What rubs is one contact, or elements
-beside it or in its place (`faces_kernels`); the load is constant or varies (`pressing_kernels`). A contact is a module with
-`solve_step`, `apply_increment`, `commit_step` and `read_state`, as `interfaces.element_kernels` has them. `instances` makes
-an instance of this text per contact and set of parts, and what a rig does not have is not compiled.
+which do exactly the work of the laws: the sum of all energies never grows by itself. The interface is one contact, or
+elements beside it or in its place (`faces_kernels`); the load is constant or varies (`pressing_kernels`). A contact is a
+module with `solve_step`, `apply_increment`, `commit_step` and `read_state`, see `interfaces.element_kernels`. `instances`
+makes an instance of this text per contact and set of parts, and what a rig does not have is not compiled.
 """
 
 from ...compiled.jit import njit

@@ -84,7 +84,7 @@ class MarchResult:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Mark:
-    """The window of cycles before a mark, and the march as it was there.
+    """Last cycles of a march at a requested number of cycles, and the march at that time.
 
     - `window`, `step_force`, `work`, `amplitudes`, `ledger`: as in `MarchResult`.
     - `after`: the `Run` to continue from.
@@ -494,10 +494,10 @@ def _join_cycles(parts) -> tuple:
 
 
 class Run:
-    """The arrays of a march, and how far it is.
+    """State of a march: its arrays and the number of steps done.
 
     - `state` (2, n): coordinates and rates of the modes.
-    - `contact`, `faces`, `load`: arrays of what rubs and of the load, in `interfaces.arrays`.
+    - `contact`, `faces`, `load`: arrays of the contact, the elements and the load, in `interfaces.arrays`.
     - `ledger` (9,): energy balance of `loop_kernels.march`.
     - `totals` (3,): friction work, dissipated and created energy since the start [J].
     - `second` (2,): friction work from the samples, and sum of the absolute works of the steps [J].
@@ -559,7 +559,7 @@ class Run:
         return twin
 
     def _carried_state(self) -> list:
-        """Return what the march carries to the next step, as rows of numbers of one kind each.
+        """Return the state that the march carries to the next step, as rows of numbers of one kind.
 
         The first row has the coordinates and the rates over the frequency of the drive, the others the
         memories. The list is empty if no period brings the state back.
@@ -918,7 +918,7 @@ class Run:
         return rows
 
     def _copy_before_piece(self) -> tuple:
-        """Return copies of all that steps change, if a spring is nonlinear."""
+        """Return copies of all arrays that steps change, if a spring is nonlinear."""
         if all(joint.potential is None for joint in self.model.joints):
             return ()
         return tuple(array.copy() for array in (*self.contact, *self._changing_arrays()))
@@ -1005,7 +1005,7 @@ class Run:
         """Return the friction work of the steps between the rows [J] from slides and forces alone.
 
         Blows at the end of a step, of slides that stop, have no slide from which their work could be read;
-        their work is added if all that rubs is set-valued.
+        their work is added if all friction is set-valued.
         """
         n = 2 * self.modes.omega.size
         model = self.model
@@ -1078,7 +1078,7 @@ class Run:
         )
 
     def find_interface_energy(self) -> float:
-        """Return the energy in what rubs, in springs and in the normal contact [J]."""
+        """Return the energy [J] stored in the interfaces, the springs and the normal contact."""
         n = 2 * self.modes.omega.size
         rows = np.zeros((1, self.width))
         self.loops.march(

@@ -93,7 +93,7 @@ class ContactModel:
         return (Joint(0, self.element),) if self.set_valued else ()
 
     def picture_fields(self, contact) -> dict:
-        """Return what a picture needs of the memory: "stretch" (t,) of elements, or "bonds" (5, m)."""
+        """Return the fields of the memory for a picture: "stretch" (t,) of elements, or "bonds" (5, m)."""
         form = self.element.form if self.element is not None else ""
         if form == "parallel":
             return {"stretch": contact.mem[0, 3:].copy()}
@@ -295,7 +295,7 @@ def point_lists_model(
 
 
 def lower_pressure_fields(x, sigma, measure: float) -> dict:
-    """Return what `point_lists_model` needs for points under a pressure that stays on the lower piece.
+    """Return fields of `point_lists_model` for points under a pressure that stays on the lower piece.
 
     Parameters
     ----------
@@ -318,7 +318,7 @@ def lower_pressure_fields(x, sigma, measure: float) -> dict:
 
 
 def nodal_load_fields(force, measure) -> dict:
-    """Return what `point_lists_model` needs for points under nodal forces that change.
+    """Return fields of `point_lists_model` for points under nodal forces that change.
 
     Both arguments are (m,) arrays [N]; `measure` has the forces of the friction limits.
     """

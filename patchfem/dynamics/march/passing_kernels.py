@@ -304,7 +304,7 @@ def add_drag_steps(block, i, q, at, force, modal_system, table, interface, folde
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def march_drag(first, count, i, q, motion, modal_system, table, interface, folded):
-    """March on while all points slip one way.
+    """March as long as all points slip in the same direction.
 
     The sample at the end of the last step is not read; no sample before it has a larger slide in its direction.
     The modes go over a block of steps one after the other, and once more over the steps before the drag ends in

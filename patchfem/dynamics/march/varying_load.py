@@ -205,7 +205,7 @@ def make_pressed_fields(law: VaryingLoadLaw, normal, shear, limit: float) -> tup
 class VaryingLoadModel:
     """Description of a varying load for `march.march`.
 
-    - `law`: what rubs.
+    - `law`: friction law.
     - `sets`: contact sets.
     - `rows` (3, n): slide, heave and pitch per coordinate.
     - `load`: function of times (k,) [s] to a prescribed load [N] on one point, in place of the contact.
@@ -225,7 +225,7 @@ class VaryingLoadModel:
 
     @property
     def limit(self) -> float:
-        """Scale of the residuals [N]: static friction of the preload, or the load where nothing rubs."""
+        """Scale of the residuals [N]: static friction of the preload, or the load without friction."""
         return (self.law.static or 1.0) * max(self.preload, 1e-9)
 
     @property
@@ -245,7 +245,7 @@ class VaryingLoadModel:
 
     @property
     def runner(self):
-        """The class that marches the model."""
+        """Class that marches the model."""
         return VaryingLoadRun
 
     @property
@@ -255,7 +255,7 @@ class VaryingLoadModel:
 
     @property
     def loading(self) -> str:
-        """How the load is borne, as `instances` names it."""
+        """Kind of the load in `instances`: on the whole interface or on each point."""
         return POINT_LOADS if self.has_point_loads else COMMON_LOAD
 
     @property
@@ -397,10 +397,10 @@ def make_model(
 
 
 class VaryingLoadRun(Run):
-    """The arrays of a march under a load that varies, and how far it is."""
+    """State of a march under a load that varies."""
 
     def _initial_load(self) -> arrays.VaryingLoad:
-        """Return the load at the start, and set what rubs under it.
+        """Return the load at the start, and set the points of the contact under it.
 
         The contact sets are kept apart, because other runs may ask them.
         """

@@ -97,7 +97,7 @@ class TurnPositions(NamedTuple):
     - free_acceleration, inverse_mass, slide: for a law that holds, the acceleration [m s-2] without
     its force, the
       acceleration per newton [1/kg] that its force takes away, and the relative displacement [m]
-    - force, normal_force, release_direction: what a law that holds answers, [N], [N], and the
+    - force, normal_force, release_direction: results of a law that holds, [N], [N], and the
     direction in which it
       lets go, 0 where it holds
     """
@@ -193,7 +193,7 @@ class MotionArrays(NamedTuple):
 
 
 class MotionRecord(NamedTuple):
-    """What is recorded of a motion.
+    """Records of a motion.
 
     A sample (2 n + 7,) has the time, coordinates, rates, relative displacement and velocity, force,
     slip, energy in the interface and friction work [J].

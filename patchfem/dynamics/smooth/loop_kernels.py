@@ -25,7 +25,7 @@ STEP_SAFETY = 0.9
 AT_REVERSAL = 2.0
 # cycles over which a maximum of coordinates and rates fades
 FADING_CYCLES = 3.0
-# tried steps of a call; they take a tenth of a second, in which compiled code hears no signal
+# tried steps of a call; they take a tenth of a second, in which compiled code receives no signal
 MAX_TRIED_STEPS = 50_000
 # progress in time that MAX_TRIED_STEPS steps must make, over the time of the fastest motion
 MIN_PROGRESS = 1e-3
@@ -82,7 +82,7 @@ def distance_to_event(motion, event, y, slopes, travel):
         side = 1.0 if motion.turn[TURN.is_above_knee] > 0 else -1.0
         floor = motion.turn[TURN.knee_velocity]
         return side * (direction * v - floor), side * direction * gain, 1e-12 * floor
-    # a set-valued law writes the remaining margin of its hold and of its load after its loss
+    # the rates of a set-valued law hold, after its loss, the margin of its holding force and its normal force
     if event >= EVENT.release:
         return slopes[2 * n + event - EVENT.release + 1], 0.0, 0.0
     x, w = watch.find_output(motion, y)
@@ -375,7 +375,7 @@ def start_direction(motion, direction):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def end_direction(motion, record):
-    """End the motion in one direction: update the memory of the law and add event it dissipated."""
+    """End the motion in one direction: update the memory of the law, and add its friction loss."""
     n = motion.modes.shape[1]
     size = motion.state.size
     q, v, _, before, _ = watch.read_interface(motion, motion.state)
@@ -395,7 +395,7 @@ def end_direction(motion, record):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def choose_direction(motion):
-    """Return the direction of a motion that starts, by velocity, acceleration or event follows."""
+    """Return the direction in which a motion starts, by its velocity or else its acceleration."""
     n = motion.modes.shape[1]
     t = motion.scalars[SCALAR.time]
     v = steps.find_slide(motion, motion.state)[1]

@@ -480,7 +480,7 @@ class Motion:
         rows : ndarray
             (k, 2 n + 7) samples.
         measures : tuple
-            As of `reader.measure_parts`.
+            See `reader.measure_parts`.
         """
         begin = max(end - window, self.time)
         self.run_ahead_to(begin)

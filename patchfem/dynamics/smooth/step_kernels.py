@@ -98,7 +98,7 @@ def write_mode_slopes(motion, i, y, out, drive, friction_accel):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def write_free_motion(motion, q, y, drive):
-    """Write what a set-valued law must know into motion.turn, see `TurnPositions`.
+    """Write free acceleration, inverse mass and slide into motion.turn for a set-valued law.
 
     Parameters
     ----------

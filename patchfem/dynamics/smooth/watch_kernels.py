@@ -134,7 +134,7 @@ def find_output_extreme(motion, record, a, b, rate):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def widen_by_step(motion, h, record, parts):
-    """Widen the extremes of the present cycle by a step.
+    """Include the output during a step in the extremes of the present cycle.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def widen_by_step(motion, h, record, parts):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def widen_extremes(cycles, period, time, x, y):
-    """Widen the extremes of the cycle of a time by two outputs.
+    """Include two values of the output in the extremes of the cycle that contains a time.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def add_phasor(cycles, period, t, h, begin, end):
     Parameters
     ----------
     cycles, period, t, h
-        As of `MotionRecord`; times [s].
+        See `MotionRecord`; times [s].
     begin, end : tuple
         Output [m], its rate [m/s] and acceleration [m s-2] at both ends.
     """

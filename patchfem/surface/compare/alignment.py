@@ -27,7 +27,7 @@ MIN_STEP = 8.0  # depth / standard deviation from which a box is a shallow track
 N_THINNED = 2000
 # samples in the running means that detect wear below the noise of a single height
 MEAN_WINDOWS = (4, 16)
-MIN_WIDE_RUN = 64  # samples of a worn run from which its flanks may leave the floor slowly
+MIN_WIDE_RUN = 64  # samples of a worn run from which its flanks may leave the floor gradually
 # width beside a worn run / width of the run; slight wear there would be taken for a drift
 MARGIN_FRACTION = 0.2
 MARGIN_SAMPLES = 8  # smallest width of the margin beside a worn run, in samples
@@ -112,7 +112,7 @@ class Alignment:
 
     @property
     def agreed_fraction(self) -> float:
-        """Fraction of the heights that agree in both traces, on this floor or the rival floor."""
+        """Fraction of the heights that agree in both traces: the larger of this and the rival floor."""
         other = self if self.rival is None else self.rival
         return float(max(self.unworn.mean(), other.unworn.mean()))
 
@@ -224,7 +224,7 @@ def _fit_all_heights(model, state, free) -> Alignment:
 
 
 def _make_alignment(model, state, free, scale: float, worn) -> Alignment:
-    """Make the alignment of a state, and select the heights that show the drift of the datum."""
+    """Make the alignment at parameters `state`, and select the heights that show the datum drift."""
     depth, jacobian = model.linearize(state)
     unworn = (np.abs(depth) <= MAX_UNWORN * scale) & ~worn
     clear = unworn.copy()

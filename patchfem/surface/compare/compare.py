@@ -74,7 +74,7 @@ N_SPECK_ROUNDS = 2
 
 
 class Ratios(NamedTuple):
-    """Ratios of amplitude and slope after / before wear, and `Size` of both (none if unknown)."""
+    """Ratios after / before wear of amplitude and slope; `Size` of both surfaces, () if unknown."""
 
     amplitude: Quantity
     slope: Quantity
@@ -501,7 +501,7 @@ def _pool_sides(pairs: list, step: float) -> tuple:
 
 
 def _pool_with_scatter(pieces: list, step: float) -> Size:
-    """Pool as `_pool`, with no more degrees of freedom than the scatter along the trace shows."""
+    """Pool like `_pool`, but limit the degrees of freedom by the scatter along the trace."""
     size = _pool(pieces, step)
     scatter = np.sum([estimate_freedom(piece, step, BAND) for piece in pieces], axis=0)
     freedom = tuple(min(own, other) for own, other in zip(size.freedom, scatter))
@@ -565,7 +565,7 @@ def _other_direction(direction: str) -> str:
 def _compare_waves(scans: tuple, filled: tuple, direction: str) -> Comparison:
     """Compare the waves of two scans in one direction.
 
-    `fill_missing` are both scans without missing heights.
+    `filled` holds the result of `fill_scan` for each scan.
     """
     reason = "areal scans are compared point by point in x and y together"
     try:
@@ -579,7 +579,7 @@ def _compare_waves(scans: tuple, filled: tuple, direction: str) -> Comparison:
 
 
 def compare_directions(parts: list) -> list[DirectionRatios]:
-    """Compare direction x with y, before and after wear; nothing for a single direction.
+    """Compare direction x with y, before and after wear; return [] for a single direction.
 
     Traces are read at the coarsest step of all of them, so that slopes compare.
     """

@@ -123,7 +123,7 @@ def block_length(correlation: float, count: int) -> int:
 
 
 def student_factor(blocks: float) -> float:
-    """Return the width of Student's interval for a number of blocks / that of a normal interval."""
+    """Return the ratio of Student's interval for a number of blocks to the normal interval."""
     from scipy.special import stdtrit
 
     return float(stdtrit(max(blocks - 1, 1.0), (1 + LEVEL) / 2)) / SIDE

@@ -77,7 +77,7 @@ class TraceModel:
         self.middle = float(self.x[inside][0] + self.x[inside][-1]) / 2
 
     def start(self, shift: float) -> np.ndarray:
-        """Return a state in which only the shift [m] is not zero."""
+        """Return a parameter vector in which only the shift [m] is not zero."""
         return np.array([0.0, 0.0, shift, 0.0, 0.0])
 
     def places(self, state) -> np.ndarray:
@@ -142,7 +142,7 @@ class TraceModel:
         self.slope = lambda at: np.interp(at, self.before.x, smooth)
 
     def cut(self, state) -> "TraceModel":
-        """Return the model of the samples that lie on the first trace in a state."""
+        """Return the model of only those samples that overlap the first trace at parameters `state`."""
         inside = self.overlap(self.places(state))
         out = copy(self)
         out.x, out.z, out.is_cut = self.x[inside], self.z[inside], True

@@ -172,7 +172,7 @@ def _align_at_mark(before: Profile, after: Profile, shift: float, is_straight: b
 
 
 def _has_enough_unworn(alignment: Alignment) -> bool:
-    """Whether enough heights agree for a reference; with a straight datum, more than two flanks."""
+    """Whether enough heights agree for a reference: for a straight datum, more than two flanks."""
     return alignment.agreed_fraction > (2 * SHORT_FLANK if alignment.is_straight else MIN_UNWORN)
 
 

@@ -26,7 +26,7 @@ DRIFT = "a scar or a datum that drifts, both are possible"
 MIN_DEPTH_OVER_DRIFT = 12.0
 # covariance of neighbouring unworn parts / their variance, which is near 1 for a drift and 0 for noise
 MIN_SLOW_FRACTION = 0.5
-# slow height differences of the flanks / depth of the track; above it, the flanks are worn
+# long-wave difference of the traces on the flanks / depth of the track; above it, the flanks are worn
 MAX_FLANK_ERROR = 0.1
 N_WAVES = 8  # largest number of half waves of the cosines that describe a drift along the trace
 # residual of these cosines / noise; below it, a drift explains the whole difference of the traces
@@ -36,7 +36,7 @@ MIN_BLOCKS = 12.0
 
 
 class Reading(NamedTuple):
-    """Headline of an ambiguity ("" for a single interpretation), and why no depth is given."""
+    """Headline of an ambiguity, "" if there is none, and the reason why no depth is given."""
 
     headline: str
     reason: str
@@ -184,10 +184,10 @@ def describe_drift(alignment: Alignment) -> str:
 def find_worn_flanks(
     before: Profile, after: Profile, shift: float, flanks: Flanks, *, is_straight: bool
 ) -> str:
-    """State why the flanks of a track are known to be worn; "" if they may be unworn.
+    """State why the flanks of a track are known to be worn; return "" if they may be unworn.
 
-    The difference of both traces is straight over unworn flanks. If it varies slowly there, by a tenth
-    of the depth of the track, the flanks are worn or the datum is bent.
+    The difference of both traces is straight over unworn flanks. If its long-wave part varies there by a
+    tenth of the depth of the track, the flanks are worn or the datum is bent.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ class Fit(NamedTuple):
 
 
 def estimate_scale(depth) -> float:
-    """Estimate the standard deviation [m] of noise about zero from the less worn or grown half."""
+    """Estimate the standard deviation [m] of noise from depths of the sign that scatters less."""
     sides = depth[depth > 0], -depth[depth < 0]
     return min((robust_deviation(side) for side in sides if side.size > 3), default=0.0)
 

@@ -200,7 +200,7 @@ def _cut_to_valleys(z) -> np.ndarray:
 
 
 def _draw_chance(first, best_score) -> Chance:
-    """Compute the largest Fisher's z, best_score(z), for random traces with the first spectrum."""
+    """Return mean and scatter of the best score of random traces with the first trace's spectrum."""
     random = np.random.default_rng(SEED)
     z = np.array([best_score(_randomize_phases(first, random)) for _ in range(N_RANDOM)])
     return Chance(float(z.mean()), float(z.std(ddof=1)))
@@ -234,7 +234,7 @@ class _ValleySearch:
         self.power = self._correlate(np.ones(count), rfft(fixed**2, self.size))
 
     def _correlate(self, moved, transform) -> np.ndarray:
-        """Sum moved[i] fixed[i + lag] at the lags."""
+        """Return the sum of moved[i] fixed[i + lag] over i for each lag."""
         from scipy.fft import irfft, rfft
 
         sums = irfft(transform * np.conj(rfft(moved, self.size)), self.size)

@@ -29,7 +29,7 @@ MIN_PILE_UP = 3.0  # standard deviations above the first trace from which a heig
 # samples between the point where a smooth flank leaves zero and its first worn sample
 OFFSETS = (1 / 3, 2 / 3, 1.0)
 MIN_STEP_DEVIANCE = 12.0  # decrease of the deviance from which a flank begins with a step
-# largest number of bootstrap blocks of a mean section; more would not show its slow errors
+# largest number of bootstrap blocks of a mean section; more would not show its long-wave errors
 MAX_BLOCKS = 8
 N_FIFTHS = 5  # number of parts of a track; the deepest part is the floor
 MAX_CUT_SAMPLES = 5  # samples between a track and the end of the section, where it may be cut off
@@ -103,7 +103,7 @@ class Section(NamedTuple):
 
 
 def noise_threshold(count: int, n_tests: int = N_TESTS) -> float:
-    """Return the standard deviations that noise alone exceeds in 1 of 1000 traces (Bonferroni).
+    """Return the number of standard deviations that noise exceeds in 1 of 1000 traces.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def _select_end(deviances, candidates, low: int, count: int) -> FlankEnd:
 
 
 def _widen_by_level_error(flank: FlankEnd, depth, noise, draws, correlation, worn) -> FlankEnd:
-    """Widen the interval of the end of a flank by the error of the level that the depth leaves.
+    """Widen the interval of the end of a flank by the error of the reference level.
 
     The ends are found again with the depths raised and lowered by this error. A flank of slope s moves
     by error / s, and one of curvature c that runs out flat by the square root of 2 error / c. The error
@@ -288,7 +288,7 @@ def _widen_by_level_error(flank: FlankEnd, depth, noise, draws, correlation, wor
 
 
 def _outside_deviances(depth, noise) -> np.ndarray:
-    """Return the deviance of the first 0, 1, 2, ... depths as unworn heights, (n + 1,)."""
+    """Return the deviances (n + 1,) of the first 0, 1, ..., n depths from a model of noise alone."""
     squares = np.where(depth < -MIN_PILE_UP * noise, 1.0, (depth / noise) ** 2)
     terms = np.minimum(squares, MAX_NOISE**2) + 2 * np.log(noise)
     sums = np.concatenate([[0.0], np.cumsum(terms)])
@@ -298,7 +298,7 @@ def _outside_deviances(depth, noise) -> np.ndarray:
 
 
 def _flank_deviances(depth, noise) -> np.ndarray:
-    """Return the deviances of depths (n,) as smooth flanks, as a flat one and with a step.
+    """Return the deviances of fits to depths (n,): smooth flanks, a flat flank and one with a step.
 
     There is a smooth flank b t + c t^2 for each of OFFSETS. The flat one is b t^2 + c t^3. The scatter
     of a flank is at least that of the noise.

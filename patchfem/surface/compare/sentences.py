@@ -131,7 +131,7 @@ def _describe_wear(part: Comparison, name: str) -> str:
 
 
 def _describe_deposits(part: Comparison) -> str:
-    """Describe the material above the first trace, "" if there is little."""
+    """Describe the material above the first trace; return "" if there is little."""
     deposited = part.worn.deposited
     if deposited <= 0 or deposited <= MIN_DEPOSITED * (part.worn.area.value or 0.0):
         return ""
@@ -182,7 +182,7 @@ def _describe_other_tracks(part: Comparison) -> list:
 
 
 def _describe_track(part: Comparison) -> str:
-    """Begin the sentence on the longest track; "" without a track."""
+    """Return the beginning of the sentence on the longest track, "" without a track."""
     if part.flanks is not None:
         span = _format_span(part.flanks.start, part.flanks.end)
         return f"a track from about x = {span} in the second trace (after wear); "
@@ -190,7 +190,7 @@ def _describe_track(part: Comparison) -> str:
 
 
 def _describe_sizes(sizes: dict) -> str:
-    """Begin a sentence on a track with these dimensions; "" without a track."""
+    """Return the beginning of a sentence on a track with these dimensions, "" without a track."""
     if not sizes:
         return ""
     start, end = sizes["from"].value, sizes["to"].value

@@ -146,7 +146,7 @@ def _find_headline(parts: list) -> str:
 
 
 def _describe_variant(parts: list[Comparison]) -> str:
-    """Describe what was mirrored or inverted; "" for nothing."""
+    """Describe what was mirrored or inverted; return "" if nothing was."""
     if parts[0].change is not None:
         return scans.describe_variant(parts[0].change)
     is_mirrored = any(part.is_mirrored for part in parts)

@@ -282,7 +282,7 @@ def _raise_upper_ends(sizes: dict, floor_error: float) -> dict:
 
 
 def _name_other(track: dict) -> dict:
-    """Adapt the definitions of the dimensions of a track that is not the longest one."""
+    """Replace "the longest track" by "this track" in the definitions of the dimensions of a track."""
     return {
         name: size._replace(text=size.text.replace(" the longest track", " this track"))
         for name, size in track.items()

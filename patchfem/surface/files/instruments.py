@@ -1,4 +1,4 @@
-"""Files of other instruments, read with SurfaceTopography in a separate process.
+"""Files in formats of instruments, read with SurfaceTopography in a separate process.
 
 Importing the library takes two seconds for each file.
 """
@@ -31,7 +31,7 @@ CPU_LIMIT_SIGNAL = -24  # exit code of a process that exceeded its CPU time (SIG
 
 
 def read_instrument(raw: Raw, units: tuple | None) -> Profile | Areal:
-    """Read a file of another instrument.
+    """Read a file in the format of an instrument by the package SurfaceTopography.
 
     Raises Missing without SurfaceTopography, and PatchfemError if it cannot read the file, if the
     file is too large, or if neither the file nor the caller states the units.

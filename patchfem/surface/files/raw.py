@@ -91,7 +91,7 @@ def fetch(path) -> Raw:
 
 
 def _read_limited(file, head: bytes, size: int) -> bytes:
-    """Read a file up to `size` bytes, of which `head` is read, without allocating all of them."""
+    """Read a file that begins with `head` up to `size` bytes, without allocating all of them."""
     parts = [head]
     left = size - len(head)
     while left > 0 and (part := file.read(min(left, BLOCK_BYTES))):

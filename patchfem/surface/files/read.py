@@ -16,7 +16,7 @@ from .x3p import read_x3p
 
 READERS = {"npy": read_npy, "mat": read_mat, "binary": read_instrument, "text": read_text}
 READERS_WITH_UNITS = {"x3p": read_x3p, "dektak": read_dektak}  # formats that state their units
-WYKO = b"Wyko ASCII"  # first words of a text in wavelengths, which only SurfaceTopography reads
+WYKO = b"Wyko ASCII"  # start of a text file with heights in wavelengths; SurfaceTopography reads it
 
 
 def read_surface(path, units: tuple | None = None) -> Profile | Areal:

@@ -104,9 +104,10 @@ def rms_slope(heights: Heights) -> float:
 
 
 def mean_over_sections(heights: Heights, size: Callable) -> float | None:
-    """Average size((k, samples) [m]) -> (k,) over the sections.
+    """Return the mean of a parameter over the sections of a trace.
 
-    None if the trace is shorter than one.
+    `size` maps the heights (k, samples) [m] of the sections to k values. The result is None if the
+    trace is shorter than one section.
     """
     return float(size(heights.sections).mean()) if len(heights.sections) else None
 

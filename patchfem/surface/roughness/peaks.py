@@ -136,7 +136,7 @@ def _filter_short_waves(trace: Profile, cutoff: float | None) -> Profile:
 def _describe_dust(trace: Profile) -> tuple:
     """Describe the few heights that make up most of the mean square curvature, as dust does.
 
-    () if none do.
+    Returns () if no heights do.
     """
     bend = np.diff(trace.z, 2) ** 2
     count = max(int(SHARPEST_FRACTION * bend.size), 1)
@@ -159,7 +159,7 @@ def _describe_dust(trace: Profile) -> tuple:
 
 
 def _describe_skew(z, moments: Moments, length: float) -> str:
-    """State skewness and kurtosis of heights z (n,) [m]; "" if they are Gaussian.
+    """State skewness and kurtosis of heights z (n,) [m]; return "" if they are Gaussian.
 
     A Gaussian trace has slope length/(pi height) crossings of its mean line, each taken as one
     independent height.
@@ -204,7 +204,7 @@ def gaussian_peaks(moments: Moments) -> Peaks:
 
 
 def persson_stiffness(pressure: float, height: float) -> tuple[float, float]:
-    """Compute the least and the largest stiffness [Pa/m] of a rough contact by Persson's theory.
+    """Compute the smallest and the largest stiffness [Pa/m] of a rough contact by Persson's theory.
 
     The pressure is proportional to exp(-u/u_0) with u_0 = 0.4 to 0.5 of the rms height [m], so the
     stiffness p/u_0 does not depend on the shortest waves. The theory holds while little of the area

@@ -322,7 +322,7 @@ def describe_variant(change: Change) -> str:
 
 
 def _choose_unit(volume: Quantity) -> tuple:
-    """Choose the factor and the unit of a volume: mm^3 from a thousandth of one on, else um^3."""
+    """Choose the factor and the unit of a volume: mm^3 from 0.001 mm^3 on, else um^3."""
     return (1e9, "mm^3") if max(volume.high, 0.0) >= 1e-12 else (1e18, "um^3")
 
 

@@ -18,7 +18,7 @@ from .model import PLACE, Parameter, ScanModel
 N_TILES = 40  # tiles along the shorter side of the depth map
 MIN_TILE_SIDE = 4  # heights along the side of a tile; smaller maps have fewer tiles
 MIN_UNWORN_FRACTION = 0.3  # fraction of unworn heights that a tile needs to enter the bootstrap
-MIN_BLOCK_FRACTION = 1 / 8  # same ratio: shorter blocks would not show slow errors
+MIN_BLOCK_FRACTION = 1 / 8  # same ratio: shorter blocks would not show long-wave errors
 MAX_BLOCK_FRACTION = 1 / 3  # side of a block / shorter side of the map: leaves nine blocks
 N_PARTS = 6  # parts along each side whose summed scores give the covariance of the alignment
 N_LINES = 200  # lines of the map from which the correlation of neighbouring heights is estimated

@@ -32,7 +32,7 @@ BLOCK = 1 << 20  # heights of a depth map that are computed at a time, which lim
 
 
 class Parameter(IntEnum):
-    """Indices of the parameters in a state; slopes are heights [m] at the edges of the scan."""
+    """Indices of the parameters in the parameter vector; slopes are heights [m] at the edges."""
 
     OFFSET = 0
     SLOPE_X = 1
@@ -81,7 +81,7 @@ def rotation(angle: float) -> np.ndarray:
 
 
 class _Linearized(NamedTuple):
-    """Difference (k,) [m] of both scans without a plane, and Jacobian (k, 6), at a position.
+    """Difference (k,) [m] of two scans before a plane is added, and its Jacobian (k, 6).
 
     place: rotation [rad] and shifts [m] of the second scan.
     """
@@ -125,7 +125,7 @@ class ScanModel:
 
     @property
     def at(self) -> np.ndarray:
-        """Points (k, 2) [m] of the sample, from the middle of the first scan."""
+        """Points (k, 2) [m] of the sample, relative to the middle of the first scan."""
         x, y = self.before.x - self.before.middle[0], self.before.y - self.before.middle[1]
         return np.column_stack([x[self.columns], y[self.rows]])
 
@@ -160,7 +160,10 @@ class ScanModel:
         self._compute_slopes(float(np.clip(sigma, MIN_SMOOTHING, MAX_SMOOTHING)))
 
     def places(self, at, state) -> np.ndarray:
-        """Map points (k, 2) [m] from the middle of the first scan to rows and columns of the second."""
+        """Return the rows and columns (2, k) in the second scan of points (k, 2) of the first scan.
+
+        The points are in metres, relative to the middle of the first scan.
+        """
         shift = state[[Parameter.SHIFT_X, Parameter.SHIFT_Y]]
         x, y = (at @ rotation(state[Parameter.ANGLE]).T + shift + self.before.middle).T
         pairs = ((y, self.after.y), (x, self.after.x))
@@ -193,7 +196,7 @@ class ScanModel:
         return difference + (state[0] + jacobian[:, 1:3] @ state[1:3]), jacobian
 
     def _linearize_place(self, state, place: tuple) -> "_Linearized":
-        """Read the second scan at a position, and compute the Jacobian there."""
+        """Read the second scan at the position of a state, and compute the Jacobian there."""
         at, slopes, z = self.at, self.slopes, self.before.z[self.rows, self.columns]
         places = self.places(at, state)
         if not self.is_cut:
@@ -235,7 +238,7 @@ class ScanModel:
         return out
 
     def cut(self, state) -> "ScanModel":
-        """Return the model of the heights that lie on the second scan in a state."""
+        """Return the model of only those heights that overlap the second scan at parameters `state`."""
         inside = self.overlap(self.places(self.at, state))
         if inside.sum() < MIN_HEIGHTS:
             raise PatchfemError("hardly any heights of the two scans coincide")
@@ -244,7 +247,7 @@ class ScanModel:
         return out
 
     def thin(self, count: int) -> "ScanModel":
-        """Return the model of the first heights; their order is random."""
+        """Return the model of the first `count` heights, which are a random subset."""
         return self._select(slice(count))
 
     def map_depth(self, state) -> np.ndarray:
@@ -266,7 +269,7 @@ class ScanModel:
         return out
 
     def _parts(self):
-        """Yield rows of the first scan as a slice, with their points (k, 2) [m] from its middle."""
+        """Yield slices of rows of the first scan and their points (k, 2) [m] relative to its middle."""
         x, y = self.before.x - self.before.middle[0], self.before.y - self.before.middle[1]
         count = max(BLOCK // x.size, 1)
         for first in range(0, y.size, count):
@@ -274,7 +277,7 @@ class ScanModel:
             yield part, np.stack(np.broadcast_arrays(x, y[part, None]), axis=-1).reshape(-1, 2)
 
     def plane_map(self, state) -> np.ndarray:
-        """Compute the plane (m, n) [m] of a state."""
+        """Compute the heights (m, n) [m] of the plane that the parameters `state` describe."""
         u = (self.before.x - self.before.middle[0]) / self.before.half[0]
         v = (self.before.y - self.before.middle[1]) / self.before.half[1]
         return state[0] + state[1] * u + state[2] * v[:, None]

@@ -167,7 +167,7 @@ class _Search:
         self.size = None
 
     def _prepare(self, shape) -> None:
-        """Transform the fixed image for correlation with images of a shape."""
+        """Compute the Fourier transforms of the fixed image, padded for an image of this shape."""
         from scipy.fft import next_fast_len, rfft2
 
         size = tuple(next_fast_len(a + b, real=True) for a, b in zip(self.z.shape, shape))
