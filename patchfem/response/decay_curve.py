@@ -7,7 +7,7 @@ measured one from a sine fitted to each (`identify.swings`). Out: a `DecayCurve`
 Half swing k has a middle t_k and a size S_k. Over 2 m + 1 half swings, the slope of ln S_k is
 the logarithmic decrement of half a cycle, pi zeta/(1 - zeta^2)^(1/2), and the slope of t_k is
 half a period. Both are exact for a viscous decay and any m, and are means over the span for any
-other decay. The error by noise falls with m^(-3/2), the error by the curvature grows with m^2:
+other decay. The error due to noise falls with m^(-3/2), that due to the curvature grows with m^2:
 the span is the longest one whose slope agrees with those of all shorter ones (Lepski, 1991).
 """
 
@@ -112,7 +112,7 @@ class DecayCurve(NamedTuple):
         )._replace(amplitude=np.asarray(amplitudes))
 
     def add_sampling_error(self, other: "DecayCurve") -> "DecayCurve":
-        """Return the curve with the error of sampling added.
+        """Return the curve with the sampling error added to its errors.
 
         The error is the largest difference from the curve of `find_turning_points_outside` at the points
         around.
@@ -190,7 +190,8 @@ def measure_last_swing(time, place, speed, period: float) -> float | None:
     late = float(np.ptp(place[time >= time[-1] - period * (1 + STEP_END_TOL)]))
     if late <= MIN_HALF_SWING * np.ptp(place):
         return late / 2
-    # turning points, from the end; direction; farthest position since the last turning point
+    # turning points from the end of the motion; direction; farthest position since the last turning
+    # point
     found, way, far = (
         [],
         0,
@@ -228,7 +229,7 @@ def find_turning_points_outside(time, place, speed) -> tuple:
     share = speed[k] / (speed[k] - speed[k + 1])
 
     def found(step, near):
-        """Return the time [s] at which the speed on the cubic of a step vanishes (Newton's method).
+        """Find the time [s] of zero speed on the continued cubic of a step by Newton's method.
 
         near: initial guess as a fraction of the step, outside 0 to 1.
         """
@@ -381,7 +382,8 @@ def fit_slopes(values, noise) -> Slopes:
         tried.append((wide, wide_spread))
     at_end = np.isnan(bias)
     bias[at_end] = shorter_change[at_end]
-    # Next to an end there is no other span; the second difference estimates the bias without noise.
+    # Only the shortest span fits at the first and the last inner point. There the second difference
+    # estimates the bias if the values have no noise.
     only = np.isnan(bias)
     bend = np.abs(np.diff(values, 2)) / 2
     bias[only] = np.where(spread > 0, 0.0, bend)[only]
@@ -391,10 +393,11 @@ def fit_slopes(values, noise) -> Slopes:
 
 
 def _add_sampling_error(found: DecayCurve) -> DecayCurve:
-    """Widen the errors by the change of the curve over delta^2/8 of its amplitude.
+    """Add the errors that follow from amplitudes that are too large by the fraction delta^2/8.
 
     Half of a half swing is cosh(delta/2) times the amplitude at its middle, where delta is the
-    decrement of half a cycle.
+    decrement of half a cycle. The errors are the changes of the curve over this fraction of the
+    amplitude.
     """
     delta = np.pi * found.damping / np.sqrt(np.maximum(1 - found.damping**2, VALUE_ROUND_OFF))
     share = (
@@ -437,7 +440,7 @@ def _limit_noise(noise, values) -> np.ndarray:
 
 
 def _parabola_weights(m: int) -> np.ndarray:
-    """Return the weights (2 m + 1,) that give the middle of the least-squares parabola."""
+    """Return the weights (2 m + 1,) for the midpoint value of a least-squares parabola."""
     x = np.arange(-m, m + 1)
     x2, n = x**2, x.size
     return (
@@ -459,7 +462,11 @@ def _interpolate_monotone(x, own, values) -> np.ndarray:
 
 
 def _evaluate_cubic(place, speed, share):
-    """Return positions (k,) at fractions (k,) of a step on the cubics; speed is times the step."""
+    """Return positions (k,) at the fractions `share` (k,) of steps, on cubics.
+
+    place, speed: positions and speeds at both ends of the steps; the speeds are multiplied by the
+    durations of the steps.
+    """
     (a, b), (c, d), s = place, speed, share
     return a + s * (c + s * (3 * (b - a) - 2 * c - d + s * (2 * (a - b) + c + d)))
 

@@ -20,8 +20,8 @@ from .rows import error_floor, find_row
 SAFETY_FACTOR = (
     3.0  # Roache's factor for two runs; it covers runs that are too coarse to show the order
 )
-MIN_ORDER = 1.0  # lowest order that is believed
-MAX_ORDER = 2.0  # highest order that is believed, that of the methods
+MIN_ORDER = 1.0  # smallest order that an estimate assumes
+MAX_ORDER = 2.0  # largest order that an estimate assumes, that of the methods
 MAX_CHANGE_RATIO = 16.0  # ratio of two changes, of order 4; above it the last is small by chance
 MIN_OBSERVED_ORDER = (
     0.5  # lowest observed order at which an error counts as decreasing with the step

@@ -93,7 +93,7 @@ def find_reversals(time, slide, rate, force, period: float, by: str = "rate") ->
 
 
 def _find_largest(time, y, v, near: float) -> tuple:
-    """Find the largest y of the cubics through samples with rates v.
+    """Find the maximum of the cubics through samples `y` with rates `v`.
 
     Returns the index of the sample before it, its value, and the fraction of the step to the next
     sample.

@@ -170,7 +170,7 @@ def compute_slip_measures(
     """
     across, beside = second
     if largest_distance(window.slide, across) <= MIN_SLIDE_RANGE:
-        # a law without a stiffness changes its traction, and so its slip, while nothing moves
+        # the slip of a law without a stiffness follows its traction, even if the slide is constant
         return {"slip_amplitude": 0.0, "stick_fraction": 1.0}
     slip = window.slip
     out = {"slip_amplitude": largest_distance(slip, beside) / 2}

@@ -276,7 +276,7 @@ def error_of_steady(steady, error, amplitude, own):
 
 
 def is_still_loading(window, period: float, tolerance: float) -> bool:
-    """Return whether the force on a stuck interface still increases, as in a stick of a belt.
+    """Return whether the friction force of a stuck interface still increases, as on a belt.
 
     The mean of the last cycle must exceed that of the first by more than the tolerance times the
     largest force. In a window of one cycle, the force must increase throughout.

@@ -43,7 +43,7 @@ UNCLOSED = (
 
 
 def find_missing(values, window, drive, rubs: bool, beside: float = 0.0) -> dict:
-    """Return the measures that a coupled run could have but has not, by name, with the reasons.
+    """Return the measures that lack a value in a coupled run, by name, each with the reason.
 
     Parameters
     ----------
@@ -77,10 +77,10 @@ def find_missing(values, window, drive, rubs: bool, beside: float = 0.0) -> dict
 
 
 def find_missing_secant(values) -> dict:
-    """Return the secant stiffness without a value if rigid friction sticks at the largest slide.
+    """Replace the value of the secant stiffness by a reason if the friction force is not unique.
 
-    The force there has no single value. values: Measure by name; the result is a dict, {}
-    otherwise.
+    The force of rigid friction takes many values if the interface sticks at the largest slide.
+    values: Measure by name. The result is a dict by name; {} if the value remains.
     """
     one, stuck = values.get("secant_stiffness"), values.get("stick_fraction")
     holds = (
@@ -97,7 +97,7 @@ def find_missing_secant(values) -> dict:
 
 
 def find_missing_steady(values, outcome: Outcome, drive) -> dict:
-    """Return the steady amplitude as a Measure without value, if a transient hides its limit.
+    """Return the steady amplitude with a reason in place of a value, if a transient hides it.
 
     The result is a dict by name; {} for a drive that is not periodic.
     """
@@ -117,9 +117,10 @@ def find_missing_steady(values, outcome: Outcome, drive) -> dict:
 
 
 def find_missing_drift(values, drive) -> dict:
-    """Return the drift without a value, by name, if no period of the mean slide is known.
+    """Replace the value of the drift by a reason if the drive is not periodic.
 
-    Means over other time spans differ without any drift. values: Measure by name.
+    Means over time spans other than a period differ without any drift. values: Measure by name.
+    The result is a dict by name; {} if the value remains.
     """
     one = values.get("drift_per_cycle")
     return (
@@ -134,7 +135,7 @@ def find_missing_drift(values, drive) -> dict:
 
 
 def find_missing_unbounded(values) -> dict:
-    """Return the measures of a steady motion that does not exist: all but the load lack a value."""
+    """Replace the values of all measures except the load by a reason: no bounded motion exists."""
     return {
         name: replace(
             one,
@@ -146,7 +147,7 @@ def find_missing_unbounded(values) -> dict:
 
 
 def find_missing_loops(values, window, drive) -> dict:
-    """Return the loop areas without a value, by name, of loops that do not close; {} if all do.
+    """Replace the areas of loops that do not close by a reason; {} if all loops close.
 
     The work per cycle is reported as a loss. If nothing forces the motion to repeat, as after a
     release, the interface also returns or stores energy: if this exceeds the dissipation, the work
@@ -178,7 +179,7 @@ def find_missing_loops(values, window, drive) -> dict:
 
 
 def _why_no_phase(values, drive) -> str:
-    """Return the reason why the start of slip has no phase."""
+    """Return the reason why the phase at the start of slip has no value."""
     if not is_sinusoidal(drive):
         return "the drive is not a sine at the end of the run, so the start of slip has no phase"
     stuck = getattr(values.get("stick_fraction"), "value", values.get("stick_fraction"))

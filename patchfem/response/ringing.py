@@ -1,6 +1,6 @@
 """Free vibration of a rig while an interface sticks: a decaying sinusoid and forced motion.
 
-In: a signal during the sticks of a window. Out: `ring_frequency` and `ring_damping` with their
+In: a signal during the stick intervals of a window. Out: `ring_frequency`, `ring_damping` and their
 errors. The model is a sum of decaying sinusoids, the forced sine and a constant. Frequency and
 decay enter nonlinearly, all else linearly (variable projection, Golub and Pereyra, 1973). Up to
 three sinusoids are fitted together, and the one with the most energy is kept. Without a sine,
@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import compiled
 
-# periods of the ringing in a stick; with fewer, frequency and decay are not independent
+# periods of the ringing in a stick interval; with fewer, frequency and decay are not independent
 MIN_PERIODS = 1.5
 MIN_SAMPLES = 16
 MAX_SAMPLES, MAX_STICKS, MAX_SINUSOIDS = 600, 20, 3
@@ -52,7 +52,7 @@ class Ring:
 
 
 def fit_ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | None:
-    """Return the ringing in a signal during one stick; None if there is none.
+    """Return the ringing in a signal during one stick interval; None if there is none.
 
     A line at a harmonic of the drive that does not decay is forced motion and no ringing.
 
@@ -75,7 +75,7 @@ def fit_ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring
     rest = value - columns @ np.linalg.lstsq(columns, value, rcond=1e-12)[0]
     if np.abs(rest).max() <= MIN_SINUSOID * size:
         return None
-    # the first part of a long stick is used, because the ringing decays
+    # the first part of a long stick interval is used, because the ringing decays
     if time.size > MAX_SAMPLES:
         # a stride keeps no more samples per period than the ringing needs
         stride = max(
@@ -147,7 +147,7 @@ def make_ring(amplitude: float, own: float, damping: float, size: float) -> dict
 class HeldMode(NamedTuple):
     """Free vibration of one mode while every interface sticks.
 
-    - begin, end: time span of the stick [s].
+    - begin, end: start and end of the stick interval [s].
     - frequency: frequency of the damped motion [Hz].
     - damping: damping ratio [1].
     - displacement, acceleration: amplitudes at the output at `begin` [m], [m s-2].
@@ -177,7 +177,7 @@ def held_modes(modes, stiffness, motion) -> list:
     stiffness : (i,)
         Stiffness of the interfaces [N/m].
     motion : Response
-        Samples of the stick.
+        Samples of the stick interval.
     """
     n, rows = modes.omega.size, modes.interfaces
     whole = np.diag(modes.omega**2) + rows.T * stiffness @ rows / modes.mass
@@ -203,14 +203,14 @@ def held_modes(modes, stiffness, motion) -> list:
 
 
 def select_strongest(held: list, kind: str) -> HeldMode:
-    """Return the HeldMode with the most energy over the stick.
+    """Return the HeldMode with the largest energy over the stick interval.
 
     Energy is the time integral of the square of its "displacement" or "acceleration", as `kind`
     says.
     """
 
     def energy(one: HeldMode) -> float:
-        """Return the mean square of the decaying sinusoid over the stick.
+        """Return the mean square of the decaying sinusoid over the stick interval.
 
         Its amplitude is the field of this `kind`.
         """
@@ -221,7 +221,7 @@ def select_strongest(held: list, kind: str) -> HeldMode:
 
 
 def measure_ringing(time, value, sticks, omega: float = 0.0) -> tuple:
-    """Return frequency and damping ratio of the ringing in a signal: medians over the sticks.
+    """Return frequency and damping ratio of the ringing in a signal: medians over stick intervals.
 
     Parameters
     ----------

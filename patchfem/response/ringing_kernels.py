@@ -23,7 +23,7 @@ SUCCESS_STEP_TOL, FAILURE_STEP_TOL = 1e-13, 1e-15
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def fill_sinusoids(time, poles, columns, first):
-    """Fill columns (c, k) from row `first` with the sinusoids of poles (2 r,) at times (k,) [s]."""
+    """Fill `columns` (c, k) from row `first` with the sinusoids of `poles` (2 r,) at times (k,)."""
     for r in range(poles.size // 2):
         own, rate = poles[2 * r], poles[2 * r + 1]
         for j in range(time.size):
@@ -36,7 +36,7 @@ def fill_sinusoids(time, poles, columns, first):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def dot(a, b):
-    """Return the scalar product of a (k,) and b (k,)."""
+    """Return the scalar product of `a` (k,) and `b` (k,)."""
     out = 0.0
     for j in range(a.size):
         out += a[j] * b[j]
@@ -45,7 +45,7 @@ def dot(a, b):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def subtract_multiple(a, share, b):
-    """Subtract share times b (k,) from a (k,) in place."""
+    """Subtract the multiple `share` of `b` (k,) from `a` (k,) in place."""
     for j in range(a.size):
         a[j] -= share * b[j]
 
@@ -77,7 +77,7 @@ def factor_qr(columns, count, basis, corner):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def project(value, count, basis, inside, left):
-    """Project a value (k,) onto a basis of `count` rows.
+    """Project a signal (k,) onto a basis of `count` rows.
 
     Fills `left` (k,) with the residual and `inside` (count,) with the coefficients.
     """
@@ -104,7 +104,7 @@ def solve_upper_triangle(count, corner, inside, numbers):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def compute_residual(time, value, poles, columns, few):
-    """Compute the residual of the sinusoids of poles for value (k,) at times (k,) [s].
+    """Compute the residual of the sinusoids of poles for a signal (k,) at times (k,) [s].
 
     Fills the workspace and returns the sum of squares of the residual.
     """
@@ -145,7 +145,7 @@ def compute_jacobian(time, poles, scale, columns, few, slopes, normal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(normal, damping, step, lower):
-    """Fill step (m,) with the Levenberg-Marquardt step of normal (m, m + 1).
+    """Fill `step` (m,) with the Levenberg-Marquardt step of the normal equations (m, m + 1).
 
     The step is -(N + damping diag N)^-1 g, by Cholesky factorization; a dependent direction is left
     out. lower: workspace (m, m). Returns the product of gradient g and step.
@@ -182,7 +182,7 @@ def solve_step(normal, damping, step, lower):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def fit_sinusoids(time, value, poles, scale, ends, room):
-    """Fit sinusoids to value (k,) at times (k,) [s] by the Levenberg-Marquardt method.
+    """Fit sinusoids to a signal (k,) at times (k,) [s] by the Levenberg-Marquardt method.
 
     Parameters
     ----------

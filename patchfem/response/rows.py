@@ -42,7 +42,7 @@ NO_INTEGRATED_MEASURES = (
 
 @dataclass(frozen=True, eq=False)
 class LastCycles:
-    """Last cycles of a run, with the values that its engine knows better than its samples.
+    """Last cycles of a run, with values that its engine computes more accurately than samples.
 
     - window: histories.
     - drive: drive of the run.
@@ -147,7 +147,7 @@ class LastCycles:
 
     @cached_property
     def cycle(self) -> dict:
-        """Measures of the friction loop by name, as far as the run has them.
+        """Measures of the friction loop by name; {} without friction or without a whole cycle.
 
         loop_area [J]; under a sine also equivalent_stiffness and secant_stiffness [N/m] and
         equivalent_damping [1].
@@ -312,7 +312,7 @@ def _drift_scale(values: dict):
 
 
 def _random_rows(name: str, unit: str, floor: float, words: str, group: str = "motion") -> tuple:
-    """Return the rows of a measure of a random drive, and of its scatter between records."""
+    """Return the definitions of a measure under a random drive and of its scatter."""
     scatter = f"{name}_scatter"
     return (
         MeasureDefinition(
@@ -687,10 +687,11 @@ MAX_DISPLACEMENT_FLOOR = (
 
 
 def compute_measures(seen: LastCycles) -> dict:
-    """Return the value by name of every row that the run has, in SI units.
+    """Compute the measures of a run from its last cycles, by name, in SI units.
 
-    The measures INTERFACE_MEASURES are repeated for every further interface, with its number after the name. A
-    value of the engine is used before the one computed from samples.
+    Measures without a value are left out. The INTERFACE_MEASURES are repeated for every further
+    interface, with its number after the name. A value of the engine replaces the one computed from
+    samples.
     """
     out = {row.name: _compute_value(row, seen) for row in ROWS}
     for number, other in enumerate(seen.others(), 1):
@@ -702,7 +703,7 @@ def compute_measures(seen: LastCycles) -> dict:
 
 
 def _compute_value(row: MeasureDefinition, seen: LastCycles) -> float | None:
-    """Return the value of a row; None if the run does not have it or lacks its histories."""
+    """Return the value of a measure definition; None if the run has no value or lacks histories."""
     if row.name in seen.known:
         return seen.known[row.name]
     if row.function is None or (row.needs_run and seen.run is None):
@@ -711,7 +712,7 @@ def _compute_value(row: MeasureDefinition, seen: LastCycles) -> float | None:
 
 
 def stick_fraction(stuck, span):
-    """Return the fraction of a time span [s] that is stuck [s]; numbers or (n,).
+    """Return the time in stick [s] over a time span [s]; numbers or (n,).
 
     A fraction that differs from 1 only by the round-off of the sum of its parts is set to 1.
     """
@@ -791,5 +792,5 @@ def set_final_floors(found: dict, tolerance: float) -> dict:
 
 
 def find_row(name: str) -> MeasureDefinition:
-    """Return the row of a measure of any interface; KeyError for an unknown name."""
+    """Return the definition of a measure of any interface; KeyError for an unknown name."""
     return TABLE[remove_interface_number(name)]

@@ -124,9 +124,9 @@ def find_stick_intervals(window, drive, log=None, held: float = 0.0) -> list:
 
 
 def select_last_cycle(spans, end: float, period: float) -> list:
-    """Return the sticks that begin in the last cycle but one before `end` and end before it.
+    """Return the stick intervals that begin in the last cycle but one, and end before `end`.
 
-    These are all sticks of a periodic motion; there are none if the interface sticks forever.
+    These are all stick intervals of a periodic motion; none if the interface always sticks.
     """
     return [(a, b) for a, b in spans if end - 2 * period <= a < end - period and b < end]
 
@@ -149,7 +149,7 @@ def measure_rings(
     held : float
         Slip in a cycle [m] below which the interface sticks in it.
     repeats : bool
-        Whether the motion is periodic, so that the sticks of one cycle represent all others. A
+        Whether the motion is periodic, so that the stick intervals of one cycle represent all. A
         stick that outlasts the cycle is left out, because nothing decays in it.
     """
     if not drive.segments or window.time.size < 8:
@@ -168,7 +168,7 @@ def measure_rings(
 
 
 def add_uncertainty(measures: dict, own: dict | None) -> dict:
-    """Return measures whose errors include the uncertainty `own` by name of the run itself."""
+    """Add the errors `own`, which the run itself states by name, to the errors of measures."""
     return {
         name: replace(m, error=m.error + (own or {}).get(name, 0.0)) if m.error is not None else m
         for name, m in measures.items()

@@ -285,7 +285,7 @@ def slip_period(time, rate) -> float:
     way = np.sign(rate) * (np.abs(rate) > SLIP_SPEED_TOL * np.abs(rate).max(initial=0.0))
     time = np.asarray(time, float)
     begins = np.flatnonzero((way[1:] != 0) & (way[1:] != way[:-1]))
-    # after a stick, the slip starts at the last sample of the stick
+    # the slip after a stick interval starts at the last sample of this interval
     starts = time[begins + (way[begins] != 0)]
     longest = float(np.diff(starts[-4:]).max(initial=0.0))
     return longest if starts.size and time[-1] - starts[-1] <= 1.5 * longest else 0.0

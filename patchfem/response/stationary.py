@@ -49,9 +49,9 @@ class Spectra(NamedTuple):
     """One-sided spectral densities over frequency, and the frequency response.
 
     - frequency (q,): [Hz].
-    - drive, acceleration (q,): densities of the drive and of the acceleration of the output [m2
-      s-3].
-    - place (q,): density of the displacement of the output [m2 Hz-1].
+    - drive, acceleration (q,): spectral densities of the drive and of the acceleration of the
+      output [m2 s-3].
+    - place (q,): spectral density of the displacement of the output [m2 Hz-1].
     - gain (q,): complex H1 of the displacement over the drive [s2].
     - coherence (q,): of displacement and drive [1].
     """
@@ -77,7 +77,7 @@ def make_record(window, drive) -> Record:
 
 
 def random_measures(window, drive) -> dict:
-    """Return the measures of a stationary random drive by name, as far as the record has them."""
+    """Return the measures under a stationary random drive by name, except those without value."""
     record, out = make_record(window, drive), {}
     for name, values, even in (
         ("relative_displacement_rms", window.output, record.place),
@@ -250,7 +250,7 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
 
 
 def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
-    """Return ln of (omega [rad/s], damping ratio) of the mode whose `expected_response` response fits H1.
+    """Return ln of (omega [rad/s], damping ratio) of the mode whose `expected_response` fits H1.
 
     A complex constant is fitted as well, for the other modes.
 

@@ -14,7 +14,7 @@ class Segments(NamedTuple):
 
     - frequency (q,): [Hz].
     - transforms (r, m, q): of r records over m segments, scaled so that 2 |X|^2 is a one-sided
-      density.
+      spectral density.
     """
 
     frequency: np.ndarray
@@ -22,7 +22,7 @@ class Segments(NamedTuple):
 
 
 class CrossDensities(NamedTuple):
-    """One-sided densities (q,) of an input and an output, and their complex cross density (q,)."""
+    """One-sided spectral densities of input and output, and complex cross density, (q,) each."""
 
     input: np.ndarray
     output: np.ndarray

@@ -26,7 +26,7 @@ from .rig import plan as of_rig
 from .tolerance_forecast import NOTHING_FORESEEN, Forecast, foresee_tolerance
 from .wear import plan as of_wear
 
-PACKAGES = 80e6  # bytes of the packages that every run imports
+PACKAGES = 80e6  # memory of the packages that every run imports [bytes]
 LONGEST = 1e6  # CPU seconds (twelve days) above which no run is started
 # engines that skip the cycles of a periodic motion, and number of cycles from which a plan says so
 SKIPS, MIN_SKIPPED_CYCLES = (
@@ -160,7 +160,7 @@ def compile_words(seconds: float) -> str:
 
 
 def plan(asked) -> Plan:
-    """Return the Plan of a Scene or a Model from its numbers, without a mesh or a solution.
+    """Return the Plan of a Scene or a Model, without making a mesh or a solution.
 
     Parameters
     ----------

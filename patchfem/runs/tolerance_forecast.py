@@ -58,7 +58,7 @@ class Forecast(NamedTuple):
     causes: tuple
 
     def sentence(self) -> str:
-        """Return the sentence that the tolerance will be missed and what to do; "" without a cause."""
+        """Return a sentence on the causes of missing the tolerance and the remedy, or ""."""
         if not self.causes:
             return ""
         words = " and ".join(cause.words for cause in self.causes)
@@ -92,7 +92,7 @@ def _cure_words(cure: dict) -> str:
 
 
 def foresee_tolerance(model: Model) -> Forecast:
-    """Return the Forecast of a model from its numbers alone."""
+    """Predict whether a model will miss its tolerance, as a Forecast, before it is computed."""
     tolerance = model.accuracy.tolerance
     if cause := _mesh_cause(model, tolerance):
         return Forecast(tolerance, (cause,))

@@ -77,7 +77,7 @@ def _batch(
         return lambda *given: getattr(module(), function)(*given)
 
     def parts(models: Sequence) -> dict:
-        """Return {group: indices} of the models that the batch takes as columns."""
+        """Return {group: indices} of the models whose numbers the batch reads as columns."""
         some_of = [models.first] if isinstance(models, SimilarModels) else models
         if not any(getattr(one, "kind", "") == kind for one in some_of) or _why_run_singly(kind):
             return {}
@@ -142,7 +142,7 @@ def _kind(batch: Batch, model: Model) -> str:
 
 
 def choose_batch(model: Model, study: int = 1) -> Batch | None:
-    """Return the batch of a model in a study of so many cases; None if it is run by itself."""
+    """Return the batch of a model in a study of `study` cases; None if it is run by itself."""
     return next((one for one in BATCHES if study >= one.least and not one.refuses(model)), None)
 
 
@@ -204,7 +204,7 @@ def solve_models(
 
 
 def _model_without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
-    """Return a model with the modes without the joint, or the error that there are none."""
+    """Return a model whose modes do not contain the joint, or the error that there are none."""
     if (
         isinstance(model, PatchfemError)
         or model.rig is None
@@ -218,9 +218,10 @@ def _model_without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
 
 
 def _by_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
-    """Return the indices of models that no batch takes as columns, and those that one takes.
+    """Divide models by the batch that reads their numbers as columns.
 
-    The latter are a dict by batch and group.
+    Return the indices of models that no batch reads as columns, and those of all others in a dict
+    by batch and group.
     """
     out, left = {}, np.arange(len(models))
     for batch in BATCHES:
@@ -253,7 +254,7 @@ NO_BATCH = Place(None, None)
 
 
 def _place(model: Model, study: int) -> Place:
-    """Return the batch and the group of a model in a study of so many cases."""
+    """Return the batch and the group of a model in a study of `study` cases."""
     batch = None
     try:
         batch = choose_batch(model, study)
@@ -275,7 +276,7 @@ def _say_failure(say: Callable | None, count: int, failure: str) -> None:
 
 
 def _with_case_indices(keep: Callable | None, cases: list) -> Callable | None:
-    """Return `keep` for a part of the cases, called with indices in this part."""
+    """Return a callback that calls `keep` with an index in all cases instead of one in `cases`."""
     return keep and (lambda case, result: keep(cases[case], result))
 
 

@@ -110,7 +110,7 @@ class CaseResults:
         return cls(np.full(count, "", object), room=room if count > MIN_CASES_ON_DISK else None)
 
     def measure(self, name: str, unit: str) -> None:
-        """Add the columns of a measure, with NaN in every case, if it has none yet."""
+        """Add columns of NaN for a measure, unless the results have this measure already."""
         if name not in self.values:
             self.units[name] = unit
             for columns in (self.values, self.errors, self.floors):
@@ -196,7 +196,7 @@ class CaseResults:
         return out
 
     def has(self, name: str, case: int) -> bool:
-        """Return whether a case has a measure, with a value or with a reason for none."""
+        """Return whether a case has a value of a measure, or a reason why it has none."""
         return not np.isnan(self.values[name][case]) or case in self.reasons.get(name, ())
 
 

@@ -80,7 +80,10 @@ class _PressedCase(NamedTuple):
 
 
 def refuses(model: Model) -> str:
-    """Return why the batch does not take a model; "" if a few points may represent its patch."""
+    """Return why the batch does not take a model; "" if it does.
+
+    It takes elastic patches with bonds under a constant load that are integrated in time.
+    """
     if (
         model.patch is None
         or not model.partial_slip
@@ -311,7 +314,7 @@ class _Read(NamedTuple):
     - extremes, phasors: of the cycles.
     - reach (n,): largest slide [m].
     - own: errors by name that each case states itself.
-    - lost (n,): whether it must be run otherwise.
+    - lost (n,): whether the case must be run by itself.
     """
 
     values: dict
@@ -346,7 +349,7 @@ def _read(models: list, held: list, done: lanes.MarchedCases, steps: int, asked=
     with np.errstate(all="ignore"):
         stiffness = np.array([model.rig.first_mode.stiffness for model in models])
         values = seen.values(book, stiffness * ~_has_other_modes(models[0], done), load)
-        # the pieces are compliant, so that nothing vibrates faster than the rig on its bonds
+        # upper bound of the natural frequencies [rad/s] of the rig, with its bonds as springs
         fastest = np.sqrt(
             (modes.omega**2).max()
             + (modes.slide**2).sum()
@@ -394,7 +397,7 @@ def _has_other_modes(model: Model, done: lanes.MarchedCases) -> np.ndarray:
 
 
 def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple:
-    """Return the Runs with their errors, and the parts of these for each case (see `left_open`)."""
+    """Return the Runs with their errors, and the parts of the errors of each case."""
     fine, (steps, window, cycles), n = reads[0], counts, len(models)
     whole = []
     for one in reads:
@@ -444,7 +447,7 @@ def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple
 def _left_out(
     values: dict, fraction: float, static: float, points: lanes.PointsCase, work: float
 ) -> dict:
-    """Return `friction_errors` of the error by few modes and points.
+    """Return the errors of the measures due to the small number of modes and points, by name.
 
     Parameters
     ----------

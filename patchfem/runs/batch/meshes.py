@@ -35,7 +35,7 @@ class Shared:
                 continue
 
     def given(self, model: Model | PatchfemError) -> Model | PatchfemError:
-        """Return the model with its shared meshes; unchanged if it shares none."""
+        """Return the model with its shared meshes; the same model if it has none."""
         meshes = self.meshes.get(_key(model)) if self.meshes and _wants(model) else None
         if meshes is None:
             return model
@@ -57,5 +57,5 @@ def _wants(model: Model | PatchfemError) -> bool:
 
 
 def _key(model: Model) -> tuple:
-    """Return the key of geometry and tolerance."""
+    """Return the key of the geometry and the tolerance of a model."""
     return patch_meshes.geometry_key(model.patch), model.accuracy.tolerance

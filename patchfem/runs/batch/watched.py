@@ -83,7 +83,7 @@ class MotionObserver:
         self.made, self.before = {}, before.made if before is not None else {}
 
     def __call__(self, drive, near=None) -> ObservedMotion | None:
-        """Return the motion at a drive, started from `near` if it is given; None if not found."""
+        """Return the motion under a drive, found from `near` or from rest; None if not found."""
         try:
             return self._gauged(
                 {
@@ -147,7 +147,7 @@ class MotionObserver:
         )
 
     def _yields(self, drive, near) -> ObservedMotion:
-        """Return the motion of elastic-plastic elements, by the map of yields or else by balance."""
+        """Return the motion of elastic-plastic elements, by their event map or harmonic balance."""
         orbits = self._once("yields", self._orbits)
         try:
             seen = orbits(drive, near)
@@ -162,7 +162,7 @@ class MotionObserver:
         )
 
     def _orbits(self):
-        """Return the map of yields, in the workspace of an earlier MotionObserver if it fits."""
+        """Return the event map, in the workspace of an earlier MotionObserver if it fits."""
         modes, groups = (
             self.model.rig.modes,
             pieces.YieldingElements(self.model, self.numerics, self.patch).groups,

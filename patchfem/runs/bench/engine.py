@@ -1,4 +1,4 @@
-"""Engine of a bench: which method slides its interface, its error and its cost.
+"""Engine of a bench: the method that slides its interface, its error and its cost.
 
 In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `Cost`. Recursion, list of
 bonds and elements are the compiled ones that rigs use. A law without memory needs no loop. If
@@ -52,7 +52,7 @@ class BenchEngine:
 
     - kind: one of the constants above.
     - seconds: CPU seconds per sample.
-    - choice: method of the sum over bonds; None without a sum.
+    - choice: engine of the sum over bonds, with its settings; None without a sum.
     """
 
     kind: int
@@ -137,10 +137,10 @@ def pressure_changes(model) -> bool:
 
 
 def choose_bond_sum(model, slide) -> "bond_engines.EngineChoice":
-    """Return the method of the sum over bonds of a rigid slide along samples slide (k,) [m].
+    """Choose the engine that sums over the bonds of an interface that slides rigidly.
 
     It is chosen as in a rig, except that its error is relative to the force that is reached, which
-    is small if the stroke is short compared with the bond length.
+    is small if the stroke is short compared with the bond length. slide: samples (k,) [m].
     """
     law, accuracy = model.bonds, model.accuracy
     stroke, steps = mean_stroke(slide)
@@ -166,8 +166,9 @@ def requested_engine(model) -> str:
 
 
 def choose_smooth_bond_sum(model, slide) -> "bond_engines.EngineChoice | None":
-    """Return `choose_bond_sum` without merging, for a fit; None for other laws or a prescribed engine.
+    """Choose the engine as `choose_bond_sum` does, but without merging, for a fit.
 
+    None for laws without bonds, or if the scene prescribes the engine or the merging.
     With merging, the force would jump by the error of the sum when a value of the scene changes.
     """
     if (

@@ -1,4 +1,4 @@
-"""Errors of a bench by its steps, its mesh and its sum over bonds, from coarse passes.
+"""Errors of a bench due to its steps, its mesh and its sum over bonds, from coarse passes.
 
 In: the fine pass and patches on nested meshes. Out: errors by measure name for each kind.
 """
@@ -31,11 +31,11 @@ FINER = 0.5  # factor of the merge width in the pass that shows the error of mer
 
 
 class Pass(NamedTuple):
-    """Coarse pass.
+    """Settings of a coarse pass of a bench along its path.
 
     - steps: steps per cycle.
     - level: index of the coarser mesh; 0 is that of the run.
-    - choice: method of the sum over bonds.
+    - choice: engine of the sum over bonds, with its settings.
     - springs, modes: see `PassOptions`.
     """
 
@@ -47,7 +47,7 @@ class Pass(NamedTuple):
 
 
 def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> tuple:
-    """Return the errors of a pass on its ladder of coarse passes.
+    """Estimate the errors of a bench from coarse passes along its path.
 
     Parameters
     ----------
@@ -83,11 +83,11 @@ def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> tu
 
 
 def list_coarse_passes(model, patches: list, fine, steps: int) -> list:
-    """Return the coarse passes of a bench.
+    """Return the coarse passes of a bench, as `CoarserRuns`.
 
-    They are half and a quarter of the steps; at a quarter of them the coarser mesh, another number
-    of shear modes, merged cells of a density of sliders, and narrower strips of a merged list of
-    bonds. Parallel elements are run on all coarser meshes, with steps that do not depend on the
+    They have half and a quarter of the steps; at a quarter of them also the coarser mesh, another
+    number of shear modes, merged cells of a density of sliders, or narrower strips of a merged list
+    of bonds. Parallel elements are run on all coarser meshes, with steps that do not depend on the
     tolerance.
 
     Parameters
@@ -126,7 +126,7 @@ def list_coarse_passes(model, patches: list, fine, steps: int) -> list:
 
 
 def sum_error(model, engine) -> float:
-    """Return a bound of the error of the sum over bonds over the friction limit [1]; else 0."""
+    """Return the error bound of the sum over bonds over the friction limit [1]; 0 without a sum."""
     if engine.kind in (LIST, LISTS):
         return engine.choice.error
     return (
@@ -137,7 +137,7 @@ def sum_error(model, engine) -> float:
 
 
 def _sum_errors(model, fine) -> dict:
-    """Return `friction_errors` of the sum over bonds of a pass."""
+    """Return the errors of the measures of a pass due to its sum over bonds, by name."""
     work = np.abs(np.diff(fine.ledger[0]))
     friction = model.friction
     scale = FrictionScale(

@@ -29,7 +29,7 @@ def law_for(model, patch=None):
 
 
 def estimate_tail_loss(model) -> float:
-    """Return the loss by the cut-off of the NumPy sum over bonds, over the friction limit [1]."""
+    """Return the error due to the cut-off of the NumPy sum over bonds, over the friction limit."""
     accuracy = model.accuracy
     if accuracy.quadrature == "direct":
         return 0.0

@@ -126,7 +126,7 @@ def one_point(model, load: float, engine: BenchEngine, springs=None) -> ContactM
 
 
 def coarser_cells(few) -> CoarserRuns:
-    """Return the passes in which four cells each of a density of sliders are merged.
+    """Return the coarse runs in which groups of four cells of a density of sliders are merged.
 
     few: the Pass with which they are compared.
     """

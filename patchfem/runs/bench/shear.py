@@ -234,7 +234,7 @@ def sheared_lists(patch, law, shear, found, force=None):
 
 
 def coarser_elements(count: int, few) -> CoarserRuns:
-    """Return the passes of a bench of elements on coarser meshes.
+    """Return the coarse runs of a bench with parallel elements, on coarser meshes.
 
     Parameters
     ----------

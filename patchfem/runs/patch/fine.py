@@ -2,7 +2,7 @@
 
 In: a `PatchModel` with a profile. Out: static measures with errors, and the pressure on the
 points. The compliance of waves along the interface is known in closed form; finite elements
-only compute the smooth change by the free ends of the pieces. Errors come from the changes from
+only compute the smooth change due to the free ends of the pieces. Errors come from the changes from
 level to level, as for meshes: with cells half as long at the ends, and with twice as many
 points.
 """
@@ -63,7 +63,7 @@ class PointSolution(NamedTuple):
 
 
 class PointLevel(NamedTuple):
-    """Solved level.
+    """Solution of the contact on the points of one level.
 
     - force (n,): nodal forces [N].
     - surface: pressure and gap on the points.
@@ -162,7 +162,7 @@ def _add_series(coarse: list, series: list) -> dict:
 
 
 def _ends(asked, level: int) -> list:
-    """Return the change of compliance by the free ends of the pieces, on the cells of a level.
+    """Return the change of compliance due to the free ends of the pieces, on the cells of a level.
 
     Returns positions (k,) [m] and changes (2, k, k) [m2/N] for pressure and for shear.
     """

@@ -204,7 +204,7 @@ def search_layout(asked) -> Layout:
 
 
 def find_layout(asked, seen: list) -> Layout:
-    """Return the layout of the coarsest columns for some contacts, finest where a contact ends.
+    """Return the columns of the coarsest mesh, graded towards the ends of some contacts.
 
     seen: ContactExtents, of one patch under several loads or of several patches.
     """
@@ -321,7 +321,7 @@ def contact_extent(patch: Patch, slip=None) -> ContactExtent:
 def _crests(x, sigma) -> tuple:
     """Return (position, half-width) [m] of the maxima of pressures (m,) [Pa] inside a contact.
 
-    Each is that of the parabola through three nodes.
+    Both are those of the parabola through three nodes.
     """
     top = np.flatnonzero(
         (sigma[1:-1] > CREST * sigma.max())

@@ -205,9 +205,9 @@ def most_seconds(asked, tolerance: float | None = None) -> float:
 
 
 def static_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
-    """Solve the patch of a bench that slips in part as a static run does, fine to coarse.
+    """Solve the patch of a bench with partial slip on the meshes of a static run, fine to coarse.
 
-    () if there is no such ladder: the mesh is prescribed, shared with other cases, or solved
+    Return () if the mesh is prescribed or shared with other cases, or if the patch is solved
     already.
     """
     if (
@@ -229,7 +229,7 @@ def _shows_slip(asked, patches: list, tolerance: float) -> bool:
 
 
 def _finer(asked) -> bool:
-    """Return whether a profile may be solved on points finer than any cells."""
+    """Return whether a patch with a profile can be solved on equally spaced points."""
     if asked.gap.profile is None:
         return False
 
@@ -237,7 +237,7 @@ def _finer(asked) -> bool:
 
 
 def _on_points(asked, patches: list, tolerance: float):
-    """Return the finest patch with the measures on points as fine as the profile."""
+    """Return the finest patch with measures computed on points as fine as its profile."""
     found, first = fine.solve_on_points(asked, partial(_enough, patches, tolerance)), patches[0]
     return replace(
         first,
@@ -294,7 +294,7 @@ def _grids(patch) -> tuple:
 
 
 def _enough(patches: list, tolerance: float, sharp: dict) -> bool:
-    """Return whether patches meet the tolerance with measures `sharp` on points of a profile."""
+    """Return whether patches meet the tolerance with the measures `sharp` computed on points."""
     return is_within_tolerance(
         measures(replace(patches[0], sharper=sharp), *patches[1:], tolerance=tolerance), tolerance
     )

@@ -1,8 +1,8 @@
 """Measures of a static patch, with errors from coarser meshes.
 
 In: a `Patch` and the same on coarser meshes. Out: measures by name with errors by `limits`,
-plus the errors that a change of the mesh does not show (`Hidden`); and the model errors by the
-plane state and by the number of strips.
+plus the errors that a change of the mesh does not show (`Hidden`); and the model errors due to
+the plane state and the number of strips.
 """
 
 from dataclasses import replace
@@ -189,7 +189,7 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
 
 
 def _with_parts_of_finest(fine: Patch, series: list) -> list:
-    """Return the coarser patches that see as many parts of the contact as the finest one.
+    """Return the coarser patches that resolve as many parts of the contact as the finest one.
 
     A part of a few cells next to a step may be missing on a coarse mesh. The change to such a mesh
     shows this part and no order of convergence, so that neither this mesh nor coarser ones count.
@@ -441,7 +441,7 @@ class Hidden(NamedTuple):
 
 
 def hidden_by_meshes(pair, pieces, force, gap_range, turns: bool) -> Hidden:
-    """Return what the meshes hide of q patches on one Pair.
+    """Return the Hidden properties of q patches on one Pair.
 
     Parameters
     ----------
@@ -478,7 +478,7 @@ def hidden_by_meshes(pair, pieces, force, gap_range, turns: bool) -> Hidden:
 
 
 def _hidden_by_mesh(patch: Patch, missed_peak: float) -> Hidden:
-    """Return what the meshes hide of a Patch under load.
+    """Return the Hidden properties of a Patch under load.
 
     missed_peak: pressure [Pa] of `unresolved_rounding`.
     """

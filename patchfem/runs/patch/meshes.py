@@ -197,7 +197,7 @@ def _numbers(asked) -> tuple:
 
 
 def _halvings(cases: list, tolerance: float) -> dict:
-    """Return how often a single run halves the cells of a case beyond the fewest levels.
+    """Return how often a single run halves the cells of a case beyond the minimum of levels.
 
     The keys are `_numbers`. CLIMBED_CASES cases are tried.
     """

@@ -26,11 +26,12 @@ from .grids import (
 )
 from .ladder import comparison_meshes
 
-PACKAGES = 2e7  # bytes of the packages that elastic pieces import
+PACKAGES = 2e7  # memory of the packages that a run with elastic pieces imports [bytes]
 CONDENSING_BYTES_RATIO = 0.8  # measured bytes over the predicted bytes of condensing
-OUTLINED_NODE = 4.6e3  # bytes per node of pieces with cells beyond the interface
-FRAMES_NODE = 3.5e3  # bytes per node of the frames of a motion
-STRIP_NODE = 3000.0  # bytes per strip and node of the interface
+# memory per node of pieces that extend beyond the interface [bytes]
+OUTLINED_NODE = 4.6e3
+FRAMES_NODE = 3.5e3  # memory of the frames of a motion per node [bytes]
+STRIP_NODE = 3000.0  # memory per strip and node of the interface [bytes]
 # tolerance below which a contact with an end inside the interface, or over a jump, needs another
 # level
 TIGHT_TOL = 2e-3

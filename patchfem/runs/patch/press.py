@@ -275,7 +275,7 @@ def areas(asked, interface) -> np.ndarray:
 
 
 def presser(asked, pair: Pair):
-    """Return a function that computes the contact forces of a worn `PatchModel`.
+    """Return a function that computes the contact forces on the worn faces of a `PatchModel`.
 
     It maps worn depth (m,) [m], which is added to the gap, and softening (m,) [m/N], which is added
     to the diagonal of the compliance, to forces (m,) [N]; all are (s, m) for strips. Everything

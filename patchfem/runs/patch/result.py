@@ -83,7 +83,7 @@ def static_measures(model, patch, coarse) -> dict:
         (asked.mesh.tolerance or model.accuracy.tolerance) if asked.mesh.is_automatic else None
     )
     found = set_floors(model, derived.static_measures(asked, patch, coarse, tolerance))
-    # `wear.measures` adds the error by the number of strips for worn strips
+    # for worn strips, `wear.measures` adds the error due to their number
     if patch.strips is None or coarse[0] is None or model.wear is not None:
         return found
     return strip_error(model.patch, coarse[0], found)

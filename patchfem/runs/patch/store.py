@@ -58,5 +58,8 @@ def content_key(asked) -> tuple:
 
 
 def is_shared(asked) -> bool:
-    """Return whether several `PatchModel`s may be equal: with shared meshes and without files."""
+    """Return whether the results of a `PatchModel` may be reused by other cases of a sweep.
+
+    This requires shared meshes, and neither a mesh nor a profile from a file.
+    """
     return asked.mesh.shared is not None and asked.mesh.file is None and asked.gap.profile is None

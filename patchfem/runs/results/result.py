@@ -150,10 +150,10 @@ def interface_frames(patch, time, tau, local, slide) -> dict:
 
 
 def on_a_mesh_of_known_error(model, patch, coarse) -> bool:
-    """Return whether the error of a motion by the mesh of its patch can be estimated.
+    """Return whether the error of a motion due to the mesh of its patch can be estimated.
 
-    This needs a coarser patch, unless the motion does not depend on the mesh. coarse: patches on
-    coarser meshes; None for a missing one.
+    This requires the patch on a coarser mesh, unless the motion does not depend on the mesh.
+    coarse: patches on coarser meshes; None for a missing one.
     """
     if patch is None or coarse[0] is not None:
         return True

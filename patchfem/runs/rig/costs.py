@@ -171,12 +171,15 @@ def expected_elements(model: Model) -> tuple:
 
 
 def pieces_per_cycle(model: Model) -> float:
-    """Return the largest number of pieces per cycle of the drive, of stick and of events."""
+    """Return the largest number of intervals of the exact solution per cycle of the drive."""
     return sum(ringing_and_events(model))
 
 
 def ringing_and_events(model: Model) -> tuple:
-    """Return the pieces per cycle of a motion in permanent stick, and those of events and rows."""
+    """Return the intervals of the exact solution per cycle that ringing and that events require.
+
+    Those of events include the rows of a recorded drive.
+    """
     modes, drive = model.rig.modes, model.rig.drive.signal
     (count, stiff), made = expected_elements(model), modal_system.make_modal_system(modes)
     faces, damping = len(made.interfaces), made.damping_norm
@@ -191,7 +194,7 @@ def ringing_and_events(model: Model) -> tuple:
     events = 2 * max(count, faces) * quick + 2 + rows
     if 2 * pi * quick <= made.slow_rate * drive.period:
         dying = DYING / min(find_min_decay_rate(modes), float(modes.omega.min()) ** 2 / damping)
-        # events per cycle after which a mode rings
+        # events per cycle that start a free vibration; without an interface, the start of the run
         times = (
             events + _jumps(model) if model.rig.friction.interfaces else 1 / model.rig.drive.cycles
         )
@@ -226,7 +229,7 @@ def seconds_of_pieces(model: Model) -> float:
 
 
 def _size_seconds(model: Model) -> float:
-    """Return the additional CPU seconds of a piece with several modes and interfaces."""
+    """Return the CPU seconds that further modes and interfaces add to an interval."""
     modes = model.rig.modes
     return cost_model.PIECE_MODE_SECONDS * (
         modes.omega.size - 1
@@ -236,7 +239,7 @@ def _size_seconds(model: Model) -> float:
 def expected_seconds(model: Model) -> float:
     """Estimate the CPU seconds of an event-driven run before it starts.
 
-    The pieces of ringing during stick count for the fraction of the time of stick.
+    The intervals that ringing requires count for the fraction of the time in stick.
     """
     rig, (count, stiff) = model.rig, expected_elements(model)
     limit = sum(

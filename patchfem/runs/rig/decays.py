@@ -43,7 +43,7 @@ def compute_decay(raw: Solution) -> DecayCurve | None:
     """Return the decay curve of the output of a release, with errors; None if it has no points.
 
     Points whose error exceeds MAX_POINT_ERROR of their value are left out. The errors are those of the
-    evaluation plus the changes by the coarse runs at the same amplitudes; they are infinite outside
+    evaluation plus the changes in the coarse runs at the same amplitudes; they are infinite outside
     the range of a coarse run.
     """
     found = _read(raw)
@@ -57,7 +57,7 @@ def compute_decay(raw: Solution) -> DecayCurve | None:
 
 
 def _add_coarse_changes(found: DecayCurve, raw: Solution) -> DecayCurve:
-    """Return a curve of a run with the changes by its coarse runs added to the errors."""
+    """Return the curve of a run with its differences from coarse runs added to the errors."""
     for run, beside in raw.coarser:
         one, other = (
             _read(run).over(found.amplitude),
@@ -118,7 +118,7 @@ def laws_on(model, patch, meshed: tuple = ()):
 
 
 def coarse_laws(model, coarse) -> list:
-    """Return the Groups of the laws in which one patch after the other has a coarser mesh.
+    """Return a list of LawGroups, in each of which another patch has a coarser mesh.
 
     coarse: Patch of its [contact] on a coarser mesh, or None.
     """
@@ -174,11 +174,11 @@ def decay_rows(modes, found: list) -> np.ndarray:
 
 
 def mesh_error(fine, rough, read) -> np.ndarray:
-    """Return the error by the mesh of the values that read(LawGroup) returns, for partial slip.
+    """Return the error due to the mesh of the values that read(LawGroup) returns, for partial slip.
 
-    It is the change by a coarser mesh at second order, but not less than the change if the elements
-    are spread over the yield slides between the nodes (`slip.mesh_correction`): at a slide at which
-    no node slips, a coarser mesh changes nothing.
+    It follows from the change on a coarser mesh at second order. It is not less than the change if
+    the elements are spread over the yield slides between the nodes (`slip.mesh_correction`): at a
+    slide at which no node slips, a coarser mesh changes nothing.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def _spread(stiffness, slide) -> tuple:
 
 
 def mesh_errors_of_decay(model, patch, coarse, amplitudes, mode) -> tuple:
-    """Return the errors of frequency [Hz] and damping by the mesh at amplitudes of the output.
+    """Return the errors of frequency [Hz] and damping due to the mesh at amplitudes of the output.
 
     Parameters
     ----------

@@ -236,7 +236,7 @@ def _none(*_) -> list:
 
 
 def sampling_errors(values: dict) -> dict:
-    """Return errors by name of the measures that are computed from 400 samples per cycle."""
+    """Return the errors of measures that are computed from 400 samples per cycle, by name."""
     loops = (
         "loop_area",
         "equivalent_stiffness",
@@ -268,7 +268,7 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """Return the coarse runs of the engine of yields: coarser meshes, fewer cells of a density."""
+    """Return the coarse runs of the engine of yields: with coarser meshes, with fewer cells."""
     meshes = [Variant(one, patch) for one in _numerics_of_meshes(model, numerics)]
     if coarse is not None and model.partial_slip:
         meshes = [Variant(numerics, coarse), *meshes]
@@ -288,12 +288,12 @@ def _numerics_of_meshes(model: Model, numerics) -> list:
 
 
 def _fewer(numerics, share: int):
-    """Return Numerics with the steps divided by `share`."""
+    """Return the Numerics of a run whose steps per cycle are divided by `share`."""
     return replace(numerics, steps=max(1, numerics.steps // share))
 
 
 def _march_in_time(model: Model, numerics, patch) -> list:
-    """Return the coarse runs of a march in time: half and a quarter of the steps."""
+    """Return the coarse runs of a march in time: with half and a quarter of the steps."""
     return [
         CoarserRuns(
             _halves(numerics, patch), partial(step_errors, steps=numerics.steps), of="steps"
@@ -357,7 +357,7 @@ def _coarse_sums(model: Model, few, patch, solution) -> list:
 
 
 def _sum_errors(model: Model, patch, fraction: float, values: dict, solution) -> dict:
-    """Return `friction_errors` of a sum over bonds with an error relative to the friction limit."""
+    """Return the errors of the measures due to the error `fraction` of a sum over bonds."""
     friction, load = model.friction, patch.pressure.load if patch is not None else model.point.load
     passed = np.abs(np.diff(solution.window.extra["ledger"][0])).sum()
     span = solution.window.time[-1] - solution.window.time[0]
@@ -382,7 +382,7 @@ def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """Return the coarse runs of a steady motion: its own errors, and coarser meshes."""
+    """Return the coarse runs of a steady motion on coarser meshes, and the errors it states."""
     meshed = (
         _pieces_in_space(model, numerics, patch, coarse, solution)
         if choose_steady_method(model).engine == PIECES.name

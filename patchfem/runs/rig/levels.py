@@ -32,7 +32,7 @@ def level_ends(rig) -> tuple:
 
 
 def levels_with_errors(levels, ways, made: dict) -> tuple:
-    """Return the levels with the errors by their coarse runs in addition to their own errors.
+    """Return the levels with the errors from their coarse runs in addition to their own errors.
 
     The error of a measure that a coarse run does not have is its absolute value.
 

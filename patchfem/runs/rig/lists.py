@@ -55,7 +55,7 @@ MOST_SWING = 2.0  # largest phase of the vibration of the block on its bonds in 
 
 @lru_cache(maxsize=8)
 def choose_quadrature(model: Model, numerics: Numerics):
-    """Return the method of the sum over the bonds of a nonlocal law, as a Choice.
+    """Choose the engine that sums over the bonds of a nonlocal law, as an EngineChoice.
 
     The stroke is taken as four times the amplitude that follows from speed over frequency of the
     drive, or from the stiffness of the bonds of a block that they hold. The stroke of a motion that
@@ -79,7 +79,7 @@ def has_list(model: Model, numerics: Numerics) -> bool:
 
 
 def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine: str):
-    """Return the Choice of `choose_quadrature` for an engine, or "auto".
+    """Return the EngineChoice of `choose_quadrature` for a requested engine, or "auto".
 
     stretch: bond lengths by which a block moves on its bonds.
     """
@@ -98,10 +98,11 @@ def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine:
 
 
 def _stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
-    """Return the bond lengths by which a drive moves a block on the stiffness mu_s N/eps_0.
+    """Return the displacement of a driven block on the stiffness of its bonds, in bond lengths.
 
-    inf if the bonds do not hold the block, i.e. their limit is below `least` times the required
-    force, or if the printed law gives them no stiffness.
+    The stiffness is mu_s N/eps_0. The result is inf if the bonds do not hold the block, i.e. if
+    their limit is below `least` times the required force, or if the printed law gives them no
+    stiffness.
     """
     f, rig = model.friction, model.rig
     if f.reading == "report" or rig.drive.kind == "free":
@@ -140,13 +141,13 @@ def _bond_swing(model: Model) -> float:
 
 
 def held_by_bonds(model: Model, push: float | None = None) -> float:
-    """Return the limit of bonds without stiffness over the force that holds the block; else 0.
+    """Return the friction limit of bonds without stiffness over the force that holds the block.
 
-    The printed law reaches its limit at any stroke, so that its stiffness mu_s N/stroke is
-    unbounded; bonds of order 0 have the same force at any stretch. A released block with a list of
-    growing bonds is loaded by its spring alone: it then either vibrates on its bonds or reverses in
-    almost every step, and the length of the step decides by chance (232 steps per cycle: the
-    former; 230 and 234: the latter).
+    It is 0 for other bonds. The printed law reaches its limit at any stroke, so that its stiffness
+    mu_s N/stroke is unbounded; bonds of order 0 have the same force at any stretch. A released
+    block with a list of growing bonds is loaded by its spring alone: it then either vibrates on its
+    bonds or reverses in almost every step, and the length of the step decides by chance (232 steps
+    per cycle: the former; 230 and 234: the latter).
 
     push: acceleration of the drive [m s-2]; None: the largest one.
     """
@@ -214,10 +215,10 @@ def lists_grow(model: Model) -> bool:
 
 
 def find_min_drive(rig) -> float:
-    """Return the smallest acceleration [m s-2] at which the drive of a Rig stays.
+    """Return the acceleration [m s-2] of the lowest level of the drive of a Rig.
 
-    For levels it is half the first one, where the bisection of the onset starts, or the smallest
-    level.
+    For a drive in levels it is the smaller of the lowest level and half the first one, where the
+    bisection of the onset starts. Without levels it is the largest acceleration of the drive.
     """
     levels = rig.drive.levels.amplitudes
     return min(levels[0] / 2, *levels) if levels else find_max_acceleration(rig.drive.signal)

@@ -30,7 +30,7 @@ from .lists import ListGuard, choose_quadrature, has_list
 from .reading import Reader
 from .solution import Solution, normal_load, sampled_loop
 
-LATE = 1.5  # factor on the first-order change by an end that is not the requested one
+LATE = 1.5  # factor on the first-order change due to an end other than the requested one
 
 
 def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -127,7 +127,7 @@ class MarchReader(Reader):
         )
 
     def own(self, run, drive, values: dict) -> dict:
-        """Return the errors by peaks between samples and by the end of the run, by measure name."""
+        """Return the errors due to peaks between samples and due to the end of the run, by name."""
         late, between = self.late(run.window), self.between(run.window)
         return {name: late.get(name, 0.0) + between.get(name, 0.0) for name in late | between}
 
@@ -136,7 +136,7 @@ class MarchReader(Reader):
         return peak_sampling_errors(window, self.model.grooves is not None)
 
     def late(self, window) -> dict:
-        """Return the errors by an end at a sample next to the requested end, by measure name."""
+        """Return the errors due to an end at a sample next to the requested end, by name."""
         steps = self.numerics.cycles * self.numerics.steps
         found = estimate_window_error(
             window, self.model.rig.drive.signal.period, steps - round(steps)
@@ -144,7 +144,7 @@ class MarchReader(Reader):
         return {name: LATE * error for name, error in found.items()}
 
     def summed(self):
-        """Return the Choice for the sum over bonds; None for other laws."""
+        """Return the EngineChoice of the sum over bonds; None for laws without bonds."""
         f = self.model.friction
         return (
             choose_quadrature(self.model, self.numerics)
@@ -159,7 +159,7 @@ class MarchReader(Reader):
         )
 
     def more(self, run, drive, stuck: bool) -> dict:
-        """Return the loop and, for an interface that sticks under a law with a jump, known measures."""
+        """Return the loop and, if an interface with a set-valued law sticks, its known measures."""
         if not self.rubs:
             return {}
         rig, jumps = self.model.rig, self.contact.set_valued

@@ -16,7 +16,7 @@ from .engines import choose_engine
 
 # fraction of a cycle by which a run may differ from whole cycles: a record of 30 periods has 30
 WHOLE_CYCLE_TOL = 1e-6
-N_DECAY_TIMES = 3.0  # decay times after which the mean square of the start has fallen to e^-6
+N_DECAY_TIMES = 3.0  # decay times after which the mean square of the transient is e^-6 of its start
 LEAST_KEPT = 100  # smallest number of samples of a run without cycles
 
 

@@ -152,7 +152,7 @@ class PieceReader(Reader):
         return replace(run, response=response, window=window)
 
     def sticks(self, run) -> bool:
-        """Return whether the interface sticks; of independent strips, all have to stick."""
+        """Return whether the interface sticks, or all of its strips if they slide independently."""
         return (
             run_events.is_all_stuck(run.window, self.held)
             if self.apart and self.rubs
@@ -160,14 +160,18 @@ class PieceReader(Reader):
         )
 
     def integrated(self, run, drive) -> IntegratedMeasures:
-        """Return the loops of the interfaces; for independent strips, their loop from samples.
+        """Return the friction loops of the interfaces.
 
-        `more` returns all else that the series of the pieces give.
+        Strips that slide independently have a single loop, that of their mean, from samples. `more`
+        returns all other measures.
         """
         return IntegratedMeasures(loops=(_strips_loop(run, drive),) if self.apart else run.loops)
 
     def more(self, run, drive, stuck: bool) -> dict:
-        """Return measures from the series of the pieces; work on rigid elements is all dissipated."""
+        """Return the measures that the engine computes between events, as fields of `LastCycles`.
+
+        Rigid elements dissipate all work of friction, so that their ledger is known.
+        """
         found = measures_of_reading(
             run.reading,
             run.ledger,
@@ -194,7 +198,7 @@ class PieceReader(Reader):
         """Return the ringing during stick, and its errors.
 
         It is known in closed form for a single element, and if every interface sticks until the end
-        of a run without a sine. For a periodic motion, the sticks of a single cycle are used.
+        of a run without a sine. For a periodic motion, the stick intervals of one cycle are used.
         """
         if not self.rubs:
             return {}, {}
@@ -228,7 +232,7 @@ class PieceReader(Reader):
         return held_modes(self.model.rig.modes, np.concatenate(springs), motion)
 
     def tail(self, run, drive) -> dict:
-        """Return the ringing after the last slip of a release, for `Solution.extra`; else {}."""
+        """Return the ringing after the last slip of a release, for `Solution.extra`, or {}."""
         if (
             self.model.rig.drive.kind != "free"
             or run.response is None
@@ -307,7 +311,7 @@ def _strips_loop(run, drive) -> InterfaceLoop:
 
 
 def still_changes(extremes, window: int, tolerance: float, decay: float) -> bool:
-    """Return whether a motion may still change by a fraction CHANGES of the tolerance.
+    """Return whether a motion may still change by more than CHANGES times the tolerance.
 
     It may if the run is too short, or if the extremes of its cycles have moved too much in the last
     WINDOWS windows, divided by the fraction of the slowest free motion that decays in this time.

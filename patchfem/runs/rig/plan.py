@@ -43,8 +43,8 @@ from .numerics import choose
 MODE_PAIR = 125.0
 # bytes per pair of harmonics of a balance: Jacobian, and the factors for its error
 HARMONIC_PAIR = 94.0
-MODE_NODE = 24.0  # bytes per shear mode and node of the interface
-DRIVE_ROW = 400.0  # bytes per row of a recorded drive
+MODE_NODE = 24.0  # memory per shear mode and node of the interface [bytes]
+DRIVE_ROW = 400.0  # memory per row of a recorded drive [bytes]
 STEADY_CODES = {
     "exact": EVENT_CODE,
     "piecewise": EVENT_CODE,
@@ -435,7 +435,7 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
 
 
 def _steady_point(model: Model, by: str) -> float:
-    """Return the CPU seconds of a point of a curve of steady motions by the finder of this name."""
+    """Return the CPU seconds per point of a curve of steady motions; by: name of the finder."""
     rig = model.rig
     if by == "balance":
         size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.friction.interfaces))
@@ -461,7 +461,7 @@ def _steady_point(model: Model, by: str) -> float:
 
 
 def _smooth_laws(rig) -> float:
-    """Return the additional CPU seconds of a point by harmonic balance for smooth laws.
+    """Return the CPU seconds that smooth laws add to a point computed by harmonic balance.
 
     Their slope changes during the whole cycle, whereas that of elements that stick and slip is
     constant for most of it.

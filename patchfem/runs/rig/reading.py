@@ -25,7 +25,7 @@ from .solution import Solution, last_cycle_amplitude, last_cycles
 class Reader:
     """Evaluator of the runs of a model by one engine.
 
-    An engine states what it knows itself in `integrated` and `more`.
+    The methods `integrated` and `more` return the measures that an engine computes itself.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Reader:
         return IntegratedMeasures()
 
     def more(self, run, drive, stuck: bool) -> dict:
-        """Return other fields of `response.rows.LastCycles`."""
+        """Return further fields of `response.rows.LastCycles` that the engine knows, by name."""
         return {}
 
     def values(self, run, drive=None, stuck: bool = False, ledger=None) -> dict:
@@ -109,7 +109,7 @@ class Reader:
         )
 
     def own(self, run, drive, values: dict) -> dict:
-        """Return the errors of the values by name that the run itself states, except of its ringing."""
+        """Return the errors that the run itself states, by name, except those of its ringing."""
         return {}
 
     def fewer(self, run):
@@ -117,9 +117,10 @@ class Reader:
         return replace(run, window=thin_samples(run.window))
 
     def sampled(self, run, drive, values: dict) -> dict:
-        """Return the errors by sampling of the measures of an exact motion, by name.
+        """Estimate the sampling errors of the measures of an exact motion, by name.
 
-        They follow from every second sample; measures that the engine integrated have none.
+        They follow from the change with every second sample. Measures that the engine integrated
+        have no such error.
         """
         fewer = self.values(self.fewer(run), drive, ledger=run.response.extra.get("ledger"))
         own = self.integrated(run, drive)
@@ -152,7 +153,7 @@ class Reader:
         return histories if kept and histories.time.size and histories.time[0] == 0 else None
 
     def between_samples(self, run, drive, values: dict) -> dict:
-        """Return the errors by sampling of the measures of the whole run, from every second sample.
+        """Estimate the sampling errors of the measures that use the whole run, by name.
 
         The changes without the even and without the odd samples are added, because each reversal
         has neighbours of one kind.

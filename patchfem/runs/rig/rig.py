@@ -160,7 +160,7 @@ def _add_outcome(run: Coupled) -> Coupled:
 
 
 def _add_reasons(run: Coupled) -> Coupled:
-    """Return the run with a reason for each measure that it could have but has not."""
+    """Return the run with a reason for each measure that lacks a value."""
     found, window, rig = run.measures, run.raw.window, run.model.rig
     rigid = (
         run.rubs
@@ -182,11 +182,11 @@ def _add_reasons(run: Coupled) -> Coupled:
 
 
 def _add_decay(run: Coupled, coarse) -> tuple:
-    """Return the run, its decay curve and notes, with errors not below those by the mesh.
+    """Return the run, its decay curve and notes, with errors not below those due to the mesh.
 
-    The ringing has the error at half the swing in the last stick. The curve is None without a
-    release. coarse: Patch on a coarser mesh or None. The notes say for which errors the mesh is not
-    included.
+    The ringing has the error at half the swing in the last stick interval. The curve is None
+    without a release. coarse: Patch on a coarser mesh or None. The notes say for which errors the
+    mesh is not included.
     """
     found, raw = (
         decays.compute_decay(run.raw)
@@ -234,7 +234,7 @@ def _add_decay(run: Coupled, coarse) -> tuple:
 
 
 def _set_floors(run: Coupled) -> Coupled:
-    """Return the run with the final floors of its measures, without values if no motion exists."""
+    """Return the run with final floors of its measures, and no values of an unbounded motion."""
     found = set_final_floors(run.measures, run.model.accuracy.tolerance)
     if ENGINES[run.numerics.engine].finds_periodic_motion and run.outcome is Outcome.GROWS:
         found = reasons.find_missing_unbounded(found)
@@ -274,7 +274,7 @@ def _extra(run: Coupled, notes: list) -> dict:
 
 
 def _solve(model, numerics, patch, coarse, seconds, say, progress, estimated) -> tuple:
-    """Return the Solution of the engine, its Numerics, and measures with errors by coarse runs.
+    """Return the Solution of the engine, its Numerics, and measures with errors from coarse runs.
 
     Steps per cycle that the scene does not fix are doubled until the error of the displacement is
     within the tolerance.
@@ -343,7 +343,7 @@ def _solve(model, numerics, patch, coarse, seconds, say, progress, estimated) ->
 
 
 class _RefinedRun:
-    """Passes of one engine over one model; `solutions` stores coarse runs by their Variant.
+    """Successive runs of a model by one engine; `solutions` stores coarse runs by their Variant.
 
     Parameters
     ----------
@@ -399,7 +399,7 @@ class _RefinedRun:
 
 
 def _with_level_errors(found: Solution, coarser_runs: list, solutions: dict) -> Solution:
-    """Return a run whose levels have errors by coarse runs, with the coarse runs of its decay.
+    """Return a run whose levels have errors from coarse runs, with the coarse runs of its decay.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ class Moment:
     - used: slip path per cycle in the last jump (m,), of strips (s, m) [m].
     - pressure, gap (m,): pressure [Pa] and remaining gap [m]; for strips the mean pressure and the
       smallest gap over the width.
-    - miss: relative error of the slip path by the number of frames.
+    - miss: relative error of the slip path due to the number of frames.
     - values: measures of patch and motion by name.
     """
 
@@ -66,7 +66,7 @@ class Evolved:
     - depths: worn depths (k,), of strips (s, k) [m], on the nodes of each coarser mesh.
     - stripped: (patch, depth (t, m) [m]) in another number of strips, by the same jumps
       (`measures.other_strips`); None without strips.
-    - miss: relative error of the slip path by the number of frames.
+    - miss: relative error of the slip path due to the number of frames.
     - seconds: CPU seconds.
     - stopped: reason of an early end, else "".
     """

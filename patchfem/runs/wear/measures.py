@@ -125,11 +125,11 @@ def _note_on_coating(model, found, gone: dict) -> list:
 
 
 def widen_by_jumps(model, found, measures: dict) -> dict:
-    """Return measures of the worn patch whose errors include those by the length of the jumps.
+    """Return measures of the worn patch whose errors include those due to the length of the jumps.
 
-    They are the change if the depth is computed by the same jumps without subdivision, and the
-    change to another number of strips, at first order: an edge of contact that moves during a jump
-    leaves nodes that just came into contact too high.
+    They follow, at first order, from the change if the depth is computed by the same jumps without
+    subdivision, and from the change to another number of strips: an edge of contact that moves
+    during a jump leaves nodes that just came into contact too high.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ class CycleSlip(NamedTuple):
 
     - path: slip path of each node (m,), of strips (s, m) [m]. With form 'energy' it is friction
       work per area over pressure, and over grooves it is along their flanks.
-    - miss: relative error by the number of frames, and by differences between the cycles of the
+    - miss: relative error due to the number of frames and to differences between the cycles of the
       window.
     - values: measures of the motion by name.
     - outcome: reason why no cycle is periodic, else None.
@@ -138,7 +138,7 @@ def _rig(model, patch, frames: int) -> CycleSlip:
 
 
 def _beat(values: dict, slip) -> float:
-    """Return the relative difference of the last slip amplitude from that of the window.
+    """Return the relative difference between the slip amplitudes of the last cycle and the window.
 
     It is due to a mode that still beats. slip: (k,) [m] of the last cycle.
     """

@@ -52,7 +52,7 @@ MAIN_MEASURE, PHASE_MEASURE = "relative_displacement_amplitude", "slip_start_pha
 
 
 class Sizes(NamedTuple):
-    """Sizes in the scenes of n models, (n,) each.
+    """Scales of n models from their scenes, (n,) each.
 
     - tolerance: [1].
     - moved: expected displacement [m].
@@ -341,7 +341,7 @@ def _stops(found: CaseResults) -> None:
 
 
 def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
-    """Add the reasons why cases have no value of measures that they could have."""
+    """Add the reasons why measures of the cases lack a value."""
     names = [*CYCLE_MEASURES, PHASE_MEASURE]
     for name in names:
         found.measure(name, TABLE[name].unit)

@@ -64,7 +64,7 @@ KINDS = {
     "lugre": "friction.laws.lugre_kernels",
     "nonlocal": "friction.laws.stretch_kernels",
 }
-MARCH_ON = "yielding", *march.MASING  # laws whose motions march on until they settle
+MARCH_ON = "yielding", *march.MASING  # laws with which a motion is marched on until it is steady
 # steps per cycle under a stretch law, and largest phase of its fastest rate in a step
 SMOOTH, CALM = (
     (128, 256, 512, 1024, 2048),
@@ -118,8 +118,8 @@ OF_STATED, OF_TAIL = 2.5, 7e-6
 # errors. 1 of 590 random cases differed by more than one error, by 1.9.
 FINER_CELLS, SHORT = 2, 2.0
 RING = "ring_frequency", "ring_damping"
-# Largest relative change by a coarser mesh that is fine enough to march; the loop of little slip
-# may be completely uncertain.
+# Largest relative change of each measure on a coarser mesh that is fine enough; the loop of a small
+# slip may be completely uncertain.
 WILD = ("relative_displacement_amplitude", 0.1), ("friction_force_peak", 0.1), ("loop_area", 10.0)
 # fraction of a loop by which a loop that is forgotten for lack of memory may be larger
 DROPPED_LOOP_RATIO = 1e-2
@@ -134,7 +134,7 @@ IN_DOUBT, WRONG = (
     70,
     0.03,
 )
-# phase of the free vibration in a stick [rad] from which a ringing is searched for
+# phase of the free vibration in a stick interval [rad], above which ringing is searched for
 RINGS = 0.9 * 3 * np.pi
 
 
@@ -148,7 +148,7 @@ def refuses(model: Model) -> str:
 
 
 def no_lanes(model: Model) -> str:
-    """Return why lanes take no model that differs from this one in plain numbers only, or ""."""
+    """Return why lanes take no model with the options of this one, whatever its numbers, or ""."""
     if why := lumped.not_one_point(model):
         return why
     if not SHORTEST <= model.rig.drive.cycles <= LONGEST or not model.friction.static > 0:
@@ -170,7 +170,7 @@ def asks_more(model: Model) -> str:
 
 
 def _manifold(friction) -> str:
-    """Return why a stretch law has more states than its stretch; "" if it has not."""
+    """Return why a stretch law has states besides its stretch; "" if it has none."""
     grows = law_has_trait(friction.law, "bonds") and (
         is_bond_list(friction) or friction.slip_growth is not None
     )
@@ -178,7 +178,7 @@ def _manifold(friction) -> str:
 
 
 def _creates(model: Model):
-    """Return whether a stretch law may create energy, or its bonds have several stretches."""
+    """Return whether a stretch law may create energy, or its bonds differ in their stretch."""
     f = model.friction
     if law_has_trait(f.law, "bonds"):
         return np.not_equal(f.breakaway or 0.0, 0.0) | np.not_equal(f.initial_bonds, 1.0)
@@ -219,7 +219,7 @@ def steps_per_cycle(models: Sequence[Model]) -> np.ndarray:
 
 
 def steps_at_rate(rate, ends) -> np.ndarray:
-    """Return the steps per cycle (n,) at fastest rates (n,) over that of the drive.
+    """Return the steps per cycle (n,) for ratios (n,) of the fastest rate to that of the drive.
 
     ends: sequence of (largest rate, steps).
     """
@@ -418,9 +418,9 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     """March models side by side, and refine the steps until their errors meet the tolerance.
 
     All cases with the same steps march together, including those whose errors need these steps. If
-    the change by half the steps is too large with a stretch law, a quarter of them shows how the
-    errors fall. The change by a coarser mesh is computed with the fewest steps; with more if it is
-    so large that the steps are too long for the start, or if the case sticks, because what then
+    the difference from half the steps is too large with a stretch law, a quarter of them shows how
+    the errors fall. The difference from a coarser mesh is computed with the fewest steps. More are
+    used if this difference exceeds the limits in WILD, or if the case sticks, because what then
     remains of the third harmonic depends on both.
 
     Parameters
@@ -445,13 +445,13 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     finest = (SMOOTH if smooth else RATES[-1])[-1]
 
     def tell_mesh(places, fine: dict) -> None:
-        """Store the errors by the mesh of some cases."""
+        """Store the errors of some cases due to the mesh."""
         rough = _march_and_measure(law, *_select(cases[2], places), cycles, now)[0]
         for name, error in _mesh_errors(fine, rough).items():
             meshed.setdefault(name, np.zeros(len(models)))[places] = error
 
     def measured(places, count: int) -> tuple:
-        """March some cases, and store their measures by the number of steps."""
+        """March some cases, and store their measures under their number of steps."""
         seen = _march_and_measure(law, *_select(cases[:2], places), cycles, count)
         for name, column in seen[0].items():
             known.setdefault(count, {}).setdefault(name, np.full(len(models), np.nan))[places] = (
@@ -496,9 +496,9 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
 
 
 def _needs_finer_mesh(values: dict, meshed: dict) -> np.ndarray:
-    """Return which cases (n,) a coarser mesh changes more than a mesh that is fine enough.
+    """Return which cases (n,) a coarser mesh changes by more than the limits in WILD.
 
-    values, meshed: measures and errors by the mesh, (n,) by name.
+    values, meshed: measures, and their errors due to the mesh, (n,) by name.
     """
     return np.any(
         [~(meshed[name] <= share * np.abs(values[name])) for name, share in WILD if name in meshed],
@@ -566,14 +566,14 @@ def has_large_error(models, found: CaseResults, meshed: dict | None = None) -> n
     """Return whether an error of a case exceeds its tolerance, (n,).
 
     The tolerance applies to a measure or to the larger terms of which it is the difference. The
-    errors by the mesh are not counted, because no other engine reduces them.
+    errors due to the mesh are not counted, because no other engine reduces them.
 
     Parameters
     ----------
     models : sequence of Model
     found : CaseResults
     meshed : dict, optional
-        Errors by the mesh, (n,) by name.
+        Errors due to the mesh, (n,) by name.
     """
     tolerance, out = (
         collect_columns(models, lambda model: (model.accuracy.tolerance,))[0],
@@ -658,7 +658,7 @@ def collect_runs(models, cases: tuple, steps: int, seen: tuple, coarser: list) -
     ----------
     models : sequence of Model
     cases : tuple
-        From `make_cases`, and the errors by the mesh.
+        From `make_cases`, and the errors due to the mesh.
     steps : int
         Steps per cycle.
     seen : tuple
@@ -724,15 +724,16 @@ def collect_runs(models, cases: tuple, steps: int, seen: tuple, coarser: list) -
 
 
 def may_ring(cases, found) -> np.ndarray:
-    """Return whether a stick of the last cycles is long enough for a ringing, (n,)."""
+    """Return whether a stick interval of the last cycles is long enough for ringing, (n,)."""
     own = np.sqrt(np.maximum(cases.stiffness + cases.spring - cases.damping**2 / 4, 0.0))
     return found.reading("LONGEST_STICK") * own >= RINGS
 
 
 def start_may_remain(cases, found) -> np.ndarray:
-    """Return whether the start or a ringing may remain at the end, (n,).
+    """Return whether a transient or ringing may remain at the end of a run, (n,).
 
-    The last two cycles differ by its decay in one cycle, at least by that of the damper.
+    What remains is at most the change between the last two cycles over the fraction that the damper
+    removes in one cycle.
     """
     last = found.history[:, -2:, :2]
     change = np.abs(last[:, 1] - last[:, 0]).max(axis=1) / np.maximum(
@@ -745,8 +746,8 @@ def start_may_remain(cases, found) -> np.ndarray:
 def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
     """Return the ringing by name, its errors, and which cases need another run.
 
-    A ringing is computed in a stick that lasts all the time: in closed form for a spring, else by
-    the fit of a single run.
+    The ringing is computed if the interface sticks all the time: in closed form for a spring, else
+    by the fit of a single run.
 
     Parameters
     ----------
@@ -770,14 +771,14 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
         np.zeros(len(found.n_before), bool),
     )
     out = tuple({name: np.full(n, np.nan) for name in RING} for _ in range(2))
-    if law == "rigid":  # a rigid interface with one mode does not move in a stick
+    if law == "rigid":  # a rigid interface with one mode does not move while it sticks
         return *out, faint, faint
     rings, marched = may_ring(cases, found), found.n_before >= found.history.shape[1] - window
     held = found.reading("STICK_ANGLE") > 2 * np.pi * (found.n_observed - 1e-6)
     if law == "yielding":
         _ring_on_springs(cases, c, found, held & rings & marched, out)
         return *out, rings & ~held, faint
-    # a periodic motion does not ring, but the start may remain in a stick of all cycles
+    # a periodic motion does not ring, but a transient may remain if the interface always sticks
     may = (
         (rings & marched & (march.law_state(law, found.motion, "EVER_SLIPPED") > 0))
         | (start_may_remain(cases, found) & stuck)
@@ -895,7 +896,7 @@ def _march_until_settled(law: str, cases, found, steps: int, amplitudes, free) -
 def _slips_until_steady(ranges, length, value, error) -> np.ndarray:
     """Return whether a motion slips in all cycles up to its steady state, or in none, (n,).
 
-    If slip ceases in between, its free motion decays differently from then on.
+    If the slip ceases before the steady state, the free motion decays differently from then on.
 
     Parameters
     ----------
@@ -1048,7 +1049,7 @@ def lane_kind(model: Model) -> str:
 
 
 def _mesh_errors(fine: dict, rough: dict) -> dict:
-    """Return the errors (n,) by name of a mesh from a coarser one.
+    """Return the errors (n,) by name due to a mesh, estimated from a coarser one.
 
     The error of a measure that the coarser mesh does not have is its absolute value.
     """
@@ -1111,7 +1112,7 @@ def step_errors(values: dict, coarser: list) -> dict:
 
 
 def _loops(values: dict) -> np.ndarray:
-    """Return whether a case has a loop (n,), not only the round-off of a stick."""
+    """Return whether the friction loop of a case is larger than round-off, (n,)."""
     return np.abs(values["loop_area"]) > NO_LOOP * values["friction_force_peak"] * np.abs(
         values[AMPLITUDE]
     )

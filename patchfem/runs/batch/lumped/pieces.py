@@ -31,7 +31,7 @@ from ...rig.pieces import (
 from .columns import ENDS, MAIN_MEASURE, Runs
 from .threads import in_threads
 
-CYCLES = 3  # cycles that contain every stick of a cycle completely
+CYCLES = 3  # cycles that contain each stick interval of a cycle completely
 # smallest and largest number of cycles of a run, whose extremes are all kept
 SHORTEST, LONGEST = 20, 4000
 
@@ -52,7 +52,7 @@ class Case(NamedTuple):
 
 
 def refuses(model) -> str:
-    """Return why law, cycles or engine of a model do not belong to this batch; "" if they do."""
+    """Return why the law, the cycles or the engine of a model exclude it from the batch, or ""."""
     f = model.friction
     if not _holds(model) and not law_has_trait(f.law, "cells") and f.law != "elastic-plastic":
         return "the friction law of the case is not a set of friction elements"
@@ -154,7 +154,7 @@ def runs_of_cases(
     done = [None] * len(cases)
 
     def go(part: slice) -> None:
-        """Run a part of the cases."""
+        """Run the cases of a slice, and store their runs in `done`."""
         rigs = [(one.model.rig, one.groups) for one in cases[part]]
         done[part] = histories.simulate_batch(
             ((rig.modes, rig.drive.signal, groups, rig.start) for rig, groups in rigs),

@@ -49,7 +49,7 @@ class Balanced(Reader):
         )
 
     def more(self, run, drive, stuck: bool) -> dict:
-        """Return the loop by the trapezoidal rule, and the peaks of force and slip."""
+        """Return the loop, computed by the trapezoidal rule, and the peaks of force and slip."""
         loop = sampled_loop(run.window, drive, run.ledger["friction"])
         if not self.rubs or not self.turns:
             return {"loop": loop}
@@ -67,7 +67,7 @@ class Balanced(Reader):
 
 
 class BalanceFinder:
-    """Finder for laws with memory and nonlinear springs, by harmonic balance.
+    """Finder of steady motions by harmonic balance, for laws with memory and nonlinear springs.
 
     It starts near the point of a curve that it gets, if there are several motions.
     """
@@ -204,7 +204,7 @@ class BalanceFinder:
         return self._shown(add_stability(found, self.modes))
 
     def _shown(self, found) -> CurvePoint:
-        """Return the point of a curve of a SteadyMotion with its multipliers."""
+        """Return a SteadyMotion, whose multipliers are known, as a point of a curve."""
         kind, stable = balanced_regime(found)[0], bool(found.stable)
         drive = SineDrive(found.level, found.omega, self.model.rig.drive.signal.moving)
         return CurvePoint(

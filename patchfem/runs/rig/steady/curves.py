@@ -23,7 +23,7 @@ COLUMN_MEASURES = {
 }
 # relative error of the measures of a motion that an exact engine integrates from a given state
 READ = 1e-9
-LAST = 1e-12  # round-off of the third harmonic relative to the first
+LAST = 1e-12  # round-off of the third harmonic of the acceleration relative to the first
 POINTS = 121  # points of a curve over frequency before its refinement
 # The neighbourhood of a peak ends at this fraction of the peak, and no other peak may be higher
 # than this fraction. It is computed alone if it is at most this fraction of the curve. Its curve
@@ -77,7 +77,7 @@ class CurvePoint(NamedTuple):
 
 
 def exact_errors(values: dict, left: float) -> dict:
-    """Return the errors by name of a motion that closes to the relative error `left`."""
+    """Return the errors of a motion that repeats up to the relative error `left`, by name."""
     return {
         name: abs(v) * (READ + left) + LAST * (name == "acceleration_distortion")
         for name, v in values.items()
@@ -124,7 +124,10 @@ def make_missing_point(drive) -> CurvePoint:
 
 
 class Followed:
-    """Curve over frequency whose points `shown` finds; leaves: see `top.refine_peak`."""
+    """Curve over frequency whose points the method `shown` computes.
+
+    leaves: see `top.refine_peak`.
+    """
 
     leaves = 1e-2, 0.1
 

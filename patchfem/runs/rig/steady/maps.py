@@ -89,7 +89,7 @@ class Maps(Followed):
         self.groups = self.found.groups
 
     def repeating(self, drive, near) -> PeriodicMotion:
-        """Return the motion that repeats with a sine, as PeriodicMotion."""
+        """Return the PeriodicMotion under a sine."""
         raise NotImplementedError
 
     def point(self, drive, near=None) -> tuple:
@@ -141,7 +141,7 @@ class Maps(Followed):
         ), one.near
 
     def begun(self, memory):
-        """Return the memory of elements with which a run begins, with energies counted from there."""
+        """Return the memory of elements at the start of a run, whose energies count from there."""
         return memory
 
     def shown(self, drive, near=None) -> CurvePoint:
@@ -194,7 +194,7 @@ def _curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
 
 
 class YieldFinder(Maps):
-    """Finder for elastic-plastic elements, by the map from yield to yield."""
+    """Finder of steady motions with elastic-plastic elements, by the map from yield to yield."""
 
     name, elements = "yields", YieldingElements
 
@@ -203,11 +203,11 @@ class YieldFinder(Maps):
         self.tries_another = len(model.rig.friction.interfaces) == 1
 
     def begun(self, memory):
-        """Return the memory with energies counted from the start (see `Maps.begun`)."""
+        """Return the memory of elements with work and loss set to 0 (see `Maps.begun`)."""
         return event_elements.reset_work(memory)
 
     def repeating(self, drive, near) -> PeriodicMotion:
-        """Return the motion that repeats, started from the Point `near` or from rest."""
+        """Return the PeriodicMotion under a sine, found from the Point `near` or from rest."""
         one = steady.solve_steady(self.modes, drive, self.groups, near)
         return PeriodicMotion(
             one.start,
@@ -224,7 +224,7 @@ class YieldFinder(Maps):
 
 
 class EventFinder(Maps):
-    """Finder for Coulomb interfaces, or none, by the event map."""
+    """Finder of steady motions with Coulomb friction or without friction, by the event map."""
 
     name, elements = "events", RigidElements
 
@@ -234,7 +234,7 @@ class EventFinder(Maps):
         return np.array([(one.static, one.kinetic) for one in self.groups]).T
 
     def repeating(self, drive, near) -> PeriodicMotion:
-        """Return the motion that repeats.
+        """Return the PeriodicMotion under a sine.
 
         If friction falls with the first slip, several motions exist, and the search starts from the
         state `near`. Multipliers of two simultaneous events hold for one order of these only, so

@@ -33,8 +33,8 @@ ROUGH = 1e-2
 def left_grooves(model, numerics, patch, drive, contact) -> Solution | None:
     """Return the Solution of a motion whose lifted mass leaves its grooves; None if it does not.
 
-    It must leave them within LEAD cycles of a march from rest. The errors are the changes by half
-    the steps.
+    It must leave them within LEAD cycles of a march from rest. The errors are the differences
+    from a march with half the steps.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def left_grooves(model, numerics, patch, drive, contact) -> Solution | None:
 
 
 class MarchFinder(Followed):
-    """Finder of the steady motion over grooves, by a march whose initial state is corrected."""
+    """Finder of steady motions over grooves, by a march whose initial state is corrected."""
 
     tries_another, leaves = True, (0.3, 30.0)  # the points have errors of the size of the tolerance
 
@@ -111,7 +111,11 @@ class MarchFinder(Followed):
         return values | {"drift_per_cycle": 0.0}, mark, snapshots, stuck
 
     def point(self, drive, near=None) -> tuple:
-        """Return the steady motion (see `_point`), or that of a mass that leaves its grooves."""
+        """Return the Solution of the steady motion under a sine, and the Run that continues it.
+
+        If there is none because the lifted mass leaves its grooves, the Solution of this motion and
+        None are returned.
+        """
         try:
             return self._point(drive, near)
         except NotConverged:
@@ -124,8 +128,8 @@ class MarchFinder(Followed):
     def _point(self, drive, near) -> tuple:
         """Return the Solution of one cycle of the steady motion, and the Run that continues it.
 
-        The steps are doubled until the change of the amplitude by half of them is within the
-        tolerance. This change is the error of every measure.
+        The steps are doubled until the amplitude differs from that with half as many by less than
+        the tolerance. The error of a measure contains its difference from half of the steps.
         """
         begin, name = perf_counter(), "relative_displacement_amplitude"
         run, left = self._run(drive, near, self.steps)
