@@ -1,6 +1,6 @@
 """Error of a scene against computing time, over tolerances or values of a numerical setting.
 
-In: a model, and the setting that varies. Out: a list of `Cost`, one per run, and sentences on the
+In: a model, and the setting that varies. Out: a list of `Cost`, one per run, and sentences about the
 cheapest setting that meets a tolerance.
 
 Read `tolerance_curve` first: it runs the scene at several tolerances, and if a run misses its
@@ -530,7 +530,7 @@ def cost_sentence(runs: list, tolerance: float) -> str:
 
 
 def _effect_sentence(runs: list, tolerance: float) -> str:
-    """Return a clause on settings that change nothing relevant; "" if they change something."""
+    """Return a clause about settings that change nothing relevant; "" if they change something."""
     turned = changed_measures(runs)
     if len(runs) < 2 or any(
         one.distances.get(name, 0.0)

@@ -42,7 +42,7 @@ class ContactProblem(NamedTuple):
 
     @property
     def free_rotations(self) -> list[int]:
-        """Indices of the rotations that no spring holds."""
+        """Indices of the rotations that no spring restrains."""
         return [k for k in range(1, self.springs.size) if self.springs[k] == 0]
 
     @property
@@ -167,9 +167,9 @@ class _SetEquations:
         )
 
     def _close_gap(self, gap_force: np.ndarray, loads: np.ndarray) -> tuple:
-        """Return forces (k,) [N] and orthogonal motions (r,) that close a gap under given loads.
+        """Return the forces (k,) [N], and the amounts (r,) of the orthogonalised motions, that close a gap.
 
-        gap_force: (k,) forces [N] that close the gap without any motion; loads: (r,) of the motions.
+        gap_force: (k,) forces [N] that close the gap without any motion; loads: (r,) of these motions.
         """
         motion = (loads + self.rows @ gap_force) / self.stiffness
         return motion @ self.nodal_forces - gap_force, motion
@@ -357,7 +357,7 @@ def solve_primal(
 
 
 def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> float:
-    """Return the rotation theta [rad] at which a rigid piece rests under load and moment.
+    """Return the rotation theta [rad] of a rigid piece in equilibrium under a load and a moment.
 
     The piece rests on the edge of the lower convex hull of the gap below the load line; against a spring it may rest
     on one corner.
@@ -393,7 +393,7 @@ def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> flo
 
 
 def find_rest_motion(problem: ContactProblem) -> np.ndarray:
-    """Return the motion q (r,) at which a rigid piece rests under load and moments.
+    """Return the motion q (r,) of a rigid piece in equilibrium under a load and moments.
 
     The rotations are found about one axis after the other.
     """
@@ -417,7 +417,7 @@ def find_rest_motion(problem: ContactProblem) -> np.ndarray:
 
 
 def guess_contact_set(compliance, problem: ContactProblem) -> np.ndarray:
-    """Guess the nodes (n,) that the load brings into contact from the rest position.
+    """Guess the nodes (n,) that the load brings into contact, from the gap of rigid pieces in equilibrium.
 
     The load closes the gap by the geometric mean of what a point load and a uniform load would. Under a prescribed
     approach these are the nodes that overlap.

@@ -228,7 +228,7 @@ def _solve_strip(problem: AsperityProblem) -> AsperitySolution:
 
 
 def solve_at_motion(problem: AsperityProblem, motion: np.ndarray) -> AsperitySolution:
-    """Solve every strip by itself under the prescribed motion of the holder.
+    """Solve every strip separately under the prescribed motion of the holder.
 
     Parameters
     ----------
@@ -341,7 +341,7 @@ def _search_dual(
 
 
 def _linearised_start(problem: AsperityProblem) -> tuple:
-    """Return first separations and motion, from the law linearised at the mean pressure."""
+    """Return initial separations and motion, from the law linearised at the mean pressure."""
     contact = problem.contact
     mean_pressure = problem.mean_pressure
     mean_separation = problem.asperities.separation(np.array([mean_pressure]))

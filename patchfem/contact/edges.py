@@ -51,7 +51,7 @@ def edge_offset_fraction(aspect):
 
 
 def edge_offset(inner, outer, fraction, row_height: float | None = None):
-    """Return the distances [m] of edges inside the positions that `ContactEdge.fraction` gives.
+    """Return how far [m] edges lie inside the positions that `ContactEdge.fraction` gives.
 
     The cell length is interpolated between both cells by the fraction, so an edge does not jump where cells of two
     lengths meet.

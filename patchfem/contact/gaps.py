@@ -11,7 +11,7 @@ import numpy as np
 
 
 class ShapeProperties(NamedTuple):
-    """Properties of a shape, each a function of the keys of its table, or None.
+    """Functions that return the properties of a shape from its table; None for a property it does not have.
 
     - angle: angle [rad] by which the shape rotates the piece.
     - edge: position and height [m] of a jump of the gap.
@@ -31,7 +31,7 @@ SHAPE_PROPERTIES = {
 
 
 def tilt(x: np.ndarray, angle: float) -> np.ndarray:
-    """Return the gap angle x (m,) [m] of a tilted upper piece.
+    """Return the gap (m,) [m] of a tilted upper piece: the angle times the position x.
 
     An angle [rad] > 0 opens the gap at +x.
     """
@@ -39,7 +39,7 @@ def tilt(x: np.ndarray, angle: float) -> np.ndarray:
 
 
 def crown(x: np.ndarray, radius: float) -> np.ndarray:
-    """Return the gap x^2/(2 radius) (m,) [m] of a crowned piece on a flat one; radius [m] > 0."""
+    """Return the gap (m,) [m] of a crowned piece on a flat one: x^2/(2 radius), with radius [m] > 0."""
     return x**2 / (2 * radius)
 
 

@@ -50,7 +50,7 @@ class ContactBounds(NamedTuple):
 
 
 class ContactEnergy(NamedTuple):
-    """Energy [J] of the preloaded contact, and its derivatives by heave [N] and rotation [N m]."""
+    """Energy [J] of the preloaded contact; derivatives with respect to heave [N] and rotation [N m]."""
 
     value: float
     heave_slope: float
@@ -125,7 +125,7 @@ def multiply_three(line, columns):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def refine_rows(sets):
-    """Refine the last three columns of the tableau by one iterative step with C.
+    """Refine the last three columns of the tableau by one step of iterative refinement with C.
 
     Returns the largest relative residual of a column before the step.
     """
@@ -316,7 +316,7 @@ def check_set(sets, slot, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def exchange_failing(sets, slot, d, t, bounds, is_single):
-    """Write a set with its violating nodes exchanged to the target of the tableau.
+    """Write to the target of the tableau the set that results from exchanging the violating nodes.
 
     Parameters
     ----------

@@ -9,17 +9,17 @@ import numpy as np
 
 MAX_POLYGON_SIDES = 16  # largest number of sides; sets with more are checked node by node
 # indices into `SetArrays.reference`
-REFERENCE_LOAD = 0  # load of the reference state [N]
-REFERENCE_MOMENT = 1  # moment of the reference state about x = 0 [N m]
-REFERENCE_ENERGY = 2  # elastic energy of the reference state [J]
-REFERENCE_OPENING = 3  # largest magnitude of its openings [m]
-REFERENCE_STIFFNESS = 4  # dN/d(approach) of the reference state [N/m]
+REFERENCE_LOAD = 0  # index of the load of the reference state [N]
+REFERENCE_MOMENT = 1  # index of the moment of the reference state about x = 0 [N m]
+REFERENCE_ENERGY = 2  # index of the elastic energy of the reference state [J]
+REFERENCE_OPENING = 3  # index of the largest magnitude of its openings [m]
+REFERENCE_STIFFNESS = 4  # index of dN/d(approach) of the reference state [N/m]
 # indices into `SetArrays.counters`
-N_STORED = 0  # number of sets that are stored
-NEXT_SLOT = 1  # slot of the next set
-N_BUILT = 2  # number of sets computed so far
-N_PIVOTS = 3  # number of pivots so far
-N_RESETS = 4  # number of times that the tableau was computed anew
+N_STORED = 0  # index of the number of stored sets
+NEXT_SLOT = 1  # index of the slot of the next set
+N_BUILT = 2  # index of the number of sets computed so far
+N_PIVOTS = 3  # index of the number of pivots so far
+N_RESETS = 4  # index of the number of times that the tableau was computed anew
 
 
 class Tableau(NamedTuple):

@@ -75,7 +75,7 @@ class StripCompliance:
         return float(np.abs(self.common).sum(axis=1).max() + added)
 
     def product(self, force: np.ndarray) -> np.ndarray:
-        """Return the displacements C f (n,) [m] of forces f (n,) [N]."""
+        """Return the displacements C f (n,) [m] under forces f (n,) [N]."""
         strips = force.reshape(-1, len(self.common))
         is_loaded = strips.any(axis=0) if len(strips) > 1 else force
         loaded = is_loaded.nonzero()[0]

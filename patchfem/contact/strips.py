@@ -286,7 +286,7 @@ def press_strips(
     rotation: float = 0.0,
     roll: float = 0.0,
 ) -> StripsState:
-    """Press strips by one holder, under a load or by an approach.
+    """Press strips with one holder, under a prescribed load or approach.
 
     If nothing touches, the outcome is no_contact.
 

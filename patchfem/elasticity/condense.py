@@ -30,7 +30,7 @@ MIRROR_SIGNS = np.array([-1.0, 1.0])
 
 @dataclass(frozen=True, eq=False, slots=True)
 class KeptNodeFactor:
-    """Cholesky factor of the stiffness of the kept nodes, for one kind of motion.
+    """Cholesky factor of the stiffness of the kept nodes, for even or for odd motion if the grid is mirrored.
 
     - ``unknowns``: (k,) kept unknowns that can move, those of the interface last
     - ``lower_factor``: (k, k) lower Cholesky factor
@@ -131,7 +131,7 @@ class CondensedGrid:
         return u
 
     def solve(self, load, *, has_inner_loads: bool = True) -> np.ndarray:
-        """Return the displacements of loads (nx, rows, 2, r) [N/m], without refinement.
+        """Return the displacements under loads (nx, rows, 2, r) [N/m], without refinement.
 
         has_inner_loads: whether forces act below the interface.
         """

@@ -30,7 +30,7 @@ class Layers:
     plane: str
 
     def lame(self, is_coating) -> np.ndarray:
-        """Return lambda and mu (2, ...) [Pa] of cells, by whether they are coating (...)."""
+        """Return lambda and mu (2, ...) [Pa] of cells; `is_coating` (...) selects those of the coating."""
         constants = [lame(*pair, self.plane) for pair in (self.substrate, self.coating)]
         return np.moveaxis(np.array(constants)[np.asarray(is_coating, int)], -1, 0)
 
@@ -129,7 +129,7 @@ class Piece:
 
 
 def describe_remedy(layers: Layers, min_length: float, size, *, has_coating: bool) -> str:
-    """Return a sentence on what to change if the stiffness of a piece cannot be factorised.
+    """Return a sentence about what to change if the stiffness of a piece cannot be factorised.
 
     Parameters
     ----------

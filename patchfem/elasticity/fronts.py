@@ -69,7 +69,7 @@ class Fronts:
 
 
 class ZeroEnergyMotion(NotConverged):
-    """The stiffness is singular to round-off: it has a zero-energy (rigid-body) mode."""
+    """Raised if the stiffness is singular to round-off: it has a zero-energy (rigid-body) mode."""
 
 
 class SparseFactor:

@@ -1,4 +1,4 @@
-"""Multifrontal elimination of the inside of a tensor grid.
+"""Multifrontal elimination of the inner nodes of a tensor grid.
 
 The grid is halved again and again by lines of nodes, always across its longer side (nested
 dissection, George 1973). Eliminating the inside of a part leaves its update, a Schur complement
@@ -88,7 +88,7 @@ class NodeNumbering:
 
 @lru_cache(maxsize=4096)
 def number_nodes(shape: RegionShape) -> NodeNumbering:
-    """Number the nodes of a part: first those eliminated with it, then those on its ring."""
+    """Number the nodes of a part: first those eliminated with it, then those on its boundary."""
     grid = np.arange((shape.columns + 1) * shape.n_free_rows).reshape(
         shape.columns + 1, shape.n_free_rows
     )
@@ -120,7 +120,7 @@ def number_nodes(shape: RegionShape) -> NodeNumbering:
 
 
 class StiffnessBlocks(NamedTuple):
-    """Stiffness blocks of g parts of one shape: unknowns to eliminate (own) and of the ring.
+    """Stiffness blocks of g parts of one shape: unknowns to eliminate (own), and on the boundary (ring).
 
     ::
 
@@ -157,7 +157,7 @@ def _zero_blocks(shape: RegionShape, n_parts: int) -> StiffnessBlocks:
 
 
 class LeafCouplings(NamedTuple):
-    """The entries of the stencil that make one block of the matrix of a leaf.
+    """Entries of the stencil that form one block of the matrix of a leaf.
 
     - ``axes``: (6, k) indices into the stencil of a grid whose first node is the corner of the leaf
     - ``entry``: (k,) position of each in the flattened block
@@ -236,7 +236,7 @@ def _assemble_leaves(stencil, shape: RegionShape, corners) -> StiffnessBlocks:
 
 
 class IndexRun(NamedTuple):
-    """Successive nodes on the ring of a half that are also successive in the whole part.
+    """Boundary nodes of a half of a part that are consecutive both in the half and in the part.
 
     - ``source``: their unknowns in the update of the half
     - ``target``: their unknowns among those that the whole part eliminates, or among its ring
@@ -247,7 +247,7 @@ class IndexRun(NamedTuple):
 
 
 class UpdateRuns(NamedTuple):
-    """Runs of successive nodes on the ring of a half, by their use in the whole part.
+    """Runs of consecutive boundary nodes of a half of a part, by their use in the part.
 
     - ``own``: runs of nodes that the whole part eliminates
     - ``ring``: runs of nodes that stay on the ring of the whole part
@@ -259,7 +259,7 @@ class UpdateRuns(NamedTuple):
 
 @lru_cache(maxsize=4096)
 def _split_ring(shape: RegionShape, half: RegionHalf) -> UpdateRuns:
-    """Split the boundary nodes of one half of a part into runs consecutive in the whole part.
+    """Split the boundary nodes of a half of a part into runs with consecutive numbers in the part.
 
     The nodes on the boundary of a half form its ring. They are split where their numbers in the whole part are not
     successive, and where nodes that the part eliminates (its cut) meet nodes on the ring of the part.
@@ -607,7 +607,7 @@ def predict_work(nx: int, ny: int, is_mirrored: bool) -> WorkEstimate:
 
 
 def _count_unknowns(shape: RegionShape) -> tuple[int, int]:
-    """Count the unknowns that are eliminated with a part, and the unknowns of its ring."""
+    """Count the unknowns that are eliminated with a part, and those on its boundary."""
     kept_sides = shape.left + shape.right
     kept_lines = 1 + (shape.bottom and shape.n_free_rows > 1)
     ring = kept_sides * shape.n_free_rows + (shape.columns + 1 - kept_sides) * kept_lines

@@ -79,7 +79,7 @@ class Mortar:
     - ``to_lower``, ``to_upper``: (m, n) sparse matrix T of each piece
     - ``compliance``: (m, m) [m2/N] of both pieces together, with the signs of the lower one
     - ``ripple``: largest expected ripple of the pressure over its peak
-    - ``reason``: a sentence on this ripple
+    - ``reason``: a sentence about this ripple
     """
 
     side: str

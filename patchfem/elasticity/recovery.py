@@ -86,7 +86,7 @@ class CellPoints:
 
 
 def _local_slopes(element: ElementValues, corners, values) -> np.ndarray:
-    """Return the derivatives (g, 2, 2, c) of nodal values (N, 2) by the local coordinates.
+    """Return the derivatives (g, 2, 2, c) of nodal values (N, 2) with respect to the local coordinates.
 
     The second axis is the local coordinate, the third the component of the values.
     """

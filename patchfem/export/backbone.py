@@ -290,14 +290,14 @@ def summarise_backbone(found: Backbone) -> list:
 
 
 def _describe_ends(mode: str, curve: Curve) -> str:
-    """Return a sentence on frequency and damping at the smallest and the largest amplitude."""
+    """Return a sentence about frequency and damping at the smallest and the largest amplitude."""
     ends = [_format_point(curve, k) for k in sorted({0, curve.amplitude.size - 1})]
     parts = [f"{one.amplitude}: {one.frequency}, damping ratio {one.damping}" for one in ends]
     return f"Mode {mode} at {'; at '.join(parts)}."
 
 
 def _describe_largest_damping(curve: Curve) -> list:
-    """Return a sentence on the largest damping ratio of several amplitudes."""
+    """Return a sentence about the largest damping ratio of several amplitudes."""
     count = curve.amplitude.size
     if count < 2:
         return []

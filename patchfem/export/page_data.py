@@ -32,7 +32,7 @@ class SceneText:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Verdict:
-    """Summary of a run and the sentence on its outcome.
+    """Summary of a run and the sentence about its outcome.
 
     Attributes
     ----------

@@ -328,7 +328,7 @@ def _stress_picture(data: RunData) -> Picture | None:
 
 
 def _mesh_sentence(data: RunData) -> str:
-    """Return the sentence on pressure peaks that the stress in the pieces misses; else ""."""
+    """Return the sentence about pressure peaks that the stress in the pieces misses; else ""."""
     sigma, mine = data.patch.fields["normal_stress"][0], data.patch.bodies["pressure"]
     if sigma.size == mine.size:
         return ""
@@ -510,7 +510,7 @@ PICTURES = {
 
 
 def _unsettled_sentence(data: RunData) -> str:
-    """Return the sentence on a motion that is not steady; "" if it is."""
+    """Return the sentence about a motion that is not steady; "" if it is."""
     outcome = data.verdict.summary["outcome"]
     return (
         ""
@@ -570,7 +570,7 @@ LEVEL_COLUMNS = (
 
 
 def _levels_section(levels: list) -> Section:
-    """Return the section on all levels.
+    """Return the section about all levels.
 
     A row has drive, amplitude, acceleration, distortion, the outcome if it is known, and whether
     the interface sticks.
@@ -617,7 +617,7 @@ def measure_entry(value: float, unit: str, error: float | None) -> dict:
 
 
 def _measures_section(data: RunData) -> Section:
-    """Return the section on all measures with errors, in other units, and with definitions."""
+    """Return the section about all measures with errors, in other units, and with definitions."""
     rows, means = [], data.verdict.means
     found = data.verdict.summary["measures"]
     for name, m in order_measures(found).items():
@@ -654,7 +654,7 @@ def _measures_section(data: RunData) -> Section:
 
 
 def _cost_section(data: RunData) -> Section:
-    """Return the section on what was computed, by which equations, and how long it took."""
+    """Return the section about what was computed, by which equations, and how long it took."""
     summary = data.verdict.summary
     rows = [
         [escape(e["effect"]), escape(e["equations"]), f"{e['seconds']:.3f}"]
@@ -680,7 +680,7 @@ def _cost_section(data: RunData) -> Section:
 
 
 def _origin_section(data: RunData) -> Section:
-    """Return the section on the scene as written and as understood, the files and the versions."""
+    """Return the section about the scene as written and as understood, the files and the versions."""
     versions = ", ".join(f"{k} {v}" for k, v in data.versions.items())
     lacks = ["fields.vtkhdf"] * (data.patch.x is None) + ["interfaces"] * (not data.patch.faces)
     there = [one for one in RESULT_FILES if one[0] not in lacks]

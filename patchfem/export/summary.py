@@ -64,7 +64,7 @@ def make_summary(
     absent : list of str
         Effects that are not in the scene.
     said : tuple
-        Warnings on numerical trust, and notes on what the model leaves out.
+        Warnings about numerical trust, and notes about what the model leaves out.
     seconds : dict
         Part of the run -> time.
 

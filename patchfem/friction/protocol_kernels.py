@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ..compiled.jit import NJIT_NO_REFCOUNT, njit
 
-IS_SET_VALUED = False  # whether the law keeps a relative displacement at rest without a stretch
+IS_SET_VALUED = False  # whether the law sticks without any elastic stretch, as Coulomb's does
 HAS_ZERO_KINK = False  # whether the rate equation has a kink at zero stretch
 # whether the stretch depends on the path alone and is given by `integrate_stretch`
 IS_RATE_INDEPENDENT = False
@@ -78,7 +78,7 @@ def step_bond_length(numbers, memory, velocity, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(numbers, memory, free, compliance):
-    """Return that the step of the law has no closed form.
+    """Return a StepSolution that is not solved, because the step of the law has no closed form.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def solve_step(numbers, memory, free, compliance):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def integrate_stretch(numbers, stretch, mean_square, increment, direction):
-    """Return the unchanged stretch: the law has a rate only.
+    """Return the stretch unchanged, for a law that is given by its rate equation alone.
 
     Parameters
     ----------

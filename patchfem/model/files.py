@@ -78,7 +78,7 @@ def find_file_faults(
 
 
 class _FileKey(NamedTuple):
-    """Key of a file as its check expects it.
+    """Key of a file and the tables with which the file is checked.
 
     - prefix: prefix of the keys of an interface, "" for any other file.
     - key: key of the file; for the patch of an interface, its key in [contact].
@@ -91,7 +91,7 @@ class _FileKey(NamedTuple):
 
 
 def _select_interface(key: str, tables) -> _FileKey:
-    """Return the key of a file as its check expects it, with the tables of its interface."""
+    """Return the key of a file, and the tables with which it is checked: for an interface, its own."""
     prefix, separator, name = key.partition(".contact.")
     if not separator:
         return _FileKey("", key, tables)
@@ -128,7 +128,7 @@ def _check_mesh(path: Path, tables, *, is_valid: bool) -> None:
 
 
 def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple:
-    """Check that a trace covers the interface and is not too fine; return notes on it."""
+    """Check that a trace covers the interface and is not too fine; return notes about it."""
     import numpy as np
 
     profile.read_trace(path)
@@ -185,7 +185,7 @@ def _check_measured(path: Path, tables, *, is_valid: bool) -> None:
 
 
 def _check_wear_start(path: Path, tables, *, is_valid: bool) -> tuple:
-    """Check that the pieces are those of the earlier run; return a note on the worn depth."""
+    """Check that the pieces are those of the earlier run; return a note about the worn depth."""
     if is_valid:
         return (earlier_wear.read_earlier_wear(path, tables).sentence,)
     return (earlier_wear.read_end_state(path).sentence,)

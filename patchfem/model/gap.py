@@ -18,7 +18,7 @@ from ..effects import GAP_SHAPES
 from ..scene.keys.contact import Contact
 from . import profile as profiles
 
-DEFAULT_CELLS = 200  # number of cells along the interface of an even mesh
+DEFAULT_CELLS = 200  # number of cells along the interface in a uniform mesh
 
 
 class ProfileLengths(NamedTuple):
@@ -92,7 +92,7 @@ class Gap:
         return min((wave for _, wave in self._values("wave")), default=inf)
 
     def _values(self, quantity: str) -> list:
-        """Return pairs (keys, value) of the shapes that have a quantity of `gaps.ShapeProperties`."""
+        """Return (table, value of a property) for each shape that has this property of `gaps.ShapeProperties`."""
         pairs = []
         for name, keys in self.shapes:
             evaluate = getattr(gaps.SHAPE_PROPERTIES.get(name), quantity, None)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .wear import WearModel
 
 MIN_RIG_REST_SPEED = 1e-12  # m/s; smallest default of the rest speed of bonds (2.10) in a rig
-MAX_SHOWN_EFFECTS = 160  # characters of the list of effects in the representation of a model
+MAX_SHOWN_EFFECTS = 160  # maximum number of characters of the effects in the repr of a model
 
 
 class MeasuredFile(NamedTuple):

@@ -47,7 +47,7 @@ class PatchPiece:
         return self.end.half_contact_length(self.length)
 
     def corner_kind(self, half_length: float) -> str:
-        """Return the kind of corner at a distance [m] from the middle, "flat" inside the face."""
+        """Return the kind of corner at a distance [m] from the middle; "flat" if the face extends beyond it."""
         if self.half_contact_length > half_length * (1 + LENGTH_TOL):
             return "flat"
         return self.end.kind
@@ -253,7 +253,7 @@ class PatchModel:
 
     @property
     def uniform_element_size(self) -> float:
-        """Element size [m] of an even interface.
+        """Element size [m] of a uniform mesh of the interface.
 
         The automatic size resolves the waves that a cut-off leaves to the mesh.
         """

@@ -138,7 +138,7 @@ def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
 
 
 def _describe_short_waves(trace: Profile, cutoff: float) -> tuple:
-    """Return a sentence on the waves shorter than a cut-off [m], () without such waves."""
+    """Return a sentence about the waves shorter than a cut-off [m], () without such waves."""
     fraction = fine_fraction(trace, cutoff)
     if not fraction > 0:
         return ()
@@ -191,7 +191,7 @@ def _fit_spline(trace: Profile):
 
 
 def _smooth_profile(trace: Profile, nodes) -> Profile:
-    """Return the cubic spline through the means of a trace over even nodes (k,) [m]."""
+    """Return the cubic spline through the means of a trace over evenly spaced nodes (k,) [m]."""
     n_points = CURVE_POINTS_PER_CELL * (nodes.size - 1) + 1
     x = np.interp(np.arange(n_points) / CURVE_POINTS_PER_CELL, np.arange(nodes.size), nodes)
     means = replace(trace, x=frozen_array(nodes), z=average_at_nodes(trace, nodes))

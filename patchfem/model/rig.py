@@ -159,7 +159,7 @@ class FirstMode:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RigStructure:
-    """Origin of the modes of a rig: listed in the scene or computed from its structure.
+    """Data on the structure of a rig: its natural frequencies, and where its modes come from.
 
     - frequencies: natural frequencies [Hz], with the bonded spring, shape (n,).
     - lists_modes: whether the scene lists the modes.
@@ -199,12 +199,12 @@ class Rig:
 
     @property
     def speed_scale(self) -> float:
-        """Expected speed [m/s] by drive and start; the default of the rest speed (2.10) follows."""
+        """Expected speed [m/s] from drive and initial state; it sets the default rest speed (2.10)."""
         return estimate_peak_speed(self.drive.signal, self.start)
 
     @property
     def displacement_scale(self) -> float:
-        """Expected displacement [m] by drive and start: the speed over the omega of the drive."""
+        """Expected displacement [m]: the expected speed over the angular frequency of the drive."""
         return self.speed_scale / find_drive_omega(self.drive.signal)
 
     def with_signal(self, signal, **changes) -> "Rig":
@@ -326,7 +326,7 @@ def _build_first_mode(scene, own_modes: ModalBasis, modes: ModalBasis) -> FirstM
 
 
 def _build_structure(scene, modes: ModalBasis, joint: float | None) -> RigStructure:
-    """Build the record of where the modes of a rig come from."""
+    """Build the RigStructure of a scene from the modes of its rig."""
     structure = scene.structure
     without_joint = None
     if structure.measured == "stuck" and joint is None and has_pressed_joint(scene):

@@ -149,7 +149,7 @@ def _replace_drive(rig: Rig, drive: Drive) -> Rig:
 
 
 def _replace_modes(rig: Rig, structure: Structure) -> Rig:
-    """Return a rig without a bonded spring with the modes of another table [structure]."""
+    """Replace the modes of a rig, which has no bonded spring, by those of another table [structure]."""
     columns = [mode.frequency for mode in structure.mode]
     columns += [mode.damping for mode in structure.mode]
     frequency, damping = np.split(np.array(np.broadcast_arrays(*columns)), 2)

@@ -17,9 +17,9 @@ class Source:
     - text: text of the scene as it was read.
     - write: function that returns `resolved`; its last argument is the model.
     - effects: effects that the scene names.
-    - remarks: sentences on keys without effect.
+    - remarks: sentences about keys without effect.
     - sets: ``key=value`` strings that were given in addition to the text.
-    - notes: sentences on what the defaults neglect.
+    - notes: sentences about what the defaults neglect.
     """
 
     path: Path
@@ -43,7 +43,7 @@ class Source:
         return self.write()
 
     def where(self, key: str) -> str:
-        """Return ``FILE:LINE: key`` for a message on a key."""
+        """Return ``FILE:LINE: key`` for a message about a key."""
         return locate_key(self.path, self.text, key)
 
 

@@ -300,7 +300,7 @@ def find_first_elastic_mode(scene, own_modes: ModalBasis) -> tuple:
 
 
 def needs_strip_displacements(scene) -> bool:
-    """Return whether a mode yaws the patch, which gives each of its strips another displacement."""
+    """Return whether a mode yaws a patch with strips, so that the strips have different displacements."""
     if scene.contact is None or scene.contact.strips is None or scene.friction is None:
         return False
     return any(mode.yaw for mode in scene.structure.mode)

@@ -188,7 +188,7 @@ def _reduce(
 
 
 def _note_rounding(files: tuple, aligned: list, stiffness, unit: float, shape) -> list:
-    """Write a note on each matrix whose digits leave the lowest frequency uncertain.
+    """Write a note about each matrix whose digits leave the lowest frequency uncertain.
 
     The uncertainty of the square of the frequency is two standard deviations of shape^T A shape, with
     the shape (n,) of the lowest mode of unit modal mass; that of the frequency is half as large.

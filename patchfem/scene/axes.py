@@ -38,7 +38,7 @@ LENGTH_KEY = "drive.displacement"  # key of a length, whose values `read_lengths
 MAX_RANGE_VALUES = 10_000_000
 # ratio of the ends; a range of positive numbers with at least this ratio is logarithmic by default
 MIN_LOG_RATIO = 10
-MAX_SUGGESTED_KEYS = 4  # keys of a table that a message suggests in place of the table
+MAX_SUGGESTED_KEYS = 4  # maximum number of keys that a message suggests in place of their table
 # significant digits of a value; a tenth of a range is 0.1 and not 0.1000000000000001
 SIGNIFICANT_DIGITS = 15
 # magnitude up to which a whole number without a unit is written without a decimal point
@@ -163,7 +163,7 @@ def read_axes(
     Returns
     -------
     tuple
-        The axes, and the sentences on mistakes.
+        The axes, and the sentences about mistakes.
     """
     axes: list[Axis | SampledRange] = []
     mistakes = []
@@ -217,7 +217,7 @@ def read_table(table: Any) -> tuple[list[Axis | SampledRange], list[tuple[str, s
 
 
 def describe_ranges(texts: Iterable[str]) -> list[str]:
-    """Return a sentence on the range of each text ``table.key=value +- width`` of drawn values."""
+    """Return a sentence about the range of each string ``table.key=value +- tolerance`` of drawn values."""
     sentences = []
     for text in texts:
         key, _, values = (part.strip() for part in text.partition("="))
@@ -326,9 +326,9 @@ def _find_range(key: str, piece: str, *, is_sampled: bool) -> _WrittenRange | No
 
 
 def _range_about(text: str) -> str:
-    """Return ``4.0 mm..6.0 mm`` for ``5 mm +- 1 mm``; "" for a text without a width.
+    """Return ``4.0 mm..6.0 mm`` for ``5 mm +- 1 mm``; "" for a string without a tolerance.
 
-    ValueError if the width has another unit than the value.
+    ValueError if the tolerance has another unit than the value.
     """
     match = _TOLERANCE_PATTERN.fullmatch(text)
     if match is None:
@@ -359,7 +359,7 @@ def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:
 
 
 def _refuse_table(key: str, texts: tuple) -> None:
-    """Raise ValueError, which suggests keys, if plain values are given to a table."""
+    """Raise ValueError, with suggested keys, if a table is given plain values."""
     model, name = find_key(key)
     inner = find_inner_table(model, name)
     if inner is None or is_table_or_value(model, name):
@@ -417,7 +417,7 @@ def _split_at_commas(text: str) -> list[str]:
 
 
 def _make_value_reader(key: str) -> Callable[[str], float | str]:
-    """Return the function that converts a text of a key to SI; it keeps a text without number.
+    """Return the function that converts a string of a key to SI; a string without a number is unchanged.
 
     The function raises ValueError if the key does not accept the text.
     """

@@ -53,7 +53,7 @@ def _list_patch_files(table_key: str, contact: Any) -> list[tuple[str, Any]]:
 
 
 def file_exists(path: Path) -> bool:
-    """Return whether a path is that of a file; False for a text that cannot be a path."""
+    """Return whether a path names a file; False for a string that cannot be a path."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -82,7 +82,7 @@ def require_files(scene: Any) -> Any:
 
 
 def make_relative_file_sets(scene: Any, folder: Path) -> list[str]:
-    """Return ``table.key=value`` for each file of a scene, with paths from another folder."""
+    """Return ``table.key=value`` for each file of a scene, with its path relative to another folder."""
     return [
         f"{key}={Path(os.path.relpath(scene.resolve_path(file), folder)).as_posix()}"
         for key, file in list_named_files(scene)

@@ -42,7 +42,7 @@ PLAIN_KEYS = {
 
 
 class _ReadTable(NamedTuple):
-    """Cached table: its name, its plain values, what was read, and the keys set by --set."""
+    """Cached table: its name, its plain values, the result of reading it, and the keys set by --set."""
 
     name: str
     raw: Any
@@ -53,7 +53,7 @@ class _ReadTable(NamedTuple):
 class BaseScene:
     """Valid scene from which others differ in a few keys; text and tables are read only once.
 
-    The table [sweep] of the scene stands in none of the others.
+    None of the other scenes contains the table [sweep].
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -104,7 +104,7 @@ class BaseScene:
         return True
 
     def plain_numbers(self, scene: Scene, keys: Sequence[str]) -> PlainNumbers | None:
-        """Return what makes scenes with other values of some keys without checking them.
+        """Return the PlainNumbers that make scenes with other values of some keys without checks.
 
         Parameters
         ----------
@@ -115,7 +115,7 @@ class BaseScene:
         Returns
         -------
         PlainNumbers or None
-            None if a key is not plain, or if a rule of such a scene looks at its value.
+            None if a key is not plain, or if a rule of such a scene depends on its value.
         """
         has_own_kinetic = "friction.static" in keys and "kinetic" in self._draft.raw.get(
             "friction", {}

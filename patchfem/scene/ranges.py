@@ -39,7 +39,7 @@ def read_ranges(texts: Iterable[str]) -> tuple[list[Range], list[str]]:
     Returns
     -------
     tuple
-        The ranges, and the sentences on mistakes.
+        The ranges, and the sentences about mistakes.
     """
     ranges = []
     mistakes = []

@@ -221,7 +221,7 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
 
 
 def _find_item(draft: SceneDraft, items: list[Any], path: str, written_key: str) -> int | None:
-    """Return the index of the item that a key of --set names; report a missing one as None.
+    """Return the index of the item that a key of --set names; report a missing item and return None.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ from .toml_text import parse_text, read_text
 
 __all__ = ["Scene", "SceneError", "load", "loads", "move_scene", "read_sweep_axes"]
 
-# characters of effects or --set values that the text of a Scene object shows
+# maximum number of characters of the effects, and of the --set values, in the repr of a Scene
 MAX_LISTED_CHARACTERS = 160
 
 
@@ -41,10 +41,10 @@ class Scene:
     - kind: kind of run: "patch", "bench", "rig" or "linear".
     - title, contact, normal, friction, slide, structure, drive, wear, accuracy, measured: title and tables;
       None for a table that the scene does not contain.
-    - remarks: sentences on keys that are not used.
+    - remarks: sentences about keys that are not used.
     - sets: the ``table.key=value`` of --set, in their order.
     - sweep: axes of the table [sweep].
-    - notes: sentences on what the defaults leave out.
+    - notes: sentences about what the defaults leave out.
     """
 
     path: Path
@@ -212,7 +212,7 @@ def finish_scene(
 
 
 def move_scene(scene: Scene, path: Path) -> Scene:
-    """Return a scene as if it were stored at another path; its files are named from there."""
+    """Return the scene for a file at another path; its file names become relative to the new folder."""
     return loads(scene.text, path, [*scene.sets, *make_relative_file_sets(scene, path.parent)])
 
 

@@ -36,7 +36,7 @@ def format_scene(tables: dict[str, Any]) -> str:
 
 
 def format_values(key: str, values: Any) -> list[str]:
-    """Return the values of one key as in --over between commas; one value gives a list of one.
+    """Return the values of one key as strings in the form of --over; a single value gives a list of one.
 
     Texts stay as they are, but for quotes around a text with a comma or a bracket; numbers in SI get the unit of the key.
     """
@@ -63,7 +63,7 @@ def require_units(scene: Any, values: dict[str, Any]) -> Any:
 def find_oversized_lengths(
     values: dict[str, Any], patch_length: float | None = None, key_prefix: str = ""
 ) -> list[str]:
-    """Return a sentence on each bare number that would be a length longer than any joint.
+    """Return a sentence about each bare number that would be a length greater than that of any joint.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def _find_kind(key: str) -> str | None:
 
 
 def _format_value(key: str, value: Any) -> str:
-    """Return one value as --over reads it between commas."""
+    """Return one value as a string in the form of --over."""
     if isinstance(value, str):
         is_toml = value.startswith(("[", "{", '"', "'"))
         if is_toml or not set(",\"'[{") & set(value):
@@ -128,7 +128,7 @@ def _format_value(key: str, value: Any) -> str:
 
 
 def _format_toml(key: str, value: Any) -> str:
-    """Return a TOML value with all digits; a number of a key with a unit becomes a text in SI."""
+    """Return a TOML value with all digits; a number of a key with a unit becomes a string in SI."""
     value = _to_plain_value(value)
     if isinstance(value, dict):
         pairs = [f"{name} = {_format_toml(f'{key}.{name}', item)}" for name, item in value.items()]

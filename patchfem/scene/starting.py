@@ -18,7 +18,7 @@ TEMPLATE_DESCRIPTIONS = {
     "misalignment": "a sweep: how far the patch in the rig of the 1985 report may be tilted",
     "wear": "how a tilted patch wears in over many cycles",
 }
-# Verb that answers the question of a kind, if it is not `run`.
+# Kind of scene -> the patchfem command to use with it, if this is not `run`.
 NEXT_VERBS = {
     "beam": "backbone",
     "damper": "sweep",

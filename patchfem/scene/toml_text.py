@@ -1,4 +1,4 @@
-"""Reading of the text of a scene: the file, the plain values, and messages on TOML syntax."""
+"""Reading of the text of a scene: the file, the plain values, and messages about TOML syntax."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .rules.scene_draft import SceneDraft, SceneError
 
 # bytes; maximum size of a scene file, because larger data belong in files that the scene names
 MAX_BYTES = 32 * 2**20
-MAX_QUOTED_CHARACTERS = 60  # characters of a value that the advice on missing quotes repeats
+MAX_QUOTED_CHARACTERS = 60  # maximum length of a value in the advice on missing quotes
 # n modes with full matrices need 3 n^2 BYTES_PER_ENTRY of memory and n^3 SECONDS_PER_CUBED_MODE on one core.
 BYTES_PER_ENTRY = 8
 SECONDS_PER_CUBED_MODE = 1.5e-9
@@ -106,7 +106,7 @@ def _refuse_too_many_coordinates(values: dict, text: str, path: str | Path) -> N
 
 
 def _describe_syntax(error: Exception, text: str, path: str | Path) -> str:
-    """Return the line of text on an error of tomllib."""
+    """Return the message about a syntax error that tomllib found."""
     if isinstance(error, RecursionError):
         return f"{path}:1: not valid TOML: nested too deeply"
     message = str(error)

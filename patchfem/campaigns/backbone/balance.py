@@ -27,17 +27,17 @@ HARMONICS = (
 )
 MAX_SAMPLES = 65536  # Samples per cycle: more take too long, and 39 harmonics need fewer.
 N_SAMPLES = 4096  # Samples of a cycle from which the largest motion is read.
-ROUND_OFF_ERROR = 1e-9  # Relative error of a value by round-off.
+ROUND_OFF_ERROR = 1e-9  # Relative error of a value due to round-off.
 AMPLITUDE_TOL = (
     1e-7  # Relative tolerance of an amplitude, if the steps do not reach ROUND_OFF_ERROR.
 )
-MAX_STEPS = 8  # Secant steps to the motion that has the requested amplitude at the output.
-# Least slope of the logarithms of both amplitudes with which a secant step is taken.
+MAX_STEPS = 8  # Maximum number of secant steps to the motion that has the requested amplitude at the output.
+# Smallest slope of the logarithms of both amplitudes with which a secant step is taken.
 MIN_SLOPE = 0.1
 
 
 class FreeMotion(NamedTuple):
-    """A free motion.
+    """Free motion at one amplitude, found by harmonic balance.
 
     free: a `harmonic.backbone.FreeMotion`; unknowns: (N,); reach: amplitude at the output / amplitude of
     the coordinate.

@@ -20,7 +20,7 @@ from .linear import compute_level_curve
 from .quasi_static import compute_static_curve
 from .records import METHODS, Backbone, Curve, LossExponents, ModeFrequencies
 
-ROUND_OFF_ERROR = 1e-9  # Relative error of a value by round-off.
+ROUND_OFF_ERROR = 1e-9  # Relative error of a value due to round-off.
 AMPLITUDE_TOL = 1e-7  # Relative tolerance of the first and last amplitudes of two curves.
 # Amplitude / amplitude at which the whole contact begins to slip; above this ratio a point counts as gross slip.
 GROSS_SLIP_BEGIN = 3.0
@@ -50,7 +50,7 @@ def backbone(
     methods : sequence of str
         From METHODS.
     progress : callable, optional
-        Takes the name of a method that begins, and a sentence on the time of a long decay.
+        Takes the name of a method that begins, and a sentence about the time of a long decay.
     errors : bool
         Whether the errors of the mesh, of the cells of a law and of missing modes are computed; the
         values are the same without them, in less than half the time.
@@ -105,7 +105,7 @@ def compute_curve(joint: Joint, amplitudes, method: str, progress=None) -> Curve
     method : str
         One of METHODS.
     progress : callable, optional
-        Takes a sentence on the time of a long decay.
+        Takes a sentence about the time of a long decay.
 
     Returns
     -------

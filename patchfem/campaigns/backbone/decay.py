@@ -29,7 +29,7 @@ from .balance import HARMONICS, find_free_motions
 from .joint import MIN_AMPLITUDE_FACTOR, RELEASE_FACTOR, Joint
 from .records import Curve
 
-ROUND_OFF_ERROR = 1e-9  # Relative error of a value by round-off.
+ROUND_OFF_ERROR = 1e-9  # Relative error of a value due to round-off.
 N_SAMPLES = 4096  # Samples of a cycle of a free motion.
 # Cycles of the first decay; longer ones follow until the amplitude is small enough.
 FIRST_CYCLES = 50
@@ -38,7 +38,7 @@ MAX_CYCLES = 3200  # The same for several modes, for which each cycle takes long
 MAX_CYCLES_TURNS = 102400  # For one mode with elastic elements, of which only reversals are stored.
 # Amplitudes at which the free motion of a release is computed, up to that of the release.
 N_START_STEPS = 12
-MAX_RAISED = 3  # Repeated releases from a higher amplitude.
+MAX_RAISED = 3  # Maximum number of repeated releases, each from a higher amplitude.
 MAX_RAISE_FACTOR = 8.0  # Largest ratio of the amplitudes of two successive releases.
 # End of a decay / smallest amplitude, by which coarser runs reach this amplitude as well.
 END_FACTOR = 0.8
@@ -78,7 +78,7 @@ class DecayReading(NamedTuple):
 
 
 class _GrowingRelease(NotConverged):
-    """Raised if the swings of a release grow: negative damping supplies more than is dissipated."""
+    """Raised if a released motion grows: negative damping supplies more energy than is dissipated."""
 
 
 def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
@@ -90,7 +90,7 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
     amplitudes : (k,) array
         Increasing, at the output [m].
     progress : callable, optional
-        Takes a sentence on the time that a long decay takes.
+        Takes a sentence about the time that a long decay takes.
     """
     n_decaying, release = _release_from_largest_decaying(joint, amplitudes, progress)
     release, reading = _refine_release(joint, release, amplitudes)
@@ -136,7 +136,7 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
 
 
 def _note_mixed(amplitudes) -> list:
-    """Return a sentence on amplitudes (k,) [m] at which other modes move too much."""
+    """Return a sentence about amplitudes (k,) [m] at which other modes move too much."""
     count = amplitudes.size
     if not count:
         return []
@@ -150,7 +150,7 @@ def _note_mixed(amplitudes) -> list:
 
 
 def _note_growing(amplitudes) -> list:
-    """Return a sentence on amplitudes (k,) [m] from which a release grows."""
+    """Return a note about the amplitudes (k,) [m] from which a released motion grows."""
     if not amplitudes.size:
         return []
     return [
@@ -160,7 +160,7 @@ def _note_growing(amplitudes) -> list:
 
 
 def _note_unknown_modes(joint: Joint, known, motion) -> list:
-    """Return a sentence on amplitudes at which the motion of other modes is not known."""
+    """Return a sentence about amplitudes at which the motion of other modes is not known."""
     unknown = known & np.isnan(motion)
     if joint.modes.omega.size == 1 or not unknown.any():
         return []
@@ -308,7 +308,7 @@ def _is_stuck(group: LawGroup, free) -> np.ndarray:
 
 
 def _release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> tuple:
-    """Release the mode from the largest amplitude whose release does not grow.
+    """Release the mode from the largest amplitude from which its motion does not grow.
 
     Parameters
     ----------
@@ -316,7 +316,7 @@ def _release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> t
     amplitudes : (k,) array
         Increasing, at the output [m].
     progress : callable, optional
-        Takes a sentence on the time that a long decay takes.
+        Takes a sentence about the time that a long decay takes.
 
     Returns
     -------

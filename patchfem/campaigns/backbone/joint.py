@@ -229,7 +229,7 @@ class Joint(NamedTuple):
             raise PatchfemError(f"{method} cannot be computed {reason}")
 
     def space_errors(self, read: Callable) -> np.ndarray | float:
-        """Return the errors of read(LawGroup) by the mesh and by the discrete sliders of a law."""
+        """Return the errors of read(LawGroup) due to the mesh and to the discrete sliders of a law."""
         model = self.model
         has_cells = any(
             law_has_trait(one.numbers.law, "cells") for one in model.rig.friction.interfaces

@@ -6,7 +6,7 @@ from ...core import NotConverged
 from .joint import Joint
 from .records import Curve
 
-ROUND_OFF_ERROR = 1e-9  # Relative error of a value by round-off.
+ROUND_OFF_ERROR = 1e-9  # Relative error of a value due to round-off.
 # Fixed-point steps to the negative damping that maintains the motion; they converge fast.
 N_STEPS = 8
 

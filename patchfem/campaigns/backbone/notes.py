@@ -1,4 +1,4 @@
-"""Sentences on the curves of a backbone: gaps, and differences of the methods."""
+"""Sentences about the curves of a backbone: gaps, and differences of the methods."""
 
 import numpy as np
 
@@ -32,7 +32,7 @@ REASONS_OF_DIFFERENCES = {
 
 
 def note_linear_rig(joint: Joint) -> list:
-    """Return a sentence on a rig that has friction in the scene although no friction acts."""
+    """Return a sentence about a rig that has friction in the scene although no friction acts."""
     has_friction = joint.model.friction is not None or joint.model.rig.friction.interfaces
     if joint.is_linear and has_friction:
         return ["no friction acts, so frequency and damping are the same at all amplitudes"]
@@ -40,12 +40,12 @@ def note_linear_rig(joint: Joint) -> list:
 
 
 def note_wear(model: Model) -> list:
-    """Return a sentence on a scene with wear."""
+    """Return a sentence about a scene with wear."""
     return [] if model.wear is None else ["these curves are for unworn pieces: [wear] is ignored"]
 
 
 def note_missing_mesh(joint: Joint) -> list:
-    """Return a sentence on a contact with partial slip that has no coarser mesh."""
+    """Return a sentence about a contact with partial slip that has no coarser mesh."""
     model = joint.model
     if joint.is_linear:
         return []
@@ -59,7 +59,7 @@ def note_missing_mesh(joint: Joint) -> list:
 
 
 def note_micro_slip(joint: Joint, wanted) -> list:
-    """Return a sentence on amplitudes (k,) [m] that do not determine the exponent of micro-slip."""
+    """Return a sentence about amplitudes (k,) [m] that do not determine the exponent of micro-slip."""
     edge = MICRO_SLIP_END * joint.slip_amplitude
     if wanted[0] > edge:
         begin = format_length(MIN_AMPLITUDE_FACTOR / MICRO_SLIP_END * edge, 2)
@@ -77,7 +77,7 @@ def note_micro_slip(joint: Joint, wanted) -> list:
 
 
 def note_gaps(wanted, curves: dict) -> list:
-    """Return sentences on the requested amplitudes (k,) [m] at which a curve has no value."""
+    """Return sentences about the requested amplitudes (k,) [m] at which a curve has no value."""
     out = []
     for method, curve in curves.items():
         lacks = wanted[~np.isin(wanted, curve.amplitude)]
@@ -97,7 +97,7 @@ def note_gaps(wanted, curves: dict) -> list:
 
 
 def note_secant_stiffness(joint: Joint, wanted, curves: dict) -> list:
-    """Return a sentence on a static curve in slip, if there is no balance to compare with."""
+    """Return a note about the secant stiffness of a quasi-static curve in slip, without a curve by balance."""
     if joint.is_linear or not joint.friction_limit:
         return []
     slips = wanted[-1] > MICRO_SLIP_END * joint.slip_amplitude
@@ -112,7 +112,7 @@ def note_secant_stiffness(joint: Joint, wanted, curves: dict) -> list:
 
 
 def note_differences(curves: dict) -> list:
-    """Return sentences on curves that differ from the balance by more than both errors."""
+    """Return sentences about curves that differ from the balance by more than both errors."""
     if "balance" not in curves:
         return []
     balance = curves["balance"]

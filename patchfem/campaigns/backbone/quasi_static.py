@@ -12,11 +12,11 @@ from .bench_loops import LOOP_MEASURES, settle_loop
 from .joint import Joint
 from .records import Curve
 
-ROUND_OFF_ERROR = 1e-9  # Relative error of a value by round-off.
+ROUND_OFF_ERROR = 1e-9  # Relative error of a value due to round-off.
 AMPLITUDE_TOL = 1e-7  # Relative tolerance of an amplitude.
 N_SAMPLES = 4096  # Samples of a cycle of a loop; half as many give the error.
-MAX_STEPS = 60  # Corrections of the displacement until the amplitude is the requested one.
-MIN_FLOOR = 1e-10  # Least relative error of a loop on a bench.
+MAX_STEPS = 60  # Maximum number of corrections of the displacement until the amplitude is the requested one.
+MIN_FLOOR = 1e-10  # Smallest relative error of a loop on a bench.
 
 
 def compute_static_curve(joint: Joint, amplitudes) -> Curve:

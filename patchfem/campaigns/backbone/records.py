@@ -21,7 +21,7 @@ class Curve(NamedTuple):
     loss : (k,) array
         Energy that the contact dissipates per cycle [J]; NaN if it is not known.
     notes : tuple of str
-        Sentences on the errors.
+        Sentences about the errors.
     other_modes : (k,) array or None
         For a decay, the motion of other modes / amplitude; NaN if it is not known.
     """

@@ -50,7 +50,7 @@ N_KEPT_CURVES = 8  # Cached curves: a step of the search needs the last ones aga
 
 
 class MeasuredCurve(NamedTuple):
-    """A measured curve.
+    """Measured frequency and damping ratio of a mode against amplitude.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class FittedCurve:
     method : {"balance", "quasi-static"}
         How the model's curve was computed.
     notes : tuple of str
-        Sentences on what is compared, and on the error of the modes that a reduced structure lacks.
+        Sentences about what is compared, and about the error of the modes that a reduced structure lacks.
     """
 
     keys: FittedKeys
@@ -336,7 +336,7 @@ def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tupl
 
 
 def _describe_substitutes(lost) -> str:
-    """Return the warning on amplitudes (k,) [m] at which the balance has no result."""
+    """Return the warning about amplitudes (k,) [m] at which the balance has no result."""
     return (
         f"harmonic balance found no oscillation at the amplitudes {_list_amplitudes(lost)}; there, "
         "the values of the static curve are used, multiplied by the ratio of the two methods at "
@@ -362,7 +362,7 @@ def _compare_methods(path, method: str, measured: MeasuredCurve) -> tuple:
 
 
 class WidenedFit(NamedTuple):
-    """A fit whose intervals contain the error of missing modes, and notes on it."""
+    """A fit whose intervals contain the error of missing modes, and notes about it."""
 
     fit: Fit
     notes: tuple

@@ -201,7 +201,7 @@ def _add_counts(found: Fit, before: Fit) -> Fit:
 
 
 def _doubt_warnings(fitted: FittedLoop, scene: Scene, has_lead_in: bool) -> list:
-    """Return warnings if the rows are no sample of the model with independent noise.
+    """Return warnings if the rows differ from the model by more than independent noise.
 
     `has_lead_in`: the model does not start without stress in the first row.
     """

@@ -75,7 +75,7 @@ class Problem:
     sets : sequence of str
         The ``table.key=value`` strings that the scene takes for all values.
     notes : sequence of str
-        Sentences on what the model assumes, which become warnings.
+        Sentences about what the model assumes, which become warnings.
     """
 
     scene: Scene

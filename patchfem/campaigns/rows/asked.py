@@ -32,7 +32,7 @@ class FitRequest:
 
 
 class ConditionModels:
-    """A scene of a rig under a sine of its base, at measured conditions and with free keys.
+    """Models of a rig under sinusoidal base motion, at measured conditions and for values of free keys.
 
     If the scene names no method, its steady motions are computed, provided that the method
     'harmonic' accepts it (`notes` says so): a row was read after the rig had settled.

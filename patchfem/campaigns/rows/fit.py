@@ -301,7 +301,7 @@ def _predict_null(cells: Readings, name: str, held, parts) -> NullPrediction:
 
 
 def _doubt_warnings(cells: Readings, found: BestFit, logs, how: SearchSettings) -> list:
-    """Return warnings on the rows and on the search."""
+    """Return warnings about the rows and about the search."""
     out = []
     if cells.empty:
         numbers = ", ".join(str(k + 1) for k in cells.empty)

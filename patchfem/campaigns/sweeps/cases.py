@@ -156,7 +156,7 @@ class Cases:
         return sorted(numbers, key=patch)
 
     def names(self, asked: SweepScene, numbers: Sequence[int] | None = None) -> np.ndarray:
-        """Return names (n,) uint64 of cases, which follow from what each case computes.
+        """Return names (n,) uint64 of cases: hashes of their keys and values and of what all cases share.
 
         The same values in other units or in another order have the same name, also as part of
         another sweep of the same scene, unless all cases of a sweep share a mesh that is chosen for

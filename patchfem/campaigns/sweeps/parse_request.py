@@ -27,9 +27,7 @@ from .cases import Cases, combine_cases
 N_CHECKED = 32  # cases that are read before a sweep starts, to find a valid one
 MAX_PRINTED = 12  # number of mistakes that are printed
 MAX_SUGGESTIONS = 4  # number of measures that a mistyped name may mean
-MAX_CASES = (
-    3_000_000  # cases of a sweep; the names and columns of more would need several gigabytes
-)
+MAX_CASES = 3_000_000  # maximum number of cases; the names and columns of more take gigabytes
 
 
 @dataclass(frozen=True, slots=True)

@@ -101,7 +101,7 @@ def compute_sobol_indices(keys: Sequence[tuple], measures: dict, shape: tuple | 
 
 
 def _is_varying(values: np.ndarray, errors: np.ndarray) -> bool:
-    """Return whether a measure of most cases changes by more than its errors and round-off."""
+    """Return whether most cases have a measure that varies by more than its errors and round-off."""
     there = np.isfinite(values)
     if there.mean() < 0.9:
         return False
@@ -118,7 +118,7 @@ def _rank_fraction(values: np.ndarray) -> np.ndarray:
 
 
 def _grid_indices(values: np.ndarray) -> tuple:
-    """Return first-order and total indices and their interval (4 of (keys,)) on a full grid."""
+    """Return first-order and total Sobol indices and the interval of the total, (keys,) each, on a full grid."""
     axes, whole = range(values.ndim), values.var()
     first = (
         np.array(
@@ -131,9 +131,9 @@ def _grid_indices(values: np.ndarray) -> tuple:
 
 
 def _random_indices(levels: np.ndarray, values: np.ndarray) -> list:
-    """Return (first, total, low, high), (keys,) each, of each column of values.
+    """Return the Sobol indices of each column of values from random cases.
 
-    None for a column that a surface does not explain well enough.
+    One entry per column: (first, total, low, high), (keys,) each; None if no surface explains it well enough.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def _unexplained_variance(levels, values, order, half: int, smooth: float) -> np
 
 
 def _surface_indices(levels: np.ndarray, values: np.ndarray, smooth: float) -> tuple:
-    """Return first-order and total indices, (columns, keys) each, of a surface through cases."""
+    """Return first-order and total Sobol indices, (columns, keys) each, of a surface through cases."""
     from scipy.stats import sobol_indices, uniform
 
     surface = _fit_surface(levels, values, smooth)
@@ -211,7 +211,7 @@ def _surface_indices(levels: np.ndarray, values: np.ndarray, smooth: float) -> t
 
 
 def _sort_shares(names: list, shares: Sequence) -> list:
-    """Return the Share of each key, the largest total first."""
+    """Return the SobolIndex of each key, the largest total first."""
     return sorted(
         (SobolIndex(name, *map(float, numbers)) for name, *numbers in zip(names, *shares)),
         key=lambda one: -one.total,

@@ -31,8 +31,8 @@ MAX_DEATHS = (
 # Seconds that a chunk should take: long compared with its transfer to a worker, short compared with
 # a sweep.
 CHUNK_SECONDS = 1.0
-MAX_CASES_PER_CHUNK = 4096  # cases of a chunk
-MAX_MESH_CASES = 256  # cases from which the meshes of a sweep are chosen
+MAX_CASES_PER_CHUNK = 4096  # maximum number of cases of a chunk
+MAX_MESH_CASES = 256  # maximum number of cases from which the meshes of a sweep are chosen
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +173,7 @@ def _build_case_model(work: Work, number: int):
 
 
 def choose_meshes(work: Work) -> Work:
-    """Return the work with the meshes that all its cases share, also those already computed."""
+    """Return the work with the meshes that all cases share, including cases already computed."""
     if work.meshes is not None:
         return work
     numbers, models = work.cases.spread_cases(MAX_MESH_CASES), []
@@ -286,7 +286,7 @@ def iterate_chunks(
         if hasattr(executor, "begin"):
             executor.begin(work, len(numbers), say)
         work = choose_meshes(work)
-        # Other executors import what runs a case in their workers.
+        # With several workers, only the workers import the code that `_min_chunk_size` needs to run a case.
         chunks = Chunks(
             work.cases.neighbours(numbers),
             executor.workers,

@@ -1,4 +1,4 @@
-"""Records of arrays on which the compiled contacts of many cases work."""
+"""Records of the arrays from which compiled functions solve the contacts of many cases."""
 
 from typing import NamedTuple
 

@@ -120,7 +120,7 @@ def solve_motion(load, moment, spring, is_free, sums, stop):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_end(stretches, a, y, limit, loads, is_free):
-    """Return the end of the longest stretch from node a that ends like a contact.
+    """Return the end of the longest stretch from node a that fulfils the contact conditions at its end.
 
     The last node of the stretch is pressed, and the next node is open.
 
@@ -166,7 +166,7 @@ def find_end(stretches, a, y, limit, loads, is_free):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def move_left_end(stretches, a, b, is_start):
-    """Move the left end from a to b: factor, `unit`, and the sums of the left ends on the way.
+    """Move the left end from a to b; update the factor, and write the sums of each new left end.
 
     A step by one node takes 2 m^2 multiplications.
 

@@ -204,7 +204,7 @@ class Intervals:
     def _try_left_end(
         self, stretches, cases: Cases, indices, a: int, *, is_free: bool
     ) -> np.ndarray:
-        """Try the left end a for some cases; return the next left ends (n,), m if solved."""
+        """Solve cases for contacts that begin at node a; return the node (n,) to try next, m for solved cases."""
         m = self.x.size
         limits = np.minimum(cases.end_limit[indices], m)
         nodes = slice(a, max(int(limits.max()), a + 1))
@@ -230,7 +230,7 @@ class Intervals:
     def _store_solutions(
         self, stretches, cases: Cases, indices, group: _LeftEndSolutions, *, is_free: bool
     ) -> None:
-        """Store the solutions of the cases `some` (n,) after a step of iterative refinement."""
+        """Store the solutions of the cases `indices` (n,) after a step of iterative refinement."""
         a = group.left_end
         stop = group.stop
         nodes = slice(a, a + group.force.shape[1])

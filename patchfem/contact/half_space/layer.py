@@ -79,7 +79,7 @@ def _solve_waves(k, depths: list, moduli: list) -> WaveCompliance:
         below = _layer_states(k, 0.0, depths[n + 1], moduli[n + 1], scale)
         matrix[:, rows, first_column + 4 : first_column + 8] = -below
     right_sides = np.zeros((k.size, n_unknowns, 2))
-    # tension of the face under a unit of pressure, and its shear under a unit of traction
+    # loads on the face: normal stress -1 for a unit pressure, and shear stress -1 for a unit shear traction
     right_sides[:, 0, 0] = -1.0
     right_sides[:, 1, 1] = -1.0
     coefficients = np.linalg.solve(matrix, right_sides)[:, :4]

@@ -20,7 +20,7 @@ EQUATION_TOL = 1e-10  # relative residual of the equations on the active points
 # offset of an edge over the length of a cell (see `edges.edge_offset`), measured to 0.001 for Hertz contact
 # on 24 rows of points
 EDGE_OFFSET_FRACTION = 0.189
-# points up to which a contact is measured in the choice of the longest one; longer contacts are equivalent
+# maximum number of points that are counted to find the longest contact; longer contacts count as equal
 MAX_REFERENCE_POINTS = 64
 
 
@@ -53,7 +53,7 @@ class PointCompliance:
         return float(self.waves.max()) / self.area + of_ends
 
     def product(self, force: np.ndarray) -> np.ndarray:
-        """Return the displacements (n,) [m] of forces (n,) [N]."""
+        """Return the displacements (n,) [m] under forces (n,) [N]."""
         by_ends = self.modes @ (self.mode_compliances * (force @ self.modes))
         return idct(self.waves * dct(force)) / self.area + by_ends
 
@@ -104,7 +104,7 @@ class PointCompliance:
 
 
 class SmoothModes(NamedTuple):
-    """Functions (n, r) [1] and their compliances (r,) [m2/N]."""
+    """Eigenfunctions (n, r) [1] of a compliance, and their compliances (r,) [m2/N]."""
 
     modes: np.ndarray
     mode_compliances: np.ndarray

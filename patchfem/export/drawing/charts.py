@@ -589,7 +589,7 @@ def curve_axis(curve: dict) -> tuple:
 
 
 def regime_sentence(steady: dict | None) -> str:
-    """Return a sentence on regime and stability of a steady motion; "" if they are not known."""
+    """Return a sentence about regime and stability of a steady motion; "" if they are not known."""
     if steady is None:
         return ""
     size = steady["multiplier"]

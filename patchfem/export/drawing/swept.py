@@ -84,7 +84,7 @@ def _make_key_axis(key: str, along) -> tuple:
 
 
 def _spans_ratio(values, ratio: float) -> bool:
-    """Return whether values are all positive and span a ratio."""
+    """Return whether all values are positive and the largest is at least `ratio` times the smallest."""
     if values.dtype.kind != "f" or values.size < 2 or values.min() <= 0:
         return False
     return values.max() >= ratio * values.min()

@@ -1,4 +1,4 @@
-"""Notes on stresses beyond the yield strength of a named material.
+"""Notes about stresses beyond the yield strength of a named material.
 
 The model does not include plastic flow.
 """
@@ -59,7 +59,7 @@ def find_yielding(asked, bodies: dict) -> dict:
 
 
 def _yielding_note(known: Strength, highest: tuple, pieces: int) -> str:
-    """Return the note on a material; highest: (stress [Pa], side, position [m])."""
+    """Return the note about a material; highest: (stress [Pa], side, position [m])."""
     stress, side, (x, y) = highest
     both = "; the other piece exceeds its yield strength too" * (pieces > 1)
     return (

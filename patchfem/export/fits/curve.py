@@ -94,7 +94,7 @@ def _csv_rows(fitted: FittedCurve) -> list:
 
 
 def _draw_charts(fitted: FittedCurve) -> list:
-    """Return frequency and damping ratio against amplitude, measured with errors and fitted."""
+    """Return charts of frequency and damping ratio against amplitude, measured with errors and fitted."""
     measured = fitted.measured
     unit, scale = choose_axis_unit(measured.amplitude, "m")
     along = charts.make_axis("amplitude", unit, True)

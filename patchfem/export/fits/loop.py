@@ -102,7 +102,7 @@ def _csv_rows(fitted: FittedLoop) -> list:
 
 
 def _draw_charts(fitted: FittedLoop) -> list:
-    """Return the reading against displacement, and the residual of each row."""
+    """Return charts of the reading against displacement, and of the residual of each row."""
     loop = fitted.loop
     name, unit = LABELS[loop.quantity]
     along, size = choose_axis_unit(loop.displacement, "m")

@@ -84,7 +84,7 @@ def _value_with_ends(described: dict) -> str:
 
 
 def _values_table(values: dict) -> str:
-    """Return value, interval and range of each key."""
+    """Return the table of the value, the interval and the range of each key."""
     rows = []
     for key, described in values.items():
         value, unit, ends = format_fitted(described)
@@ -109,7 +109,7 @@ def _format_bound(described: dict, end: float) -> str:
 
 
 def _correlation_table(correlation: list, names: list) -> str:
-    """Return the correlation of the errors of the values."""
+    """Return the table of the correlations between the errors of the values."""
     rows = []
     for name, row in zip(names, correlation):
         cells = ["&ndash;" if part is None else f"{part:.2f}" for part in row]

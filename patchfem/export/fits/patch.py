@@ -142,7 +142,7 @@ def _csv_rows(fitted: FittedPatch) -> list:
 
 
 def _draw_charts(fitted: FittedPatch) -> list:
-    """Return stiffness and loss per cycle against the amplitude of the slide."""
+    """Return charts of the stiffness and the loss per cycle against the amplitude of the slide."""
     slides = fitted.patch.slides
     unit, scale = choose_axis_unit(slides, "m")
     along = charts.make_axis("amplitude of the slide", unit, True)
@@ -224,7 +224,7 @@ def _best_law_sentence(answer: dict) -> str:
 
 
 def _error_sentences(law: str, answer: dict) -> list:
-    """Return sentences on the error of a law in place of the patch."""
+    """Return sentences about the error of a law in place of the patch."""
     low, high = (format_quantity(end, "m", 3) for end in answer["amplitudes"])
     stiffness, loss = (answer["laws"][law][part] for part in PARTS)
     side = "larger" if loss["largest"] > 0 else "smaller"
@@ -244,7 +244,7 @@ def _error_sentences(law: str, answer: dict) -> list:
 
 
 def _relative_sentence(loss: dict) -> str:
-    """Return a sentence on the largest difference relative to the patch, if it differs."""
+    """Return a sentence about the largest difference relative to the patch, if it differs."""
     if loss["relative"] == loss["largest"]:
         return ""
     return (

@@ -123,7 +123,7 @@ def describe_answer(fitted: FittedRows) -> dict:
 
 
 def _instrument_settings(fitted: FittedRows) -> dict:
-    """Return how the instruments read, with fitted or given gains."""
+    """Return the settings of the instruments, with fitted or given gains."""
     read = fitted.asked.read
     out = {
         "reading": "peak" if read is None else read.reading,
@@ -234,7 +234,7 @@ def _format_cell(value: float | None, unit: float) -> str:
 
 
 def _draw_charts(answer: dict) -> list:
-    """Return computed against measured accelerations and displacements."""
+    """Return charts of computed against measured accelerations and displacements."""
     return [
         _draw_chart(answer, "acceleration", "g", G_N),
         _draw_chart(answer, "displacement", "mil", MIL),
@@ -242,7 +242,7 @@ def _draw_charts(answer: dict) -> list:
 
 
 def _draw_chart(answer: dict, name: str, unit: str, scale: float) -> dict:
-    """Return computed against measured readings of one kind, by whether they were held out."""
+    """Return the chart of computed against measured readings of one kind, fitted and held out."""
     groups: dict = {}
     for row in answer["rows"]:
         reading = row[name]

@@ -21,7 +21,7 @@ OUTPUT = {"displacement": ("output_displacement", "relative_displacement", "slid
 
 
 class Estimate(NamedTuple):
-    """How modes or a response are estimated; "" is the default.
+    """Settings for the estimate of modes or of a response; "" stands for the default.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Columns over time in a results folder: histories of a run, or a measured and fitted loop."""
+"""Columns over time in a results folder: histories of a run, or the measured and the fitted loop of a fit."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +24,7 @@ LOOPS = (
 
 
 class Column(NamedTuple):
-    """A history.
+    """History of one quantity over time.
 
     name; unit as in netCDF ("m s-2"); values (k,); number: of the interface or mode from 1, 0 if
     there is only one.
@@ -114,7 +114,7 @@ def _read_run_histories(path: Path) -> Histories:
 
 
 def _read_fit_histories(path: Path) -> Histories:
-    """Read measured and fitted loop of a fit."""
+    """Read the measured and the fitted loop of a fit."""
     units = {**FORCE_UNITS, **SLIDE_UNITS, "fitted": {"": 1.0}}
     fitted_loop = TableFormat(
         units,

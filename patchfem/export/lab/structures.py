@@ -97,7 +97,7 @@ def export_structure(model: Model, out: Path) -> str:
 
 
 def _omitted_features(model: Model) -> str:
-    """Return the end of a sentence on what the file lacks of the scene."""
+    """Return the end of a sentence about what the file lacks of the scene."""
     rig = model.rig
     out = ["[wear]"] * (model.wear is not None) + ["structure.travel"] * (
         rig.springs.travel < MAX_TRAVEL

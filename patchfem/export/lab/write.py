@@ -50,7 +50,7 @@ def export_histories(folder: Path, out: Path) -> str:
 
 
 def _thinning_note(found) -> str:
-    """Return the note on early rows of histories that contain only reversals; else ""."""
+    """Return the note about early rows of histories that contain only reversals; else ""."""
     place = next((one.values for one in found.columns if one.name.endswith("displacement")), None)
     if place is None or found.time is None:
         return ""

@@ -167,7 +167,7 @@ def summarise_sweep(table: dict) -> SweepHeadline:
         keys = [key_limits.key if key["name"] == key_limits.key["name"] else key for key in keys]
 
     def where(case: int) -> str:
-        """Return the values of the keys in a case as text."""
+        """Return the values of the varied keys in a case as text."""
         return ", ".join(
             f"{key['name']} {shorten_number(str(key['texts'][case]))}"
             for key in keys

@@ -39,9 +39,7 @@ CURVES = (
     ("gap", "gap"),
     ("slip", "slide"),
 )
-MAX_CONTACT_FRACTION = (
-    0.25  # fraction of the length below which the contact fills half of what is shown
-)
+MAX_CONTACT_FRACTION = 0.25  # contact / interface length, below which twice the contact is shown
 MM_PER_M = 1e3
 
 
@@ -152,9 +150,9 @@ def _read_frames(folder: Path) -> dict:
 
 
 def _contact_range(x, sigma) -> tuple | None:
-    """Return the range of x (n,) [m] in which some frame of sigma (f, n) has contact, widened.
+    """Return the ends x [m] of the view around the nodes in contact in any frame; x (n,), sigma (f, n).
 
-    The range is twice as long as the contact. None if the contact is longer than MAX_CONTACT_FRACTION times the
+    The view is about twice as long as the contact. None if the contact is longer than MAX_CONTACT_FRACTION times the
     length.
     """
     touching = x[np.any(sigma > 0, axis=0)]

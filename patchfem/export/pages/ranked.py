@@ -55,11 +55,11 @@ class RankedKeys(NamedTuple):
     shares : dict
         Sobol indices of the keys for each measure, from `sobol_indices`.
     rank : str
-        The sentence on them; "" if there is nothing to say.
+        The sentence about them; "" if there is nothing to say.
     quantiles : dict
         From `measure_quantiles`.
     scatter : str
-        The sentence on them.
+        The sentence about them.
     """
 
     shares: dict

@@ -34,7 +34,7 @@ def describe_release(result: Result) -> str:
 
 
 def _describe_decay(decay) -> str:
-    """Return a clause on frequency and damping of the second and the last known swing."""
+    """Return a clause about frequency and damping of the second and the last known swing."""
     known = (
         []
         if decay is None

@@ -247,7 +247,7 @@ def _unknown_measures(measures: dict) -> str:
 
 
 def verdict_sentence(summary: dict) -> str:
-    """Return the sentence on how a run ended, from its summary.
+    """Return the sentence about how a run ended, from its summary.
 
     `stuck` refers to the interface as a whole. If the last cycles dissipate or slip more than their
     error, part of it slips, and the sentence says how much. For a bench the sentence also says
@@ -338,7 +338,7 @@ def _bench_slip_sentence(slip: dict | None, done: str, patch: bool) -> str:
 
 
 def _bench_loop_sentence(loop: dict, stiffness: dict) -> str:
-    """Return the sentence on stiffness and damping of a bench; loop: from `summary.loop_entry`."""
+    """Return the sentence about stiffness and damping of a bench; loop: from `summary.loop_entry`."""
     factor, error = loop["loss_factor"], loop["error"]
 
     def number(scale: float) -> str:

@@ -238,7 +238,7 @@ def _explorer_html(said: str, folders: list | None) -> str:
 
 
 def _change_section(table: dict, found: limits.Limits) -> list:
-    """Return the section on the change of each main measure since the first case.
+    """Return the section about the change of each main measure since the first case.
 
     [] if the sweep has no limits.
     """

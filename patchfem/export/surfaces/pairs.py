@@ -244,13 +244,13 @@ def page_html(rows: list, name: str) -> str:
 
 
 def _group_heading(group: tuple, count: int) -> str:
-    """Return the heading of a group of pairs."""
+    """Return the heading of the means of a group of pairs."""
     text = _group_title(*group)
     return f"{text[0].upper()}{text[1:]}: mean of {count} pairs"
 
 
 def _means_html(number: int, rows: list, averages: dict) -> str:
-    """Return picture and table of the means of a group of pairs as HTML."""
+    """Return the picture and the table of the means of a group of pairs as HTML."""
     panels = []
     for name in _main_names(rows[0]):
         if name in averages:

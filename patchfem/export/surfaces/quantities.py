@@ -90,7 +90,7 @@ def quantity_data(quantity: Quantity) -> dict:
 
 
 class CsvColumns(NamedTuple):
-    """Heads of the columns of several tables of quantities, and the cells of each table."""
+    """Column headers that several tables of quantities share, and the cells of each table."""
 
     heads: list
     cells: list
@@ -139,7 +139,7 @@ class Row(NamedTuple):
 
 
 class QuantityTable(NamedTuple):
-    """Rows of quantities, and the heads of the columns words, value, interval, more and unit."""
+    """Rows of quantities, and the headers of the columns words, value, interval, more and unit."""
 
     heads: tuple
     rows: list

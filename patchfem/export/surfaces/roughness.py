@@ -183,12 +183,12 @@ def means_lines(reports: list) -> list:
 
 
 def _means_heading(means: Means) -> str:
-    """Return the heading of a mean."""
+    """Return the heading of the means of the parameters over several files."""
     return f"Mean of {means.count} {KINDS[means.kind]}"
 
 
 def _means_table(means: Means) -> QuantityTable:
-    """Return the table of the means."""
+    """Return the table of the means of the parameters over several files."""
     rows = []
     for name, average in means.values.items():
         unit = ("", 1.0)
@@ -315,7 +315,7 @@ def write_page(path: Path, reports: list) -> None:
 
 
 def _means_section(means: Means) -> Section:
-    """Return the section of a mean."""
+    """Return the page section with the means of the parameters over several files."""
     caution = (
         warning_box([f"{means.caution[0].upper()}{means.caution[1:]}."]) if means.caution else ""
     )
@@ -324,7 +324,7 @@ def _means_section(means: Means) -> Section:
 
 
 def _surface_section(number: int, report: RoughnessReport) -> Section:
-    """Return the section of a surface."""
+    """Return the page section with the parameters and pictures of a surface."""
     parts = [
         f"<p class=verdict>{_verdict_sentence(report)}</p>",
         f"<p class=soft>{escape(describe_surface(report))}.</p>",

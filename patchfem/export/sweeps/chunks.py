@@ -24,7 +24,7 @@ from ...disk.atomic_write import write_bytes
 from ...runs.batch.case_results import CaseResults
 
 CHUNKS, ENDING = "chunks", ".h5"
-MAX_CASES_PER_FILE = 4096  # cases of a file
+MAX_CASES_PER_FILE = 4096  # maximum number of cases of a file
 PARTS = ("values", "errors", "floors")
 
 

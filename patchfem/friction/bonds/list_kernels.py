@@ -112,7 +112,7 @@ class StripCount(NamedTuple):
 
 
 class MeanForce(NamedTuple):
-    """Path-mean force [1] of an increment and its derivative by the increment [1/m]."""
+    """Path-mean force [1] of an increment, and its derivative with respect to the increment [1/m]."""
 
     mean: float
     slope: float
@@ -280,9 +280,9 @@ def list_force(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_energy(increment, bond_list, v0, dt):
-    """Return stored energy / friction limit [m] after an increment, for reading="stretch".
+    """Return the stored energy / friction limit [m] after an increment.
 
-    The bonds that form on the increment are included.
+    The bonds that form on the increment are included. The law must have friction.reading = "stretch".
 
     Parameters
     ----------
@@ -467,7 +467,7 @@ def _integrate_panel(is_energy, span, increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_slope(increment, bond_list, v0, dt):
-    """Return path-mean force and its derivative by the increment, for reading="stretch" and p = 1.
+    """Return the path-mean force and its derivative with respect to the increment, in the form FORM_MOMENTS.
 
     Parameters
     ----------

@@ -206,7 +206,7 @@ def _have_similar_lengths(bonds, i, k, clocks):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _have_same_range(bonds, i, k, clocks, law, status):
-    """Return whether two strips cover nearly the same range, so that both can be spread over its mean."""
+    """Return whether two strips cover nearly the same range, so that both can be spread over a mean range."""
     low_i = min(bonds[STRIP.start, i], bonds[STRIP.end, i])
     high_i = max(bonds[STRIP.start, i], bonds[STRIP.end, i])
     low_k = min(bonds[STRIP.start, k], bonds[STRIP.end, k])

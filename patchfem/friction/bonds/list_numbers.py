@@ -30,7 +30,7 @@ def sum_form(law: Bonds) -> float:
 
 
 def cutoff_age(order: float, tail: float) -> float:
-    """Return the path R/eps [1] at which older bonds carry `tail` of the friction limit.
+    """Return the age R/eps [1] beyond which bonds carry only the fraction `tail` of the friction limit.
 
     It solves Q(p + 1, R/eps) = tail, with Q the regularised upper incomplete gamma function and p > -1.
     """

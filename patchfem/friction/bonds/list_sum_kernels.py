@@ -237,7 +237,7 @@ def sum_linear_density(displacement, start, end, weights, p):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def sum_powers(displacement, damage, bonds, strips, law):
-    """Sum |u|^p over strips in the form FORM_POWER (eq. 2.17 with reading="stretch").
+    """Sum the forces and energies of bonds over strips in the form FORM_POWER (eq. 2.17).
 
     Two Gauss points per strip are exact enough away from u = 0. A strip near u = 0 is integrated from there; if it is
     as narrow for its age as a merged strip, its density is taken as linear.
@@ -294,7 +294,7 @@ def sum_powers(displacement, damage, bonds, strips, law):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _sum_report_closed(displacement, path, bonds, strips, law):
-    """Sum strips of reading="report" for p = 0, 1 or 2, where P(p + 1, x) is elementary.
+    """Sum strips for friction.reading = "report" for p = 0, 1 or 2, where P(p + 1, x) is elementary.
 
     The bond length is constant, and each strip has been passed only once.
 
@@ -340,7 +340,7 @@ def _sum_report_closed(displacement, path, bonds, strips, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _sum_report_table(displacement, path, bonds, strips, law, table):
-    """Sum strips of reading="report" at constant bond length by the table of P(p + 1, x).
+    """Sum strips for friction.reading = "report" at constant bond length by the table of P(p + 1, x).
 
     It holds for any order p and strips that have been passed only once.
     """
@@ -384,7 +384,7 @@ def _sum_report_table(displacement, path, bonds, strips, law, table):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def sum_report(displacement, path, bonds, strips, law, table):
-    """Sum strips of reading="report" at a constant bond length (eq. 2.17), exactly.
+    """Sum strips for friction.reading = "report" at a constant bond length (eq. 2.17), exactly.
 
     A strip of one pass is split where u changes its sign.
 
@@ -569,7 +569,7 @@ def _spread_growing_strip(displacement, path, mature, bonds, k, p):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def sum_growing(displacement, path, mature, bonds, strips, law):
-    """Sum strips of reading="report" with growing bonds (eqs. 2.10 and 2.17).
+    """Sum strips for friction.reading = "report" with growing bonds (eqs. 2.10 and 2.17).
 
     Parameters
     ----------
@@ -665,7 +665,7 @@ def sum_initial(displacement, path, damage, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def average_initial(increment, displacement, path, law):
-    """Average the force of the initial bonds of reading="report" over an increment, exactly.
+    """Average the force of the initial bonds for friction.reading = "report" over an increment, exactly.
 
     The force jumps at displacement 0, or changes its sign over the width over which the bonds are distributed.
 

@@ -1,4 +1,4 @@
-"""Bonds of one point on a line for reading="stretch" and p = 1, compiled (see `recursion`).
+"""Bonds of one point on a line for friction.reading = "stretch" and p = 1, compiled (see `recursion`).
 
 m [Pa], z [Pa m] and s2 [Pa m2] are the sums over the bonds of a point: density, stretch and stretch squared. sigma [Pa]
 is the pressure under which new bonds form, eps [m] the bond length of the step. The traction is mu_s/eps_0 z.

@@ -245,7 +245,7 @@ class Quadrature:
         )
 
     def _release_by_moments(self, state: Strips, s0, s1) -> _Release:
-        """Return a release after which the bonds have the moments of `recursion.press_bonds`.
+        """Return the change of the bonds at rest that leads to the moments of `recursion.press_bonds`.
 
         A negative density removes unstretched bonds.
         """
@@ -256,7 +256,7 @@ class Quadrature:
         return _Release(kept, density - kept * m)
 
     def _release_last_formed(self, state: Strips, s0, s1) -> _Release:
-        """Return a release of the last-formed bonds where the pressure falls.
+        """Return the change of the bonds at rest; where the pressure falls, the last-formed bonds are lost first.
 
         Bonds form unstretched where the pressure rises, or where the remaining ones would carry more than mu_s sigma.
         """

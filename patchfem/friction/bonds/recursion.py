@@ -1,4 +1,4 @@
-"""Bond law for reading="stretch" and p = 1, summed exactly by moments, on a line or in a plane.
+"""Bond law for friction.reading = "stretch" and p = 1, summed exactly by moments, on a line or in a plane.
 
 With k = exp(-int dR/eps) the surviving fraction of a bond, u its stretch and 1/eps frozen when it forms, the sums over
 all bonds

@@ -166,7 +166,7 @@ class _GaussRule(NamedTuple):
 
 
 def surviving_density(state: Strips) -> np.ndarray:
-    """Return the density of surviving bonds / pressure at formation (k,), for reading="stretch".
+    """Return the density of surviving bonds / pressure at formation (k,), for friction.reading = "stretch".
 
     A cohort keeps exp(-D), and a strip this times 1 - exp(-length/eps), with D the damage since its end.
     """
@@ -228,7 +228,7 @@ def _weight_function(law: Bonds, x, damage) -> np.ndarray:
 
 
 def _energy_divisor(law: Bonds) -> float:
-    """Return the force times the stretch of a bond / its stored energy."""
+    """Return the ratio of force times stretch of a bond to its stored energy."""
     return law.order + 1 if law.reading == "stretch" else 1.0
 
 
@@ -248,7 +248,7 @@ def _cohort_weights(cohorts: Strip, now: PathState, law: Bonds) -> np.ndarray:
 
 
 def _linear_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
-    """Integrate u and |u|^2/2 over strips in closed form, for reading="stretch" and p = 1."""
+    """Integrate u and |u|^2/2 over strips in closed form, for friction.reading = "stretch" and p = 1."""
     stretch = now.displacement - strips.end.displacement
     eps = strips.bond_length
     x = strips.length / eps
@@ -268,7 +268,7 @@ def _linear_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
 
 
 def _report_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
-    """Integrate strips of reading="report" at a constant bond length in closed form.
+    """Integrate strips for friction.reading = "report" at a constant bond length in closed form.
 
     The stretch is along the strips. The integrals are differences of P(p + 1, R/eps) and P(p + 2, R/eps), the
     regularised lower incomplete gamma function, on both sides of u = 0.
@@ -323,7 +323,7 @@ def _sum_points(strips: Strip, now: PathState, distance, weight, law: Bonds) -> 
 
 
 def _bond_lengths(strips: Strip, now: PathState, distance, law: Bonds):
-    """Return the bond lengths (n, points) [m] for reading="report", which grow from zero (eq. 2.10)."""
+    """Return the bond lengths (n, points) [m] for friction.reading = "report", which grow from zero (eq. 2.10)."""
     if not law.has_growth:
         return law.length
     fraction = distance / strips.length[:, None]

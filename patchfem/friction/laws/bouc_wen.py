@@ -28,7 +28,7 @@ NEWTON_TOL = 1e-14  # change of w / (1 + w) at which Newton's method has converg
 class _HalfLoop(NamedTuple):
     """Half of a steady loop, from -y to y.
 
-    - displacement: displacement [eps] of the stroke, and its derivative by w
+    - displacement: displacement [eps] of the stroke, and its derivative with respect to w
     - area: area [mu N eps] between loading and unloading
     """
 
@@ -77,7 +77,7 @@ class BoucWen:
         return _HalfLoop(displacement, self._rates(w)[0], (weights * area_by_w).sum(axis=-1))
 
     def _rates(self, w) -> tuple:
-        """Return the derivatives by w of the displacement [eps] and the area [mu N eps]."""
+        """Return the derivatives of the displacement [eps] and the area [mu N eps] with respect to w."""
         rate = self._loading_rate(w)
         y = -np.expm1(-w)
         unloading = 1 - 2 * self.shape

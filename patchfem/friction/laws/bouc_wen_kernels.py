@@ -288,7 +288,7 @@ def read_memory(numbers, memory, rel_disp, velocity):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def relax_stretch(numbers, stretch, increment, dt):
-    """Return the stretch eps z after an increment, for harmonic balance; time plays no part.
+    """Return the stretch eps z after an increment, for harmonic balance; it does not depend on time.
 
     Returns
     -------
@@ -343,7 +343,7 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def end_motion(numbers, memory, motion, increment, velocity, states):
-    """Set the memory to the final z, 0 at the kink; return nan, because the engine takes the loss from the work.
+    """Store the final z, which is 0 at the kink; return nan, so that the engine computes the loss from the work.
 
     Returns
     -------

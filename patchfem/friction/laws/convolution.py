@@ -1,4 +1,4 @@
-"""Friction law with an average of the pressure behind a point, which the report extends.
+"""Friction law with an average of the pressure behind each point; eq. 2.17 extends this law.
 
 Source: Oden and Pires, J. Appl. Mech. 50, 67, 1983.
 

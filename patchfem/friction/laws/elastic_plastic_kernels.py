@@ -18,7 +18,7 @@ MIN_INCREMENT = 1e-290  # increment below which a quotient by it would overflow
 
 
 class Stretch(NamedTuple):
-    """End of a stretch, its integral over the increment, and the elastic part of the increment."""
+    """Final stretch of a spring, its integral over the increment, and the elastic part of the increment."""
 
     end: float
     integral: float

@@ -197,7 +197,7 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def end_motion(numbers, memory, motion, increment, velocity, states):
-    """Set the memory to the final stretch; return nan, because the engine takes the loss from the work.
+    """Store the final stretch; return nan, so that the engine computes the loss from the work.
 
     Returns
     -------

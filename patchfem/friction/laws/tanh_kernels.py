@@ -57,7 +57,7 @@ def tanh_fit(y):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def rate_equation(numbers, stretch, velocity, direction):
-    """Return the force at a velocity and its derivative; nothing stretches.
+    """Return the force at a velocity and its derivative; there is no stretch.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def read_memory(numbers, memory, rel_disp, velocity):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_motion(numbers, memory, direction, states):
-    """Return that the rates have no kink; there is no state to set.
+    """Return an infinite path, because the rates have no kink; the law has no state to set.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def end_motion(numbers, memory, motion, increment, velocity, states):
-    """Return nan, because the engine takes the dissipated energy from the work; there is no memory.
+    """Return nan, so that the engine computes the dissipated energy from the work; there is no memory.
 
     Returns
     -------

@@ -3,7 +3,7 @@
 The attribute is the only place where a key is described, and everything that reads, checks or documents scenes is made
 from it. Read `tables` first: it holds all tables but those under [contact] (`contact`) and [accuracy] (`accuracy`).
 `types` has the types of keys, `quantities` the units of each kind of quantity, `materials` the named materials,
-`lookup` finds a dotted key, and `removed` has the sentences on keys and options of earlier versions.
+`lookup` finds a dotted key, and `removed` has the sentences about keys and options of earlier versions.
 
 How to add a key
 ----------------

@@ -1,4 +1,4 @@
-"""Dotted keys: the table and attribute of a key, valid values, and messages on wrong values."""
+"""Dotted keys: the table and attribute of a key, valid values, and messages about wrong values."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .types import (
     list_key_types,
 )
 
-MAX_SHOWN_CHARACTERS = 60  # characters of a wrong value that a message shows
+MAX_SHOWN_CHARACTERS = 60  # maximum number of characters of a wrong value in a message
 MATERIAL_REQUIREMENT = (
     'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
 )
@@ -159,7 +159,7 @@ def _describe_array_requirement(types: tuple) -> str:
 
 
 def describe_error(definition: KeyDefinition, error: Any, value: Any) -> str:
-    """Return the sentence for an error of pydantic.
+    """Return the message for a validation error of pydantic.
 
     Parameters
     ----------

@@ -146,8 +146,8 @@ _QUANTITY_PATTERN = re.compile(rf"({NUMBER_PATTERN})[ \t]+(\S.*)")
 _BARE_NUMBER_PATTERN = re.compile(NUMBER_PATTERN)
 _JOINED_UNIT_PATTERN = re.compile(rf"({NUMBER_PATTERN})([^\s0-9.,#+±-].*)")
 _DECIMAL_COMMA_PATTERN = re.compile(r"[+-]?[0-9]+,[0-9]+")
-_MAX_CHARACTERS = 100  # characters of a quantity; a longer text is refused before it is analysed
-_MAX_SHOWN_CHARACTERS = 60  # characters of a wrong quantity that a message shows
+_MAX_CHARACTERS = 100  # maximum length of a quantity; a longer string is refused unread
+_MAX_SHOWN_CHARACTERS = 60  # maximum length of a wrong quantity in a message
 # Context with room for all digits of a product of a value and a factor.
 _EXACT_CONTEXT = Context(prec=2 * _MAX_CHARACTERS, Emax=MAX_EMAX, Emin=MIN_EMIN)
 
@@ -227,7 +227,7 @@ def normalize_unit(unit: str) -> str:
 
 
 def _describe_non_text(value: object, kind: str) -> str:
-    """Return the sentence on a value that is not a text."""
+    """Return the message about a value that is not a string."""
     reason = "not a quantity"
     if isinstance(value, bool):
         reason = f"{str(value).lower()} is not a quantity"
@@ -237,7 +237,7 @@ def _describe_non_text(value: object, kind: str) -> str:
 
 
 def _describe_malformed_text(words: str, kind: str) -> str:
-    """Return the sentence on a text that is not a number, a blank and a unit."""
+    """Return the message about a string that does not consist of a number, a blank and a unit."""
     shown = (
         words if len(words) <= _MAX_SHOWN_CHARACTERS else f"{words[: _MAX_SHOWN_CHARACTERS - 3]}..."
     )
@@ -260,7 +260,7 @@ def _describe_malformed_text(words: str, kind: str) -> str:
 
 
 def _describe_wrong_unit(number: str, unit: str, kind: str) -> str:
-    """Return the sentence on a unit that is not one of this kind."""
+    """Return the message about a unit that does not belong to this kind of quantity."""
     plain = normalize_unit(unit)
     advice = f"use one of {_list_units(kind)}, such as '{EXAMPLE_QUANTITIES[kind]}'"
     other_kinds = [other for other, units in UNIT_FACTORS.items() if plain in units]

@@ -66,7 +66,7 @@ class QuadratureFacts(TableFacts):
 
     @property
     def is_named(self) -> bool:
-        """Whether the scene names the quadrature."""
+        """Whether accuracy.quadrature is set to a method, and not left at "auto"."""
         return bool(self.quadrature) and self.quadrature != "auto"
 
     @property
@@ -125,7 +125,7 @@ def check_settings(draft: SceneDraft, kind: str) -> None:
 
 
 def find_unused_settings(tables: Tables, kind: str) -> dict[str, str]:
-    """Return setting -> words that tell where it has no effect, for settings without effect."""
+    """Return, for each setting without effect, the words that state where it has none."""
     accuracy = tables.accuracy
     method = "bench" if kind == "bench" else accuracy.method or "auto"
     unused = {}

@@ -184,7 +184,7 @@ def _check_law(draft: SceneDraft, table_key: str, law: Friction, contact: Contac
 
 
 def is_temperature_unused(law: Friction) -> bool:
-    """Return whether a surface temperature changes no growth of bonds."""
+    """Return whether a surface temperature has no effect on the growth of bonds."""
     temperature = law.temperature
     if temperature is None or not law_has_trait(law.law, "bonds"):
         return False

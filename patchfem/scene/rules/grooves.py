@@ -37,7 +37,7 @@ class GrooveFacts(TableFacts):
 
     @property
     def key_preventing_recursion(self) -> str:
-        """Key of [friction] that rules out the recursion over bonds; "" if none does."""
+        """Key of [friction] that rules out a recursive computation of the sum over bonds; "" if none does."""
         law = self.scene.friction
         if not self.has_bonds or not (is_bond_list(self.law_table) or law.breakaway):
             return ""

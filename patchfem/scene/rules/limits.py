@@ -63,7 +63,7 @@ class JointFacts(TableFacts):
         return law_has_trait(self.table.law, trait)
 
     def supports(self, *words: str) -> bool:
-        """Return whether the law supports all these words of `effects.LAWS[...].supports`."""
+        """Return whether the law supports all of these features, named as in `effects.LAWS[...].supports`."""
         return all(law_supports(self.table, word) for word in words)
 
     @property
@@ -83,12 +83,12 @@ class JointFacts(TableFacts):
 
     @cached_property
     def yaw(self) -> str:
-        """Key of the first mode that yaws the patch; "" if none does."""
+        """Key of the yaw of the first mode that yaws the patch; "" if no mode does."""
         return find_yaw_key(self.draft.tables)
 
     @property
     def key_preventing_recursion(self) -> str:
-        """Key of the law that prevents the recursion over bonds."""
+        """Key of the law that rules out a recursive computation of the sum over bonds."""
         if self.reading == "report":
             return "reading"
         return "breakaway" if self.breakaway else "order"
@@ -112,7 +112,7 @@ class JointFacts(TableFacts):
 
     @property
     def quadrature(self) -> str:
-        """Quadrature that adds up single bonds; "" if the scene names none."""
+        """Method of accuracy.quadrature that adds up single bonds; "" if the scene sets no such method."""
         name = self.scene.accuracy.quadrature
         is_sum = name in ("direct", "truncated", "merged")
         return name if is_sum and self.has_trait("bonds") and not self.compliance else ""
@@ -124,7 +124,7 @@ class JointFacts(TableFacts):
 
     @property
     def recursion_feature(self) -> str:
-        """Feature that only the recursion over bonds can compute, in words; "" if there is none."""
+        """Feature that requires a recursive computation of the sum over bonds, in words; "" if there is none."""
         if self.has_lower_shape:
             return "a shape on the lower piece"
         return "friction.breakaway" if self.breakaway else ""

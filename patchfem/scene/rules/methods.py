@@ -205,7 +205,7 @@ def find_nonlinear_spring(tables: Tables) -> str:
 
 
 def find_climbed_grooves(tables: Tables) -> str:
-    """Return the key of the grooves that the upper piece climbs; "" without or with flat ones."""
+    """Return the key of the grooves that the upper piece climbs; "" without grooves or if they are flat."""
     for name in ("contact", "normal"):
         if TableView(tables)[name].grooves.amplitude:
             return f"[{name}.grooves]"
@@ -213,7 +213,7 @@ def find_climbed_grooves(tables: Tables) -> str:
 
 
 def find_yaw_key(tables: Tables) -> str:
-    """Return the key of the first mode that yaws the patch; "" if none does."""
+    """Return the key of the yaw of the first mode that yaws the patch; "" if no mode does."""
     for index, mode in enumerate(TableView(tables).structure.mode):
         if mode.yaw:
             return f"structure.mode.{index}.yaw"

@@ -18,7 +18,7 @@ from .view import TableView
 
 
 class TableFacts(TableView):
-    """Facts on which the rules of one table depend: the values, and which keys are written.
+    """Facts on which the rules of one table depend: the values, and which keys the scene sets.
 
     Subclasses add what follows from the values as properties. The tables do not change while rules are applied, so that
     a property which several rules use is a `cached_property`.
@@ -54,14 +54,14 @@ class TableFacts(TableView):
         return find_compliance_key(self.table, self.draft.tables)
 
     def has(self, *names: str) -> bool:
-        """Return whether all of these keys of the table are written."""
+        """Return whether the scene sets all of these keys of the table."""
         for name in names:
             if find_value(self._written, name) is None:
                 return False
         return True
 
     def has_any(self, *names: str) -> bool:
-        """Return whether at least one of these keys of the table is written."""
+        """Return whether the scene sets at least one of these keys of the table."""
         return any(map(self.has, names))
 
 

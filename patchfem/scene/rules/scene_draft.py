@@ -18,7 +18,7 @@ from .view import TableView
 SET_MISTAKE_ORDER = 10**9
 # characters; no key, unit or file name is as long, so a message cuts a longer word
 MAX_WORD_CHARACTERS = 200
-N_SHOWN_CHARACTERS = 60  # characters of a word longer than MAX_WORD_CHARACTERS that a message shows
+N_SHOWN_CHARACTERS = 60  # characters shown of a word longer than MAX_WORD_CHARACTERS
 _LONG_WORD_PATTERN = re.compile(rf"[^\s/\\:]{{{MAX_WORD_CHARACTERS},}}")
 
 
@@ -67,7 +67,7 @@ class SceneDraft:
 
     @property
     def values(self) -> TableView:
-        """View of the tables read so far; a missing or refused value is UNKNOWN_VALUE."""
+        """View of the tables read so far; a missing or invalid value is UNKNOWN_VALUE."""
         if self._values.table is not self.tables:
             self._values = TableView(self.tables)
         return self._values
@@ -78,7 +78,7 @@ class SceneDraft:
         return bool(self._mistakes)
 
     def has(self, key: str) -> bool:
-        """Return whether a key or table is written, right or wrong."""
+        """Return whether the scene contains a key or table, also with an invalid value."""
         return self.written_value(key) is not None
 
     def written_value(self, key: str) -> Any:
@@ -86,7 +86,7 @@ class SceneDraft:
         return find_value(self.raw, key)
 
     def has_set_key(self, key: str) -> bool:
-        """Return whether a key in the notation of --set, with items by name or number, is written."""
+        """Return whether the scene contains a key that is given as in --set, with items by name or number."""
         value: Any = self.raw
         for piece in split_key(key):
             value = find_item_or_value(value, piece)

@@ -62,12 +62,12 @@ class StructureFacts(TableFacts):
 
     @cached_property
     def descriptions(self) -> list[str]:
-        """Keys of DESCRIPTION_KEYS that are written."""
+        """Keys of DESCRIPTION_KEYS that the scene sets."""
         return [key for key in DESCRIPTION_KEYS if self.has(key)]
 
     @property
     def second_description(self) -> str:
-        """Key of DESCRIPTION_KEYS that is one too many; "" if there is none."""
+        """Second of the DESCRIPTION_KEYS that the scene sets; "" if it sets at most one."""
         return self.descriptions[1] if len(self.descriptions) > 1 else ""
 
     @property
@@ -390,7 +390,7 @@ def check_energy_gain(draft: SceneDraft, kind: str) -> None:
 
 
 def describe_hidden_modes(tables: Tables) -> list[str]:
-    """Return a sentence on each mode that slides and, by default, does not move the output."""
+    """Return a sentence about each mode that slides and, by default, does not move the output."""
     structure = tables.structure
     drive = tables.drive
     sentences = []
@@ -461,7 +461,7 @@ def _check_masses(draft: SceneDraft) -> None:
 
 
 def _check_mass_pair(draft: SceneDraft, key: str, pair: tuple | None) -> None:
-    """Report a pair of masses that is one mass, or that names a mass that does not exist."""
+    """Report a pair that joins a mass to itself or names a mass that does not exist."""
     if pair is None:
         return
     if pair[0] == pair[1]:
@@ -547,7 +547,7 @@ def find_file_extension(name: str) -> str:
 
 
 def _check_start(draft: SceneDraft) -> None:
-    """Report initial values that are missing, or are not one for each mode or mass."""
+    """Report missing initial values, and lists without one value for each mode or mass."""
     structure = draft.tables.structure
     if not draft.has("structure.start.displacement") and not draft.has("structure.start.velocity"):
         draft.add_missing(

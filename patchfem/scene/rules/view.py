@@ -1,4 +1,4 @@
-"""Views of the tables for the rules: a missing or refused value compares as false."""
+"""Views of the tables for the rules: a comparison with a missing or invalid value is false."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..keys.types import Table
 
 
 class _Unknown(float):
-    """Value of a missing or refused key: a NaN that is false, empty and has any attribute."""
+    """Placeholder for a missing or invalid value: a false, empty NaN whose attributes are all itself."""
 
     def __bool__(self) -> bool:
         return False

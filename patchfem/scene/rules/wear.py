@@ -44,7 +44,7 @@ class WearFacts(TableFacts):
 
     @property
     def strip_compliance(self) -> str:
-        """Key of the compliance that allows partial slip of strips; "" if there is none."""
+        """Key that sets the compliance for partial slip of the strips; "" without such a key or without strips."""
         return self.compliance if self.scene.contact.strips else ""
 
     @property
@@ -243,7 +243,7 @@ def check_wear(draft: SceneDraft, kind: str) -> None:
 
 
 def _check_factors(wear: WearFacts) -> None:
-    """Report factors that are not one for each depth, or do not begin with 1."""
+    """Report factors whose number is not that of the depths, or that do not begin with 1."""
     for key in FACTOR_KEYS:
         factors = wear.friction[key]
         if factors and wear.depths and len(factors) != len(wear.depths):
