@@ -52,9 +52,9 @@ class LastCycles:
     - stiffness: K of the first mode as seen by the contact [N/m]; 0 if no damping ratio refers to
       it.
     - sine: whether the drive is a sine at the end of the run.
-    - own: measures that the engine integrated itself.
+    - integrated: measures that the engine integrated itself.
     - loop: first harmonics of slide [m] and force [N] and work per cycle [J], if they do not come
-      from `own`; None if the window contains no whole cycle.
+      from `integrated`; None if the window contains no whole cycle.
     - ledger (4, k): friction work and energies [J], or None.
     - known: values by name that the engine has itself; None if it has no value of a measure.
     - by: how the force at a reversal of the slide is evaluated (see `loops.find_reversals`).
@@ -75,7 +75,7 @@ class LastCycles:
     load: float | None
     stiffness: float
     sine: bool
-    own: IntegratedMeasures = NO_INTEGRATED_MEASURES
+    integrated: IntegratedMeasures = NO_INTEGRATED_MEASURES
     loop: tuple | None = None
     ledger: np.ndarray | None = None
     known: dict = field(default_factory=dict)
@@ -107,7 +107,7 @@ class LastCycles:
         """slip_amplitude [m], stick_fraction [1] and slip_start_phase [rad] by name, where defined."""
         if self.load is None:
             return {}
-        first = self.own.loops[0] if self.own.loops else None
+        first = self.integrated.loops[0] if self.integrated.loops else None
         if first is None or first.stuck_time is None:
             window = self.even or self.samples
             steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
@@ -118,7 +118,7 @@ class LastCycles:
                 [lateral_history(window, one, self.number) for one in ("slides", "slips")],
             )
         else:
-            starts = self.own.slip_start_phases
+            starts = self.integrated.slip_start_phases
             found = {"stick_fraction": stick_fraction(first.stuck_time, self.span)} | (
                 {} if starts is None else slip_start_measure(np.asarray(starts))
             )
@@ -128,17 +128,17 @@ class LastCycles:
     @cached_property
     def turns(self) -> list:
         """Smallest and largest `Reversal` of the slide in every whole cycle of the window."""
-        if self.own.reversals:
-            return [tuple(Reversal(*one) for one in pair) for pair in self.own.reversals]
+        if self.integrated.reversals:
+            return [tuple(Reversal(*one) for one in pair) for pair in self.integrated.reversals]
         w = self.samples
         return find_reversals(w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.by)
 
     @cached_property
     def harmonics(self) -> tuple | None:
         """First harmonics of slide and force, and work per cycle [J]; None without a whole cycle."""
-        if self.loop is not None or not self.own.loops or not self.whole:
+        if self.loop is not None or not self.integrated.loops or not self.whole:
             return self.loop
-        first = self.own.loops[0]
+        first = self.integrated.loops[0]
         return (
             first.displacement_harmonic,
             first.force_harmonic,
@@ -173,10 +173,10 @@ class LastCycles:
         """
         if not (self.sine and self.whole):
             return {}
-        if self.own.acceleration_harmonics is None:
+        if self.integrated.acceleration_harmonics is None:
             return wave_measures(*odd_harmonics(self.window, self.drive))
         return wave_measures(
-            *self.own.acceleration_harmonics, drive_sizes.find_max_acceleration(self.drive)
+            *self.integrated.acceleration_harmonics, drive_sizes.find_max_acceleration(self.drive)
         )
 
     @cached_property
@@ -205,14 +205,16 @@ class LastCycles:
     @property
     def work_check(self) -> float | None:
         """Relative difference [1] of the two values of the friction work; None without a second one."""
-        if self.load is None or self.own.friction_works is None:
+        if self.load is None or self.integrated.friction_works is None:
             return None
-        return relative_gap(*self.own.friction_works, self.book["power"] + self.book["peak_stored"])
+        return relative_gap(
+            *self.integrated.friction_works, self.book["power"] + self.book["peak_stored"]
+        )
 
     def others(self) -> list:
         """Return the LastCycles of each interface after the first one.
 
-        The work of an interface comes from `own.loops` or, without them, from the samples.
+        The work of an interface comes from `integrated.loops` or, without them, from the samples.
         """
         extra = self.window.extra
         if self.load is None or self.together or "slides" not in extra:
@@ -226,7 +228,7 @@ class LastCycles:
                 force=extra["forces"][:, k],
                 slip=slips[:, k],
             )
-            loops = self.own.loops[k : k + 1]
+            loops = self.integrated.loops[k : k + 1]
             work = loops[0].work if loops else float(np.trapezoid(window.force, window.slide))
             if not loops:
                 work += lateral_work(self.window, k)
@@ -234,7 +236,7 @@ class LastCycles:
                 replace(
                     self,
                     window=window,
-                    own=IntegratedMeasures(loops=loops),
+                    integrated=IntegratedMeasures(loops=loops),
                     sine=False,
                     known={},
                     number=k,
@@ -345,8 +347,8 @@ ROWS = (
         "motion, from a reversal to the second reversal after it",
         lambda s: (
             float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2
-            if s.own.output_amplitude is None
-            else s.own.output_amplitude
+            if s.integrated.output_amplitude is None
+            else s.integrated.output_amplitude
         ),
     ),
     MeasureDefinition(
@@ -356,8 +358,8 @@ ROWS = (
         "largest acceleration at the output, base motion included",
         lambda s: (
             compute_acceleration_peak(s.window)
-            if s.own.acceleration_peak is None
-            else s.own.acceleration_peak
+            if s.integrated.acceleration_peak is None
+            else s.integrated.acceleration_peak
         ),
     ),
     MeasureDefinition(
@@ -369,8 +371,8 @@ ROWS = (
         lambda s: (
             None
             if s.load is None
-            else s.own.loops[0].max_force
-            if s.own.loops
+            else s.integrated.loops[0].max_force
+            if s.integrated.loops
             else resultant_peak(s.samples.force, s.lateral("forces"))
         ),
         group="friction",
@@ -407,7 +409,7 @@ ROWS = (
         "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over the "
         "first cycle of the window)/(number of cycles between these two cycles); if the interface slides in a plane, "
         "the length of this vector; null if the drive is not periodic at the end of the run",
-        lambda s: compute_drift(s) if s.own.drift is None else s.own.drift,
+        lambda s: compute_drift(s) if s.integrated.drift is None else s.integrated.drift,
         larger_term=("slip amplitude (without slip: amplitude of the motion)", _drift_scale),
         order=CUBIC_ORDER,
     ),

@@ -23,10 +23,10 @@ from .cost import Cost, MemoryPart
 from .patch import plan as patch_plan
 from .rig import engines
 from .rig import plan as of_rig
-from .tolerance_forecast import NOTHING_FORESEEN, Forecast, foresee_tolerance
+from .tolerance_forecast import NOTHING_FORESEEN, Forecast, forecast_tolerance
 from .wear import plan as of_wear
 
-PACKAGES = 80e6  # memory of the packages that every run imports [bytes]
+PACKAGE_BYTES = 80e6  # memory of the packages that every run imports [bytes]
 LONGEST = 1e6  # CPU seconds (twelve days) above which no run is started
 # engines that skip the cycles of a periodic motion, and number of cycles from which a plan says so
 SKIPS, MIN_SKIPPED_CYCLES = (
@@ -226,7 +226,7 @@ def _make_plan(model: Model) -> Plan:
         and model.rig.drive.cycles >= MIN_SKIPPED_CYCLES
     ):
         on_law.append(UP_TO)
-    foreseen = foresee_tolerance(model)
+    foreseen = forecast_tolerance(model)
     on_motion = [*([foreseen.sentence()] if foreseen.causes else []), *on_motion]
     is_compiled = cost.compile_seconds == 0 or compiled.has_run(
         compiled_kind(model, cost.engine, cost.sizes)
@@ -257,7 +257,7 @@ def _cost(model: Model) -> Cost:
     elif model.kind == "bench":
         motion = of_bench.cost(model, points)
     total = (
-        Cost({"start": cost_model.START_SECONDS}, (MemoryPart(PACKAGES, "packages"),))
+        Cost({"start": cost_model.START_SECONDS}, (MemoryPart(PACKAGE_BYTES, "packages"),))
         + pressing
         + motion
     )

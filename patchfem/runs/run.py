@@ -107,7 +107,7 @@ def _run(what: Plan, say, progress, estimate: bool, fresh: bool, kept: StateFile
             model.patch, model.accuracy.tolerance, estimate, fresh
         )
         if model.kind == "bench" and patch.pressure.outcome is not Outcome.NO_CONTACT:
-            still = patch_result.static_ladder(
+            still = patch_result.solve_static_ladder(
                 model.patch, model.accuracy.tolerance, estimate, fresh
             )
         seconds["contact"] = perf_counter() - begin

@@ -91,7 +91,7 @@ def _cure_words(cure: dict) -> str:
     return " and ".join(parts)
 
 
-def foresee_tolerance(model: Model) -> Forecast:
+def forecast_tolerance(model: Model) -> Forecast:
     """Predict whether a model will miss its tolerance, as a Forecast, before it is computed."""
     tolerance = model.accuracy.tolerance
     if cause := _mesh_cause(model, tolerance):

@@ -75,7 +75,7 @@ def test_always_other_patches_are_not_the_same(changed):
 
 def test_always_a_file_that_may_change_is_read_again(tmp_path):
     own = pf.build(TEXT)
-    assert not store.is_shared(own.patch) and store.is_shared(
+    assert not store.may_be_shared(own.patch) and store.may_be_shared(
         with_shared_meshes([own, own])[0].patch
     )
     (tmp_path / "heights.csv").write_text(
@@ -85,4 +85,4 @@ def test_always_a_file_that_may_change_is_read_again(tmp_path):
         TEXT.replace(SHEAR, SHEAR + '[contact.profile]\nfile = "heights.csv"\n')
     )
     profiled = with_shared_meshes([pf.build(tmp_path / "a.toml")] * 2)[0].patch
-    assert profiled.mesh.shared is not None and not store.is_shared(profiled)
+    assert profiled.mesh.shared is not None and not store.may_be_shared(profiled)

@@ -103,7 +103,7 @@ def test_a_right_run_raises_no_alarm():
         evidence = Evidence(result)
         for check in checks.CHECKS:
             findings = list(check(evidence))
-            assert not any(finding.is_failed for finding in findings)
+            assert not any(finding.has_failed for finding in findings)
             made |= {check} if findings else set()
     assert made == set(checks.CHECKS)
 

@@ -157,7 +157,7 @@ class BenchModel:
         if model.patch is None:
             return None
         if self.moves_contact:
-            self.patch = press_patch(self._shared_meshes().given(model))
+            self.patch = press_patch(self._shared_meshes().with_shared_meshes(model))
         elif self.patch is None:
             self.patch = press_patch(model)
         return self.patch

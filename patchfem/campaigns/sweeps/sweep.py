@@ -160,7 +160,11 @@ def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels |
         return found
     if found.first.kind != "patch":
         return None
-    return found if work.meshes is None else replace(found, first=work.meshes.given(found.first))
+    return (
+        found
+        if work.meshes is None
+        else replace(found, first=work.meshes.with_shared_meshes(found.first))
+    )
 
 
 def _build_case_model(work: Work, number: int):
@@ -169,7 +173,7 @@ def _build_case_model(work: Work, number: int):
         model = work.asked.model(work.cases.sets(number), work.cases.values(number))
     except PatchfemError as error:
         return error
-    return model if work.meshes is None else work.meshes.given(model)
+    return model if work.meshes is None else work.meshes.with_shared_meshes(model)
 
 
 def choose_meshes(work: Work) -> Work:

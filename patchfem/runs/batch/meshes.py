@@ -34,7 +34,7 @@ class Shared:
             except PatchfemError:  # each case is run by itself, which reports its error
                 continue
 
-    def given(self, model: Model | PatchfemError) -> Model | PatchfemError:
+    def with_shared_meshes(self, model: Model | PatchfemError) -> Model | PatchfemError:
         """Return the model with its shared meshes; the same model if it has none."""
         meshes = self.meshes.get(_key(model)) if self.meshes and _wants(model) else None
         if meshes is None:
@@ -48,7 +48,7 @@ def with_shared_meshes(models: Sequence[Model | PatchfemError]) -> list:
     A single patch of a geometry keeps the mesh that its own run chooses.
     """
     shared = Shared(models)
-    return [shared.given(model) for model in models]
+    return [shared.with_shared_meshes(model) for model in models]
 
 
 def _wants(model: Model | PatchfemError) -> bool:

@@ -67,7 +67,7 @@ def solved_together(models: Sequence[Model]) -> list[Model]:
     out, groups = list(models), {}
     for case, model in enumerate(models):
         if not static.not_together(model.patch):
-            asked = store.content_key(model.patch) if store.is_shared(model.patch) else case
+            asked = store.content_key(model.patch) if store.may_be_shared(model.patch) else case
             groups.setdefault(group(model), {}).setdefault(asked, []).append(case)
     for alike in groups.values():
         first = [models[cases[0]] for cases in alike.values()]

@@ -85,7 +85,7 @@ class MotionObserver:
     def __call__(self, drive, near=None) -> ObservedMotion | None:
         """Return the motion under a drive, found from `near` or from rest; None if not found."""
         try:
-            return self._gauged(
+            return self._with_gauge_displacement(
                 {
                     "yields": self._yields,
                     "balance": self._balance,
@@ -98,7 +98,7 @@ class MotionObserver:
                 return None
         return self(drive)
 
-    def _gauged(self, seen: ObservedMotion | None) -> ObservedMotion | None:
+    def _with_gauge_displacement(self, seen: ObservedMotion | None) -> ObservedMotion | None:
         """Return the result with the displacement of the gauge, if the rig has one."""
         gauge = self.model.rig.modes.gauge
         if seen is None or gauge is None or seen.window is None:
@@ -110,7 +110,7 @@ class MotionObserver:
             )
         )
 
-    def _once(self, name: str, make):
+    def _get_or_make(self, name: str, make):
         """Return the object of this name, made on the first call."""
         if name not in self.made:
             self.made[name] = make()
@@ -148,7 +148,7 @@ class MotionObserver:
 
     def _yields(self, drive, near) -> ObservedMotion:
         """Return the motion of elastic-plastic elements, by their event map or harmonic balance."""
-        orbits = self._once("yields", self._orbits)
+        orbits = self._get_or_make("yields", self._orbits)
         try:
             seen = orbits(drive, near)
         except NotConverged:
@@ -176,7 +176,7 @@ class MotionObserver:
 
     def _balance(self, drive, near) -> ObservedMotion:
         """Return the motion by harmonic balance."""
-        one = self._once(
+        one = self._get_or_make(
             "balance",
             lambda: rig_balance.BalanceFinder(self.model, self.numerics, self.patch, 0, self.say),
         )
@@ -193,7 +193,7 @@ class MotionObserver:
 
     def _events(self, drive, near) -> ObservedMotion | None:
         """Return the motion of Coulomb interfaces by the event map."""
-        one = self._once(
+        one = self._get_or_make(
             "events", lambda: maps.EventFinder(self.model, self.numerics, self.patch, 0, self.say)
         )
         return _last_cycles(one.point(drive)[0])

@@ -24,8 +24,8 @@ from ..results.notes import (
 from ..results.result import (
     FRAMES,
     Result,
+    has_known_mesh_error,
     interface_frames,
-    on_a_mesh_of_known_error,
     remove_unknown_errors,
 )
 from ..results.travel import (
@@ -103,7 +103,7 @@ def run_prescribed(what, patch, coarse, seconds, warnings, say, progress, estima
         )
         notes = growth_notes(model.bonds, peak)
     notes = [*notes, *climbing_as_one(model, patch)]
-    known = estimate and on_a_mesh_of_known_error(model, patch, coarse)
+    known = estimate and has_known_mesh_error(model, patch, coarse)
     found = remove_unknown_errors(found, known)
     found = set_final_floors(found, model.accuracy.tolerance)
     count = shear.count_shear_modes(model, patch) if model.partial_slip else None

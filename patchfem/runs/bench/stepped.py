@@ -21,7 +21,9 @@ from .ledger import (
     make_ledger,
 )
 
-MOST_WORK = 2e11  # most strip-point products of a direct quadrature; a bench with more is refused
+MAX_STRIP_POINT_PRODUCTS = (
+    2e11  # most strip-point products of a direct quadrature; a bench with more is refused
+)
 
 
 def slide_step_by_step(
@@ -202,7 +204,7 @@ def _evaluate_law(
 
 
 def refuse_long_sum(model, law, samples: int, points: int, slide) -> None:
-    """Raise Missing if the NumPy sum over bonds needs more than MOST_WORK strip-point products.
+    """Raise Missing if the NumPy sum over bonds needs more than MAX_STRIP_POINT_PRODUCTS strip-point products.
 
     Bonds older than 25 bond lengths count as cut off.
 
@@ -220,10 +222,10 @@ def refuse_long_sum(model, law, samples: int, points: int, slide) -> None:
     reach = 25 * model.friction.bond_length
     per_step = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
     strips = min(samples, 2 * reach / per_step + 64)
-    if 6 * strips * samples * points > MOST_WORK:
+    if 6 * strips * samples * points > MAX_STRIP_POINT_PRODUCTS:
         raise Missing(
             f"the direct sum over bonds would need {6 * strips * samples * points:.1e} multiplications, more "
-            f"than the limit of {MOST_WORK:.0e}; lower accuracy.steps_per_cycle or slide.cycles",
+            f"than the limit of {MAX_STRIP_POINT_PRODUCTS:.0e}; lower accuracy.steps_per_cycle or slide.cycles",
             "",
         )
 

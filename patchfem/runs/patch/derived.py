@@ -31,7 +31,7 @@ def static_measures(asked, patch: Patch, coarse, tolerance: float | None) -> dic
 
     return (
         store.reuse(("measures", patch, coarse, tolerance), make)
-        if store.is_shared(asked)
+        if store.may_be_shared(asked)
         else make()
     )
 
@@ -40,6 +40,6 @@ def plane_notes(asked, patch: Patch) -> list:
     """Return the note on the plane state of a patch (`measures.plane_band`), as a list."""
     if asked.solved is not None:
         return asked.solved.band
-    if not store.is_shared(asked):
+    if not store.may_be_shared(asked):
         return plane_band(asked, patch)
     return store.reuse(("plane band", patch), lambda: plane_band(asked, patch))

@@ -113,7 +113,7 @@ def solve_on_points(asked, enough) -> PointSolution:
     enough : callable
         Function of the measures that ends the refinement; MAX_POINTS and MAX_WORK end it as well.
     """
-    count, series, found = _first(asked), [], {}
+    count, series, found = _first_level_points(asked), [], {}
     with one_thread():
         try:
             cells = [_ends(asked, level) for level in range(MIN_LEVELS)]
@@ -131,7 +131,7 @@ def solve_on_points(asked, enough) -> PointSolution:
     )
 
 
-def _first(asked) -> int:
+def _first_level_points(asked) -> int:
     """Return the number of points of the first level."""
     n_samples = asked.pieces.length / profile.find_sample_spacing(asked.gap.profile)
     return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))

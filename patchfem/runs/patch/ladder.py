@@ -64,7 +64,7 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
                 [condense(asked, *level, fresh=True) for level in asked.mesh.shared.levels],
                 estimate,
             )
-        if store.is_shared(asked):
+        if store.may_be_shared(asked):
             return store.reuse(
                 ("patches", store.content_key(asked), estimate),
                 lambda: solve_on_pairs(asked, shared_pairs(asked), estimate),
@@ -204,7 +204,9 @@ def most_seconds(asked, tolerance: float | None = None) -> float:
     )
 
 
-def static_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
+def solve_static_ladder(
+    asked, tolerance: float, estimate: bool = True, fresh: bool = False
+) -> tuple:
     """Solve the patch of a bench with partial slip on the meshes of a static run, fine to coarse.
 
     Return () if the mesh is prescribed or shared with other cases, or if the patch is solved

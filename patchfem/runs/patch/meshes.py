@@ -154,7 +154,7 @@ def select_distinct_patches(patches, most: int = MAX_CASES) -> tuple:
     most : int
         Largest number of patches.
     """
-    rows = {_numbers(one): one for one in patches}
+    rows = {_contact_numbers(one): one for one in patches}
     keys = sorted(rows)
     if len(keys) <= most:
         return [rows[key] for key in keys], True
@@ -170,7 +170,7 @@ def select_distinct_patches(patches, most: int = MAX_CASES) -> tuple:
     return [rows[keys[k]] for k in sorted(picked)], False
 
 
-def _numbers(asked) -> tuple:
+def _contact_numbers(asked) -> tuple:
     """Return the numbers by which the contacts of two patches of one geometry differ."""
     shapes = [
         float(value)
@@ -199,12 +199,12 @@ def _numbers(asked) -> tuple:
 def _halvings(cases: list, tolerance: float) -> dict:
     """Return how often a single run halves the cells of a case beyond the minimum of levels.
 
-    The keys are `_numbers`. CLIMBED_CASES cases are tried.
+    The keys are `_contact_numbers`. CLIMBED_CASES cases are tried.
     """
     out = {}
     for one in select_distinct_patches(cases, CLIMBED_CASES)[0]:
         try:
-            out[_numbers(one)] = (
+            out[_contact_numbers(one)] = (
                 len(ladder.solve_on_ladder(one, one.mesh.tolerance or tolerance)) - grids.MIN_LEVELS
             )
         except PatchfemError:  # the single run of this case reports the error
@@ -242,7 +242,9 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
             return None
         layout = _merge_layouts(
             [
-                grids.find_layout(one, [found]).scale_cells(0.5 ** halvings.get(_numbers(one), 0))
+                grids.find_layout(one, [found]).scale_cells(
+                    0.5 ** halvings.get(_contact_numbers(one), 0)
+                )
                 for one, found in seen
             ],
             between,

@@ -26,10 +26,10 @@ from .grids import (
 )
 from .ladder import comparison_meshes
 
-PACKAGES = 2e7  # memory of the packages that a run with elastic pieces imports [bytes]
+PACKAGE_BYTES = 2e7  # memory of the packages that a run with elastic pieces imports [bytes]
 CONDENSING_BYTES_RATIO = 0.8  # measured bytes over the predicted bytes of condensing
 # memory per node of pieces that extend beyond the interface [bytes]
-OUTLINED_NODE = 4.6e3
+BYTES_PER_OUTLINED_NODE = 4.6e3
 FRAMES_NODE = 3.5e3  # memory of the frames of a motion per node [bytes]
 STRIP_NODE = 3000.0  # memory per strip and node of the interface [bytes]
 # tolerance below which a contact with an end inside the interface, or over a jump, needs another
@@ -157,8 +157,10 @@ def pressing_cost(asked, tolerance: float) -> Cost:
         "condensing": per_second * found.seconds,
         "fields": cost_model.FIELDS_SECONDS,
     }
-    size = PACKAGES + (
-        OUTLINED_NODE * found.nodes if found.outlined else CONDENSING_BYTES_RATIO * found.bytes
+    size = PACKAGE_BYTES + (
+        BYTES_PER_OUTLINED_NODE * found.nodes
+        if found.outlined
+        else CONDENSING_BYTES_RATIO * found.bytes
     )
     if not asked.mesh.is_static:
         times["fields"] += cost_model.FRAMES_SECONDS + cost_model.FRAME_NODE_SECONDS * found.nodes

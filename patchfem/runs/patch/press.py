@@ -274,7 +274,7 @@ def areas(asked, interface) -> np.ndarray:
     return np.repeat(interface.weight[None] / count, count, axis=0)
 
 
-def presser(asked, pair: Pair):
+def make_force_function(asked, pair: Pair):
     """Return a function that computes the contact forces on the worn faces of a `PatchModel`.
 
     It maps worn depth (m,) [m], which is added to the gap, and softening (m,) [m/N], which is added

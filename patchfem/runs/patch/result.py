@@ -19,7 +19,7 @@ from ...surface import nodes
 from ..results.patch_rows import TABLE
 from ..results.result import Result, at_rest
 from . import derived, skin
-from .ladder import solve_all, static_ladder
+from .ladder import solve_all, solve_static_ladder
 from .measures import strip_error
 from .values import reaches_steep_end, values
 
@@ -30,8 +30,8 @@ __all__ = [
     "bodies",
     "notes_on_neglected_effects",
     "solve_all",
+    "solve_static_ladder",
     "static",
-    "static_ladder",
     "static_measures",
     "static_measures_without_errors",
     "warn_of_strains",

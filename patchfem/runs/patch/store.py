@@ -57,7 +57,7 @@ def content_key(asked) -> tuple:
     )
 
 
-def is_shared(asked) -> bool:
+def may_be_shared(asked) -> bool:
     """Return whether the results of a `PatchModel` may be reused by other cases of a sweep.
 
     This requires shared meshes, and neither a mesh nor a profile from a file.

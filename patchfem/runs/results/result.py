@@ -149,7 +149,7 @@ def interface_frames(patch, time, tau, local, slide) -> dict:
     }
 
 
-def on_a_mesh_of_known_error(model, patch, coarse) -> bool:
+def has_known_mesh_error(model, patch, coarse) -> bool:
     """Return whether the error of a motion due to the mesh of its patch can be estimated.
 
     This requires the patch on a coarser mesh, unless the motion does not depend on the mesh.

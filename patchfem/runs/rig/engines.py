@@ -113,7 +113,7 @@ class Engine(NamedTuple):
         """
         if model.rig.structure.richer_rig is None:
             return []
-        few = _fewer(numerics, 4) if self.coarser_in_time is _march_in_time else numerics
+        few = _divide_steps(numerics, 4) if self.coarser_in_time is _march_in_time else numerics
         beside = None if few is numerics else Variant(few, patch)
         return [
             CoarserRuns(
@@ -287,7 +287,7 @@ def _numerics_of_meshes(model: Model, numerics) -> list:
     return [replace(numerics, meshed=one) for one in faces.interfaces_with_coarse_mesh(model)]
 
 
-def _fewer(numerics, share: int):
+def _divide_steps(numerics, share: int):
     """Return the Numerics of a run whose steps per cycle are divided by `share`."""
     return replace(numerics, steps=max(1, numerics.steps // share))
 
@@ -303,7 +303,7 @@ def _march_in_time(model: Model, numerics, patch) -> list:
 
 def _halves(numerics, patch) -> tuple:
     """Return the Variants with half and a quarter of the steps."""
-    return tuple(Variant(_fewer(numerics, share), patch) for share in (2, 4))
+    return tuple(Variant(_divide_steps(numerics, share), patch) for share in (2, 4))
 
 
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
@@ -311,7 +311,7 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
     They have a coarser mesh, another number of shear modes, or another sum over bonds.
     """
-    few, varies, out = _fewer(numerics, 4), model.rig.friction.load_varies, []
+    few, varies, out = _divide_steps(numerics, 4), model.rig.friction.load_varies, []
     quarter = Variant(few, patch)
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     if coarse is not None and (varies or model.partial_slip):

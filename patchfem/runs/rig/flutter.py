@@ -32,7 +32,7 @@ UNBALANCED = (
     'with bonds limit cycles can be computed only for friction.reading = "stretch", order = 1, a constant '
     "bond length, breakaway = 0 and pieces that are rigid in shear"
 )
-SLIDES = (
+NO_SLIDING_NOTE = (
     "no motion was found in which the interface always slides and friction dissipates the energy that the mode "
     "gains"
 )
@@ -116,7 +116,7 @@ def _cycles(model, numerics, patch) -> tuple:
                     0.0,
                 )
             static, kinetic = contact.element.numbers[1:3]
-            return limit_cycles.find_relay_cycles(modes, row, kinetic, static), SLIDES, 0.0
+            return limit_cycles.find_relay_cycles(modes, row, kinetic, static), NO_SLIDING_NOTE, 0.0
         finder = BalanceFinder(model, numerics, patch)
         cycles, looked = limit_cycles.find_balance_cycles(modes, finder.group, row, f.static * load)
         return cycles, NONE if not looked else FEWER, looked

@@ -109,7 +109,7 @@ def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
     return (low + high) / 2, (high - low) / 2
 
 
-def drive_with(drive, number: int, level: float):
+def drive_at_level(drive, number: int, level: float):
     """Return the drive that ends with `level` [m s-2] in place of the level of this index."""
     return replace(
         drive, segments=(*drive.segments[:number], replace(drive.segments[number], amplitude=level))

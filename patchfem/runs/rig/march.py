@@ -121,17 +121,17 @@ class MarchReader(Reader):
             prepare=prepare,
             levels=levels,
             probe=probe,
-            summed=self.summed(),
+            summed=self.choose_bond_sum(),
             extra={"late": self.late(run.window)},
             **more,
         )
 
-    def own(self, run, drive, values: dict) -> dict:
+    def stated_errors(self, run, drive, values: dict) -> dict:
         """Return the errors due to peaks between samples and due to the end of the run, by name."""
-        late, between = self.late(run.window), self.between(run.window)
+        late, between = self.late(run.window), self.peak_excesses(run.window)
         return {name: late.get(name, 0.0) + between.get(name, 0.0) for name in late | between}
 
-    def between(self, window) -> dict:
+    def peak_excesses(self, window) -> dict:
         """Return by how much the peaks of a run may exceed its samples, by measure name."""
         return peak_sampling_errors(window, self.model.grooves is not None)
 
@@ -143,7 +143,7 @@ class MarchReader(Reader):
         )
         return {name: LATE * error for name, error in found.items()}
 
-    def summed(self):
+    def choose_bond_sum(self):
         """Return the EngineChoice of the sum over bonds; None for laws without bonds."""
         f = self.model.friction
         return (
@@ -152,13 +152,13 @@ class MarchReader(Reader):
             else None
         )
 
-    def integrated(self, run, drive) -> IntegratedMeasures:
+    def integrated_measures(self, run, drive) -> IntegratedMeasures:
         """Return the two values of the friction work, both of which a march integrates."""
         return IntegratedMeasures(
             friction_works=tuple(run.ledger[name] for name in ("sampled", "booked", "passed"))
         )
 
-    def more(self, run, drive, stuck: bool) -> dict:
+    def further_fields(self, run, drive, stuck: bool) -> dict:
         """Return the loop and, if an interface with a set-valued law sticks, its known measures."""
         if not self.rubs:
             return {}
@@ -243,7 +243,7 @@ class MarchReader(Reader):
 
         def probe(number, level):
             """Run another level after the level of this index, and return its Level."""
-            other = rig_levels.drive_with(rig.drive.signal, number + 1, level)
+            other = rig_levels.drive_at_level(rig.drive.signal, number + 1, level)
             run = (
                 done.marks[number].after.fork(other)
                 if number >= 0

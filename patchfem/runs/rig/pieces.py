@@ -159,7 +159,7 @@ class PieceReader(Reader):
             else super().sticks(run)
         )
 
-    def integrated(self, run, drive) -> IntegratedMeasures:
+    def integrated_measures(self, run, drive) -> IntegratedMeasures:
         """Return the friction loops of the interfaces.
 
         Strips that slide independently have a single loop, that of their mean, from samples. `more`
@@ -167,12 +167,12 @@ class PieceReader(Reader):
         """
         return IntegratedMeasures(loops=(_strips_loop(run, drive),) if self.apart else run.loops)
 
-    def more(self, run, drive, stuck: bool) -> dict:
+    def further_fields(self, run, drive, stuck: bool) -> dict:
         """Return the measures that the engine computes between events, as fields of `LastCycles`.
 
         Rigid elements dissipate all work of friction, so that their ledger is known.
         """
-        found = measures_of_reading(
+        found = measures_from_reading(
             run.reading,
             run.ledger,
             is_sinusoidal(drive),
@@ -244,7 +244,7 @@ class PieceReader(Reader):
         held = self.held_modes(run, after, drive)
         return {"tail": select_strongest(held, "displacement")} if held else {}
 
-    def own(self, run, drive, values: dict) -> dict:
+    def stated_errors(self, run, drive, values: dict) -> dict:
         """Return the errors of measures that come from samples, and of the drift of rigid elements.
 
         The drift of rigid elements has the round-off of the difference of two means; below 1.5
@@ -255,7 +255,7 @@ class PieceReader(Reader):
         drive falls with 1/r^2, and its fourth derivative grows with r^2.
         """
         window, modes = run.window, self.model.rig.modes
-        left = {} if self.apart else self.sampled(run, drive, values)
+        left = {} if self.apart else self.sampling_errors(run, drive, values)
         if not self.rigid or window.time[-1] - window.time[0] < 1.5 * drive.period:
             return left
         if not self.apart:
@@ -464,7 +464,7 @@ def elements_of_law(element) -> elements.Elements:
     )
 
 
-def measures_of_reading(
+def measures_from_reading(
     reading: Reading, book: dict, sine: bool, whole: bool, stiffness, size
 ) -> dict:
     """Return measures of the first interface and the motion by name, of one run or (n,) of many.

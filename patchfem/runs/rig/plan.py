@@ -442,7 +442,7 @@ def _steady_point(model: Model, by: str) -> float:
         return (
             cost_model.BALANCE_POINT_SECONDS
             + cost_model.BALANCE_UNKNOWN_SECONDS * size**3
-            + _smooth_laws(rig)
+            + _smooth_law_seconds(rig)
         )
     if by == "march":
         return N_MARCHED_CYCLES * steps_per_cycle(model) * cost_model.GROOVE_STEP_SECONDS
@@ -460,7 +460,7 @@ def _steady_point(model: Model, by: str) -> float:
     )
 
 
-def _smooth_laws(rig) -> float:
+def _smooth_law_seconds(rig) -> float:
     """Return the CPU seconds that smooth laws add to a point computed by harmonic balance.
 
     Their slope changes during the whole cycle, whereas that of elements that stick and slip is

@@ -50,11 +50,11 @@ class Reader:
         )  # such a law never sticks
         self.held = 0.0 if self.creeps else held
 
-    def integrated(self, run, drive) -> IntegratedMeasures:
+    def integrated_measures(self, run, drive) -> IntegratedMeasures:
         """Return the measures that the engine integrated over the last cycles of a run."""
         return IntegratedMeasures()
 
-    def more(self, run, drive, stuck: bool) -> dict:
+    def further_fields(self, run, drive, stuck: bool) -> dict:
         """Return further fields of `response.rows.LastCycles` that the engine knows, by name."""
         return {}
 
@@ -73,9 +73,10 @@ class Reader:
             See `LastCycles`.
         """
         drive = drive or self.model.rig.drive.signal
-        given = {"own": self.integrated(run, drive), "run": self.whole_run(run, drive)} | self.more(
-            run, drive, stuck
-        )
+        given = {
+            "integrated": self.integrated_measures(run, drive),
+            "run": self.whole_run(run, drive),
+        } | self.further_fields(run, drive, stuck)
         if self.rubs:
             given = {"by": reversal_evaluation(self.model), "ledger": ledger} | given
         window, book = given.pop("window", run.window), given.pop("book", run.ledger)
@@ -91,7 +92,7 @@ class Reader:
 
     def sticks(self, run) -> bool:
         """Return whether no interface slips in the last cycles by more than `held` or round-off."""
-        loops = self.integrated(run, self.model.rig.drive.signal).loops
+        loops = self.integrated_measures(run, self.model.rig.drive.signal).loops
         if not self.rubs or self.creeps:
             return False
         if loops:
@@ -108,22 +109,24 @@ class Reader:
             run.window, self.model.rig.modes, drive, getattr(run, "log", None), self.held
         )
 
-    def own(self, run, drive, values: dict) -> dict:
+    def stated_errors(self, run, drive, values: dict) -> dict:
         """Return the errors that the run itself states, by name, except those of its ringing."""
         return {}
 
-    def fewer(self, run):
+    def with_half_the_samples(self, run):
         """Return the run with every second one of its samples."""
         return replace(run, window=thin_samples(run.window))
 
-    def sampled(self, run, drive, values: dict) -> dict:
+    def sampling_errors(self, run, drive, values: dict) -> dict:
         """Estimate the sampling errors of the measures of an exact motion, by name.
 
         They follow from the change with every second sample. Measures that the engine integrated
         have no such error.
         """
-        fewer = self.values(self.fewer(run), drive, ledger=run.response.extra.get("ledger"))
-        own = self.integrated(run, drive)
+        fewer = self.values(
+            self.with_half_the_samples(run), drive, ledger=run.response.extra.get("ledger")
+        )
+        integrated = self.integrated_measures(run, drive)
         apart = {
             name: gap
             for name, gap in absolute_change(values, fewer).items()
@@ -135,7 +138,7 @@ class Reader:
                 + find_row(name).sample_error / self.steps
                 for name, gap in apart.items()
             }
-            if own.loops or hasattr(drive, "band")
+            if integrated.loops or hasattr(drive, "band")
             else {}
         )
 
@@ -187,7 +190,7 @@ class Reader:
             Other fields of the Solution.
         """
         drive, window = drive or self.model.rig.drive.signal, self.numerics.window
-        stuck, (rings, own) = self.sticks(run), self.rings(run, drive)
+        stuck, (rings, ring_errors) = self.sticks(run), self.rings(run, drive)
         values = self.values(run, drive, stuck, run.response.extra.get("ledger")) | rings
         kept = {"message": "", "log": None, "snapshots": []}
         more = (
@@ -209,7 +212,9 @@ class Reader:
             seconds=seconds,
             contact=self.contact,
             held=self.held,
-            own=own | self.own(run, drive, values) | self.between_samples(run, drive, values),
+            stated_errors=ring_errors
+            | self.stated_errors(run, drive, values)
+            | self.between_samples(run, drive, values),
             extremes=run.amplitudes,
             **more,
         )

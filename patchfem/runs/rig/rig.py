@@ -21,7 +21,7 @@ from ...response.rows import NEEDS_RUN, set_final_floors
 from ...response.settling import slip_period
 from ...structure.drive_sizes import find_decay_rate, is_periodic
 from ..patch import faces
-from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, remove_unknown_errors
+from ..results.result import FRAMES, Result, has_known_mesh_error, remove_unknown_errors
 from ..results.travel import outcome_on_piece
 from . import decays, flutter, levels, lists, motion_warnings
 from .costs import MOST_STEPS
@@ -88,7 +88,7 @@ def run_coupled(what, patch, coarse, seconds, warnings, say, progress, estimate)
     known = (
         estimate
         and raw.outcome is not Outcome.NOT_CONVERGED
-        and on_a_mesh_of_known_error(model, patch, coarse)
+        and has_known_mesh_error(model, patch, coarse)
         and (not rig.friction.has_partial_slip or faces.has_error_meshes(model))
     )
     run = Coupled(
@@ -141,7 +141,7 @@ def _add_level_measures(run: Coupled) -> Coupled:
 def _add_outcome(run: Coupled) -> Coupled:
     """Return the run with its outcome, and errors that include those the run itself states."""
     found = remove_unknown_errors(
-        run_events.add_uncertainty(run.measures, run.raw.own), run.estimated
+        run_events.add_uncertainty(run.measures, run.raw.stated_errors), run.estimated
     )
     rig = run.model.rig
     outcome, found = judge_outcome(
@@ -475,12 +475,17 @@ class Passes:
     ----------
     progress : callable or None
         Called with the completed fraction.
-    foreseen : float
+    expected_steps : float
         Expected steps per cycle of all passes together.
     """
 
-    def __init__(self, progress, foreseen: float):
-        self.progress, self.foreseen, self.done, self.shown = progress, foreseen, 0.0, 0.0
+    def __init__(self, progress, expected_steps: float):
+        self.progress, self.expected_steps, self.done, self.shown = (
+            progress,
+            expected_steps,
+            0.0,
+            0.0,
+        )
 
     def run_pass(self, steps: float, solve):
         """Return the result of solve(progress) for a pass with this number of steps per cycle.
@@ -500,7 +505,7 @@ class Passes:
 
     def _report(self, done: float, steps: float) -> None:
         """Report the fraction that `done` steps are of the expected ones."""
-        self.shown = max(self.shown, done / max(self.foreseen, self.done + steps))
+        self.shown = max(self.shown, done / max(self.expected_steps, self.done + steps))
         self.progress(self.shown)
 
 

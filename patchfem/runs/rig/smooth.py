@@ -83,7 +83,7 @@ class SmoothReader(Reader):
             model, numerics, patch, contact, 1e-3 * contact.length, engine.SAMPLES_PER_CYCLE
         )
 
-    def integrated(self, run, drive) -> IntegratedMeasures:
+    def integrated_measures(self, run, drive) -> IntegratedMeasures:
         """Return the measures from the polynomials of the steps."""
         book, fine = run.ledger, run.integrated
         if not _clear(run):
@@ -92,13 +92,15 @@ class SmoothReader(Reader):
             )
         return replace(fine, friction_works=(book["sampled"], book["booked"], book["passed"]))
 
-    def more(self, run, drive, stuck: bool) -> dict:
+    def further_fields(self, run, drive, stuck: bool) -> dict:
         """Return the samples including the reversals, and the equally spaced ones."""
         return {"window": run.with_reversals, "even": run.window, "by": "rate"}
 
-    def fewer(self, run):
+    def with_half_the_samples(self, run):
         """Return the run with every second one of its samples."""
-        return replace(super().fewer(run), with_reversals=thin_samples(run.with_reversals))
+        return replace(
+            super().with_half_the_samples(run), with_reversals=thin_samples(run.with_reversals)
+        )
 
     def left_open(self, run, values: dict) -> dict:
         """Return the errors of measures by name that a SmoothResult states itself.
@@ -106,7 +108,7 @@ class SmoothReader(Reader):
         They are those of samples, of peaks, and of cycles that were skipped. values: measures by
         name.
         """
-        found = self.sampled(run, self.model.rig.drive.signal, values)
+        found = self.sampling_errors(run, self.model.rig.drive.signal, values)
         size = values.get("relative_displacement_amplitude", 0.0)
         for name in ("stick_fraction", "slip_start_phase"):
             found[name] = (

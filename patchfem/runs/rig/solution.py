@@ -37,7 +37,7 @@ class Solution:
     - log: events of the exact engine.
     - notes: warnings of the method.
     - held: slip in a cycle [m] below which the interface sticks in it.
-    - own: errors by measure that the run itself states.
+    - stated_errors: errors by measure that the run itself states.
     - errors: errors by measure, if the engine knows them itself.
     - summed: Choice for the sum over bonds; None without a sum.
     - coarser: coarse runs of levels, each with its reference run (None for this run).
@@ -64,7 +64,7 @@ class Solution:
     log: object = None
     notes: tuple = ()
     held: float = 0.0
-    own: dict | None = None
+    stated_errors: dict | None = None
     errors: dict | None = None
     summed: object = None
     coarser: tuple = ()

@@ -29,7 +29,7 @@ CHECKS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (
 def failed_findings(result: Result) -> list:
     """Return all Findings of a Result that exceed their thresholds."""
     run = Evidence(result)
-    return [finding for check in CHECKS for finding in check(run) if finding.is_failed]
+    return [finding for check in CHECKS for finding in check(run) if finding.has_failed]
 
 
 def with_self_checks(result: Result) -> Result:

@@ -41,7 +41,7 @@ class Finding(NamedTuple):
         return max(abs(self.found - self.expected), self.phase_difference)
 
     @property
-    def is_failed(self) -> bool:
+    def has_failed(self) -> bool:
         """Whether the difference exceeds the threshold; False for a number that is not finite.
 
         Such a number is left to other checks.

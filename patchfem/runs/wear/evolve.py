@@ -22,7 +22,7 @@ from ...effects import describe_unsupported
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, replay_jumps, start_wear, take_jump
 from ..patch.measures import other_strips
-from ..patch.press import areas, press_patch, presser
+from ..patch.press import areas, make_force_function, press_patch
 from ..patch.values import values
 from ..rig import numerics
 from .slip import CycleSlip, frames_for, slip_of_cycle, slips_uniformly, strips_slide_independently
@@ -182,7 +182,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         raise PatchfemError(text, "wear")
     clock, wear, motion, stopped = perf_counter(), model.wear, _Motion(model, patch), ""
     asked = WearProblem(
-        presser(model.patch, patch.pair),
+        make_force_function(model.patch, patch.pair),
         motion,
         areas(model.patch, patch.pieces.interface),
         wear.coefficient,
@@ -194,7 +194,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         else press_patch(model.patch, patch.pair, frozen_array(begin[0].depth))
     )
     try:
-        state, moments = begin or _first(model, patch, asked, motion)
+        state, moments = begin or _start_state(model, patch, asked, motion)
     except _Unbounded as why:
         coarse = (
             one and _with_earlier_wear(model, one, areas(model.patch, one.pieces.interface))
@@ -220,7 +220,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
             )
             break
         patch = press_patch(model.patch, patch.pair, frozen_array(state.depth))
-        moments = (*moments, _moment(patch, state, motion))
+        moments = (*moments, _record_moment(patch, state, motion))
         if keep is not None:
             keep(state, moments)
         if progress is not None:
@@ -365,13 +365,13 @@ def _with_earlier_wear(model, patch, area):
     return press_patch(model.patch, patch.pair, depth)
 
 
-def _first(model, patch, asked: WearProblem, motion: _Motion) -> tuple:
+def _start_state(model, patch, asked: WearProblem, motion: _Motion) -> tuple:
     """Return (state, moments) before any wear except that of `_with_earlier_wear`."""
     state = start_wear(asked, model.wear.compute_earlier_depth(patch.x, asked.area))
-    return state, (_moment(patch, state, motion),)
+    return state, (_record_moment(patch, state, motion),)
 
 
-def _moment(patch, state: WearState, motion: _Motion) -> Moment:
+def _record_moment(patch, state: WearState, motion: _Motion) -> Moment:
     """Return the Moment of a worn patch."""
     area = areas(motion.model.patch, patch.pieces.interface)
     worn = {
@@ -415,7 +415,7 @@ def _replay_on(asked, model, patch, other, moments) -> tuple:
 
     legs = [(two.cycle - one.cycle, path(two.used)) for one, two in pairwise(moments)]
     depth = replay_jumps(
-        presser(asked, other.pair),
+        make_force_function(asked, other.pair),
         area,
         model.wear.coefficient,
         legs,

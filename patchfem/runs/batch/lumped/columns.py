@@ -47,7 +47,7 @@ from ...rig.engines import unused_settings
 from ...rig.motion_warnings import law_warnings
 from ..case_results import CaseResults
 
-ENDS = 5  # last windows whose phasors determine a steady motion (response.settling)
+N_FINAL_WINDOWS = 5  # last windows whose phasors determine a steady motion (response.settling)
 MAIN_MEASURE, PHASE_MEASURE = "relative_displacement_amplitude", "slip_start_phase"
 
 
@@ -91,7 +91,7 @@ class Runs:
     - values: measures (n,) by name; NaN for a run without the measure.
     - book: energies of the run (n,) by name [J].
     - extremes (n, c, 2): smallest and largest output of each cycle [m].
-    - phasors (n, w): of the output in the last cycle of the last ENDS windows, or of all [m].
+    - phasors (n, w): of the output in the last cycle of the last N_FINAL_WINDOWS windows, or of all [m].
     - stuck (n,): whether nothing slipped.
     - lost (n,): whether the case must be run by itself.
     - errors: (n,) by name, in addition to `min_relative_error` times the value.
@@ -267,7 +267,9 @@ def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
     decay = sizes.decay * runs.window * sizes.period
     with np.errstate(all="ignore"):
         steady, bounded = (
-            extrapolate_steady_amplitudes(ends[:, -ENDS:], runs.phasors[:, -ENDS:]),
+            extrapolate_steady_amplitudes(
+                ends[:, -N_FINAL_WINDOWS:], runs.phasors[:, -N_FINAL_WINDOWS:]
+            ),
             False,
         )
         if runs.steady is not None:

@@ -43,11 +43,11 @@ from ....response.settling import extrapolate_steady_amplitudes, window_amplitud
 from ....scene.rules.accuracy import list_fixed_settings
 from ....structure.drive_sizes import find_max_acceleration
 from ...rig.motion_warnings import creeping_note
-from ...rig.pieces import CHANGES, measures_of_reading
+from ...rig.pieces import CHANGES, measures_from_reading
 from .. import one_by_one
 from ..case_results import CaseResults
 from . import lumped
-from .columns import ENDS, Runs, batch_answers
+from .columns import N_FINAL_WINDOWS, Runs, batch_answers
 from .pieces import LONGEST, SHORTEST
 
 AMPLITUDE = "relative_displacement_amplitude"
@@ -155,7 +155,7 @@ def no_lanes(model: Model) -> str:
         return "its cycles are too few or too many, or it has no friction"
     if model.friction.law not in KINDS:
         return "its law cannot be computed for many cases at once"
-    return _manifold(model.friction) or asks_more(model)
+    return _why_more_states(model.friction) or asks_more(model)
 
 
 def asks_more(model: Model) -> str:
@@ -169,7 +169,7 @@ def asks_more(model: Model) -> str:
     return ""
 
 
-def _manifold(friction) -> str:
+def _why_more_states(friction) -> str:
     """Return why a stretch law has states besides its stretch; "" if it has none."""
     grows = law_has_trait(friction.law, "bonds") and (
         is_bond_list(friction) or friction.slip_growth is not None
@@ -330,7 +330,7 @@ def _solve_cases(models: Sequence[Model], say) -> CaseResults:
 
     def exact(places, check: bool) -> CaseResults:
         """Return the results of some cases by the exact engine."""
-        return exactly(
+        return run_exact_cases(
             select_models(models, places), say, FINER_CELLS if law == "iwan" and check else 0
         )
 
@@ -537,7 +537,7 @@ def _march_cases(
     return found, exact | (found.outcome == "grows"), wide_of(found) | lost | alone
 
 
-def exactly(models: Sequence[Model], say, finer: int = 0) -> CaseResults:
+def run_exact_cases(models: Sequence[Model], say, finer: int = 0) -> CaseResults:
     """Return the case results of models of a group by the exact batch, or else by single runs.
 
     Parameters
@@ -700,7 +700,7 @@ def collect_runs(models, cases: tuple, steps: int, seen: tuple, coarser: list) -
     if law in march.MASING:
         exact |= march.law_state(law, found.motion, "MAX_DROPPED_GAP") > DROPPED_LOOP_RATIO
     phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
-    ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
+    ends = np.arange(cycles - 1, -1, -window)[::-1][-N_FINAL_WINDOWS:]
     nowhere = np.zeros(len(models), bool)  # lost cases are returned separately
     (tolerance,) = collect_columns(models, lambda model: (model.accuracy.tolerance,))
     runs = Runs(
@@ -729,7 +729,7 @@ def may_ring(cases, found) -> np.ndarray:
     return found.reading("LONGEST_STICK") * own >= RINGS
 
 
-def start_may_remain(cases, found) -> np.ndarray:
+def may_contain_transient(cases, found) -> np.ndarray:
     """Return whether a transient or ringing may remain at the end of a run, (n,).
 
     What remains is at most the change between the last two cycles over the fraction that the damper
@@ -781,9 +781,9 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
     # a periodic motion does not ring, but a transient may remain if the interface always sticks
     may = (
         (rings & marched & (march.law_state(law, found.motion, "EVER_SLIPPED") > 0))
-        | (start_may_remain(cases, found) & stuck)
+        | (may_contain_transient(cases, found) & stuck)
         if law in march.MASING
-        else start_may_remain(cases, found) & (stuck | rings)
+        else may_contain_transient(cases, found) & (stuck | rings)
     )
     untold, told = may & ~held, may & held
     strides = steps / (
@@ -1082,7 +1082,7 @@ def _march_and_measure(law: str, cases, c: dict, cycles: int, steps: int) -> tup
         law, cases, found, c["energy"], c["omega"], extremes[:, -window:]
     )
     with np.errstate(all="ignore"):
-        values = measures_of_reading(seen, book, True, True, c["stiffness"], c["size"])
+        values = measures_from_reading(seen, book, True, True, c["stiffness"], c["size"])
     values |= {
         "normal_load": c["load"],
         "friction_work": book["friction"],

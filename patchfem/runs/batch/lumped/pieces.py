@@ -25,10 +25,10 @@ from ...rig.pieces import (
     RigidElements,
     elements_of_law,
     find_steady_motion,
-    measures_of_reading,
+    measures_from_reading,
     still_changes,
 )
-from .columns import ENDS, MAIN_MEASURE, Runs
+from .columns import MAIN_MEASURE, N_FINAL_WINDOWS, Runs
 from .threads import in_threads
 
 CYCLES = 3  # cycles that contain each stick interval of a cycle completely
@@ -224,7 +224,7 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
             lost[k] |= found is None
             known[:, k] = (np.nan, np.nan) if found is None else found
     with np.errstate(all="ignore"):
-        values = measures_of_reading(reading, book, True, True, stiffness, size) | rings
+        values = measures_from_reading(reading, book, True, True, stiffness, size) | rings
     worked, lost_in = (
         np.array([getattr(one.end[1], name).sum() for one in done]) for name in ("work", "loss")
     )
@@ -240,7 +240,7 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
             np.abs(reading.interface_value(INTERFACE.min_slide)),
             np.abs(reading.interface_value(INTERFACE.max_slide)),
         )
-    ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
+    ends = np.arange(cycles - 1, -1, -window)[::-1][-N_FINAL_WINDOWS:]
     loads = stuck & (reading.rise > tolerance * reading.interface_value(INTERFACE.max_force))
     return Runs(
         cycles,

@@ -27,7 +27,7 @@ from ....response.spectrum import odd_harmonics, wave_measures
 from ..interface import contact_model
 from ..reading import Reader, friction_works
 from ..solution import Solution, sampled_loop
-from .curves import COLUMN_MEASURES, LAST, CurvePoint, describe_instability
+from .curves import COLUMN_MEASURES, HARMONIC_ROUND_OFF, CurvePoint, describe_instability
 
 SAMPLES = 4096  # samples of the cycle from which measures are computed
 
@@ -37,7 +37,7 @@ class Balanced(Reader):
 
     turns: tuple = ()
 
-    def integrated(self, run, drive) -> IntegratedMeasures:
+    def integrated_measures(self, run, drive) -> IntegratedMeasures:
         """Return the two values of the friction work, and the reversals.
 
         A periodic motion has no drift.
@@ -48,7 +48,7 @@ class Balanced(Reader):
             reversals=(tuple(one[:2] for one in self.turns),) if self.turns else (),
         )
 
-    def more(self, run, drive, stuck: bool) -> dict:
+    def further_fields(self, run, drive, stuck: bool) -> dict:
         """Return the loop, computed by the trapezoidal rule, and the peaks of force and slip."""
         loop = sampled_loop(run.window, drive, run.ledger["friction"])
         if not self.rubs or not self.turns:
@@ -111,8 +111,10 @@ class BalanceFinder:
         stable, notes = add_stability(found, self.modes), ()
         if not stable.stable:
             found, stable, notes = self._lasting(drive, found, stable)
-        values, response, book = self._measured(found, drive)
-        errors = self._errors(values, found, drive, lambda *of: self._measured(*of, 2 * SAMPLES)[0])
+        values, response, book = self._compute_measures(found, drive)
+        errors = self._errors(
+            values, found, drive, lambda *of: self._compute_measures(*of, 2 * SAMPLES)[0]
+        )
         if "slip_start_phase" in errors:
             errors["slip_start_phase"] = max(
                 min(errors["slip_start_phase"], np.pi / 2), 2 * np.pi / SAMPLES
@@ -196,14 +198,14 @@ class BalanceFinder:
         )
         return found, add_stability(found, self.modes), (note,)
 
-    def shown(self, drive, near=None) -> CurvePoint:
+    def curve_point(self, drive, near=None) -> CurvePoint:
         """Return a point of a curve without its errors."""
         found = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
         )
-        return self._shown(add_stability(found, self.modes))
+        return self._curve_point(add_stability(found, self.modes))
 
-    def _shown(self, found) -> CurvePoint:
+    def _curve_point(self, found) -> CurvePoint:
         """Return a SteadyMotion, whose multipliers are known, as a point of a curve."""
         kind, stable = balanced_regime(found)[0], bool(found.stable)
         drive = SineDrive(found.level, found.omega, self.model.rig.drive.signal.moving)
@@ -229,7 +231,7 @@ class BalanceFinder:
         }
         return {name: value for name, value in values.items() if value is not None}
 
-    def _measured(self, found, drive, samples: int = SAMPLES) -> tuple:
+    def _compute_measures(self, found, drive, samples: int = SAMPLES) -> tuple:
         """Return the measures by name, the Response of a cycle, and its energies [J]."""
         response = make_cycle_response(found, self.modes, drive, samples)
         book = find_cycle_energies(found, self.modes) | {
@@ -263,14 +265,14 @@ class BalanceFinder:
         )
         return [self._of_branch(one, first) for one in branch.points], branch.folds
 
-    def apart(self, one: CurvePoint, other: CurvePoint) -> float:
+    def curve_distance(self, one: CurvePoint, other: CurvePoint) -> float:
         """Return the arc length along a curve between two of its points.
 
         The frequency is scaled by the swept range.
         """
         return branches.measure_distance(one.near, other.near, self._range)
 
-    def between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
+    def point_between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
         """Return the point of a curve at a fraction of the arc length between two of its points.
 
         It is solved in the plane normal to the line between them.
@@ -292,12 +294,14 @@ class BalanceFinder:
     def _of_branch(self, found, drive) -> CurvePoint:
         """Return a SteadyMotion of a branch as a point of a curve with its errors."""
         found = add_stability(found, self.modes) if found.stable is None else found
-        point = self._shown(found)._replace(regime="stable" if found.stable else "unstable")
+        point = self._curve_point(found)._replace(regime="stable" if found.stable else "unstable")
         errors = self._errors(point.values, point.near, point.drive, self._read)
-        least = {"acceleration_distortion": LAST}  # error in addition to that relative to the value
+        least = {
+            "acceleration_distortion": HARMONIC_ROUND_OFF
+        }  # error in addition to that relative to the value
         return point._replace(
             errors={
-                name: error + LAST * abs(point.values[name]) + least.get(name, 0.0)
+                name: error + HARMONIC_ROUND_OFF * abs(point.values[name]) + least.get(name, 0.0)
                 for name, error in errors.items()
             }
         )

@@ -23,7 +23,9 @@ COLUMN_MEASURES = {
 }
 # relative error of the measures of a motion that an exact engine integrates from a given state
 READ = 1e-9
-LAST = 1e-12  # round-off of the third harmonic of the acceleration relative to the first
+HARMONIC_ROUND_OFF = (
+    1e-12  # round-off of the third harmonic of the acceleration relative to the first
+)
 POINTS = 121  # points of a curve over frequency before its refinement
 # The neighbourhood of a peak ends at this fraction of the peak, and no other peak may be higher
 # than this fraction. It is computed alone if it is at most this fraction of the curve. Its curve
@@ -79,7 +81,7 @@ class CurvePoint(NamedTuple):
 def exact_errors(values: dict, left: float) -> dict:
     """Return the errors of a motion that repeats up to the relative error `left`, by name."""
     return {
-        name: abs(v) * (READ + left) + LAST * (name == "acceleration_distortion")
+        name: abs(v) * (READ + left) + HARMONIC_ROUND_OFF * (name == "acceleration_distortion")
         for name, v in values.items()
         if v is not None
     }
@@ -131,14 +133,14 @@ class Followed:
 
     leaves = 1e-2, 0.1
 
-    def apart(self, one: CurvePoint, other: CurvePoint) -> float:
+    def curve_distance(self, one: CurvePoint, other: CurvePoint) -> float:
         """Return the distance [rad/s] of two points along the curve."""
         return abs(other.drive.omega - one.drive.omega)
 
-    def between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
+    def point_between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
         """Return the point of the curve at a fraction of the distance between two of its points."""
         omega = one.drive.omega + share * (other.drive.omega - one.drive.omega)
-        return self.shown(replace(one.drive, omega=omega), one.near)
+        return self.curve_point(replace(one.drive, omega=omega), one.near)
 
 
 def trace_curve(modes, drive, find) -> list:
@@ -286,7 +288,7 @@ def motion_at_levels(finder, drive):
     def probe(number: int, level: float) -> Level:
         """Return the Level at another level [m s-2], started from the motion at a known level."""
         sine = SineDrive(level, drive.segments[0].omega, drive.moving)
-        return finder.shown(sine, points[number].near if number >= 0 else None).level
+        return finder.curve_point(sine, points[number].near if number >= 0 else None).level
 
     lost_ones = f"no steady motion was found at {len(said)} of {len(points)} drive levels; at the first of them: "
     notes = tuple(f"{lost_ones}{one}" for one in said[:1])

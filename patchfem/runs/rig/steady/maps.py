@@ -109,7 +109,7 @@ class Maps(Followed):
                 self.frames,
                 None,
                 one.start,
-                self.begun(one.memory),
+                self.start_memory(one.memory),
             )
         )
         raw = reader.solution(done, perf_counter() - begin, drive)
@@ -140,11 +140,11 @@ class Maps(Followed):
             book=raw.book | {"iterations": float(one.iterations)},
         ), one.near
 
-    def begun(self, memory):
+    def start_memory(self, memory):
         """Return the memory of elements at the start of a run, whose energies count from there."""
         return memory
 
-    def shown(self, drive, near=None) -> CurvePoint:
+    def curve_point(self, drive, near=None) -> CurvePoint:
         """Return a point of a curve."""
         one = self.repeating(drive, near)
         if not one.bounded:
@@ -180,7 +180,7 @@ class Maps(Followed):
 
         Each point starts from the motion at the previous one.
         """
-        return trace_curve(self.modes, drive, self.shown), ()
+        return trace_curve(self.modes, drive, self.curve_point), ()
 
 
 def _curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
@@ -202,8 +202,8 @@ class YieldFinder(Maps):
         super().__init__(model, *given)
         self.tries_another = len(model.rig.friction.interfaces) == 1
 
-    def begun(self, memory):
-        """Return the memory of elements with work and loss set to 0 (see `Maps.begun`)."""
+    def start_memory(self, memory):
+        """Return the memory of elements with work and loss set to 0 (see `Maps.start_memory`)."""
         return event_elements.reset_work(memory)
 
     def repeating(self, drive, near) -> PeriodicMotion:
@@ -260,15 +260,15 @@ class EventFinder(Maps):
 
     def curve(self, drive) -> tuple:
         """Return the curve as `Maps.curve` does; without friction it is known in closed form."""
-        return trace_curve(self.modes, drive, self.shown), ()
+        return trace_curve(self.modes, drive, self.curve_point), ()
 
-    def shown(self, drive, near=None) -> CurvePoint:
+    def curve_point(self, drive, near=None) -> CurvePoint:
         """Return a point of a curve; without friction it is known in closed form.
 
         The exception is an undamped resonance.
         """
         if self.forces.any():
-            return super().shown(drive, near)
+            return super().curve_point(drive, near)
         modes, gauge = (
             self.modes,
             self.modes.output if self.modes.gauge is None else self.modes.gauge,
@@ -279,7 +279,7 @@ class EventFinder(Maps):
                 * modes.mass
             )
         except PatchfemError:
-            return super().shown(drive)
+            return super().curve_point(drive)
         size = drive.acceleration * float(abs(drive.moving + drive.omega**2 * felt))
         values = _curve_measures(
             drive.acceleration * float(abs(seen)), size, wave_measures(size, 0.0)

@@ -30,7 +30,7 @@ LOOSE = 1e-6  # largest change from cycle to cycle, over the amplitude, of a per
 ROUGH = 1e-2
 
 
-def left_grooves(model, numerics, patch, drive, contact) -> Solution | None:
+def solution_beyond_grooves(model, numerics, patch, drive, contact) -> Solution | None:
     """Return the Solution of a motion whose lifted mass leaves its grooves; None if it does not.
 
     It must leave them within LEAD cycles of a march from rest. The errors are the differences
@@ -120,7 +120,9 @@ class MarchFinder(Followed):
             return self._point(drive, near)
         except NotConverged:
             if (
-                gone := left_grooves(self.model, self.numerics, self.patch, drive, self.contact)
+                gone := solution_beyond_grooves(
+                    self.model, self.numerics, self.patch, drive, self.contact
+                )
             ) is None:
                 raise
         return gone, None
@@ -188,7 +190,7 @@ class MarchFinder(Followed):
         """Return whether the amplitude changes by more than the tolerance if the steps are halved."""
         return abs(value - half) > self.model.accuracy.tolerance * abs(value)
 
-    def shown(self, drive, near=None) -> CurvePoint:
+    def curve_point(self, drive, near=None) -> CurvePoint:
         """Return a point of a curve, found from the state `near` or, if that fails, from rest."""
         try:
             return curve_point(drive, *self.point(drive, near))
@@ -202,4 +204,4 @@ class MarchFinder(Followed):
 
         Each point starts from the motion at the previous one.
         """
-        return trace_curve(self.model.rig.modes, drive, self.shown), ()
+        return trace_curve(self.model.rig.modes, drive, self.curve_point), ()

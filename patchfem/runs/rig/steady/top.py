@@ -52,7 +52,7 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
     points : list of CurvePoint
         Points along the curve.
     finder
-        Has apart(CurvePoint, CurvePoint) -> distance along the curve, between(CurvePoint, CurvePoint, fraction) ->
+        Has curve_distance(CurvePoint, CurvePoint), point_between(CurvePoint, CurvePoint, fraction) ->
         CurvePoint, and `leaves`: fractions of the tolerance that may remain as the error of the
         amplitude, and of its position over the width of the peak.
     tolerance : float
@@ -64,7 +64,7 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
     """
     points = list(points)
     for left in range(MAX_ADDED_POINTS, -1, -1):
-        s = np.cumsum([0.0, *(finder.apart(a, b) for a, b in pairwise(points))])
+        s = np.cumsum([0.0, *(finder.curve_distance(a, b) for a, b in pairwise(points))])
         y, lasting = _heights(points), np.array([one.stable for one in points])
         best, (reach, at) = index_of_largest(points), concave_bounds(s, y)
         if not y[best] > 0 or not reach.size:
@@ -78,7 +78,9 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
         reach[np.diff(s) <= NEAREST * s[-1]] = 0.0
         k = int(np.argmax(reach))
         if reach[k] <= y[best] * (1 + finder.leaves[0] * tolerance):
-            k, at[k] = _closer(s, y, best, max(finder.leaves[1] * tolerance, POSITION_TOL)) or (
+            k, at[k] = _choose_added_point(
+                s, y, best, max(finder.leaves[1] * tolerance, POSITION_TOL)
+            ) or (
                 -1,
                 0.0,
             )
@@ -86,13 +88,14 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
             return RefinedPeak(points, best, above)
         try:
             points.insert(
-                k + 1, finder.between(points[k], points[k + 1], float(np.clip(at[k], 0.05, 0.95)))
+                k + 1,
+                finder.point_between(points[k], points[k + 1], float(np.clip(at[k], 0.05, 0.95))),
             )
         except NotConverged:
             return RefinedPeak(points, best, above)
 
 
-def _closer(s, y, best: int, share: float) -> tuple | None:
+def _choose_added_point(s, y, best: int, share: float) -> tuple | None:
     """Return where to add a point that brings a neighbour closer to the largest value, or None.
 
     None if both neighbours are closer than `share` times the width of the peak, or the largest
