@@ -294,15 +294,13 @@ def _differences_table(runs: list, names: list) -> str:
 
 
 def _format_scene_value(value) -> str:
-    """Write a value of a resolved scene as HTML; long strings are cut."""
-    text = (
-        "&ndash;"
-        if value is None
-        else f"{value:.8g}"
-        if isinstance(value, float)
-        else escape(str(value))
-    )
-    return text if len(text) < 80 else text[:76] + " …"
+    """Write a value of a resolved scene as HTML; long texts are cut."""
+    if value is None:
+        return "&ndash;"
+    if isinstance(value, float):
+        return f"{value:.8g}"
+    text = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+    return escape(text if len(text) < 80 else text[:76] + " …")
 
 
 def _measures_table(runs: list, names: list) -> str:
@@ -326,17 +324,17 @@ def _measures_table(runs: list, names: list) -> str:
         "<p class=soft>Each cell shows a value and its estimated numerical error. Bold values differ from the "
         "first run by more than the sum of both errors. The change from the first run is in brackets: in per "
         "cent; as a factor if the value is ten times the first value or more; as a dash if the first value is "
-        "smaller than its error.</p>"
+        "smaller than its error. A value in another unit than that of the first run is not compared.</p>"
         + table_html(("measure", *(f">{escape(name)}" for name in names)), rows, "across side")
     )
 
 
 def _format_cell(name: str, one: dict | None, first: dict | None) -> str:
-    """Write a measure as a cell, with its change from the first run."""
+    """Write a measure as a cell, with its change from the first run if both have one unit."""
     if one is None or one["value"] is None or not math.isfinite(one["value"]):
         return "&ndash;"
     text = escape(format_with_error(name, one))
-    alone = first is None or first["value"] is None
+    alone = first is None or first["value"] is None or first["unit"] != one["unit"]
     if alone or abs(one["value"] - first["value"]) <= (one["error"] or 0.0) + (
         first["error"] or 0.0
     ):
