@@ -41,7 +41,8 @@ def main() -> None:
     """The command line; exit code 1 where something differs."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     verbs = parser.add_subparsers(dest="verb", required=True)
-    runs, pair = verbs.add_parser("run"), verbs.add_parser("compare")
+    runs = verbs.add_parser("run")
+    pair = verbs.add_parser("compare")
     runs.add_argument("folder", type=Path)
     runs.add_argument(
         "--only", default="1/1", metavar="k/n", help="the k-th of n shares of the scenes"
@@ -68,7 +69,8 @@ def scenes() -> dict:
         r"```toml\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.S
     )[1]
     out = {name: (text, WRITTEN["shorter"].get(name, [])) for name, text in files.items()}
-    lines, draw = WRITTEN["scenes"].splitlines(), random.Random(1985)
+    lines = WRITTEN["scenes"].splitlines()
+    draw = random.Random(1985)
     lines += [drawn(draw) for _ in range(COUNT - len(out) - len(lines))]
     for number, line in enumerate(lines, 1):
         letters, *sets = Template(line).substitute(WRITTEN["words"]).split("; ")
@@ -129,7 +131,8 @@ def beside(folder: Path) -> None:
         output=[0.0, 1.0],
     )
     f = np.arange(100.0, 200.0, 0.5)
-    wave, own = 2 * np.pi * f, 2 * np.pi * 143
+    wave = 2 * np.pi * f
+    own = 2 * np.pi * 143
     pyuff.UFF(str(folder / "rig.uff")).write_sets(
         [
             {
@@ -167,15 +170,11 @@ def run(folder: Path, only: str, other: Path | None) -> int:
             json.dumps({name: sets for name, (_, sets) in made.items()}, indent=1)
         )
     os.chdir(place)
-    begin, listed = (
-        perf_counter(),
-        [*json.loads(Path("sets.json").read_text("utf-8")).items()][k - 1 :: n],
-    )
+    begin = perf_counter()
+    listed = [*json.loads(Path("sets.json").read_text("utf-8")).items()][k - 1 :: n]
     for name, sets in listed:
-        start, words = (
-            perf_counter(),
-            [f"{name}.toml", *(word for one in sets for word in ("--set", one))],
-        )
+        start = perf_counter()
+        words = [f"{name}.toml", *(word for one in sets for word in ("--set", one))]
         answer = {
             "check": told("check", *words),
             "plan": told("plan", *words, "--json"),
@@ -194,7 +193,9 @@ def told(*words: str) -> dict:
     """Exit code and stdout (of a run: in its folder) of the command line, and stderr where the code is not 0."""
     from patchfem.__main__ import main as patchfem
 
-    out, err, code = io.StringIO(), io.StringIO(), 0
+    out = io.StringIO()
+    err = io.StringIO()
+    code = 0
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
             patchfem(list(words))
@@ -209,7 +210,8 @@ def told(*words: str) -> dict:
 
 def compare(a: Path, b: Path, within: float) -> int:
     """Print a line per difference and the total; 1 where a scene differs."""
-    names, differ = sorted({path.stem for folder in (a, b) for path in folder.glob("*.json")}), 0
+    names = sorted({path.stem for folder in (a, b) for path in folder.glob("*.json")})
+    differ = 0
     for one, two, name in ((answers(a, name), answers(b, name), name) for name in names):
         changed = {key: value for key in one | two if (value := change(key, one, two)) > within}
         for key, value in sorted(changed.items()):
@@ -229,7 +231,8 @@ def compare(a: Path, b: Path, within: float) -> int:
 
 def answers(folder: Path, name: str) -> dict:
     """Name -> number, text or array of everything that a scene answered."""
-    out, place = {}, folder / name
+    out = {}
+    place = folder / name
     for at, path in {"told": folder / f"{name}.json", "summary": place / "summary.json"}.items():
         flatten(at, json.loads(path.read_text("utf-8")) if path.is_file() else {}, out)
     for path in (place / "result.nc", place / "fields.vtkhdf"):
@@ -271,7 +274,9 @@ def change(key: str, one: dict, two: dict) -> float:
         x[~(kept := np.isfinite(x))], y[~kept], equal_nan=True
     ):
         return np.inf
-    x, y, stem = x[kept].astype(float), y[kept].astype(float), key.rpartition(".")[0]
+    x = x[kept].astype(float)
+    y = y[kept].astype(float)
+    stem = key.rpartition(".")[0]
     scale = np.abs(x).max()
     if stem.startswith("summary.measures."):
         relative = stem.endswith(("energy_balance", "work_check"))  # already, of round-off

@@ -78,7 +78,8 @@ def test_always_the_law_agrees_in_three_engines(folder):
         found = measures_of(folder / engine)
         check_law(found)
         for name in ("relative_displacement_amplitude", "loop_area", "friction_force_peak"):
-            one, other = found[name], smooth[name]
+            one = found[name]
+            other = smooth[name]
             assert abs(one["value"] - other["value"]) <= one["error"] + other["error"], (
                 engine,
                 name,
@@ -108,7 +109,8 @@ def test_refuses_a_shape_whose_table_has_no_key_for_its_piece(tmp_path):
 def test_always_a_drive_has_its_waveform_and_its_sweep(folder):
     """The base accelerates by 5 g for one second and then rests, and the sweep has each of its cases."""
     run = xarray.load_dataset(folder / "hold" / "result.nc")
-    acceleration, late = run.base_acceleration.values, run.time.values > 1.0001
+    acceleration = run.base_acceleration.values
+    late = run.time.values > 1.0001
     assert (
         np.allclose(acceleration[~late & (run.time.values < 0.9999)], 5 * G_N)
         and not acceleration[late].any()
@@ -123,7 +125,8 @@ def test_always_a_drive_has_its_waveform_and_its_sweep(folder):
 
 def test_always_a_measure_of_the_whole_run_has_a_small_error(folder):
     """Both measures agree with the histories of the run, have errors, and stand in a sweep."""
-    found, run = measures_of(folder / "rig"), xarray.load_dataset(folder / "rig" / "result.nc")
+    found = measures_of(folder / "rig")
+    run = xarray.load_dataset(folder / "rig" / "result.nc")
     slide = run.relative_displacement.values
     assert found["slide_range"]["value"] == pytest.approx(np.ptp(slide), rel=1e-9)
     assert 0 <= found["slide_range"]["error"] < 1e-3 * found["slide_range"]["value"]

@@ -91,13 +91,15 @@ def test_exact_the_names_are_all_there():
 def test_exact_the_numbers_are_those_of_the_command_line(name, runs, tmp_path):
     (tmp_path / "a.toml").write_text(KINDS[name], "utf-8")
     answer = cli("run", tmp_path / "a.toml", "-o", tmp_path / "out", "-q", "--json")
-    said, result = json.loads(answer.out), runs[name]
+    said = json.loads(answer.out)
+    result = runs[name]
     assert said["measures"] == {key: measure_object(one) for key, one in result.measures.items()}
     assert (
         said["outcome"] == result.outcome == str(result.outcome)
         and said["warnings"] == result.warnings
     )
-    here, there = result.to_xarray(), xr.load_dataset(tmp_path / "out" / "result.nc")
+    here = result.to_xarray()
+    there = xr.load_dataset(tmp_path / "out" / "result.nc")
     xr.testing.assert_identical(here, there)
 
 
@@ -420,7 +422,8 @@ def test_exact_levels_are_drawn():
     text = RIG.replace('acceleration = "5 g"\n', 'waveform = "levels"\nlevels = ["3 g", "6 g"]\n')
     from matplotlib.figure import Figure
 
-    result, mine = pf.run(text), Figure().subplots()
+    result = pf.run(text)
+    mine = Figure().subplots()
     assert result.plot.levels().get_title() == "Level by level"
     assert result.plot.levels(ax=mine) is mine and len(mine.figure.axes) == 1 and mine.get_ylabel()
 

@@ -133,13 +133,12 @@ compiled.sleep = sleep
 
 
 def test_exact_an_edited_law_changes_the_answer_of_a_cached_bench(tmp_path, place, answers):
-    home, cache, first = (
-        copied(tmp_path / "home"),
-        shutil.copytree(place, tmp_path / "cache"),
-        answers[0],
-    )
+    home = copied(tmp_path / "home")
+    cache = shutil.copytree(place, tmp_path / "cache")
+    first = answers[0]
     assert first["numba"] and len(first["said"]) == 1 and "compiling" in first["said"][0]
-    again, codes = slid(home, cache), {path: path.read_bytes() for path in cache.rglob("*.code")}
+    again = slid(home, cache)
+    codes = {path: path.read_bytes() for path in cache.rglob("*.code")}
     assert not again["numba"] and again["said"] == [] and codes
     assert (again["work"], again["peak"]) == (first["work"], first["peak"])
     for path in codes:  # damaged: compiled again
@@ -177,7 +176,8 @@ def test_exact_code_that_came_with_the_package_serves_the_first_run(tmp_path, an
     """Nothing is compiled, nothing is said; kernels with another text leave it alone."""
     home = copied(tmp_path / "home")
     hook.build_machine_code(home / "patchfem" / "compiled" / "generic", smallest)
-    first, native = slid(home, tmp_path / "cache"), answers[0]
+    first = slid(home, tmp_path / "cache")
+    native = answers[0]
     assert (
         not first["numba"]
         and first["said"] == []
@@ -248,7 +248,8 @@ def test_exact_a_wheel_has_no_machine_code_unless_it_is_asked_for(monkeypatch):
         ("1", "standard", True),
     ):
         monkeypatch.setenv("PATCHFEM_MACHINE_CODE", asked)
-        data, builder = {"force_include": {}}, hook.get_build_hook()()
+        data = {"force_include": {}}
+        builder = hook.get_build_hook()()
         builder.initialize(version, data)
         assert [*data["force_include"].values()] == ["patchfem/compiled/generic"] * has
         assert data.get("tag", "").startswith("py3-none-") is has
@@ -272,7 +273,8 @@ def wheel(folder: Path, **more) -> Path:
 
 @pytest.mark.slow
 def test_exact_the_first_run_of_the_rig_from_a_wheel_compiles_nothing(tmp_path):
-    bare, full = wheel(tmp_path / "bare"), wheel(tmp_path / "full", PATCHFEM_MACHINE_CODE="1")
+    bare = wheel(tmp_path / "bare")
+    full = wheel(tmp_path / "full", PATCHFEM_MACHINE_CODE="1")
     assert (
         bare.name.endswith("-py3-none-any.whl")
         and not (bare.parent / "patchfem/compiled/generic").exists()
@@ -395,7 +397,8 @@ def test_exact_a_later_process_knows_which_kinds_of_runs_came_to_their_end(tmp_p
 )
 def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obstacle):
     """No folder of a common name in the temporary folder either: who was there first could have put code into it."""
-    base, temporary = tmp_path / "base", tmp_path / "temporary"
+    base = tmp_path / "base"
+    temporary = tmp_path / "temporary"
     temporary.mkdir()
     if obstacle == "a file in the way":
         base.write_text("not a folder", "utf-8")

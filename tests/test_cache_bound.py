@@ -34,7 +34,8 @@ def own(base: Path) -> Path:
 
 def test_exact_the_longest_unused_go_and_those_of_the_last_hour_stay(tmp_path):
     ages = [30, 2, 50, 0.5, 3, 0.1, 40, 0.9]
-    made, mine = states(tmp_path, ages), own(tmp_path)
+    made = states(tmp_path, ages)
+    mine = own(tmp_path)
     cache_limit.remove_old_folders(mine, 4)
     # the last four are of 0.1, 0.5, 0.9 and 2 hours
     assert {one.name for one in tmp_path.iterdir()} == {
@@ -74,10 +75,8 @@ def test_exact_nothing_else_is_touched(tmp_path):
 
 
 def test_exact_room_is_made_where_a_folder_is_new_and_uses_are_marked(tmp_path):
-    made, mine = (
-        states(tmp_path, [30 + k for k in range(cache_limit.MAX_OTHER_FOLDERS + 3)]),
-        own(tmp_path),
-    )
+    made = states(tmp_path, [30 + k for k in range(cache_limit.MAX_OTHER_FOLDERS + 3)])
+    mine = own(tmp_path)
     cache_limit.mark_used(mine)
     assert [one.exists() for one in made] == [True] * cache_limit.MAX_OTHER_FOLDERS + [False] * 3
     (mine / "code").mkdir()
@@ -124,7 +123,8 @@ def test_always_processes_that_make_room_at_once_leave_what_is_young(tmp_path, r
         "sys.stdin.readline(); cache_limit.remove_old_folders(Path(sys.argv[1]), 2)"
     )
     base = tmp_path / "base"
-    made, mine = states(base, [0.1, 0.2, 0.3, *range(2, 40)]), own(base)
+    made = states(base, [0.1, 0.2, 0.3, *range(2, 40)])
+    mine = own(base)
     workers = [
         subprocess.Popen(
             [sys.executable, "-c", code, mine],

@@ -51,10 +51,12 @@ ALIKE = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp"}}
 
 def nearest(values, here):
     """Number of the value next to a place, and how far it is."""
-    best, who = np.inf, -1
+    best = np.inf
+    who = -1
     for k in range(values.size):
         if abs(values[k] - here) < best:
-            best, who = abs(values[k] - here), k
+            best = abs(values[k] - here)
+            who = k
     return who, best
 
 

@@ -78,7 +78,8 @@ def reading_order(tree: dict, folder: str = "") -> list:
 
 def of_the_order(tree: dict, folder: str = "") -> list:
     """Where a reading order does not tell the truth: numbers 1, 2, 3, ..., every folder and flat module once."""
-    order, the = reading_order(tree, folder), f"the reading order{folder and ' of '}{folder}"
+    order = reading_order(tree, folder)
+    the = f"the reading order{folder and ' of '}{folder}"
     named = Counter(name for _, name in order)
     there = {inside(name, folder) for name in tree} - {"", "__main__"}
     out = [f"{the} names {name}, which does not exist" for name in named if name not in there]
@@ -98,7 +99,8 @@ def inside(name: str, folder: str) -> str:
 
 def of_a_folder(folder: str, tree: dict, found: dict) -> list:
     """Imports against the reading order of a folder, and where that order does not tell the truth."""
-    rungs, out = {name: number for number, name in reading_order(tree, folder)}, set()
+    rungs = {name: number for number, name in reading_order(tree, folder)}
+    out = set()
     for name, all_of_it in found.items():
         own = rungs.get(inside(name, folder))
         out |= {
@@ -111,7 +113,8 @@ def of_a_folder(folder: str, tree: dict, found: dict) -> list:
 
 def of_imports(name: str, found: list, rungs: dict) -> list:
     """Imports of later rungs; what the order does not name is no rung, and `of_the_order` tells of such importers."""
-    own, out = rungs.get(name.split(".")[0]), set()
+    own = rungs.get(name.split(".")[0])
+    out = set()
     for one in found:
         rung = rungs.get(one.target.split(".")[0])
         if not one.is_own or own is None or (one.target, one.name) == ("", "__version__"):
@@ -125,7 +128,8 @@ def of_imports(name: str, found: list, rungs: dict) -> list:
 
 def of_outside(found: dict) -> list:
     """Packages of others imported where they have no place, and more than one exporter that writes meshes."""
-    out, exporters = [], []
+    out = []
+    exporters = []
     for name, all_of_it in found.items():
         used = {one.target for one in all_of_it if not one.is_own}
         out += [f"{name} imports {package}" for package, places in OUTSIDE.items()

@@ -79,7 +79,8 @@ def words_of(*arguments) -> bytes:
 
 @pytest.fixture(scope="module")
 def weighing(tmp_path_factory):
-    path, given = tmp_path_factory.mktemp("code") / "weighed.code", some_arguments()
+    path = tmp_path_factory.mktemp("code") / "weighed.code"
+    given = some_arguments()
     made = njit(error_model="numpy", _nrt=False)(weighed)
     answer = made(*given)
     assert machine.store_code(path, made, given)
@@ -186,7 +187,8 @@ def test_refuses_what_numba_alone_can_run(tmp_path):
 
 
 def test_always_kinds_tell_types_apart():
-    words, grid = machine.ArgumentConverter(), np.zeros((4, 4))
+    words = machine.ArgumentConverter()
+    grid = np.zeros((4, 4))
     still = np.zeros(4)
     still.flags.writeable = False
     kinds = [
@@ -215,7 +217,8 @@ def test_always_kinds_tell_types_apart():
 def test_always_a_tuple_is_remembered_as_itself(weighing):
     """Tuples come and go at the same addresses; one that is remembered is kept alive, so none is taken for another."""
     _, (first, outer, step, _), _, code, made = weighing
-    words, mine = machine.ArgumentConverter(), np.zeros(5)
+    words = machine.ArgumentConverter()
+    mine = np.zeros(5)
     for k in range(20):
         other = outer._replace(inner=Inner(outer.inner.places * k, 0.1 * k))
         row = b"".join(words.convert(one)[1] for one in (first, other, step, mine))
@@ -267,11 +270,9 @@ print(json.dumps([out, "numba" in sys.modules]))
 
 def test_always_threads_that_call_first_at_once_bring_code_once(monkeypatch):
     """Two that loaded the same function at once ended the process in 1 of 2 first sweeps of Iwan cases."""
-    entry, brought, at_once = (
-        kernels_of_its_own("dynamics.events.series_kernels").find_highest_power,
-        [],
-        Barrier(2),
-    )
+    entry = kernels_of_its_own("dynamics.events.series_kernels").find_highest_power
+    brought = []
+    at_once = Barrier(2)
 
     def slow(path):
         brought.append(path)

@@ -126,10 +126,8 @@ def test_exact_the_scene_and_the_keys_of_the_readme():
 def test_exact_the_amplitude_of_the_readme_is_that_of_the_shipped_scene():
     """The README once went on with an error that runs no longer stated; both are held to their last digit."""
     every = pf.run(ROOT / "studies/rig/rig.toml").measures
-    found, steady = (
-        every["relative_displacement_amplitude"],
-        every["relative_displacement_amplitude_steady"],
-    )
+    found = every["relative_displacement_amplitude"]
+    steady = every["relative_displacement_amplitude_steady"]
     value, error, late, settles, about = re.search(
         r"amplitude after 200 cycles is ([\d.]+) um with an estimated error of ([\d.]+) um;.*?After 800 cycles the "
         r"amplitude is ([\d.]+) um; the steady amplitude is ([\d.]+) ± ([\d.]+) um",
@@ -152,7 +150,8 @@ def test_exact_the_readme_compares_the_measured_rig_with_what_its_commands_compu
         re.search(r"- \*A real rig\..*?(?=^## )", text("README.md"), re.S | re.M)[0].split()
     )
     unfitted = study("table_1/unfitted.py")
-    amplitude, peak = "relative_displacement_amplitude", "absolute_acceleration_peak"
+    amplitude = "relative_displacement_amplitude"
+    peak = "absolute_acceleration_peak"
 
     def compute(frequency: float, level: float) -> tuple[float, float]:
         """Return displacement [mil] and acceleration [g] of the shipped rig as `unfitted.py` prints them."""
@@ -195,12 +194,14 @@ def test_exact_the_readme_compares_the_measured_rig_with_what_its_commands_compu
 def test_exact_the_sweep_of_a_patch_in_the_guide(tmp_path, monkeypatch):
     """Pressure falls off with the tilt and rises with the load, at each of the guide's nine points."""
     monkeypatch.chdir(tmp_path)
-    rig, names = text("studies/rig/rig.toml"), {}
+    rig = text("studies/rig/rig.toml")
+    names = {}
     (tmp_path / "patch.toml").write_text(
         rig[rig.index("[contact]") : rig.index("[contact.shear]")], "utf-8"
     )
     exec(re.search(r"```python\n(.*?)```", text("patchfem/scene/GUIDE.md"), re.S)[1], names)
-    fraction, peak = names["answer"].contact_fraction.values, names["answer"].pressure_peak.values
+    fraction = names["answer"].contact_fraction.values
+    peak = names["answer"].pressure_peak.values
     assert (
         fraction.shape == (3, 3)
         and (peak[1:] > peak[:-1]).all()

@@ -22,7 +22,8 @@ UGLY = re.compile(r"± 0(?![.\d])|(?<![\d.])-0(?![.\d])|\de[-+]?0|nan|inf|\d\.\d
 def drawn(count: int, seed: int) -> list:
     """(value, bar, unit): sizes over twelve decades of people's units, bars from round-off to many times the value."""
     rng = np.random.default_rng(seed)
-    units, out = [*UNIT_LADDERS, "1"], []
+    units = [*UNIT_LADDERS, "1"]
+    out = []
     for _ in range(count):
         unit = units[rng.integers(len(units))]
         low, high = (

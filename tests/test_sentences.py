@@ -80,7 +80,9 @@ def sentences(folder: Path) -> dict:
     for name, text in FILES.items():
         (folder / name).write_text(text, "utf-8")
     out = {"outcome": {outcome.value: outcome.sentence for outcome in pf.Outcome}}
-    out["answer"], out["refusal"], out["warning"] = {}, {}, {}
+    out["answer"] = {}
+    out["refusal"] = {}
+    out["warning"] = {}
     for name, words in SCREENS.items():
         answer = cli(*words, "-o", folder / name, "--no-page")
         out["answer"][name] = (

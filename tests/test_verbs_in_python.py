@@ -31,7 +31,8 @@ substrate = "Ti-8Al-1Mo-1V"
 
 def test_exact_a_scene_from_a_dict_is_that_of_its_text():
     assert pf.load(BLOCK).resolved() == pf.load(TEXT).resolved()
-    one, other = pf.run(BLOCK, **{"normal.load": "90 N"}), pf.run(TEXT, **{"normal.load": "90 N"})
+    one = pf.run(BLOCK, **{"normal.load": "90 N"})
+    other = pf.run(TEXT, **{"normal.load": "90 N"})
     assert {name: m.value for name, m in one.measures.items()} == {
         name: m.value for name, m in other.measures.items()
     }
@@ -251,7 +252,8 @@ def test_a_folder_of_other_files_is_refused_before_the_work(tmp_path, monkeypatc
 def test_exact_a_length_is_a_number_or_a_text(tmp_path, given):
     path = tmp_path / "trace.csv"
     path.write_text("x [um],z [um]\n" + "".join(f"{k},{k % 7}\n" for k in range(2000)), "utf-8")
-    one, other = pf.profile(path, **given), pf.profile(path, cutoff=0.25e-3, window="0 um,1999 um")
+    one = pf.profile(path, **given)
+    other = pf.profile(path, cutoff=0.25e-3, window="0 um,1999 um")
     assert one["profiles"][0]["measures"]["Ra"] == other["profiles"][0]["measures"]["Ra"]
     for wrong in (0.0, float("nan"), "0.25", object()):
         with pytest.raises(pf.PatchfemError, match="profile: cutoff"):
@@ -272,10 +274,8 @@ def test_exact_a_length_is_a_number_or_a_text(tmp_path, given):
     ],
 )
 def test_refuses_a_bare_length_that_nobody_means(given, said):
-    scene, other = (
-        pf.load(pf.new("joint")),
-        {key: f"{value!r} m" for key, value in given.items() if key != "contact"},
-    )
+    scene = pf.load(pf.new("joint"))
+    other = {key: f"{value!r} m" for key, value in given.items() if key != "contact"}
     for load in (lambda sets: scene.with_(**sets), lambda sets: pf.load(pf.new("joint"), **sets)):
         with pytest.raises(pf.SceneError, match=said):
             load({key: value for key, value in given.items() if key != "contact"})
@@ -284,7 +284,8 @@ def test_refuses_a_bare_length_that_nobody_means(given, said):
 
 
 def test_exact_a_scene_with_other_values_is_that_of_load():
-    scene, sets = pf.load(BLOCK), {"normal.load": 90.0, "structure.mode.axial.damping": 0.01}
+    scene = pf.load(BLOCK)
+    sets = {"normal.load": 90.0, "structure.mode.axial.damping": 0.01}
     assert scene.with_(**sets).resolved() == pf.load(BLOCK, **sets).resolved() != scene.resolved()
     again = scene.with_(**sets).with_(title="b")
     assert (again.title, again.normal.load, scene.normal.load) == ("b", 90.0, 100.0)

@@ -116,7 +116,8 @@ def run_both_surfaces(
     -------
     SurfaceRuns
     """
-    sides, failed = [], []
+    sides = []
+    failed = []
     for name, model in (("before", before), ("after", after)):
         try:
             sides.append(_run_side(model, say))
@@ -141,7 +142,8 @@ def run_both_surfaces(
 def _run_side(model: Model, say) -> SurfaceResult:
     """Run a model and return its results."""
     result = run(plan(model), say)
-    outcome, surface = result.outcome, patch_surface(result.patch, result.fields)
+    outcome = result.outcome
+    surface = patch_surface(result.patch, result.fields)
     return SurfaceResult(
         dict(result.measures),
         str(outcome),

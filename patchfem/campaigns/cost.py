@@ -175,7 +175,8 @@ def tolerance_curve(model: Model, say=None) -> list:
         wanted = with_tolerance(model)
         # The first run includes imports and compilation, which the timings must not contain.
         _run_setting(wanted[0], "first run, not timed", None)
-        runs, spent = [], 0.0
+        runs = []
+        spent = 0.0
         for setting in wanted:
             one = _time_setting(setting, True, say)
             while one is not None:
@@ -218,7 +219,8 @@ def _proposed_setting(setting: Setting, one: Cost, seconds: float) -> Setting | 
     """
     for remedy in one.remedies:
         if found := _PROPOSED_SETTING.match(remedy):
-            key, count = found[1], int(found[2])
+            key = found[1]
+            count = int(found[2])
             before = (
                 getattr(setting.model.accuracy, key)
                 or (one.steps if key == "steps_per_cycle" else 1)
@@ -271,7 +273,8 @@ def setting_curve(model: Model, knob: str, say=None) -> list:
         wanted = list_settings(model, knob)
         # The first run includes imports and compilation, which the timings must not contain.
         _run_setting(wanted[0], "first run, not timed", None)
-        runs, done = [], 0
+        runs = []
+        done = 0
         for one in wanted:
             found = _time_setting(one, one is not wanted[-1], say, runs[-1:])
             if found is not None:
@@ -352,11 +355,13 @@ def _time_setting(setting: Setting, coarse: bool, say, before=()) -> Cost | None
     before : sequence of Cost
         Runs with which this one may be identical.
     """
-    timings, one = [], None
+    timings = []
+    one = None
     while one is None or (
         len(timings) < TIMINGS and not any(one.is_same_run(other) for other in before)
     ):
-        kept, begin = _count_compiled(), (_measure_cpu(), perf_counter())
+        kept = _count_compiled()
+        begin = (_measure_cpu(), perf_counter())
         found = _run_setting(setting, setting.label, say, coarse)
         if found is None:
             return None
@@ -466,11 +471,9 @@ def _select_confirmed_runs(runs: list, good) -> list:
 
     What the tolerance chooses is judged on its own.
     """
-    chain, alone, out = (
-        [one for one in runs if one.value is not None],
-        [one for one in runs if one.value is None],
-        [],
-    )
+    chain = [one for one in runs if one.value is not None]
+    alone = [one for one in runs if one.value is None]
+    out = []
     for one in reversed(chain):
         # The best run has no error if it only serves as the reference of the others.
         if not one.errors and not one.distances:

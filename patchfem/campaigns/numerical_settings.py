@@ -53,7 +53,8 @@ def applicable_settings(model: Model) -> list:
 
     They are its element size, time steps, shear modes, and the jumps over cycles of wear.
     """
-    out, engine = ["element_size"] if model.patch is not None else [], plan(model).engine
+    out = ["element_size"] if model.patch is not None else []
+    engine = plan(model).engine
     # The sum over the bonds takes the same steps as a bench.
     engine = "bench" if model.kind == "bench" else engine
     out += [
@@ -130,12 +131,14 @@ def _by_tolerance(model: Model) -> list:
 
 def _uniform_meshes(model: Model) -> list:
     """Return uniform meshes, and for a static patch also the mesh that its tolerance chooses."""
-    length, out = model.patch.pieces.length, []
+    length = model.patch.pieces.length
+    out = []
     middle = round(length / model.patch.uniform_element_size)
     for power in range(-3, N_VALUES - 3):
         cells = round(middle * 2.0**power)
         if 8 <= cells <= MAX_CELLS or not power:
-            label, size = f"{1e6 * length / cells:.4g} um", length / cells
+            label = f"{1e6 * length / cells:.4g} um"
+            size = length / cells
             turned = replace(model, patch=model.patch.with_element_size(size)) if power else model
             out.append(Setting(label, size, f"element size {label}", turned))
     if model.kind == "patch":
@@ -150,8 +153,10 @@ def _integer_values(model: Model, knob: str) -> list:
     A small value of the scene has fewer coarser values: a quarter and a half of 1 are no numbers of
     shear modes.
     """
-    pinned, middle = _scene_value(model, knob), _middle_value(model, knob)
-    words, models = "{} " + knob.replace("_", " "), {}
+    pinned = _scene_value(model, knob)
+    middle = _middle_value(model, knob)
+    words = "{} " + knob.replace("_", " ")
+    models = {}
     for power in range(-2, N_VALUES - 2):
         value = max(1, round(middle * 2.0**power))
         own = not power and (pinned or knob == "steps_per_cycle")

@@ -205,10 +205,8 @@ def _compare_runs(before: Path, after: Path, out, json_: bool):
     """Compare the wear between the runs in two results folders."""
     lost = worn_runs.compare_runs(before, after)
     found = worn.wear_verdict(lost)
-    data, target = (
-        worn.wear_data(lost, found),
-        choose_folder(out, f"{before.resolve().name}-{after.resolve().name}"),
-    )
+    data = worn.wear_data(lost, found)
+    target = choose_folder(out, f"{before.resolve().name}-{after.resolve().name}")
     with results.Folder(target) as folder:
         summary.write_json(data, folder.path / "compare.json")
         worn.write_page(folder.path / "report.html", lost, found)

@@ -80,7 +80,8 @@ def _version(name: str) -> str:
 
 def _cache() -> Finding:
     """Check the cache of compiled code; without it every command compiles again."""
-    folder, why = compiled.cache_folder(), compiled.explain_cache_folder()
+    folder = compiled.cache_folder()
+    why = compiled.explain_cache_folder()
     sizes = [one.stat().st_size for one in folder.rglob("*") if one.is_file()]
     return Finding(
         "compiled code",
@@ -117,7 +118,8 @@ def _window() -> Finding:
         why = re.sub(r"^.*\b(?:WARN|ERR)\| ", "", said)[:100]  # VTK begins the line with its time
         fine = done.returncode == 0
     except (OSError, subprocess.TimeoutExpired) as error:
-        fine, why = False, str(error)[:100]
+        fine = False
+        why = str(error)[:100]
     cure = (
         ""
         if fine

@@ -155,7 +155,8 @@ class progress_bar:
     """
 
     def __init__(self, silent: bool):
-        self.bar, self.silent = None, silent
+        self.bar = None
+        self.silent = silent
         if not silent and sys.stderr.isatty():
             from rich.console import Console
             from rich.progress import Progress

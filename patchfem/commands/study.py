@@ -62,7 +62,9 @@ def cost(
         if over
         else [cost_curves.TOLERANCE, *(cost_curves.applicable_settings(found) if verbose else ())]
     )
-    target, curves, answer = choose_folder(out, f"{found.source.path.stem}-cost"), {}, {}
+    target = choose_folder(out, f"{found.source.path.stem}-cost")
+    curves = {}
+    answer = {}
     for knob in knobs:
         runs = curves[knob] = cost_curves.setting_curve(
             found, knob, None if quiet else print_message
@@ -213,7 +215,8 @@ def fit(
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
-    found, target = load_scene(scene, set_), choose_folder(out, f"{scene.stem}-fit")
+    found = load_scene(scene, set_)
+    target = choose_folder(out, f"{scene.stem}-fit")
     options = fits.Options(
         hold, offset, warm_up, from_patch=from_patch, amplitudes=amplitudes, **vars(rows)
     )

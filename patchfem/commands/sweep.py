@@ -173,11 +173,10 @@ def sweep(
             "only one of these options"
         )
     by = by or By()
-    begin, part = perf_counter(), by.part()
-    target, tells = (
-        choose_folder(out, f"{scene.stem}-sweep"),
-        "json" if json_ else "faults" if quiet else "words",
-    )
+    begin = perf_counter()
+    part = by.part()
+    target = choose_folder(out, f"{scene.stem}-sweep")
+    tells = "json" if json_ else "faults" if quiet else "words"
     told = Told(target, not no_page, tells, begin)
     signed = (
         ""
@@ -257,19 +256,19 @@ class Progress:
     WAIT = 10.0
 
     def __init__(self, silent: bool):
-        self.silent, self.done, self.begin, self.text, self.over = (
-            silent,
-            0,
-            perf_counter(),
-            "",
-            Event(),
-        )
-        self.said, self.open = self.begin, sys.stderr.isatty()
+        self.silent = silent
+        self.done = 0
+        self.begin = perf_counter()
+        self.text = ""
+        self.over = Event()
+        self.said = self.begin
+        self.open = sys.stderr.isatty()
 
     def __call__(self, done: int, total: int, left: float | None) -> None:
         if not self.text and not self.silent:
             Thread(target=self._show_waiting_time, daemon=True).start()
-        self.text, self.done = f"{done}/{total} cases", done
+        self.text = f"{done}/{total} cases"
+        self.done = done
         if not self.silent and perf_counter() - self.said >= (0.2 if self.open else self.WAIT):
             self._show(
                 f"{self.text}, {sweeping.format_duration(left)} left"
@@ -324,7 +323,9 @@ def _print_results(number: int, messages: dict, written: dict, told: Told) -> No
         Content of sweep.json.
     told : Told
     """
-    target, failed, counts = told.target, sorted(messages), written["cases"]["outcomes"]
+    target = told.target
+    failed = sorted(messages)
+    counts = written["cases"]["outcomes"]
     if told.tells == "json":
         print(
             json.dumps(

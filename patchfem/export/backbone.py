@@ -50,7 +50,8 @@ FLOOR_FACTOR = 0.1  # Lower end of a bar on a logarithmic axis / smallest value.
 
 def backbone_data(found: Backbone) -> dict:
     """Return the object that `patchfem backbone --json` prints, in SI units."""
-    frequencies, exponents = found.frequencies, found.exponents
+    frequencies = found.frequencies
+    exponents = found.exponents
     curves = {
         method: {name: getattr(curve, name).tolist() for name in COLUMNS}
         for method, curve in found.curves.items()
@@ -74,7 +75,8 @@ def backbone_data(found: Backbone) -> dict:
 
 def backbone_contents(found: Backbone, title: str = "") -> Contents:
     """Return backbone.nc: each curve under the name of its method, over its amplitudes."""
-    variables, coordinates = {}, {}
+    variables = {}
+    coordinates = {}
     for method, curve in found.curves.items():
         prefix = method.replace("-", "_")
         dimension = f"{prefix}_amplitude"

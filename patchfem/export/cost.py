@@ -102,7 +102,8 @@ def _by_tolerance(runs: list) -> list[list]:
 
 def _format_outcome(group: list) -> str:
     """State whether a tolerance is met, by the run itself or by settings that were tried next."""
-    first, last = group[0], group[-1]
+    first = group[0]
+    last = group[-1]
     if first.meets_tolerance():
         return ""
     of_steps = any("accuracy.steps_per_cycle = " in remedy for remedy in first.remedies)
@@ -133,10 +134,8 @@ def format_details(knob: str, runs: list, tolerance: float) -> list[str]:
     list of str
     """
     names = detailed_measures(runs, tolerance)
-    waited, width = (
-        any(one.has_waited() for one in runs),
-        max(len(knob), *(len(one.label) for one in runs)),
-    )
+    waited = any(one.has_waited() for one in runs)
+    width = max(len(knob), *(len(one.label) for one in runs))
     head = [
         f"{knob:<{width}}",
         f"{'CPU s':>7}",
@@ -185,7 +184,8 @@ def detailed_measures(runs: list, tolerance: float) -> list:
     They are those of MAIN that the setting changes, and the worst measure of each run; if there are
     none of these, all measures that it changes.
     """
-    turned, names = changed_measures(runs) or measures_with_error(runs), measures_with_error(runs)
+    turned = changed_measures(runs) or measures_with_error(runs)
+    names = measures_with_error(runs)
     worst = {worst_error(one, names, tolerance).name for one in runs if one.errors or one.distances}
     return [name for name in (*MAIN, *sorted(worst.difference(MAIN))) if name in turned] or turned
 
@@ -323,7 +323,8 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
     for text, is_met in (("meets its tolerance", True), ("misses its tolerance", False)):
         alike = [one for one in points if (one.share <= (one.run.tolerance or tolerance)) == is_met]
         if alike:
-            x, y = [one.run.seconds for one in alike], [one.share for one in alike]
+            x = [one.run.seconds for one in alike]
+            y = [one.share for one in alike]
             marks.append(charts.make_dots(x, y, "accent", text, size=6, hollow=not is_met))
     ends = _axis_range([one.seconds for one in runs], MIN_SECONDS_RATIO)
     limit = f"tolerance of the scene, {tolerance:g}"

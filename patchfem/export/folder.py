@@ -121,7 +121,8 @@ def is_complete(what, target: Path) -> bool:
 
 def write_results(result: Result, path: Path) -> WrittenRun:
     """Write all files of a run except its page into the folder `path`."""
-    begin, bodies = perf_counter(), {}
+    begin = perf_counter()
+    bodies = {}
     text = result.plan.model.source.resolved
     write_text(path / SCENE, text)
     netcdf.write_netcdf(result_contents(result), path / "result.nc")
@@ -150,10 +151,8 @@ def write_run_page(written: WrittenRun, folder: Path) -> Path:
 
     Missing if another run has replaced the folder in the meantime.
     """
-    text, path = (
-        report.run_page(written.result, written.bodies, player.player_data(folder)),
-        Path(folder) / PAGE,
-    )
+    text = report.run_page(written.result, written.bodies, player.player_data(folder))
+    path = Path(folder) / PAGE
     if not path.parent.is_dir() or _folder_identity(path.parent) != written.place:
         raise Missing(f"{folder}: replaced by another run while the page was drawn")
     write_text(path, text)

@@ -19,7 +19,8 @@ def result_contents(result: Result) -> netcdf.Contents:
     It consists of histories, interface frames, levels, events, curve and provenance.
     """
     found, modal = collect_histories(result)
-    patch, extra = result.patch, result.extra
+    patch = result.patch
+    extra = result.extra
     surface = patch_surface(patch, result.fields)
     x, weight = (surface.x, surface.weight) if surface is not None else (None, None)
     fields = {k: v for k, v in result.fields.items() if not k.startswith("holder_")}
@@ -76,7 +77,8 @@ def collect_histories(result: Result) -> tuple:
         Histories by name, (k,) or (i, k) for i interfaces, and (names, (k, n)) of the modes or
         None; ({}, None) for a run without motion.
     """
-    kind, r = result.plan.kind, result.response
+    kind = result.plan.kind
+    r = result.response
     if r is None:
         return {}, None
     if kind == "bench":

@@ -166,7 +166,8 @@ def run_contents(
     -------
     Contents
     """
-    data, coords = {}, {}
+    data = {}
+    coords = {}
     if histories:
         coords["time"] = ("time", histories["time"], {"units": "s", "standard_name": "time"})
         for name, values in histories.items():
@@ -313,7 +314,8 @@ def add_curve(data: Contents, curve: dict) -> Contents:
     columns of CURVE_COLUMNS and the errors of all that is read.
     """
     names, number = np.unique(np.asarray(curve["regime"], str), return_inverse=True)
-    point, meanings = "curve_point", [name.replace(" ", "_") for name in names]
+    point = "curve_point"
+    meanings = [name.replace(" ", "_") for name in names]
     out = {
         "curve_frequency": (
             point,
@@ -375,7 +377,8 @@ DECAY = {
 
 def add_decay(data: Contents, decay) -> Contents:
     """Return the content with a `response.decay_curve.DecayCurve` over decay_time."""
-    over, out = "decay_time", {}
+    over = "decay_time"
+    out = {}
     for name, (unit, text) in DECAY.items():
         out[f"decay_{name}"] = (over, getattr(decay, name), {"units": unit, "long_name": text})
         if name != "amplitude":
@@ -453,9 +456,11 @@ def add_faces(data: Contents, faces) -> Contents:
     faces: list of `runs.patch.faces.Face`. The number at the end of a name is that of the
     interface, from 1.
     """
-    out, places = {}, {}
+    out = {}
+    places = {}
     for face in faces:
-        number, surface = face.number + 1, face.surface
+        number = face.number + 1
+        surface = face.surface
         one = run_contents({}, None, face.fields, surface.x, surface.weight)
         frame = "frame" if face.fields["time"].size > 1 else "frame_at_rest"
         over = {"x": f"x_{number}", "frame": frame}

@@ -265,7 +265,9 @@ def _patch(result: Result) -> PressedPatch:
 
 def _evaluations(result: Result) -> Evaluations:
     """Return the evaluations of the run."""
-    extra, levels, wear = result.extra, None, None
+    extra = result.extra
+    levels = None
+    wear = None
     if "levels" in extra:
         names = ("drive", "stuck", "values", "errors", "unit", "outcome")
         levels = [{name: getattr(level, name) for name in names} for level in extra["levels"]]
@@ -278,7 +280,8 @@ def _evaluations(result: Result) -> Evaluations:
 
 def _bench_motion(result: Result, tables: dict) -> Motion:
     """Return the histories of a bench."""
-    response, window = result.response, result.window
+    response = result.response
+    window = result.window
     history = {"time": response.time, "displacement": response.slide, "force": response.force}
     loop = {"slide": window.slide, "force": window.force, "time": window.time}
     recorded = None
@@ -307,7 +310,9 @@ def _read_recorded_loop(folder: Path, slide: dict, response) -> tuple | None:
 
 def _rig_motion(result: Result) -> Motion:
     """Return the histories of a rig."""
-    response, window, rig = result.response, result.window, result.plan.model.rig
+    response = result.response
+    window = result.window
+    rig = result.plan.model.rig
     loop = {"slide": window.slide, "force": window.force, "time": window.time}
     if rig.friction.names and "slides" in window.extra:
         loop["each"] = list(

@@ -103,7 +103,8 @@ def page_html(data: RunData) -> str:
 
 def draw_figures(data: RunData) -> tuple:
     """Return the charts of a run, each with its anchor, and the HTML of their containers."""
-    drawn, places = [], []
+    drawn = []
+    places = []
     for found in (find_picture(name, data) for name in PICTURES):
         if found is None:
             continue
@@ -137,7 +138,8 @@ def find_picture(name: str, data: RunData) -> Picture | None:
 
 def _curve_picture(data: RunData) -> Picture | None:
     """Return the picture of a curve of steady motions."""
-    found, text = data.evaluations.curve, data.source.driven
+    found = data.evaluations.curve
+    text = data.source.driven
     return (
         None
         if found is None
@@ -207,7 +209,8 @@ def _wear_picture(data: RunData) -> Picture | None:
     wear = data.evaluations.wear
     if wear is None:
         return None
-    states, history = wear.states, wear.history
+    states = wear.states
+    history = wear.history
     depth = states["worn_depth"]
     mean = depth.mean(axis=1) if depth.ndim == 3 else depth
     profiles = (states["time"] / wear.period, states["normal_stress"], mean)
@@ -257,7 +260,8 @@ def _interface_picture(data: RunData) -> Picture | None:
     """Return the picture of the stresses on the interface."""
     if not data.patch.touches():
         return None
-    fields, caption = data.patch.fields, "Normal stress of the pressed pieces"
+    fields = data.patch.fields
+    caption = "Normal stress of the pressed pieces"
     if np.any(fields.get("shear_stress", 0.0)):
         whole_cycle = data.verdict.summary["kind"] == "rig" and not data.verdict.is_part_of_cycle()
         span = "the last cycle" if whole_cycle else "the run"
@@ -329,7 +333,8 @@ def _stress_picture(data: RunData) -> Picture | None:
 
 def _mesh_sentence(data: RunData) -> str:
     """Return the sentence about pressure peaks that the stress in the pieces misses; else ""."""
-    sigma, mine = data.patch.fields["normal_stress"][0], data.patch.bodies["pressure"]
+    sigma = data.patch.fields["normal_stress"][0]
+    mine = data.patch.bodies["pressure"]
     if sigma.size == mine.size:
         return ""
     unit, scale = formatting.choose_axis_unit([sigma.max()], "Pa")
@@ -404,7 +409,8 @@ def _histories_picture(data: RunData) -> Picture | None:
     motion = data.motion
     if motion is None:
         return None
-    history, period = motion.history, motion.period
+    history = motion.history
+    period = motion.period
     if motion.window is None:
         force = " and friction force" if np.any(history["force"]) else ""
         return Picture(
@@ -428,10 +434,8 @@ def _histories_picture(data: RunData) -> Picture | None:
         "Displacement over the whole run. At the end of the run: displacement, and acceleration of "
         f"{bodies}.{_drive_sentence(data)}"
     )
-    begin, swings = (
-        charts.first_complete_time(history["time"], period, w["time"][0]),
-        bool(data.verdict.released),
-    )
+    begin = charts.first_complete_time(history["time"], period, w["time"][0])
+    swings = bool(data.verdict.released)
     kept = int(np.sum(history["time"] < begin))
     if kept:
         what = (
@@ -465,7 +469,8 @@ def _drive_sentence(data: RunData) -> str:
 
 def _measured_picture(data: RunData) -> Picture | None:
     """Return the picture of computed and measured responses."""
-    m, found = data.measured, data.verdict.summary["measures"]
+    m = data.measured
+    found = data.verdict.summary["measures"]
     if m is None or not m.is_comparable():
         return None
     points = []
@@ -524,7 +529,8 @@ def _unsettled_sentence(data: RunData) -> str:
 
 def _measured_section(data: RunData) -> list:
     """Return the section with computed and measured values; [] if they cannot be compared."""
-    m, found = data.measured, data.verdict.summary["measures"]
+    m = data.measured
+    found = data.verdict.summary["measures"]
     if not m.is_comparable():
         return []
     rows = []
@@ -538,7 +544,8 @@ def _measured_section(data: RunData) -> list:
             ),
             m.factors(),
         ):
-            value, mine = getattr(r, name), found.get(key, {"value": None})["value"]
+            value = getattr(r, name)
+            mine = found.get(key, {"value": None})["value"]
             if value is None or mine is None:
                 continue
             mine = mine * gain
@@ -575,11 +582,13 @@ def _levels_section(levels: list) -> Section:
     A row has drive, amplitude, acceleration, distortion, the outcome if it is known, and whether
     the interface sticks.
     """
-    rows, judged = [], any(one.get("outcome") for one in levels)
+    rows = []
+    judged = any(one.get("outcome") for one in levels)
     for number, one in enumerate(levels, 1):
         cells = []
         for name, unit in LEVEL_COLUMNS:
-            value, error = one["values"].get(name), one["errors"].get(name)
+            value = one["values"].get(name)
+            error = one["errors"].get(name)
             there = value is not None and np.isfinite(value)
             cells.append(
                 format_with_error(name, measure_entry(value, unit, error)) if there else EN_DASH
@@ -618,7 +627,8 @@ def measure_entry(value: float, unit: str, error: float | None) -> dict:
 
 def _measures_section(data: RunData) -> Section:
     """Return the section about all measures with errors, in other units, and with definitions."""
-    rows, means = [], data.verdict.means
+    rows = []
+    means = data.verdict.means
     found = data.verdict.summary["measures"]
     for name, m in order_measures(found).items():
         value, error = format_value_and_error(name, m)

@@ -84,7 +84,9 @@ class Folder:
     def __init__(self, target: Path, resume: bool = False):
         self.target = Path(os.path.abspath(target)).resolve()
         self.path = self.target.parent / (self.target.name + ".partial")
-        self.shown, self.resume, self.dropped = target, resume, ""
+        self.shown = target
+        self.resume = resume
+        self.dropped = ""
         self.claim = FolderLock(self.target.parent / f".{self.target.name}{LOCK}", target, "run")
 
     def __enter__(self) -> "Folder":

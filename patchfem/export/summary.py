@@ -195,7 +195,8 @@ def loop_entry(result: Result) -> dict:
         or None in (stiffness.value, work.value)
     ):
         return {}
-    amplitude, open_ = result.plan.model.slide.amplitude, stiffness.error or stiffness.floor
+    amplitude = result.plan.model.slide.amplitude
+    open_ = stiffness.error or stiffness.floor
     if stiffness.value <= MIN_STIFFNESS_ERRORS * open_ or work.value < 0:
         return {}
     factor = work.value / (math.pi * stiffness.value * amplitude**2)
@@ -231,7 +232,8 @@ def contact_entry(result: Result) -> dict:
 
 def count_cycles(result: Result) -> float | None:
     """Return the number of cycles of the drive, or of the slide; None if the run has none."""
-    r, period = result.response, result.extra.get("period")
+    r = result.response
+    period = result.extra.get("period")
     if r is not None and period and result.plan.kind != "bench":
         return float(r.time[-1] - r.time[0]) / period
     return tomllib.loads(result.plan.model.source.resolved).get("slide", {}).get("cycles")
@@ -242,7 +244,8 @@ def effect_entries(result: Result) -> list:
 
     The law and the modes share one loop, whose time is assigned to the law.
     """
-    patch, out = result.patch, []
+    patch = result.patch
+    out = []
     loop = result.seconds.get("march", result.seconds.get("bench", 0.0))
     for name in result.plan.effects:
         seconds = 0.0

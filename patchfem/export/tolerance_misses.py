@@ -151,7 +151,9 @@ def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str
         else max([name for name in FIRST if name in lost] or lost, key=beyond.get)
     )
     share = np.where(lost[name], _relative_error(measures[name]), 0.0)
-    count, case, others = int(lost[name].sum()), int(np.argmax(share)), len(lost) - 1
+    count = int(lost[name].sum())
+    case = int(np.argmax(share))
+    others = len(lost) - 1
     known = (
         f"{format_number(100 * share[case], 2)} % of its value"
         if share[case] <= ZERO_ERROR_RATIO

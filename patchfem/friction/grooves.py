@@ -142,7 +142,8 @@ class Grooves:
         -------
         float or array
         """
-        q0, q1 = np.asarray(q0, float), np.asarray(q1, float)
+        q0 = np.asarray(q0, float)
+        q1 = np.asarray(q1, float)
         signed_friction = np.sign(q1 - q0) * friction
         if friction * self.max_slope < MAX_SERIES_SLOPE:
             loss = self._integrate_series(self._angle(q0), self._angle(q1), signed_friction)

@@ -87,7 +87,8 @@ def read_spectrum(path) -> tuple:
         If the table is not a spectrum; the message names the line.
     """
     values = read_columns(path, SPECTRUM_FORMAT).values
-    frequency, level = values["frequency"], values["level"]
+    frequency = values["frequency"]
+    level = values["level"]
     wrong = np.flatnonzero((level <= 0) | (np.diff(frequency, prepend=0.0) <= 0))
     if wrong.size:
         row = wrong[0]

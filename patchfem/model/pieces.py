@@ -27,7 +27,8 @@ class RoundedEdges(NamedTuple):
 
 def make_elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
     """Return the elastic layers of a piece; a bare piece has its substrate as coating."""
-    coating, substrate = piece.face_material, piece.substrate
+    coating = piece.face_material
+    substrate = piece.substrate
     return Layers(
         (coating.young, coating.poisson), (substrate.young, substrate.poisson), patch.pieces.plane
     )

@@ -44,7 +44,8 @@ def estimate_errors(solve: Callable, fine: dict, ladder, made: dict | None = Non
     made : dict, optional
         Runs by variant that are solved already; the new ones are added.
     """
-    begin, made = perf_counter(), {} if made is None else made
+    begin = perf_counter()
+    made = {} if made is None else made
 
     def values(variant) -> dict:
         """Return the measures of a variant, solved on the first call."""

@@ -105,7 +105,8 @@ class DecayCurve(NamedTuple):
         inside = (x > own[0] - RANGE_TOL) & (x < own[-1] + RANGE_TOL)
         out = {name: np.interp(x, own, getattr(found, name)) for name in DecayCurve._fields}
         for name in ("frequency", "damping"):
-            straight, out[name] = out[name], _interpolate_monotone(x, own, getattr(found, name))
+            straight = out[name]
+            out[name] = _interpolate_monotone(x, own, getattr(found, name))
             out[f"{name}_error"] = out[f"{name}_error"] + np.abs(out[name] - straight)
         return DecayCurve(
             **{name: np.where(inside, part, np.nan) for name, part in out.items()}
@@ -117,7 +118,8 @@ class DecayCurve(NamedTuple):
         The error is the largest difference from the curve of `find_turning_points_outside` at the points
         around.
         """
-        beside, out = other.over(self.amplitude), {}
+        beside = other.over(self.amplitude)
+        out = {}
         for name in ("frequency", "damping"):
             change = np.nan_to_num(np.abs(getattr(self, name) - getattr(beside, name)))
             out[f"{name}_error"] = getattr(self, f"{name}_error") + (
@@ -155,8 +157,10 @@ def find_turning_points(time, place, speed) -> tuple:
         at a sample or alone between two of them.
     """
     speed = np.where(np.abs(speed) <= REST_SPEED_TOL * np.abs(speed).max(initial=0.0), 0.0, speed)
-    still, k = np.flatnonzero(speed == 0), np.flatnonzero(speed[:-1] * speed[1:] < 0)
-    span, places = time[k + 1] - time[k], (place[k], place[k + 1])
+    still = np.flatnonzero(speed == 0)
+    k = np.flatnonzero(speed[:-1] * speed[1:] < 0)
+    span = time[k + 1] - time[k]
+    places = (place[k], place[k + 1])
     speeds = speed[k] * span, speed[k + 1] * span
     share = _find_turning_fraction(places, speeds)
     times = np.concatenate([time[still], time[k] + share * span])
@@ -192,11 +196,9 @@ def measure_last_swing(time, place, speed, period: float) -> float | None:
         return late / 2
     # turning points from the end of the motion; direction; farthest position since the last turning
     # point
-    found, way, far = (
-        [],
-        0,
-        float(place[-1]),
-    )
+    found = []
+    way = 0
+    far = float(place[-1])
     for at in find_turning_points(time, place, speed)[1][::-1].tolist():
         if way == 0:
             way = int(np.sign(at - far)) if abs(at - far) > MAX_WIGGLE * late else 0
@@ -205,7 +207,8 @@ def measure_last_swing(time, place, speed, period: float) -> float | None:
             far = at
         elif way * (far - at) > MAX_WIGGLE * late:
             found.append(far)
-            far, way = at, -way
+            far = at
+            way = -way
         if len(found) == 3:
             return max(abs(found[0] - found[1]), abs(found[1] - found[2])) / 2
     return None
@@ -234,8 +237,12 @@ def find_turning_points_outside(time, place, speed) -> tuple:
         near: initial guess as a fraction of the step, outside 0 to 1.
         """
         span = time[step + 1] - time[step]
-        a, b, c, d = place[step], place[step + 1], speed[step] * span, speed[step + 1] * span
-        two, three = 2 * (3 * (b - a) - 2 * c - d), 3 * (2 * (a - b) + c + d)
+        a = place[step]
+        b = place[step + 1]
+        c = speed[step] * span
+        d = speed[step + 1] * span
+        two = 2 * (3 * (b - a) - 2 * c - d)
+        three = 3 * (2 * (a - b) + c + d)
         for _ in range(N_NEWTON_STEPS):
             near = near - (c + near * (two + near * three)) / (two + 2 * near * three)
         return time[step] + near * span
@@ -286,7 +293,8 @@ def compute_swing_curve(swings: HalfSwings) -> DecayCurve:
     at = np.arange(half.span.size)
     if noise.any():
         at = _overlap_spans(np.minimum(half.span, fall.span))
-    half, fall = half.at(at), fall.at(at)
+    half = half.at(at)
+    fall = fall.at(at)
     tilt = np.hypot(np.pi, fall.slope)
     found = DecayCurve(
         time=swings.middle[1 + at],
@@ -377,7 +385,9 @@ def fit_slopes(values, noise) -> Slopes:
         shorter_change[is_longer] = np.maximum(change - spread, 0.0)[is_longer]
         still = ends & (spread > 0)
         bias[still] /= (m / span[still]) ** 2 - 1
-        slope[agrees], spread[agrees], span[agrees] = wide[agrees], wide_spread[agrees], m
+        slope[agrees] = wide[agrees]
+        spread[agrees] = wide_spread[agrees]
+        span[agrees] = m
         grows = agrees
         tried.append((wide, wide_spread))
     at_end = np.isnan(bias)
@@ -442,7 +452,8 @@ def _limit_noise(noise, values) -> np.ndarray:
 def _parabola_weights(m: int) -> np.ndarray:
     """Return the weights (2 m + 1,) for the midpoint value of a least-squares parabola."""
     x = np.arange(-m, m + 1)
-    x2, n = x**2, x.size
+    x2 = x**2
+    n = x.size
     return (
         (np.sum(x2**2) - np.sum(x2) * x2) / (n * np.sum(x2**2) - np.sum(x2) ** 2)
         if m > 1
@@ -477,8 +488,10 @@ def _find_turning_fraction(place, speed) -> np.ndarray:
     The speeds at both ends have opposite signs.
     """
     (a, b), (c, d) = place, speed
-    two, three = 2 * (3 * (b - a) - 2 * c - d), 3 * (2 * (a - b) + c + d)
+    two = 2 * (3 * (b - a) - 2 * c - d)
+    three = 3 * (2 * (a - b) + c + d)
     both = -(two + np.copysign(np.sqrt(np.maximum(two**2 - 4 * three * c, 0.0)), two)) / 2
     with np.errstate(divide="ignore", invalid="ignore"):
-        near, far = c / both, both / three
+        near = c / both
+        far = both / three
     return np.clip(np.where(np.abs(near - 0.5) <= 0.5 + STEP_END_TOL, near, far), 0.0, 1.0)

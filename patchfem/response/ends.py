@@ -27,7 +27,8 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
     """
     if abs(offset) < 1e-9 or window.time.size < 4:
         return {}
-    offset, span = abs(offset), window.time[-1] - window.time[0]
+    offset = abs(offset)
+    span = window.time[-1] - window.time[0]
     cycles, (slips, slides) = span / period, slips_and_slides(window)
     forces = window.extra.get("forces", window.force[:, None])
     parts = (forces[1:] + forces[:-1]) / 2 * np.diff(slides, axis=0)

@@ -207,7 +207,8 @@ def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict
         Error of the friction force over the friction limit [1].
     scale : FrictionScale
     """
-    ratio, force = fraction * scale.static, fraction * scale.limit
+    ratio = fraction * scale.static
+    force = fraction * scale.limit
     work = fraction * scale.work
     direct = {
         "friction_force_peak": force,
@@ -240,7 +241,8 @@ def observed_orders(fine: dict, half: dict, quarter: dict) -> dict:
         Orders by name. A measure whose change falls with an order below MIN_OBSERVED_ORDER, or that a run
         does not have, is left out: more steps are not known to make it more accurate.
     """
-    last, before = absolute_change(fine, half), absolute_change(half, quarter)
+    last = absolute_change(fine, half)
+    before = absolute_change(half, quarter)
     found = {
         name: float(np.log2(before[name] / last[name]))
         for name in last
@@ -269,7 +271,8 @@ def add_errors(
     size : float
         Displacement that the drive itself causes [m], as in `rows.error_floor`.
     """
-    out, amplitude = {}, values.get("relative_displacement_amplitude", 0.0)
+    out = {}
+    amplitude = values.get("relative_displacement_amplitude", 0.0)
     for name, value in values.items():
         parts = [part.get(name, abs(value)) for part in errors]
         error = total_error(name, value, parts, min_relative_error, amplitude)

@@ -51,7 +51,8 @@ def sort_events(rows, count: int | None = None, source: str = "") -> Events:
     """
     rows = np.array(rows, float).reshape(-1, 4)
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
-    count, rows = len(rows) if count is None else count, rows[-MAX_EVENTS:]
+    count = len(rows) if count is None else count
+    rows = rows[-MAX_EVENTS:]
     return Events(
         rows[:, 0].copy(),
         rows[:, 1].astype(np.int32),
@@ -130,9 +131,14 @@ def compute_slip_states(time, slip, period: float, held: float = 0.0) -> tuple:
 def _detect_interface_events(time, slip, slide, period: float, held: float, number: int) -> list:
     """Return the event rows of one interface from its samples; `number` is its number from 1."""
     share, state = compute_slip_states(time, slip, period, held)
-    k, at = np.flatnonzero(state[1:] != state[:-1]), (time[1:] + time[:-1]) / 2
-    before, after, low, rise = state[k], state[k + 1], share[k], share[k + 1] - share[k]
-    turns, way = (before != 0) & (after != 0), np.where(before != 0, before, after)
+    k = np.flatnonzero(state[1:] != state[:-1])
+    at = (time[1:] + time[:-1]) / 2
+    before = state[k]
+    after = state[k + 1]
+    low = share[k]
+    rise = share[k + 1] - share[k]
+    turns = (before != 0) & (after != 0)
+    way = np.where(before != 0, before, after)
     kind = np.where(
         after > 0,
         np.where(turns, REVERSAL_UP, RELEASE_UP),
@@ -172,12 +178,14 @@ def find_sticks(events: Events, begin: float, end: float, moves) -> list:
         mine = events.kind[:first][events.interface[:first] == number + 1]
         if mine.size:
             sliding[number] = bool(mine[-1] != STOP)
-    found, last = {}, -np.inf
+    found = {}
+    last = -np.inf
     rows = zip(
         *(column[first:].tolist() for column in (events.time, events.interface, events.kind))
     )
     for when, number, kind in [*rows, (np.inf, 0, BORDER)]:
-        a, b = max(last, begin), min(when, end)
+        a = max(last, begin)
+        b = min(when, end)
         if b > a and not sliding[0]:
             found.setdefault(tuple(sliding), []).append((float(a), float(b)))
         if number:

@@ -51,7 +51,8 @@ def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
         np.append(first, inside.ravel())
         for first, inside in zip((window.time[0], window.slide[0], window.slide_rate[0]), parts)
     )
-    duration, increment = np.diff(time), np.diff(slide)
+    duration = np.diff(time)
+    increment = np.diff(slide)
     mean_speed = np.divide(increment, duration, out=np.zeros_like(increment), where=duration > 0)
     length = law.limit(mean_speed) / law.stiffness
     kept = np.exp(-np.abs(increment) / length)
@@ -89,16 +90,20 @@ def divide_steps(time, slide, speed) -> Steps:
     middle = np.clip(at, 1 / N_STEP_PARTS, 1 - 1 / N_STEP_PARTS)[:, None]
     half = np.arange(1, N_STEP_PARTS // 2 + 1) / (N_STEP_PARTS // 2)
     share[turns] = np.column_stack([middle * half, middle + (1 - middle) * half])
-    begin, end = speed[:-1] * step, speed[1:] * step
+    begin = speed[:-1] * step
+    end = speed[1:] * step
     rise = np.diff(slide)
-    two, three = 3 * rise - 2 * begin - end, begin + end - 2 * rise
+    two = 3 * rise - 2 * begin - end
+    three = begin + end - 2 * rise
     begin, two, three, first, step = (one[:, None] for one in (begin, two, three, slide[:-1], step))
     inside = Steps(
         time[:-1, None] + step * share,
         first + share * (begin + share * (two + share * three)),
         (begin + share * (2 * two + 3 * share * three)) / step,
     )
-    inside.slide[:, -1], inside.speed[:, -1], inside.time[:, -1] = slide[1:], speed[1:], time[1:]
+    inside.slide[:, -1] = slide[1:]
+    inside.speed[:, -1] = speed[1:]
+    inside.time[:, -1] = time[1:]
     return inside
 
 

@@ -44,10 +44,9 @@ def cycle_spans(time, period: float) -> list:
 
 def reversal_evaluation(model) -> str:
     """Return how the force at a reversal of the slide of a Model is evaluated, for `find_reversals`."""
-    law, soft = (
-        model.friction.law,
-        model.partial_slip
-        or (model.rig is not None and model.rig.friction.interfaces[0].partial_slip),
+    law = model.friction.law
+    soft = model.partial_slip or (
+        model.rig is not None and model.rig.friction.interfaces[0].partial_slip
     )
     if law_has_trait(law, "memoryless") and not soft:
         return "jumps"
@@ -71,7 +70,8 @@ def find_reversals(time, slide, rate, force, period: float, by: str = "rate") ->
         linearly in time. It is None if the slide is largest at an end of the cycle and the reversal
         is more than one sample away, because the force there is not that of a reversal.
     """
-    out, near = [], EVENT_TIME_TOL * period
+    out = []
+    near = EVENT_TIME_TOL * period
     for begin, end in cycle_spans(time, period):
         part = slice(*np.searchsorted(time, [begin - near, end + near]))
         pair = []
@@ -99,12 +99,17 @@ def _find_largest(time, y, v, near: float) -> tuple:
     sample.
     """
     top = int(np.argmax(y))
-    best, step = (top, float(y[top]), 0.0), np.diff(time)
+    best = (top, float(y[top]), 0.0)
+    step = np.diff(time)
     for k in (top - 1, top):  # the cubics on both sides of the largest sample
         if not 0 <= k < step.size or step[k] <= near or v[k] <= 0 or v[k + 1] >= 0:
             continue
-        a, p, q, rise = y[k], v[k] * step[k], v[k + 1] * step[k], y[k + 1] - y[k]
-        mid, big = 3 * rise - 2 * p - q, p + q - 2 * rise
+        a = y[k]
+        p = v[k] * step[k]
+        q = v[k + 1] * step[k]
+        rise = y[k + 1] - y[k]
+        mid = 3 * rise - 2 * p - q
+        big = p + q - 2 * rise
         root = np.sqrt(max(mid**2 - 3 * big * p, 0.0))
         s = p / (root - mid) if root > mid else 0.0
         value = a + s * (p + s * (mid + s * big))
@@ -155,7 +160,8 @@ def _force_beside_rest(slide, force, at: int, value: float) -> float | None:
     moves &= np.maximum(
         np.abs(slide[1:] - value), np.abs(slide[:-1] - value)
     ) > COORDINATE_ROUND_OFF * np.abs(slide).max(initial=0.0)
-    before, after = np.flatnonzero(moves[:at]), np.flatnonzero(moves[at:])
+    before = np.flatnonzero(moves[:at])
+    after = np.flatnonzero(moves[at:])
     return (
         float(force[before[-1]] + force[at + after[0] + 1]) / 2
         if before.size and after.size
@@ -237,7 +243,8 @@ def drift(time, slide, rate, period: float) -> float:
     period : float
         Period [s].
     """
-    end, start = time[-1], time[0]
+    end = time[-1]
+    start = time[0]
     cycles = (end - start) / period
     if cycles < 1.5:
         return float(slide[-1] - slide[0]) / max(cycles, 1e-9)
@@ -263,8 +270,11 @@ def time_mean(time, value, rate, begin: float, end: float) -> float:
     part = slice(
         np.searchsorted(time, begin - near), np.searchsorted(time, end + near, side="right")
     )
-    t, y, v = time[part], value[part], rate[part]
-    step, middle = np.diff(t), t[0]
+    t = time[part]
+    y = value[part]
+    v = rate[part]
+    step = np.diff(t)
+    middle = t[0]
     y = y - y[0]
     area = float(np.sum(step * (y[1:] + y[:-1]) / 2 + step**2 * (v[:-1] - v[1:]) / 12))
     # the gaps between the ends of the span and the nearest samples, at the value of these samples

@@ -127,16 +127,21 @@ def largest_distance(x, y=None) -> float:
     """Return the largest distance [m] between two points x (k,), or (x, y) of a path in a plane."""
     if y is None:
         return float(x.max() - x.min())
-    best, angle, turns, way = 0.0, 0.0, np.pi * np.arange(180) / 180, 0
+    best = 0.0
+    angle = 0.0
+    turns = np.pi * np.arange(180) / 180
+    way = 0
     # first the width in each of 180 directions, then in that of the widest pair until it grows no
     # more
     while way < 200:
         turn = turns[way] if way < turns.size else angle
         along = x * np.cos(turn) + y * np.sin(turn)
-        i, j = np.argmax(along), np.argmin(along)
+        i = np.argmax(along)
+        j = np.argmin(along)
         apart = float(np.hypot(x[i] - x[j], y[i] - y[j]))
         if apart > best:
-            best, angle = apart, np.arctan2(y[i] - y[j], x[i] - x[j])
+            best = apart
+            angle = np.arctan2(y[i] - y[j], x[i] - x[j])
         elif way >= turns.size:
             break
         way += 1
@@ -182,17 +187,17 @@ def compute_slip_measures(
         slice(-cycles * steps_per_cycle - 1, None) if slip.size > steps_per_cycle else slice(None)
     )
     across, beside = (None if one is None else one[kept] for one in second)
-    slid, slide, time = (
-        distances_moved(slip[kept], beside),
-        distances_moved(window.slide[kept], across),
-        window.time[kept],
-    )
+    slid = distances_moved(slip[kept], beside)
+    slide = distances_moved(window.slide[kept], across)
+    time = window.time[kept]
     still = slide <= COORDINATE_ROUND_OFF * np.abs(window.slide).max(initial=0.0)
     above = np.where(still, 0.0, slid / np.where(still, 1.0, slide)) - SLIP_FRACTION
-    before, after = above[:-1], above[1:]
+    before = above[:-1]
+    after = above[1:]
     rise = np.abs(after - before)
     # fraction of the time between two midpoints in which the linear interpolant is below 0
-    low, high = np.minimum(before, after), np.maximum(before, after)
+    low = np.minimum(before, after)
+    high = np.maximum(before, after)
     below = np.where(high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0)))
     middles = (time[1:] + time[:-1]) / 2
     out["stick_fraction"] = (
@@ -295,7 +300,8 @@ def peak_sampling_errors(window: Response, climbs: bool = False) -> dict:
     climbs : bool
         Whether the surfaces have grooves, so that the peak of the force lies between samples.
     """
-    size, out = np.abs(window.acceleration), {}
+    size = np.abs(window.acceleration)
+    out = {}
     top = int(np.argmax(size))
     if 0 < top < len(size) - 1:
         if not _is_smooth_at(size, top):
@@ -330,8 +336,11 @@ def find_turning_steps(time, place, rate) -> tuple:
     """
     step = np.diff(time)
     k = np.flatnonzero(rate[:-1] * rate[1:] < 0)
-    p, q, rise = rate[k] * step[k], rate[k + 1] * step[k], place[k + 1] - place[k]
-    two, three = 3 * rise - 2 * p - q, p + q - 2 * rise
+    p = rate[k] * step[k]
+    q = rate[k + 1] * step[k]
+    rise = place[k + 1] - place[k]
+    two = 3 * rise - 2 * p - q
+    three = p + q - 2 * rise
     # p + 2 two s + 3 three s^2 = 0; this form of the root avoids cancellation if the cubic is
     # nearly a parabola
     root = np.sqrt(np.maximum(two**2 - 3 * three * p, 0.0))
@@ -348,8 +357,11 @@ def measure_half_swing(time, place, rate) -> float:
     """
     h = np.diff(time)
     k, s = find_turning_steps(time, place, rate)
-    p, q, rise = rate[k] * h[k], rate[k + 1] * h[k], place[k + 1] - place[k]
-    two, three = 3 * rise - 2 * p - q, p + q - 2 * rise
+    p = rate[k] * h[k]
+    q = rate[k + 1] * h[k]
+    rise = place[k + 1] - place[k]
+    two = 3 * rise - 2 * p - q
+    three = p + q - 2 * rise
     every = np.concatenate([place, place[k] + s * (p + s * (two + s * three))])
     return float(every.max() - every.min()) / 2
 

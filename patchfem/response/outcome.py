@@ -94,7 +94,8 @@ def judge_outcome(
             / drive_sizes.find_drive_omega(drive) ** 2,
         )
         return found, remove_errors(measures) if found is Outcome.GROWS else measures
-    amplitudes, extremes = raw.amplitudes, raw.extremes
+    amplitudes = raw.amplitudes
+    extremes = raw.extremes
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
     floor = (
         AMPLITUDE_ROUND_OFF
@@ -183,7 +184,8 @@ def _reject_drifting(
     It must move both from cycle to cycle (`drift_per_cycle`) and from window to window (`middle`
     [m] per cycle).
     """
-    drift, amplitude = measures.get("drift_per_cycle"), measures["relative_displacement_amplitude"]
+    drift = measures.get("drift_per_cycle")
+    amplitude = measures["relative_displacement_amplitude"]
     if outcome is not Outcome.STEADY or drift is None or drift.value is None:
         return outcome
     moves = is_drifting(
@@ -243,7 +245,8 @@ def classify_periodic(
             (found != GROWS_CLASS) & (left > tolerance * amplitudes[:, -1] + floor), 0, found
         )
         none, (mean, about) = np.isnan(value), beat_mean_amplitudes(extremes, window)
-        value, error = np.where(none, mean, value), np.where(none, about, error)
+        value = np.where(none, mean, value)
+        error = np.where(none, about, error)
         # without a visible tail, the steady amplitude is the mean over the cycles of the last
         # window
         none = np.isnan(value) & (found == STEADY_CLASS)
@@ -288,14 +291,12 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
         Period of the drive [s].
     tolerance : float
     """
-    time, forces = (
-        window.time,
-        np.column_stack(
-            [
-                window.extra.get("forces", window.force),
-                window.extra.get("lateral_forces", np.zeros((window.time.size, 0))),
-            ]
-        ),
+    time = window.time
+    forces = np.column_stack(
+        [
+            window.extra.get("forces", window.force),
+            window.extra.get("lateral_forces", np.zeros((window.time.size, 0))),
+        ]
     )
     largest_force = np.abs(forces).max(axis=0)
     if time[-1] - time[0] < 1.5 * period:
@@ -304,7 +305,8 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
         return bool(np.any(rises & (size[-1] - size[0] > tolerance * largest_force)))
     # without this factor, round-off at the end of a cycle would leave out a step
     near = period * (1 + 1e-9)
-    first, last = time <= time[0] + near, time >= time[-1] - near
+    first = time <= time[0] + near
+    last = time >= time[-1] - near
     means = [
         np.abs(np.trapezoid(forces[part], time[part], axis=0)) / period for part in (first, last)
     ]

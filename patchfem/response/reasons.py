@@ -82,7 +82,8 @@ def find_missing_secant(values) -> dict:
     The force of rigid friction takes many values if the interface sticks at the largest slide.
     values: Measure by name. The result is a dict by name; {} if the value remains.
     """
-    one, stuck = values.get("secant_stiffness"), values.get("stick_fraction")
+    one = values.get("secant_stiffness")
+    stuck = values.get("stick_fraction")
     holds = (
         one is not None
         and stuck is not None
@@ -162,7 +163,8 @@ def find_missing_loops(values, window, drive) -> dict:
         Last cycles.
     drive
     """
-    ledger, loop = window.extra.get("ledger"), values.get("loop_area")
+    ledger = window.extra.get("ledger")
+    loop = values.get("loop_area")
     if ledger is None or loop is None or is_periodic(drive):
         return {}
     _, stored, lost, created = np.abs(ledger[:, -1] - ledger[:, 0])

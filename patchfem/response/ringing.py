@@ -92,7 +92,8 @@ def fit_ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring
     left, shares = _subtract_sinusoids(time, value, columns, poles)
     k = int(np.argmax([np.sum(part**2) for part in shares]))
     own, rate = poles[2 * k : 2 * k + 2]
-    amplitude, damping = float(np.abs(shares[k]).max()), float(rate / np.hypot(rate, own))
+    amplitude = float(np.abs(shares[k]).max())
+    damping = float(rate / np.hypot(rate, own))
     seen = span * own >= 2 * np.pi * MIN_PERIODS and own * np.diff(time).max() < np.pi / 2
     steady = (
         omega > 0
@@ -179,7 +180,8 @@ def held_modes(modes, stiffness, motion) -> list:
     motion : Response
         Samples of the stick interval.
     """
-    n, rows = modes.omega.size, modes.interfaces
+    n = modes.omega.size
+    rows = modes.interfaces
     whole = np.diag(modes.omega**2) + rows.T * stiffness @ rows / modes.mass
     matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-whole, -modes.damping_matrix]])
     values, shapes = np.linalg.eig(matrix)
@@ -250,12 +252,11 @@ def measure_ringing(time, value, sticks, omega: float = 0.0) -> tuple:
             found.append(one)
     if not found:
         return {}, {}
-    values, errors = {}, {}
+    values = {}
+    errors = {}
     for k, name in enumerate(("frequency", "damping")):
-        each, own = (
-            np.array([getattr(one, name) for one in found]),
-            np.array([one.errors[k] for one in found]),
-        )
+        each = np.array([getattr(one, name) for one in found])
+        own = np.array([one.errors[k] for one in found])
         middle = float(np.median(each))
         spread = 1.4826 * float(np.median(np.abs(each - middle))) / np.sqrt(each.size)
         values[f"ring_{name}"], errors[f"ring_{name}"] = middle, 2 * spread + float(np.median(own))
@@ -275,7 +276,8 @@ def _resample(time, value) -> tuple:
     on = np.abs(offset - np.median(offset)) < 1e-6 * step
     if on.sum() < MIN_SAMPLES:
         return np.empty(0), np.empty(0)
-    time, value = time[on], value[on]
+    time = time[on]
+    value = value[on]
     return time - time[0], value
 
 
@@ -358,7 +360,8 @@ def _fit_all_sinusoids(time, value, forced, rest) -> _Fit | None:
         # a smaller reduction of the residual is noise
         if not np.isfinite(new.rms) or new.rms > last / 2:
             break
-        best, last = new, new.rms
+        best = new
+        last = new.rms
         if last < 1e-6 * scale or time.size < 8 * (len(best.poles) + 2):
             break
         rest = _subtract_sinusoids(time, value, forced, best.poles)[0]
@@ -367,7 +370,8 @@ def _fit_all_sinusoids(time, value, forced, rest) -> _Fit | None:
 
 def _largest_line(time, rest) -> float:
     """Return the angular frequency [rad/s] of the highest line in the spectrum of `rest` (k,)."""
-    window, size = np.hanning(time.size + 2)[1:-1], 4 * time.size
+    window = np.hanning(time.size + 2)[1:-1]
+    size = 4 * time.size
     lines = np.abs(np.fft.rfft(rest * window, size))
     lines[:2] = 0.0
     return 2 * np.pi * int(np.argmax(lines)) / (size * (time[1] - time[0]))
@@ -378,7 +382,8 @@ def _initial_guesses(time, value, forced, poles, rest) -> list:
 
     The frequency is the best one, by projection, around the highest line of the residual.
     """
-    span, top = time[-1], _largest_line(time, rest)
+    span = time[-1]
+    top = _largest_line(time, rest)
     near = [own for own in top + np.linspace(-1.2, 1.2, 7) * 2 * np.pi / span if own > np.pi / span]
     sizes = [
         _fit_poles(time, value, forced, np.append(poles, (own, 0.5 / span)))[1] for own in near

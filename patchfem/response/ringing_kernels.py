@@ -25,9 +25,11 @@ SUCCESS_STEP_TOL, FAILURE_STEP_TOL = 1e-13, 1e-15
 def fill_sinusoids(time, poles, columns, first):
     """Fill `columns` (c, k) from row `first` with the sinusoids of `poles` (2 r,) at times (k,)."""
     for r in range(poles.size // 2):
-        own, rate = poles[2 * r], poles[2 * r + 1]
+        own = poles[2 * r]
+        rate = poles[2 * r + 1]
         for j in range(time.size):
-            fall, turn = exp(min(max(-rate * time[j], -50.0), 50.0)), own * time[j]
+            fall = exp(min(max(-rate * time[j], -50.0), 50.0))
+            turn = own * time[j]
             columns[first + 2 * r, j], columns[first + 2 * r + 1, j] = (
                 fall * cos(turn),
                 fall * sin(turn),
@@ -123,11 +125,15 @@ def compute_jacobian(time, poles, scale, columns, few, slopes, normal):
     Fills `slopes` (2 r, k) with the Jacobian, and `normal` (2 r, 2 r + 1) with the normal matrix
     and, in the last column, the gradient.
     """
-    many, count = poles.size, few.shape[1]
-    first, numbers = count - many, few[count + 1]
+    many = poles.size
+    count = few.shape[1]
+    first = count - many
+    numbers = few[count + 1]
     for r in range(many // 2):
-        cosine, sine = columns[0, first + 2 * r], columns[0, first + 2 * r + 1]
-        a, b = numbers[first + 2 * r], numbers[first + 2 * r + 1]
+        cosine = columns[0, first + 2 * r]
+        sine = columns[0, first + 2 * r + 1]
+        a = numbers[first + 2 * r]
+        b = numbers[first + 2 * r + 1]
         for at in range(time.size):
             slopes[2 * r, at] = (b * cosine[at] - a * sine[at]) * time[at] * scale[2 * r]
             slopes[2 * r + 1, at] = -(a * cosine[at] + b * sine[at]) * time[at] * scale[2 * r + 1]
@@ -207,15 +213,23 @@ def fit_sinusoids(time, value, poles, scale, ends, room):
         Number of evaluations, and sum of squares of the best residual.
     """
     columns, few, slopes, normal, more = room
-    many, damping, looked, largest, size = poles.size, 10 * INITIAL_DAMPING, 0, 1.0, inf
-    lower, step, tried = more[:many], more[many], more[many + 1]
+    many = poles.size
+    damping = 10 * INITIAL_DAMPING
+    looked = 0
+    largest = 1.0
+    size = inf
+    lower = more[:many]
+    step = more[many]
+    tried = more[many + 1]
     for r in range(many):
         tried[r] = poles[r]
     while True:
         new = compute_residual(time, value, tried, columns, few)
         looked += 1
         if new <= size:
-            size, damping, highest = new, damping / 10, 0.0
+            size = new
+            damping = damping / 10
+            highest = 0.0
             for r in range(many):
                 poles[r] = tried[r]
                 highest = max(highest, poles[r] if r % 2 == 0 else 0.0)

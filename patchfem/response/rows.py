@@ -219,7 +219,9 @@ class LastCycles:
         extra = self.window.extra
         if self.load is None or self.together or "slides" not in extra:
             return []
-        slips, count, out = extra.get("slips", extra["slides"]), extra["slides"].shape[1], []
+        slips = extra.get("slips", extra["slides"])
+        count = extra["slides"].shape[1]
+        out = []
         for k in range(1, count):
             window = replace(
                 self.window,
@@ -277,7 +279,8 @@ def compute_drift(s: LastCycles) -> float:
 
     If the interface slides in a plane, it is the magnitude of the drift vector.
     """
-    w, across = s.window, s.lateral("slides")
+    w = s.window
+    across = s.lateral("slides")
     own = drift(w.time, w.slide, w.slide_rate, s.drive.period)
     if across is None:
         return own
@@ -294,10 +297,8 @@ def first_harmonic(values: dict):
     The part in phase is the equivalent stiffness; the other part is W/(pi A^2), often many times as
     large. values: measures of one run, or (n,) of many.
     """
-    part, reach = (
-        np.abs(values["equivalent_stiffness"]),
-        np.asarray(values.get("slip_amplitude", 0.0), float),
-    )
+    part = np.abs(values["equivalent_stiffness"])
+    reach = np.asarray(values.get("slip_amplitude", 0.0), float)
     with np.errstate(all="ignore"):
         other = np.where(reach > 0, values.get("loop_area", 0.0) / (np.pi * reach**2), 0.0)
     return np.hypot(part, np.nan_to_num(other))
@@ -765,7 +766,8 @@ def larger_term(name: str, values: dict):
     float or (n,)
         0 if the measure is not a difference.
     """
-    row, number = find_row(name), name[len(remove_interface_number(name)) :]
+    row = find_row(name)
+    number = name[len(remove_interface_number(name)) :]
     if row.larger_term is None:
         return 0.0
     return row.larger_term[1](

@@ -104,7 +104,8 @@ def find_slipping(window, drive, log=None, held: float = 0.0) -> list:
 
     Parameters as in `list_events`.
     """
-    slips, held = slips_and_slides(window)[0], max(held, slip_round_off(window))
+    slips = slips_and_slides(window)[0]
+    held = max(held, slip_round_off(window))
     if log is not None:
         return [bool(np.ptp(column) > 0) for column in slips.T]
     return [

@@ -49,12 +49,14 @@ def classify_motions(a, tolerance: float, floor=0.0) -> np.ndarray:
     out = np.zeros(len(a), int)
     if a.shape[1] == 1:
         return out
-    change, scale = np.abs(a[:, -1] - a[:, -2]), tolerance * np.abs(a[:, -1]) + floor
+    change = np.abs(a[:, -1] - a[:, -2])
+    scale = tolerance * np.abs(a[:, -1]) + floor
     if a.shape[1] == 2:
         out[change <= scale] = STEADY_CLASS
         return out
     rest = np.abs(geometric_remainders(a[:, -3:]))
-    ends, rises = np.isfinite(rest), _increases_steadily(a)
+    ends = np.isfinite(rest)
+    rises = _increases_steadily(a)
     endless = rises & (change > 0.05 * scale)  # 0.05 of the limit: slower growth is steady
     out[rises & ~ends] = GROWS_CLASS
     out[(change <= scale) & np.where(ends, rest <= scale, ~endless)] = STEADY_CLASS
@@ -76,7 +78,8 @@ def geometric_remainders(three):
     It is what the series still adds to the last of three equally spaced values (..., 3), and NaN if
     the changes do not shrink. A beat is a series of complex values with a complex ratio.
     """
-    before, change = three[..., 1] - three[..., 0], three[..., 2] - three[..., 1]
+    before = three[..., 1] - three[..., 0]
+    change = three[..., 2] - three[..., 1]
     ratio = np.divide(change, before, out=np.zeros_like(change), where=before != 0)
     shrinks = np.abs(ratio) < 0.9995
     return np.where(shrinks, change * ratio / np.where(shrinks, 1 - ratio, 1.0), np.nan)[()]
@@ -129,7 +132,8 @@ def extrapolate_steady_amplitudes(a, p) -> tuple:
         [np.abs(p[:, w - 1 - k] + geometric_remainders(p[:, w - 3 - k : w - k])) for k in range(3)],
         axis=1,
     )
-    before, change = np.abs(p[:, -2] - p[:, -3]), np.abs(p[:, -1] - p[:, -2])
+    before = np.abs(p[:, -2] - p[:, -3])
+    change = np.abs(p[:, -1] - p[:, -2])
     shrink = np.minimum(np.divide(change, before, out=1.0 * (change > 0), where=before > 0), 0.9995)
     settle = (shape[:, -1] - shape[:, -2]) * shrink / (1 - shrink)
     plane = np.stack(
@@ -162,7 +166,8 @@ def plane_map_remainders(p) -> np.ndarray:
     area = (d1.conj() * d2).imag
     known = np.abs(area) > COLLINEAR_SINE * np.abs(d1) * np.abs(d2)
     area = np.where(known, area, 1.0)
-    t, q = (d1.conj() * d3).imag / area, (d2.conj() * d3).imag / area
+    t = (d1.conj() * d3).imag / area
+    q = (d2.conj() * d3).imag / area
     # both eigenvalues of the map lie inside the unit circle
     known &= (np.abs(q) < 1) & (np.abs(t) < 1 + q)
     return np.where(known, ((t - q) * d3 - q * d2) / np.where(known, 1 - t + q, 1.0), np.nan)
@@ -193,7 +198,8 @@ def window_amplitude_means(extremes, window: int) -> tuple:
     cut = given[..., given.shape[-2] - count * window :, :].reshape(
         *given.shape[:-2], count, window, 2
     )
-    low, high = cut[..., 0], cut[..., 1]
+    low = cut[..., 0]
+    high = cut[..., 1]
     return (high.max(axis=-1) - low.min(axis=-1)) / 2, (high.mean(axis=-1) - low.mean(axis=-1)) / 2
 
 
@@ -223,14 +229,13 @@ def remaining_free_motion(extremes, window: int, decay=0.0):
         return np.zeros(amplitude.shape[:-1])[()]
     third = max(1, count // 3)
     spread = amplitude - mean
-    before, last = spread[..., -2 * third : -third].max(axis=-1), spread[..., -third:].max(axis=-1)
+    before = spread[..., -2 * third : -third].max(axis=-1)
+    last = spread[..., -third:].max(axis=-1)
     lost = 1 - np.exp(-np.asarray(decay) * third)
     stays = (lost > PERIODIC_TOL) & (last > (1 - lost / 2) * before)
     away = np.abs(amplitude[..., :-1] - amplitude[..., -1:])
-    far, near = (
-        away[..., -2 * third : -third].max(axis=-1, initial=0.0),
-        away[..., -third:].max(axis=-1),
-    )
+    far = away[..., -2 * third : -third].max(axis=-1, initial=0.0)
+    near = away[..., -third:].max(axis=-1)
     share = np.minimum(1.0, np.divide(near, far, out=np.ones_like(near), where=far > 0))
     share = np.maximum(share, 1 - lost)
     return (near * share + np.where(stays, 0.0, spread[..., -1]))[()]
@@ -259,7 +264,8 @@ def beat_mean_amplitudes(extremes, window: int) -> tuple:
     third = amplitude.shape[1] // 3
     if third < 2:
         return np.full(len(mean), np.nan), np.full(len(mean), np.nan)
-    ends, value = mean[:, -third:], mean[:, -third:].mean(axis=1)
+    ends = mean[:, -third:]
+    value = mean[:, -third:].mean(axis=1)
     beat = (amplitude - mean)[:, -third:].max(axis=1)
     halves = np.abs(ends[:, : third // 2].mean(axis=1) - ends[:, third // 2 :].mean(axis=1))
     error = (

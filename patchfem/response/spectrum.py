@@ -61,9 +61,13 @@ def motion_harmonic(time, value, rate, omega: float, known: list | None = None) 
     known : list, optional
         `harmonic_weights` of the same times and frequency.
     """
-    step, rise = np.diff(time), np.diff(value)
-    p, q = rate[:-1] * step, rate[1:] * step
-    mid, big, total = 3 * rise - 2 * p - q, p + q - 2 * rise, 0j
+    step = np.diff(time)
+    rise = np.diff(value)
+    p = rate[:-1] * step
+    q = rate[1:] * step
+    mid = 3 * rise - 2 * p - q
+    big = p + q - 2 * rise
+    total = 0j
     for s, (weight, wave) in zip(
         GAUSS_POINTS, harmonic_weights(time, omega) if known is None else known
     ):
@@ -83,7 +87,8 @@ def acceleration_harmonic(time, value, rate, omega: float) -> complex:
 
 def _integrate_by_parts(time, value, rate, omega: float, first: complex) -> complex:
     """Return `acceleration_harmonic` for a known Fourier coefficient `first` of the motion."""
-    span, wave = time[-1] - time[0], np.exp(-1j * omega * time[[0, -1]])
+    span = time[-1] - time[0]
+    wave = np.exp(-1j * omega * time[[0, -1]])
     border = (rate[-1] + 1j * omega * value[-1]) * wave[1] - (
         rate[0] + 1j * omega * value[0]
     ) * wave[0]
@@ -156,8 +161,10 @@ def friction_harmonic(window, modes, drive) -> complex:
     drive
     """
     last = [part for part in drive.segments if part.start < window.time[-1]][-1]
-    time, omega = window.time, last.omega
-    known, motions = harmonic_weights(time, omega), list(zip(window.modal.T, window.modal_rate.T))
+    time = window.time
+    omega = last.omega
+    known = harmonic_weights(time, omega)
+    motions = list(zip(window.modal.T, window.modal_rate.T))
     wave = np.exp(-1j * omega * time[[0, -1]])
     first = np.array([motion_harmonic(time, z, v, omega, known) for z, v in motions])
     ends = 2 / (time[-1] - time[0]) * (window.modal[-1] * wave[1] - window.modal[0] * wave[0])
@@ -197,7 +204,8 @@ def read_instrument(
     if kind == "peak":
         return peak
     if kind == "rms":
-        step, square = np.diff(window.time), window.acceleration**2
+        step = np.diff(window.time)
+        square = window.acceleration**2
         return float(
             np.sqrt(
                 np.sum(step * (square[1:] + square[:-1]) / 2) / (window.time[-1] - window.time[0])

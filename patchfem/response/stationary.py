@@ -70,7 +70,8 @@ def make_record(window, drive) -> Record:
     The displacement comes from cubics through positions and rates.
     """
     kept = np.append(True, np.diff(window.time) > 1e-9 * drive.time[1])
-    time, step = window.time[kept], float(drive.time[1])
+    time = window.time[kept]
+    step = float(drive.time[1])
     grid = time[0] + step * np.arange(int((time[-1] - time[0]) / step * (1 + 1e-12)))
     place = CubicHermiteSpline(time, window.output[kept], window.output_rate[kept])(grid)
     return Record(step, drive.values(grid), place, np.interp(grid, time, window.acceleration[kept]))
@@ -78,7 +79,8 @@ def make_record(window, drive) -> Record:
 
 def random_measures(window, drive) -> dict:
     """Return the measures under a stationary random drive by name, except those without value."""
-    record, out = make_record(window, drive), {}
+    record = make_record(window, drive)
+    out = {}
     for name, values, even in (
         ("relative_displacement_rms", window.output, record.place),
         ("absolute_acceleration_rms", window.acceleration, record.acceleration),
@@ -108,7 +110,8 @@ def warn_if_short(found: dict, window) -> list:
     if any(name not in found or not found[name].value for name in names):
         return []
     at, zeta = (found[name].value for name in names)
-    span, decay = float(window.time[-1] - window.time[0]), 1 / (2 * np.pi * at * zeta)
+    span = float(window.time[-1] - window.time[0])
+    decay = 1 / (2 * np.pi * at * zeta)
     if span >= MIN_DECAY_TIMES * decay:
         return []
     return [
@@ -136,10 +139,8 @@ def rms_scatter(values) -> float:
     if values.size < N_GROUPS:
         return np.nan
     square = (values - values.mean()) ** 2
-    parts, mean = (
-        square[: square.size // N_GROUPS * N_GROUPS].reshape(N_GROUPS, -1).mean(axis=1),
-        square.mean(),
-    )
+    parts = square[: square.size // N_GROUPS * N_GROUPS].reshape(N_GROUPS, -1).mean(axis=1)
+    mean = square.mean()
     if not mean > 0:
         return 0.0
     share = stdtrit(N_GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(N_GROUPS) / mean
@@ -167,7 +168,8 @@ def is_steady(window, drive) -> bool:
     """Return whether the rms of both halves of a window agree within their scatter."""
     place = make_record(window, drive).place
     half = place.size // 2
-    first, last = place[:half], place[half:]
+    first = place[:half]
+    last = place[half:]
     # the half-widths are 2 standard errors, so a difference of up to 4 of its standard errors
     # passes
     return bool(
@@ -216,21 +218,26 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
     if record.place.size < 2 * MIN_SEGMENT_SAMPLES:
         return None
     frequency, (push, place, _) = transform_record(record)
-    span, line = 1 / (frequency[1]), frequency[1]
+    span = 1 / (frequency[1])
+    line = frequency[1]
     inside = np.flatnonzero((frequency >= band[0] + 2 * line) & (frequency <= band[1] - 2 * line))
     if inside.size < 5 or len(push) < N_GROUPS:
         return None
-    own, cross = (np.abs(push) ** 2)[:, inside], (push.conj() * place)[:, inside]
-    f, gain = frequency[inside], cross.sum(axis=0) / own.sum(axis=0)
+    own = (np.abs(push) ** 2)[:, inside]
+    cross = (push.conj() * place)[:, inside]
+    f = frequency[inside]
+    gain = cross.sum(axis=0) / own.sum(axis=0)
     top = int(np.argmax(np.abs(gain)))
     if top in (0, f.size - 1) or not np.abs(gain[top]) > 0:
         return None
     high = np.flatnonzero(np.abs(gain) < np.abs(gain[top]) / np.sqrt(2))
-    left, right = high[high < top].max(initial=0), high[high > top].min(initial=f.size - 1)
+    left = high[high < top].max(initial=0)
+    right = high[high > top].min(initial=f.size - 1)
     width = float(f[right] - f[left])
     theta = np.log([2 * np.pi * f[top], max(0.3 * width, 0.05 * line) / (2 * f[top])])
     for _ in range(3):  # the band of the fit follows the width of the peak
-        at, half = np.exp(theta[0]) / (2 * np.pi), np.exp(theta.sum()) / (2 * np.pi)
+        at = np.exp(theta[0]) / (2 * np.pi)
+        half = np.exp(theta.sum()) / (2 * np.pi)
         near = np.abs(f - at) <= max(FIT_BAND[0] * half, FIT_BAND[1] * line)
         theta = _fit_mode(f[near], gain[near], span, theta)
     if (
@@ -239,7 +246,8 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
         or theta[1] > 0
     ):
         return None
-    which, others = np.arange(len(push)) * N_GROUPS // len(push), []
+    which = np.arange(len(push)) * N_GROUPS // len(push)
+    others = []
     for group in range(N_GROUPS):
         left_in = which != group
         part = cross[left_in][:, near].sum(axis=0) / own[left_in][:, near].sum(axis=0)
@@ -301,7 +309,8 @@ def expected_response(f, omega: float, zeta: float, span: float) -> np.ndarray:
         Duration of a segment [s].
     """
     own = omega * np.sqrt(complex(1 - zeta * zeta))
-    turn, out = 2j * np.pi / span, 0.0
+    turn = 2j * np.pi / span
+    out = 0.0
     for pole, sign in ((-zeta * omega + 1j * own, 1), (-zeta * omega - 1j * own, -1)):
         q = pole - 2j * np.pi * f
         late = np.exp(q * span) - 1  # exp(turn span) = 1, so this is the same at q +- turn

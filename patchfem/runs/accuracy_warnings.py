@@ -114,7 +114,8 @@ def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
             ),
         )
     elif static:
-        at_rest, meshes = found, coarse
+        at_rest = found
+        meshes = coarse
         if still:
             at_rest = found._replace(
                 model=replace(model, patch=model.patch.with_mesh(is_static=True, slip=None)),
@@ -171,7 +172,8 @@ def _error_words(measure) -> str:
 
 def _static_remedy(found: Finding, excess: dict, coarse) -> str:
     """Return the remedy for static measures: more strips, or a finer mesh."""
-    asked, peak = found.model.patch, found.measures.get("pressure_peak")
+    asked = found.model.patch
+    peak = found.measures.get("pressure_peak")
     is_wear_unbounded = (
         "worn_depth_max" in _named_measures(found, excess)
         and peak is not None
@@ -250,7 +252,8 @@ def _refining_tolerance(found: Finding, coarse) -> float | None:
 
     If the coarser meshes are not at hand, it is the tolerance for one more halving.
     """
-    asked, tolerance = found.model.patch, found.model.accuracy.tolerance
+    asked = found.model.patch
+    tolerance = found.model.accuracy.tolerance
     if asked.mesh.shared is not None and isinstance(found.patch, press.Patch):
         if ladder.next_seconds(found.patch) > ladder.most_seconds(asked):
             return None
@@ -266,7 +269,8 @@ def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
 
     A looser tolerance is no remedy: it chooses coarser steps and meshes.
     """
-    model, extra = found.model, found.extra
+    model = found.model
+    extra = found.extra
     name = max(_named_measures(found, excess), key=excess.get)
     steps = extra.get("steps_per_cycle") or extra.get("steps")
     cause = _main_cause(found, name)
@@ -391,7 +395,8 @@ def _harmonics_of_friction(found: Finding) -> float:
 
     They are the largest speed over the reference speed of the law; 0 for other laws.
     """
-    law, slip = found.model.friction, found.measures.get("slip_amplitude")
+    law = found.model.friction
+    slip = found.measures.get("slip_amplitude")
     if law is None or slip is None or not law_has_trait(law.law, "creeps"):
         return 0.0
     return 2 * pi / found.extra["period"] * slip.value / law.reference_speed

@@ -42,7 +42,8 @@ def remove_joint(model: Model, patch=None) -> Model:
 
 def patch_stiffness(model: Model, patch) -> float:
     """Return the tangential stiffness [N/m] of a pressed patch with its law while nothing slips."""
-    f, load = model.friction, patch.pressure.load
+    f = model.friction
+    load = patch.pressure.load
     held = record.stick_stiffness(f, load)
     if not model.partial_slip or (np.isfinite(held) and not law_has_trait(f.law, "set-valued")):
         held = compute_sticking_stiffness(model.rig.friction.interfaces[0], load)

@@ -129,10 +129,8 @@ def _remaining_bytes(folder: Path, limit: str, usage: str) -> float:
     Inactive cached files count as free.
     """
     try:
-        most, taken = (
-            int((folder / limit).read_text("ascii")),
-            int((folder / usage).read_text("ascii")),
-        )
+        most = int((folder / limit).read_text("ascii"))
+        taken = int((folder / usage).read_text("ascii"))
         known = dict(
             line.split() for line in (folder / "memory.stat").read_text("ascii").splitlines()
         )

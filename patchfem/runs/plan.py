@@ -185,7 +185,8 @@ def _make_plan(model: Model) -> Plan:
         except PatchfemError as error:
             error.key = error.key or "measured.file"
             raise
-    chain, groups = {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}, {}
+    chain = {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}
+    groups = {}
     if model.rig is not None and model.rig.structure.without_joint is not None:
         model = replace(
             model,
@@ -193,7 +194,9 @@ def _make_plan(model: Model) -> Plan:
                 model.rig, patch_plan.chain(model.patch) | _link(model)
             ),
         )
-    on_motion, on_patch, on_law = [], [], []
+    on_motion = []
+    on_patch = []
+    on_law = []
     if model.rig is not None:
         chain = of_rig.chain(model.rig) | chain
         groups |= of_rig.groups(model) if model.kind == "rig" else {}
@@ -283,7 +286,8 @@ def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
     unknowns : dict
         Number of unknowns by name.
     """
-    rig, f = model.rig, model.friction
+    rig = model.rig
+    f = model.friction
     laws = [] if f is None else [f]
     if rig is not None:
         laws = [one.numbers for one in rig.friction.interfaces]
@@ -386,7 +390,8 @@ def _groove_words(model: Model) -> list:
     load = model.nominal_load
     if model.grooves is None or not load > 0:
         return []
-    g, mu = model.grooves, model.friction.static
+    g = model.grooves
+    mu = model.friction.static
     return [
         f"at their bottom the grooves act as a spring of stiffness N k^2 A = {g.stiffness(load):.4g} N/m; on their "
         f"steepest flank the contact resists a force of up to {g.max_force(load, mu):.4g} N; without grooves "

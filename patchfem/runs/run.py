@@ -97,9 +97,15 @@ def run(
 
 def _run(what: Plan, say, progress, estimate: bool, fresh: bool, kept: StateFile | None) -> Result:
     """Run a plan whose size was accepted; the parameters are those of `run`."""
-    begin, model = perf_counter(), what.model
-    seconds, warnings, notes = {}, list(model.source.remarks), list(model.source.notes)
-    patch, coarse, climbed, still = None, (None, None), (), ()
+    begin = perf_counter()
+    model = what.model
+    seconds = {}
+    warnings = list(model.source.remarks)
+    notes = list(model.source.notes)
+    patch = None
+    coarse = (None, None)
+    climbed = ()
+    still = ()
     if model.rig is not None:
         warnings += engines.unused_settings(model, what.engine)
     if model.patch is not None:
@@ -150,12 +156,15 @@ def _run(what: Plan, say, progress, estimate: bool, fresh: bool, kept: StateFile
             {},
         )
     else:
-        evolved, here = None, what
+        evolved = None
+        here = what
         if model.wear is not None and patch is not None:
-            key, climbed = kept and state_key(model, patch, kept.version), (patch, *coarse)
+            key = kept and state_key(model, patch, kept.version)
+            climbed = (patch, *coarse)
             evolved = evolve.evolved_with(kept, key, model, patch, coarse[:2], progress)
             progress = None  # the progress of the wear has covered all cycles
-            patch, coarse = evolved.patch, evolved.coarse
+            patch = evolved.patch
+            coarse = evolved.coarse
             if evolved.state is not None:
                 here = replace(what, model=evolve.worn_model(model, patch, evolved.state.depth))
         module, function = KINDS[what.kind].split()
@@ -216,7 +225,8 @@ def _complete_result(
     wide = tolerance_warnings(
         Finding(model, result.measures, result.patch, result.extra, climbed), coarse, still
     )
-    warned, noted = result.warnings + wide, [*notes, *result.extra.get("notes", [])]
+    warned = result.warnings + wide
+    noted = [*notes, *result.extra.get("notes", [])]
     warned, noted = (shorten_file_names(texts, model.source.path) for texts in (warned, noted))
     faces = _yielding_faces(result)
     noted += faces.values()
@@ -234,7 +244,8 @@ def _complete_result(
 
 def _yielding_faces(result: Result) -> dict:
     """Return the notes on faces that yield even at the peak pressure minus its error."""
-    peak, asked = result.measures.get("pressure_peak"), result.plan.model.patch
+    peak = result.measures.get("pressure_peak")
+    asked = result.plan.model.patch
     if asked is None or result.patch is None or peak is None or peak.value is None:
         return {}
     return strength.yielding_faces(asked, peak.value - (peak.error or 0.0))

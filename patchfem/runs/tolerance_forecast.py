@@ -155,7 +155,8 @@ def _rig_steps_cause(model: Model) -> Cause | None:
     engine = engines.choose_engine(model)
     if not engine.coarser_in_time(model, numerics.choose(model), None) or engine is engines.SMOOTH:
         return None
-    steps, wanted = numerics.choose(model).steps, costs.steps_wanted(model)
+    steps = numerics.choose(model).steps
+    wanted = costs.steps_wanted(model)
     if steps > FEWER_STEPS * wanted:
         return None
     pinned = model.accuracy.steps_per_cycle is not None
@@ -177,7 +178,8 @@ def _steps_cure(model: Model) -> dict:
     if free.name in STEPLESS:
         dropped = {"accuracy.steps_per_cycle": None} if accuracy.steps_per_cycle is not None else {}
         return dropped | ({"accuracy.method": None} if accuracy.method != "auto" else {})
-    steps, enough = numerics.choose(model).steps, ENOUGH_STEPS * costs.steps_wanted(model)
+    steps = numerics.choose(model).steps
+    enough = ENOUGH_STEPS * costs.steps_wanted(model)
     if steps >= enough:
         return {}
     return {"accuracy.steps_per_cycle": _rounded_steps(enough)}
@@ -197,7 +199,8 @@ def _more_cycles(model: Model) -> dict:
 
     The slowest mode counts; {} if the scene has enough cycles.
     """
-    rig, tolerance = model.rig, model.accuracy.tolerance
+    rig = model.rig
+    tolerance = model.accuracy.tolerance
     if not rig.drive.waveform.is_sine or not drive_sizes.is_sinusoidal(rig.drive.signal):
         return {}
     decay = drive_sizes.find_min_decay_rate(rig.modes) * rig.drive.signal.period
@@ -230,10 +233,8 @@ def _bench_steps_cause(model: Model) -> Cause | None:
         law_has_trait(model.friction.law, "memoryless") and not model.partial_slip
     ):
         return None  # a law without memory has a closed form
-    steps, wanted = (
-        bench_engine.steps_per_cycle(model),
-        bench_engine.steps_per_cycle(_replace_accuracy(model, steps_per_cycle=None)),
-    )
+    steps = bench_engine.steps_per_cycle(model)
+    wanted = bench_engine.steps_per_cycle(_replace_accuracy(model, steps_per_cycle=None))
     if steps > FEWER_STEPS_OF_BENCH[law_has_trait(model.friction.law, "bonds")] * wanted:
         return None
     enough = _rounded_steps(ENOUGH_STEPS_OF_BENCH * wanted)

@@ -44,7 +44,8 @@ def spread_elements(stiffness, yield_displacement) -> SpreadElements:
     -------
     SpreadElements
     """
-    k, y = np.asarray(stiffness, float), np.asarray(yield_displacement, float)
+    k = np.asarray(stiffness, float)
+    y = np.asarray(yield_displacement, float)
     starts = np.flatnonzero(np.diff(y, prepend=-np.inf) > EQUAL_YIELD_TOL * y)
     total = np.add.reduceat(k, starts)
     y = np.add.reduceat(k * y, starts) / total

@@ -126,7 +126,8 @@ def average_at_nodes(profile: Profile, x: np.ndarray, integral=None) -> np.ndarr
 
 def _integrate(profile: Profile, places) -> np.ndarray:
     """Integrate the trace exactly from its first sample to positions [m2], flat beyond its ends."""
-    x, z = profile.x, profile.z
+    x = profile.x
+    z = profile.z
     steps = np.diff(x)
     total = np.concatenate([[0.0], np.cumsum(steps * (z[1:] + z[:-1]) / 2)])
     within = np.clip(places, x[0], x[-1])

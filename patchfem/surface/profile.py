@@ -50,7 +50,8 @@ class Profile:
 def level(profile: Profile) -> Profile:
     """Subtract the least-squares line of the measured samples."""
     known = ~profile.missing
-    x, z = profile.x, profile.z
+    x = profile.x
+    z = profile.z
     if known.sum() < 2:
         return replace(profile, z=frozen_array(z - z[known].mean() if known.any() else z))
     s = (x - x[known].mean()) / profile.length

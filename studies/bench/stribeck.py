@@ -103,9 +103,11 @@ def draw(path: Path, rows: list, slips) -> None:
     """One panel per slip growth: lines are closed forms, marks are benches."""
     with drawing(path, (9.6, 3.4), 1, len(slips), sharey=True, squeeze=False) as (_, axes):
         for axis, part in zip(axes[0], slips):
-            slip, mine = part * LENGTH, [row for row in rows if row["slip"] == part]
+            slip = part * LENGTH
+            mine = [row for row in rows if row["slip"] == part]
             fine = 10.0 ** np.linspace(-2, 2, 81)
-            speeds, at = fine * np.sqrt(REST * slip), [row["share"] for row in mine]
+            speeds = fine * np.sqrt(REST * slip)
+            at = [row["share"] for row in mine]
             axis.semilogx(
                 fine, [promised(v, slip) for v in speeds], color=BLUE, label="2.18, Lorentzian"
             )

@@ -56,7 +56,8 @@ class SuperLU:
 
         Where SuperLU changed the order it takes a solve for each of the k unknowns.
         """
-        n, k = self.factor.shape[0], self.size
+        n = self.factor.shape[0]
+        k = self.size
         order = self.factor.perm_c
         if not (
             np.array_equal(order[n - k :], np.arange(n - k, n))
@@ -124,7 +125,8 @@ class Pardiso:
         from pypardiso import PyPardisoSolver
 
         n = matrix.shape[0]
-        self.library, self.size = PyPardisoSolver(mtype=2), size
+        self.library = PyPardisoSolver(mtype=2)
+        self.size = size
         upper = triu(matrix, format="csr")
         self.matrix = (
             upper.data,
@@ -141,11 +143,9 @@ class Pardiso:
     def _call(self, phase: int, load, out) -> None:
         data, pointer, indices = self.matrix
         number = [ctypes.byref(ctypes.c_int32(k)) for k in (1, 1, 2, phase, pointer.size - 1)]
-        fault, real, whole = (
-            ctypes.c_int32(0),
-            ctypes.POINTER(ctypes.c_double),
-            ctypes.POINTER(ctypes.c_int32),
-        )
+        fault = ctypes.c_int32(0)
+        real = ctypes.POINTER(ctypes.c_double)
+        whole = ctypes.POINTER(ctypes.c_int32)
         columns = ctypes.byref(ctypes.c_int32(1 if load.ndim == 1 else load.shape[1]))
         self.library._mkl_pardiso(
             self.library.pt.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)),

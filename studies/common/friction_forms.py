@@ -137,7 +137,8 @@ def stretch_loop(amplitude, length, limit=1.0, breakaway=0.0):
     require_positive(amplitude=amplitude, length=length)
     if not 0 <= breakaway <= 1:
         raise ValueError(f"breakaway must be in [0, 1], got {breakaway}")
-    x, b = np.asarray(amplitude, float) / length, breakaway
+    x = np.asarray(amplitude, float) / length
+    b = breakaway
     e = np.exp(-2 * np.maximum(x - b, 0.0))
     z = (1 - (1 - 2 * b) * e) / (1 + e)
     area = 4 * limit * length * (x - b + b * b - b * z - (1 + z - 2 * b) * (1 - e) / 2)

@@ -57,7 +57,8 @@ def residuals(compliance_k, gap, pressure, closing: float, mean: float) -> Mappi
 
 
 def _checked(compliance_k, gap, length: float, load: float) -> tuple:
-    gap, compliance_k = np.asarray(gap, float), np.asarray(compliance_k, float)
+    gap = np.asarray(gap, float)
+    compliance_k = np.asarray(compliance_k, float)
     if gap.ndim != 1 or gap.size < 4 or not np.isfinite(gap).all():
         raise PatchfemError("contact: the gap must be a row of at least 4 finite heights")
     if compliance_k.shape != (gap.size // 2 + 1,):
@@ -121,8 +122,12 @@ def press_periodic(
 def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tuple:
     """Pressure (n,) [Pa], closing [m] and iterations of Polonsky and Keer's method; waves[0] = 0."""
     n = gap.size
-    pressure, direction, sunk = np.full(n, mean), np.zeros(n), None
-    old, own = 0.0, irfft(waves, n)[0]  # own: what a point sinks under its own pressure
+    pressure = np.full(n, mean)
+    direction = np.zeros(n)
+    sunk = None
+    # own: what a point sinks under its own pressure
+    old = 0.0
+    own = irfft(waves, n)[0]
     for count in range(1, limit + 1):
         carried = sunk is not None
         if not carried:
@@ -135,7 +140,9 @@ def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tup
         if max(np.abs(opening[touching]).max(), -opening.min()) <= tolerance * depth:
             if not carried:
                 return pressure, float(closing), count
-            sunk, old = None, 0.0  # confirmed from the pressure itself before it counts
+            # confirmed from the pressure itself before it counts
+            sunk = None
+            old = 0.0
             continue
         size = opening[touching] @ opening[touching]
         direction = np.where(touching, opening + (size / old if old > 0 else 0.0) * direction, 0.0)

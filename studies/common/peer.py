@@ -90,7 +90,8 @@ def seconds_at(error: float, errors, seconds) -> tuple:
     needed) and ">" where its finest is worse.
     """
     order = np.argsort(errors)
-    e, t = np.asarray(errors, float)[order], np.asarray(seconds, float)[order]
+    e = np.asarray(errors, float)[order]
+    t = np.asarray(seconds, float)[order]
     sign = "<" if error > e[-1] else ">" if error < e[0] else ""
     return float(np.exp(np.interp(np.log(error), np.log(e), np.log(t)))), sign
 

@@ -9,7 +9,8 @@ from patchfem.dynamics.events.histories import evaluate_motion
 
 def basis(omega, zeta, slide, base) -> ModalBasis:
     """Modes of unit mass with one interface."""
-    omega, slide = frozen_array(omega), frozen_array(slide)
+    omega = frozen_array(omega)
+    slide = frozen_array(slide)
     return ModalBasis(
         tuple(f"mode {i + 1}" for i in range(omega.size)),
         omega,

@@ -66,7 +66,8 @@ def accelerate(rig, drive, z, v, force, out):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def holding_force(rig, accel, force):
     """Return the friction force [N] that takes the slide acceleration away, from the accelerations under `force`."""
-    face, mass = rig[2], rig[4]
+    face = rig[2]
+    mass = rig[4]
     return force + dot(face, accel) * mass / dot(face, face)
 
 
@@ -131,7 +132,8 @@ def duhamel_loop(rig, maps, stop, drive, law, history, residual, workspace):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def arrest(rig, v, accel, force):
     """Take slide speed and slide acceleration away; return the force [N] that does so."""
-    face, mass = rig[2], rig[4]
+    face = rig[2]
+    mass = rig[4]
     square = dot(face, face)
     speed = dot(face, v)
     slide_accel = dot(face, accel)
@@ -162,7 +164,10 @@ def newmark_loop(rig, maps, drive, law, needs_force, history, workspace):
     (h, inverse, softness), (z, v, force), (_, limit, stick_speed) = maps, history, law
     face = rig[2]
     n = face.size
-    accel, half, ahead, scratch = workspace[0], workspace[1], workspace[2], workspace[3]
+    accel = workspace[0]
+    half = workspace[1]
+    ahead = workspace[2]
+    scratch = workspace[3]
     accelerate(rig, drive[0], z[0], v[0], force[0], accel)
     speed = dot(face, v[0])
     direction = np.sign(speed)

@@ -87,7 +87,8 @@ class _Pair:
     sank there last [m]: the start of the next search."""
 
     def __init__(self, low, up, upper_share: float):
-        self.low, self.up = low, up
+        self.low = low
+        self.up = up
         self.shares = 1 - upper_share, upper_share
         self.approach = {}
         self.overlaps = np.empty_like(low), np.empty_like(low)
@@ -128,7 +129,8 @@ def overlap_of(heights: np.ndarray, depth: float, start: float | None, out: np.n
     linear function: from its first step on it comes from below, never passes D, and ends after finitely many steps.
     """
     approach = heights.max() - depth if start is None else start
-    wanted, near = heights.size * depth, heights
+    wanted = heights.size * depth
+    near = heights
     while True:
         touching = near[near > approach]
         over = (touching - approach).sum() - wanted
@@ -153,7 +155,8 @@ def _shifted_sum(moved, fixed, by: int, out) -> None:
 
 
 def _surfaces(lower, upper) -> tuple:
-    low, up = np.array(lower, float, order="C"), np.array(upper, float, order="C")
+    low = np.array(lower, float, order="C")
+    up = np.array(upper, float, order="C")
     if low.ndim != 2 or low.shape != up.shape or not low.size or not np.isfinite([low, up]).all():
         raise PatchfemError(
             "both surfaces must have finite heights on the same raster, but their shapes are "

@@ -34,7 +34,8 @@ def waves(x: np.ndarray, amplitudes, wavelengths, phases=None) -> Profile:
     numbers that are not finite, wavelengths not above zero, and places that do not rise.
     """
     x = _places(x)
-    a, length = _finite("amplitudes", amplitudes), _finite("wavelengths", wavelengths)
+    a = _finite("amplitudes", amplitudes)
+    length = _finite("wavelengths", wavelengths)
     shift = np.zeros(a.size) if phases is None else _finite("phases", phases)
     if not a.size == length.size == shift.size:
         raise PatchfemError(
@@ -172,7 +173,8 @@ def report_area(shape: tuple, step: float, seed: int, sigma: float = SIGMA) -> t
     """
     m, n = shape
     _resolved("report_area", m * step, n * step, step, sigma)
-    qy, qx = 2 * np.pi * np.fft.fftfreq(m, step), 2 * np.pi * np.fft.rfftfreq(n, step)
+    qy = 2 * np.pi * np.fft.fftfreq(m, step)
+    qx = 2 * np.pi * np.fft.rfftfreq(n, step)
     noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((m, n)))
     wave = noise / np.abs(noise)  # the phases of white noise: random, and those of a real surface
     z = _scaled(

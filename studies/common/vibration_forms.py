@@ -75,10 +75,13 @@ def sliding_amplitude(r, friction, damping=0.0) -> float:
         raise ValueError(
             "without damping no steady sliding motion exists at resonance; see bounded_input"
         )
-    half, w = np.pi / r, np.sqrt(1 - damping**2)
+    half = np.pi / r
+    w = np.sqrt(1 - damping**2)
 
     def basis(t):
-        e, c, s = np.exp(-damping * t), np.cos(w * t), np.sin(w * t)
+        e = np.exp(-damping * t)
+        c = np.cos(w * t)
+        s = np.sin(w * t)
         return e * np.array([c, s]), e * np.array([-damping * c - w * s, -damping * s + w * c])
 
     (x0, v0), (x1, v1) = basis(0.0), basis(half)
@@ -139,7 +142,8 @@ def two_stop_amplitude(friction) -> float:
     miss = 1 - friction
     if miss < 1e-4:
         return 2.25 * miss**2 * (1 + 2.9 * miss)
-    low, high = 0.04, np.pi * (1 - 1e-9)
+    low = 0.04
+    high = np.pi * (1 - 1e-9)
     if two_stop_relation(high)[0] >= friction:
         return float(COULOMB_RESONANCE)
     slip = brentq(

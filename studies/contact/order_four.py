@@ -141,7 +141,9 @@ def cell_stiffness(order: int, ratio: np.ndarray, young: float, poisson: float) 
         return np.einsum("ab,cd->acbd", along_y, along_x).reshape(m, m)
 
     r = ratio[:, None, None]
-    along_x, along_y, cross = product(mass, stiff), product(stiff, mass), product(mixed.T, mixed)
+    along_x = product(mass, stiff)
+    along_y = product(stiff, mass)
+    cross = product(mixed.T, mixed)
     cells = np.empty((len(ratio), 2 * m, 2 * m))
     cells[:, :m, :m] = (lame + 2 * shear) * r * along_x + shear / r * along_y
     cells[:, m:, m:] = shear * r * along_x + (lame + 2 * shear) / r * along_y
@@ -154,7 +156,8 @@ def without_interior(cells: np.ndarray, order: int) -> tuple[np.ndarray, np.ndar
     """Cells condensed to the nodes of their edges, and the numbers (of (order + 1)^2) of these nodes."""
     row, column = np.divmod(np.arange((order + 1) ** 2), order + 1)
     inside = (row % order != 0) & (column % order != 0)
-    keep, drop = np.flatnonzero(~np.tile(inside, 2)), np.flatnonzero(np.tile(inside, 2))
+    keep = np.flatnonzero(~np.tile(inside, 2))
+    drop = np.flatnonzero(np.tile(inside, 2))
     out = cells[:, keep[:, None], keep]
     if len(drop):
         mixed = cells[:, drop[:, None], keep]
@@ -205,10 +208,13 @@ def face_compliance(
     xs: np.ndarray, ys: np.ndarray, order: int
 ) -> tuple[np.ndarray, int, float, float]:
     """Normal compliance (n, n) [m2/N] of a piece on its face; unknowns; CPU s of the factors and of condensing."""
-    nx, ny = len(xs) - 1, len(ys) - 1
+    nx = len(xs) - 1
+    ny = len(ys) - 1
     place, count = numbering(nx, ny, order)
     face = nx * order + 1
-    entries, rows, columns = [], [], []
+    entries = []
+    rows = []
+    columns = []
     for material, (young, poisson) in enumerate(LAYERS):
         layer = np.flatnonzero((0.5 * (ys[1:] + ys[:-1]) > COATING) == bool(material))
         iy, ix = (grid.ravel() for grid in np.meshgrid(layer, np.arange(nx), indexing="ij"))
@@ -224,7 +230,9 @@ def face_compliance(
         rows.append(np.broadcast_to(dof[:, :, None], cells.shape).ravel())
         columns.append(np.broadcast_to(dof[:, None, :], cells.shape).ravel())
         entries.append(cells.ravel())
-    row, column, entry = np.concatenate(rows), np.concatenate(columns), np.concatenate(entries)
+    row = np.concatenate(rows)
+    column = np.concatenate(columns)
+    entry = np.concatenate(entries)
     free = (row >= 0) & (column >= 0)
     matrix = sparse.csc_array(
         (entry[free], (row[free], column[free])), shape=(2 * count, 2 * count)
@@ -235,7 +243,8 @@ def face_compliance(
     )
     factored = time.process_time()
     assert np.array_equal(factor.perm_c[-face:], np.arange(2 * count - face, 2 * count))
-    lower, upper = factor.L[-face:, -face:].toarray(), factor.U[-face:, -face:].toarray()
+    lower = factor.L[-face:, -face:].toarray()
+    upper = factor.U[-face:, -face:].toarray()
     stiffness = lower @ upper
     held = cho_factor(0.5 * (stiffness + stiffness.T), lower=True)
     compliance = cho_solve(held, np.eye(face))
@@ -259,7 +268,8 @@ def spaced(points: list[tuple[float, float, float]], grading: Grading) -> np.nda
         )
         n = max(int(np.ceil(cells[-1])), 1)
         part = np.interp(np.arange(n + 1) / n * cells[-1], cells, x)
-        part[0], part[-1] = a, b
+        part[0] = a
+        part[-1] = b
         parts.append(part[:-1])
     return np.concatenate([*parts, places[-1:]])
 
@@ -279,7 +289,8 @@ def grids(case: Case, grading: Grading) -> tuple[np.ndarray, np.ndarray]:
 def halved(breaks: np.ndarray) -> np.ndarray:
     """Every cell cut in the middle: the nested finer grid."""
     out = np.empty(2 * len(breaks) - 1)
-    out[::2], out[1::2] = breaks, 0.5 * (breaks[1:] + breaks[:-1])
+    out[::2] = breaks
+    out[1::2] = 0.5 * (breaks[1:] + breaks[:-1])
     return out
 
 
@@ -355,7 +366,8 @@ def errors(case: Case, values: np.ndarray) -> np.ndarray:
 
 def extrapolated(runs: list[Run]) -> Run:
     """Aitken's limit of three nested runs, of second order where they do not converge evenly; costs added."""
-    first, second = runs[1].values - runs[0].values, runs[2].values - runs[1].values
+    first = runs[1].values - runs[0].values
+    second = runs[2].values - runs[1].values
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = first / second
     even = (ratio > 1.4) & (ratio < 16)

@@ -85,7 +85,9 @@ class Row(NamedTuple):
 
 def plateau(slide) -> np.ndarray:
     """Rows (k,) bool that have slid half a stroke or more since the last reversal."""
-    way, out, turn = np.sign(np.diff(slide, prepend=slide[0])), np.zeros(slide.size, bool), slide[0]
+    way = np.sign(np.diff(slide, prepend=slide[0]))
+    out = np.zeros(slide.size, bool)
+    turn = slide[0]
     stroke = np.ptp(slide)
     for k in range(1, slide.size):
         if way[k] * way[k - 1] < 0:
@@ -110,7 +112,9 @@ def main(file, names=tuple(LAWS)) -> list:
     """A Row per law, fitted to a record in steady motion with an offset of the force."""
     loop = read_loop(file, LOAD_UNITS)
     period, _ = repeat(loop)
-    flat, cycle, rows = plateau(loop.displacement), slice(0, period + 1), []
+    flat = plateau(loop.displacement)
+    cycle = slice(0, period + 1)
+    rows = []
 
     def work(force):
         return float(np.trapezoid(force[cycle], loop.displacement[cycle]))

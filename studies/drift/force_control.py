@@ -28,7 +28,8 @@ def held_at(engine, state, target: float, sigma, dt: float = 1.0, length: float 
     now = float(engine.traction(state)[0])
     if abs(now - target) <= 1e-13:
         return 0.0, after(0.0)
-    way, far = (length if target > now else -length), 0.05
+    way = length if target > now else -length
+    far = 0.05
     while miss(way * far) * way < 0:
         far *= 1.5
         if far > 50:
@@ -54,8 +55,12 @@ def slides(
     Force and load change together in `pieces` straight pieces of each change: half the load (`press`), the force, the
     other half. period [s] of a cycle.
     """
-    state, load, force = engine.start(np.ones(1)), 1.0, 0.0
-    slide, ends, dt = 0.0, [], period / (len(forces) * pieces)
+    state = engine.start(np.ones(1))
+    load = 1.0
+    force = 0.0
+    slide = 0.0
+    ends = []
+    dt = period / (len(forces) * pieces)
     for _ in range(cycles):
         for next_force, next_load in zip(forces, loads):
             marks = np.linspace(load, next_load, 2 * pieces + 1)[:, None]
@@ -69,7 +74,8 @@ def slides(
                     state = engine.press(state, middle, after).state
                     dq, state = held_at(engine, state, float(target), after, 0.0, length)
                     slide += dq
-            load, force = next_load, next_force
+            load = next_load
+            force = next_force
         ends.append(slide)
     return np.array(ends)
 

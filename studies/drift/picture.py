@@ -38,7 +38,8 @@ def growing(share: float, swing: float) -> float:
 
 def main(path: Path = HERE / "drift.svg", marched=MARCHED) -> Path:
     """Draw both panels; the file written."""
-    swing, amplitude = np.linspace(0, 0.4, 401), 10.0 ** np.linspace(-1, 1.5, 200)
+    swing = np.linspace(0, 0.4, 401)
+    amplitude = 10.0 ** np.linspace(-1, 1.5, 200)
     with drawing(path, (9.6, 3.4), 1, 2) as (_, (left, right)):
         for colour, b in zip(COLOURS, SHARES):
             left.plot(

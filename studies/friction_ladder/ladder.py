@@ -76,10 +76,8 @@ def growing(amplitude: float, print_steps: int) -> list:
     """Rows with growth: constant lengths are once eps_0 with mu_s and once eps_k with mu_k (the same stiffness)."""
     stretch, lugre = (followed(points(law), amplitude) for law in (bonds(**GROWTH), at_once()))
     kinetic = followed(points(bonds(RATIO)), amplitude)
-    report, sharp = (
-        printed(amplitude, 1.0, print_steps, **GROWTH),
-        elastic_plastic(amplitude, RATIO),
-    )
+    report = printed(amplitude, 1.0, print_steps, **GROWTH)
+    sharp = elastic_plastic(amplitude, RATIO)
     rows = [
         ("report p = 1", report, None),
         ("stretch", stretch, report),

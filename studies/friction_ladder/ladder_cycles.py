@@ -57,7 +57,8 @@ def followed(model, amplitude: float, steps: int = STEPS) -> Cycle:
     """Last of the cycles of a model of the loops whose lengths are in metres and whose limit is in mu_s N."""
     path = LENGTH * harmonic(amplitude, steps)
     contact = model.build()
-    forces, energies = np.zeros((path.size, 3)), np.zeros((path.size, 2))
+    forces = np.zeros((path.size, 3))
+    energies = np.zeros((path.size, 2))
     if loop_kernels.follow_path(
         path, 1 / (HERTZ * steps), model.kind, contact, 1e-11, energies, forces
     ):
@@ -88,7 +89,9 @@ def printed(amplitude: float, order: float, steps: int, **growth) -> Cycle:
     the limit); the means of the steps are asked for in the last cycle only."""
     law = bonds(order=order, reading="report", **growth)
     c = bond_list_model(law, 1.0, cutoff_age(order, 1e-5), 0.01).build()
-    path, dt, force = LENGTH * harmonic(amplitude, steps), 1 / (HERTZ * steps), []
+    path = LENGTH * harmonic(amplitude, steps)
+    dt = 1 / (HERTZ * steps)
+    force = []
     for i, dq in enumerate(np.diff(path)):
         if i >= path.size - 1 - steps:
             force.append(list_mean(dq, c, dq / dt, dt))

@@ -40,8 +40,11 @@ def bouc_wen(path, power: float, beta: float = 0.5) -> np.ndarray:
 
 def _exact(z, dq, _, beta):
     """Seen along the motion: da = 1 + c a below zero, c = 1 - 2 beta, and 1 - a above."""
-    way, left, c = np.sign(dq), np.abs(dq), 1 - 2 * beta
-    young, old = np.minimum(way * z, 0.0), np.maximum(way * z, 0.0)
+    way = np.sign(dq)
+    left = np.abs(dq)
+    c = 1 - 2 * beta
+    young = np.minimum(way * z, 0.0)
+    old = np.maximum(way * z, 0.0)
     reach = -np.log1p(c * young) / c if c else -young
     first = np.minimum(left, reach)
     below = young * np.exp(c * first) + (np.expm1(c * first) / c if c else first)
@@ -74,7 +77,8 @@ def best_rate(share, wanted) -> float:
 
     tries = np.linspace(np.log(1e-2), np.log(1e4), 60)
     near = int(np.argmin([miss(t) for t in tries]))
-    low, high = tries[max(near - 1, 0)], tries[min(near + 1, tries.size - 1)]
+    low = tries[max(near - 1, 0)]
+    high = tries[min(near + 1, tries.size - 1)]
     return float(
         np.exp(
             minimize_scalar(miss, bounds=(low, high), method="bounded", options={"xatol": 1e-8}).x

@@ -69,7 +69,8 @@ class Problem:
 def problem(name: str) -> Problem:
     """ "decay", "block", "two" or "patch"."""
     if name == "decay":
-        rest, half = InitialState(np.array([11.5]), np.zeros(1)), np.pi
+        rest = InitialState(np.array([11.5]), np.zeros(1))
+        half = np.pi
         made = Problem(
             name,
             problems.PLAIN,
@@ -108,7 +109,8 @@ def problem(name: str) -> Problem:
     model = build(
         scene.load(HERE / "patch.toml", ["contact.element_size=0.2 mm", "accuracy.tolerance=1e-3"])
     )
-    modes, drive = model.rig.modes, model.rig.drive.signal
+    modes = model.rig.modes
+    drive = model.rig.drive.signal
     contact = contact_model(
         model, choose(model), solve_all(model.patch, model.accuracy.tolerance, False)[0]
     )

@@ -101,7 +101,8 @@ def advancer(tolerance: float, size: float):
         def stop(t, y):
             return event(t, y)
 
-        stop.terminal, stop.direction = True, -1
+        stop.terminal = True
+        stop.direction = -1
         found = solve_ivp(
             rhs,
             (t, end),

@@ -56,7 +56,8 @@ def picture(rows: list, curves: dict, path: Path = HERE / "failure.svg") -> Path
     with drawing(path, (9.6, 6.6), 3, 4) as (figure, axes):
         for column, (name, title) in enumerate(DRAWN.items()):
             found = next(r for r in rows if r.name == name).run
-            upper, lower = axes[0, column], axes[1, column]
+            upper = axes[0, column]
+            lower = axes[1, column]
             upper.set_title(title, fontsize=10)
             for axis, mine, other in (
                 (upper, found.z @ TWO.slide, truth.slide),

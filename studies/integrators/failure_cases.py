@@ -68,8 +68,11 @@ def solve(name, law: Law, step, criterion, tolerance, relax) -> Row:
         tolerance=tolerance,
         relaxation=relax,
     )
-    x, force, t = found.z @ TWO.slide, found.force, found.time
-    first, early = int(np.argmax(np.abs(x) > MOVED)), np.abs(x[t < SLIDES]).max()
+    x = found.z @ TWO.slide
+    force = found.force
+    t = found.time
+    first = int(np.argmax(np.abs(x) > MOVED))
+    early = np.abs(x[t < SLIDES]).max()
     miss = np.abs(found.residual[1:])
     return Row(
         name,

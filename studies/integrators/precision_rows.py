@@ -29,7 +29,10 @@ def once(work, one, knob) -> tuple:
 
 def measure(names=ALL, ours=OURS, peers=PEERS, repeats: int = 3) -> tuple:
     """(rows, versions, absent): the least CPU seconds of `repeats` turns of everybody, the error of each."""
-    children, versions, absent, found = {}, {"scipy": version("scipy")}, {}, {}
+    children = {}
+    versions = {"scipy": version("scipy")}
+    absent = {}
+    found = {}
     try:
         for name, (_, _, _, script, variable, remedy) in peers.items():
             try:
@@ -102,7 +105,8 @@ def front(errors, seconds) -> tuple:
 
 def ratios(rows: list, where: str, reference: str) -> dict:
     """{engine: {error: text}}: time over that of `reference` at equal error; "-" where an engine never gets there."""
-    base, out = front(*curve(rows, where, reference)), {}
+    base = front(*curve(rows, where, reference))
+    out = {}
     if not len(base[0]):
         return out
     for name in dict.fromkeys(r["engine"] for r in rows if r["problem"] == where):

@@ -17,7 +17,9 @@ OFFSET = -1e3
 def march(kernel, ask: dict):
     """(slide at every step, CPU seconds of the steps)."""
     matrix = {name: np.array(ask[name], float) for name in ("mass", "damper", "stiffness")}
-    n, h, row = len(matrix["mass"]), ask["step"], np.array(ask["row"], float)
+    n = len(matrix["mass"])
+    h = ask["step"]
+    row = np.array(ask["row"], float)
     body = kernel.LagrangianLinearTIDS(
         np.array(ask["place"][:n], float), np.zeros(n), matrix["mass"]
     )
@@ -35,7 +37,8 @@ def march(kernel, ask: dict):
     )
     wave = ask["amplitude"] * np.sin(ask["omega"] * h * np.arange(ask["steps"] + 1))
     load = np.outer(ask["theta"] * wave[1:] + (1 - ask["theta"]) * wave[:-1], ask["load"])
-    slide, outer = np.zeros(ask["steps"] + 1), body.fExt()
+    slide = np.zeros(ask["steps"] + 1)
+    outer = body.fExt()
     start = process_time()
     for k in range(ask["steps"]):
         outer[:] = load[k]

@@ -24,7 +24,8 @@ def advancer(cvode, tolerance: float, atol: float, method: str):
         def roots(t, y, out):
             out[0] = event(t, y)
 
-        roots.terminal, roots.direction = [True], [-1]
+        roots.terminal = [True]
+        roots.direction = [-1]
         solver = cvode(
             slope,
             method=method,
@@ -55,7 +56,8 @@ def advancer(cvode, tolerance: float, atol: float, method: str):
 
 def answer(cvode, ask: dict) -> dict:
     """Slide at the times asked for, CPU seconds, events."""
-    times, best = np.array(ask["times"]), np.inf
+    times = np.array(ask["times"])
+    best = np.inf
     for _ in range(ask.get("repeats", 1)):
         problem = PROBLEMS[ask["problem"]](**ask["numbers"])
         start = process_time()

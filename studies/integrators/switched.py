@@ -16,13 +16,11 @@ class Block:
     """m = k = 1 on a moving base: q'' + 2 xi q' + q = -size sin t - F, |F| <= limit, from rest at `place`."""
 
     def __init__(self, limit: float, xi: float, size: float = 1.0, place: float = 0.0):
-        self.limit, self.damper, self.period, self.size, self.place = (
-            limit,
-            2 * xi,
-            2 * pi,
-            size,
-            place,
-        )
+        self.limit = limit
+        self.damper = 2 * xi
+        self.period = 2 * pi
+        self.size = size
+        self.place = place
 
     def start(self):
         """(phase, state)."""
@@ -34,7 +32,9 @@ class Block:
         """dy/dt as a list."""
         if phase == 0:
             return lambda t, y: [0.0, 0.0]
-        force, c, a = phase * self.limit, self.damper, self.size
+        force = phase * self.limit
+        c = self.damper
+        a = self.size
 
         def slip(t, y):
             q, v = y.tolist()
@@ -66,7 +66,9 @@ class TwoMasses:
     """Two free masses and a spring, all 1; sin(omega t) on the first, friction under the second (Fig 16)."""
 
     def __init__(self, limit: float, omega: float):
-        self.limit, self.omega, self.period = limit, omega, 2 * pi / omega
+        self.limit = limit
+        self.omega = omega
+        self.period = 2 * pi / omega
 
     def start(self):
         """(phase, state x1, x2, v1, v2)."""
@@ -74,7 +76,8 @@ class TwoMasses:
 
     def rhs(self, phase):
         """dy/dt as a list."""
-        w, force = self.omega, phase * self.limit
+        w = self.omega
+        force = phase * self.limit
 
         def stick(t, y):
             a, b, va, _ = y.tolist()
@@ -113,7 +116,12 @@ def follow(problem, advance, times, share: float):
     """(slide at `times` (k,) ascending, number of events) from the start to the last of them, no step longer than
     `share` of the drive period. RuntimeError where events pile up."""
     phase, y = problem.start()
-    t, end, events, at, parts, stalls = 0.0, float(times[-1]), 0, 0, [], 0
+    t = 0.0
+    end = float(times[-1])
+    events = 0
+    at = 0
+    parts = []
+    stalls = 0
     while True:
         before = t
         t, y, states = advance(
@@ -124,7 +132,8 @@ def follow(problem, advance, times, share: float):
             at += len(states)
         if t >= end:
             return np.concatenate(parts), events
-        events, stalls = events + 1, stalls + 1 if t - before < 1e-10 * problem.period else 0
+        events = events + 1
+        stalls = stalls + 1 if t - before < 1e-10 * problem.period else 0
         if stalls > 50:
             raise RuntimeError(f"events pile up at t = {t:.9g}")
         phase, y = problem.switch(phase, t, y)

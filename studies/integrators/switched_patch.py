@@ -10,11 +10,18 @@ class Patch:
     function of the slide, so the reversals are the only events; a yield is a bend that the step control has to see."""
 
     def __init__(self, omega, zeta, slide, base, mass, drive, drive_omega, stiffness, yields):
-        self.stiff, self.damp = np.array(omega) ** 2, 2 * np.array(zeta) * np.array(omega)
-        self.row, self.base, self.mass = np.array(slide), np.array(base), mass
-        self.drive, self.omega, self.period = drive, drive_omega, 2 * pi / drive_omega
-        self.k, self.yields = np.array(stiffness), np.array(yields)
-        self.stretch, self.at = np.zeros(self.k.size), 0.0
+        self.stiff = np.array(omega) ** 2
+        self.damp = 2 * np.array(zeta) * np.array(omega)
+        self.row = np.array(slide)
+        self.base = np.array(base)
+        self.mass = mass
+        self.drive = drive
+        self.omega = drive_omega
+        self.period = 2 * pi / drive_omega
+        self.k = np.array(stiffness)
+        self.yields = np.array(yields)
+        self.stretch = np.zeros(self.k.size)
+        self.at = 0.0
 
     def start(self):
         """(phase, state z..., v...); the base moves against +x first."""
@@ -26,7 +33,9 @@ class Patch:
 
     def rhs(self, phase):
         """dy/dt."""
-        n, pull, push = self.row.size, self.base * self.drive, self.row / self.mass
+        n = self.row.size
+        pull = self.base * self.drive
+        push = self.row / self.mass
 
         def free(t, y):
             force = self.k @ self.stretches(self.row @ y[:n])
@@ -50,7 +59,8 @@ class Patch:
     def switch(self, phase, t, y):
         """(phase, state) after a reversal."""
         q = float(self.row @ y[: self.row.size])
-        self.stretch, self.at = self.stretches(q), q
+        self.stretch = self.stretches(q)
+        self.at = q
         return -phase, np.array(y)
 
     def slide(self, y):

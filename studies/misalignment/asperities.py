@@ -56,7 +56,8 @@ def between_ridges(count: int, coat: tuple = CARBIDE, shells: int = 200) -> np.n
 @cache
 def between_peaks(side: int, coat: tuple = CARBIDE, shells: int = 40) -> np.ndarray:
     """(side, side) closing at each peak of a square lattice per force on the first [m/N], without its own Hertz one."""
-    step, modulus = 2 * np.pi / WAVE, exact.combined_modulus(*coat)
+    step = 2 * np.pi / WAVE
+    modulus = exact.combined_modulus(*coat)
     qx, qy = np.meshgrid(*[step * np.fft.fftfreq(side)] * 2, indexing="ij")
     # of the waves beyond the shells
     waves = np.pi * (qx**2 + qy**2) / (modulus * step**3 * (shells + 0.5))
@@ -82,19 +83,26 @@ def own_peak(force, modulus: float) -> tuple:
 
 def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE, mean: float = MEAN) -> tuple:
     """(k_n [Pa/m] = dp/d(closing), forces (count,)) of peaks at `depth` (count,) under the pressure `mean` [Pa]."""
-    count, modulus = depth.size, exact.combined_modulus(*coat)
+    count = depth.size
+    modulus = exact.combined_modulus(*coat)
     number = np.arange(count)
     if round_peaks:
-        side, own, cell = round(count**0.5), own_peak, WAVE**2
+        side = round(count**0.5)
+        own = own_peak
+        cell = WAVE**2
         i, j = np.divmod(number, side)
         c = between_peaks(side, coat)[(i[:, None] - i) % side, (j[:, None] - j) % side]
     else:
-        own, cell = own_ridge, WAVE
+        own = own_ridge
+        cell = WAVE
         c = between_ridges(count, coat)[(number[:, None] - number) % count]
-    force, last, total = np.full(count, mean * cell), 0.0, np.array([mean * cell * count])
+    force = np.full(count, mean * cell)
+    last = 0.0
+    total = np.array([mean * cell * count])
     # secants of the peaks' own closing: at least 1/3 each time
     while np.abs(force - last).max() > 1e-11 * force.max():
-        last, soft = force, np.maximum(force, 1e-9 * force.max())
+        last = force
+        soft = np.maximum(force, 1e-9 * force.max())
         force = solve_forces(
             c + np.diag(own(soft, modulus)[0] / soft), number.astype(float), depth, total
         )[0]
@@ -123,7 +131,8 @@ def explicit(
 
 def separate(scatter: float, shape: str, coat: tuple = CARBIDE) -> float:
     """k_n [Pa/m] of round peaks that do not feel each other: one height, `uniform` or `gaussian` heights."""
-    modulus, density = exact.combined_modulus(*coat), WAVE**-2
+    modulus = exact.combined_modulus(*coat)
+    density = WAVE**-2
     rate = 4 / 3 * modulus * RADIUS**0.5 * density
     if scatter == 0:
         return 1.5 * rate ** (2 / 3) * MEAN ** (1 / 3)

@@ -75,7 +75,8 @@ def case(angle: float, spring: float | None) -> dict:
 
 def tilt_for(fraction: float, spring: float | None, steps: int = 30) -> float:
     """Tilt [rad] at which the contact fraction has fallen to `fraction`, by bisection of its logarithm."""
-    low, high = 1e-7, 1e-1
+    low = 1e-7
+    high = 1e-1
     for _ in range(steps):
         middle = float(np.sqrt(low * high))
         if case(middle, spring)["contact_fraction"] > fraction:

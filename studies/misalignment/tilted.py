@@ -79,10 +79,11 @@ def measured(asked: PatchModel) -> dict:
 
 def rubbed(patch: Patch, share: float = RUBBED) -> float:
     """Portion of the length that bears at least `share` of the mean pressure, its edges found between the nodes."""
-    x, sigma = (
-        patch.x,
-        patch.pressure.sigma_n - share * patch.pressure.load / patch.pieces.interface.weight.sum(),
+    x = patch.x
+    sigma = (
+        patch.pressure.sigma_n - share * patch.pressure.load / patch.pieces.interface.weight.sum()
     )
-    low, high = np.minimum(sigma[:-1], sigma[1:]), np.maximum(sigma[:-1], sigma[1:])
+    low = np.minimum(sigma[:-1], sigma[1:])
+    high = np.maximum(sigma[:-1], sigma[1:])
     part = np.clip(high / np.maximum(high - low, 1e-300), 0.0, 1.0)
     return float(np.diff(x) @ part / np.ptp(x))

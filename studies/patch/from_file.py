@@ -58,7 +58,8 @@ def between(one: pf.Result, other: pf.Result) -> float:
 def rows():
     """Per tilt: tilt, (departure of the file, error stated for it) of each measure and `between`, in per cent."""
     for tilt in TILTS:
-        made, read = pressed(tilt), pressed(tilt, str(MESH))
+        made = pressed(tilt)
+        read = pressed(tilt, str(MESH))
         pairs = [
             (
                 100 * (read.measures[name].value / made.measures[name].value - 1),

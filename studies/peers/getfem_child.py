@@ -22,8 +22,11 @@ class Pair:
 
     def __init__(self, gf, ask: dict):
         x, y, (young, nu) = np.array(ask["x"]), np.array(ask["depth"]), ask["material"]
-        self.gf, self.model, self.kept = gf, gf.Model("real"), []
-        model, both = self.model, ask["bodies"] == 2
+        self.gf = gf
+        self.model = gf.Model("real")
+        self.kept = []
+        model = self.model
+        both = ask["bodies"] == 2
         model.add_initialized_data("lame", young * nu / ((1 + nu) * (1 - 2 * nu)))
         model.add_initialized_data("shear", young / (2 * (1 + nu)))
         lower = self._body("u", x, -y[::-1], 1)
@@ -58,10 +61,12 @@ class Pair:
         self.order = np.argsort(nodes[0, np.abs(nodes[1]) < 1e-9])
 
     def _body(self, name, x, y, outward):
-        gf, mesh = self.gf, self.gf.Mesh("cartesian Q1", x, y)
+        gf = self.gf
+        mesh = self.gf.Mesh("cartesian Q1", x, y)
         mesh.set_region(1, mesh.outer_faces_with_direction([0, outward], 0.01))
         mesh.set_region(2, mesh.outer_faces_with_direction([0, -outward], 0.01))
-        space, rule = gf.MeshFem(mesh, 2), gf.MeshIm(mesh, 3)
+        space = gf.MeshFem(mesh, 2)
+        rule = gf.MeshIm(mesh, 3)
         space.set_classical_fem(1)
         self.model.add_fem_variable(name, space)
         self.model.add_isotropic_linearized_elasticity_brick(rule, name, "lame", "shear")

@@ -73,7 +73,8 @@ def grid_of(cells: int) -> TensorGrid:
 
 def errors_of(x, p) -> tuple:
     """Relative errors (p(0), half width, mean square inside 0.9 a over p0) of nodal pressures (m,) [Pa]."""
-    near, inside = np.abs(x) < 0.8 * HALF, np.abs(x) < 0.9 * HALF
+    near = np.abs(x) < 0.8 * HALF
+    inside = np.abs(x) < 0.9 * HALF
     slope, top = np.polyfit((x[near] / HALF) ** 2, (p[near] / PEAK) ** 2, 1)
     miss = p[inside] - exact.hertz_pressure(x[inside], LOAD, RADIUS, MODULUS)
     return (
@@ -87,7 +88,8 @@ def condensed(grid: TensorGrid, bodies: int) -> Compliance:
     """The pair from its meshes on: one piece doubled, or both pieces assembled and condensed."""
     layers = Layers(MATERIAL, MATERIAL, "strain")
     parts = [interface_compliance(make_piece(grid.x, grid.depth, 0, layers)) for _ in range(bodies)]
-    low, high = parts[0], parts[-1]
+    low = parts[0]
+    high = parts[-1]
     return Compliance(
         Interface(grid.x, frozen_array(grid.tributary_lengths()), 1.0),
         low[0] + high[0],
@@ -101,9 +103,11 @@ def ours(cells: int, form: str) -> Row:
     shape = crown(grid.x, RADIUS)
     pair, making = timed(lambda: condensed(grid, FORMS[form]))
     state, solving = timed(lambda: press(pair, shape, LOAD))
-    found, warm = [state], []
+    found = [state]
+    warm = []
     for factor, angle in STEPS[1:]:
-        gap, start = shape + tilt(grid.x, angle), found[-1].sigma_n > 0
+        gap = shape + tilt(grid.x, angle)
+        start = found[-1].sigma_n > 0
         state, seconds = timed(
             lambda gap=gap, factor=factor, start=start: press(
                 pair, gap, factor * LOAD, rotation=0.0, start=start

@@ -106,7 +106,8 @@ def second() -> Conclusion:
 @lru_cache
 def knee() -> float:
     """Level [g] above which the block slides without a stop, by halving."""
-    low, high = 5.0, 6.0
+    low = 5.0
+    high = 6.0
     while high - low > 1e-3:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if block(middle)[1]["stick_fraction"] > 0 else (low, middle)
@@ -207,7 +208,8 @@ def eighth() -> Conclusion:
 
 
 def ninth() -> Conclusion:
-    exact, stopped = exact_cycle(ONSET), newmark_run(STICK_SPEED)
+    exact = exact_cycle(ONSET)
+    stopped = newmark_run(STICK_SPEED)
     drops = [float(np.abs(np.diff(one.velocity)).max()) for one in (exact, stopped)]
     return Conclusion(
         9,

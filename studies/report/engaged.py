@@ -142,7 +142,8 @@ def turned(mode: str, touch: str, level: float, seconds: float = 8.0, seed: int 
         * G
         * 1e6
     )
-    part, own = (f >= 20) & (f <= 200), float(MODES[mode][0].split()[0])
+    part = (f >= 20) & (f <= 200)
+    own = float(MODES[mode][0].split()[0])
     return Turned(
         mode, touch, level, f[part], moved[part], float(moved[np.abs(f - own) <= 40].max())
     )
@@ -157,8 +158,10 @@ def damped(model: str, level: float, seconds: float = 20.0, seed: int = 1) -> tu
             "[drive]", f'[structure.bonded]\nstiffness = "{stiffness!r} N/m"\n\n[drive]'
         )
     if model == DAMPER:  # nothing of it fitted: 148 Hz and critical, beside the friction
-        mass, w = 1.19396625, 2 * np.pi
-        spring, damper = mass * w**2 * (148**2 - 143**2), 2 * mass * w * 148 * (1 - 0.003)
+        mass = 1.19396625
+        w = 2 * np.pi
+        spring = mass * w**2 * (148**2 - 143**2)
+        damper = 2 * mass * w * 148 * (1 - 0.003)
         text = text.replace("3.48925e6 N/m", f"{spring!r} N/m").replace(
             "1374.2 N s/m", f"{damper!r} N s/m"
         )

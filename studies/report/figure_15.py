@@ -67,7 +67,8 @@ def solve(omega: float, ratio: float) -> Row:
             "drive.cycles": ratio,
         },
     ).to_xarray()
-    time, x = found.time.values, found.relative_displacement.values
+    time = found.time.values
+    x = found.relative_displacement.values
     printed = np.pi * (ratio - 1) / 2 / omega
     return Row(
         omega,
@@ -130,7 +131,8 @@ def picture(rows: list, steps: tuple, path: Path) -> Path:
 
 def main(path: Path | None = HERE / "figure_15.svg") -> tuple:
     """([Row], what `stepped` gives), printed and drawn."""
-    rows, steps = [solve(*each) for each in READINGS], stepped()
+    rows = [solve(*each) for each in READINGS]
+    steps = stepped()
     for r in rows:
         print(
             f"w0 {r.omega:.4f}, k x0/F {r.ratio:g}: N0 unrounded {r.printed:.3f} (there x is {r.moving:+.4f} x0), at "

@@ -54,7 +54,8 @@ class Free(NamedTuple):
 
 def transmissibility(f) -> np.ndarray:
     """Acceleration of the block over that of the base (k,), complex, of the scene's modes at f (k,) [Hz]."""
-    modes, omega = pf.build(SCENE).rig.modes, 2 * np.pi * np.asarray(f, float)
+    modes = pf.build(SCENE).rig.modes
+    omega = 2 * np.pi * np.asarray(f, float)
     return (
         1
         + omega**2
@@ -128,8 +129,10 @@ def picture(free: Free, seen: Estimate, path: Path) -> Path:
 
 def main(path: Path | None = HERE / "figure_26.svg") -> tuple:
     """(Free, Estimate, (frequency [Hz], damping, what is left) fitted to H1), printed and drawn."""
-    free, seen = curve(), random_test()
-    found, at = fitted(seen.between(*NEAR)), int(np.argmax(np.abs(seen.h)))
+    free = curve()
+    seen = random_test()
+    found = fitted(seen.between(*NEAR))
+    at = int(np.argmax(np.abs(seen.h)))
     print(
         f"steady curve: {free.f.size} points, peak {free.peak[1]:.1f} at {free.peak[0]:.2f} Hz, rocking "
         f"{np.abs(free.h[free.f < 80]).max():.2f}"

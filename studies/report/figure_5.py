@@ -72,7 +72,8 @@ def motion(step: float | None = None) -> Motion:
     found = pf.run(HERE / "figure_5.toml")
     kept = found.to_xarray()
     kept = kept.isel(time=kept.time.values >= 7 * period - 1e-6)
-    block, slide = -kept.output_displacement.values, -kept.relative_displacement.values[0]
+    block = -kept.output_displacement.values
+    slide = -kept.relative_displacement.values[0]
     return Motion(
         kept.time.values - 7 * period,
         block,
@@ -165,7 +166,8 @@ def picture(exact: Motion, euler: dict, path: Path) -> Path:
 
 def main(steps=STEPS, path: Path | None = HERE / "figure_5.svg") -> tuple:
     """(exact Motion, {step: Motion by Euler}), printed and drawn."""
-    exact, euler = motion(), {h: motion(h) for h in steps}
+    exact = motion()
+    euler = {h: motion(h) for h in steps}
     for name, one in [("exact", exact), *[(f"Euler, h = {h:g}", one) for h, one in euler.items()]]:
         swung = swings(one)
         print(

@@ -100,14 +100,17 @@ def loop(frequency: float = 10.0, static: float = 0.3) -> Loop:
             "structure.start.velocity": f'["0 m/s", "{-STROKE * omega!r} m/s"]',
         },
     )
-    kept, period = found.to_xarray(), 1 / frequency
+    kept = found.to_xarray()
+    period = 1 / frequency
     time = np.linspace(5 * period, 6 * period, 4001)
     column = {
         name: np.interp(time, kept.time.values, np.squeeze(kept[name].values))
         for name in ("output_displacement", "relative_displacement", "friction_force")
     }
-    block, slip = column["output_displacement"], column["relative_displacement"]
-    cell, slider = STIFFNESS * block, block + slip
+    block = column["output_displacement"]
+    slip = column["relative_displacement"]
+    cell = STIFFNESS * block
+    slider = block + slip
     turns = np.count_nonzero(np.diff(np.sign(np.diff(cell))))
     stuck = np.abs(np.diff(slip)) < 1e-6 * np.abs(np.diff(slip)).max()
     return Loop(
@@ -141,10 +144,8 @@ def read_as_rigid(one: Loop) -> tuple:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cell.csv"
         # a cycle and a quarter, for it must come back
-        step, again = (
-            one.time[1],
-            np.arange(0, 5001, 4),
-        )
+        step = one.time[1]
+        again = np.arange(0, 5001, 4)
         rows = np.column_stack(
             [again * step, one.slider[again % 4000] * 1e6, one.cell[again % 4000]]
         )

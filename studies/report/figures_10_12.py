@@ -69,7 +69,8 @@ def solve(ratio: float) -> Row:
         HERE / "figures_10_12.toml",
         **{"drive.frequency": ratio / (2 * np.pi), "drive.cycles": cycles},
     )
-    kept, period = found.to_xarray(), 2 * np.pi / ratio
+    kept = found.to_xarray()
+    period = 2 * np.pi / ratio
     begin = (cycles - 2) * period
     time = np.linspace(0, 2 * period, 1601)
     names = (
@@ -82,11 +83,10 @@ def solve(ratio: float) -> Row:
     x1, v1, slide, speed, force = (
         np.interp(time, kept.time.values - begin, np.ravel(kept[name])) for name in names
     )
-    x2, v2 = x1 - slide, v1 - speed
-    rubbed, damped = (
-        np.trapezoid(force * speed, time),
-        np.trapezoid(DAMPING * (v1**2 + v2**2), time),
-    )
+    x2 = x1 - slide
+    v2 = v1 - speed
+    rubbed = np.trapezoid(force * speed, time)
+    damped = np.trapezoid(DAMPING * (v1**2 + v2**2), time)
     both = (x1, x2)
     return Row(
         ratio,
@@ -114,7 +114,8 @@ def picture(rows: list, path: Path) -> Path:
                 title=f"Fig. {number}: ω = {ratio:g} ω0",
                 xlim=(0, r.time[-1]),
             )
-        axis, ordered = axes[1, 1], sorted(rows)
+        axis = axes[1, 1]
+        ordered = sorted(rows)
         for which, colour in ((1, BLUE), (0, ORANGE)):
             axis.loglog(
                 [r.ratio for r in ordered],

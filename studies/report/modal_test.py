@@ -47,7 +47,8 @@ class Estimate(NamedTuple):
 def random_base(seconds: float, rms: float, seed: int = 1) -> RecordedDrive:
     """A normal random record, even over BAND; rms in g."""
     count = int(seconds * RATE)
-    f, random = np.fft.rfftfreq(count, 1 / RATE), np.random.default_rng(seed)
+    f = np.fft.rfftfreq(count, 1 / RATE)
+    random = np.random.default_rng(seed)
     lines = (random.standard_normal(f.size) + 1j * random.standard_normal(f.size)) * (
         (f > BAND[0]) & (f < BAND[1])
     )
@@ -61,7 +62,8 @@ def marched(scene, drive=None, steps: int = STEPS, seconds: float | None = None)
     """Every sample (`Window` of the march) of the rig of a scene, path or text, from rest; drive: that of the scene
     unless given; steps: in what counts as its cycle; seconds: of the run, those of the drive unless given."""
     model = pf.build(scene)
-    drive, modes = drive or model.rig.drive.signal, model.rig.modes
+    drive = drive or model.rig.drive.signal
+    modes = model.rig.modes
     patch = (
         None if model.patch is None else solve_all(model.patch, model.accuracy.tolerance, False)[0]
     )

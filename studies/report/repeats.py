@@ -81,10 +81,13 @@ class Reading(NamedTuple):
 
 def columns() -> list:
     """(column, row) of Table 1 in the order of the print, rows without a reading included."""
-    out, column, last = [], -1, None
+    out = []
+    column = -1
+    last = None
     for row in read_table(TABLE):
         kind = row.frequency, "R" in row.flag
-        column, last = column + (kind != last), kind
+        column = column + (kind != last)
+        last = kind
         out.append((column, row))
     return out
 
@@ -105,7 +108,8 @@ def series(
         SCENE.read_text("utf-8")
         + f'[wear]\ncoefficient = "{coefficient!r} m^2/N"\ncycles = 1\n{friction}'
     )
-    out, start = [], []
+    out = []
+    start = []
     for number, (column, row) in enumerate(columns() if rows is None else rows):
         sets = STEADY | {
             "drive.frequency": f"{row.frequency!r} Hz",

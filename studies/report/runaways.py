@@ -50,7 +50,8 @@ STILL = {YAW: 0.0}
 
 def block(friction: str, more: str = "") -> str:
     """Text of a block without grooves and without yaw."""
-    head, tail = GROOVED.split("[normal.grooves]")[0], GROOVED[GROOVED.index("[structure]") :]
+    head = GROOVED.split("[normal.grooves]")[0]
+    tail = GROOVED[GROOVED.index("[structure]") :]
     yaw = tail.index('[[structure.mode]]\nname = "yaw"')
     return f"{head}[friction]\n{friction}\n{tail[:yaw]}{more}{tail[tail.index('[drive]') :]}"
 
@@ -140,9 +141,12 @@ def motion(name: str, frequency: float, level: float, **more) -> tuple:
 
 def row(name: str) -> Row:
     """By halving, so that a path that leaves at one level is taken to leave at all above it."""
-    out, before = [], None
+    out = []
+    before = None
     for frequency in FREQUENCIES:
-        low, high, seen = -1, len(LEVELS), None
+        low = -1
+        high = len(LEVELS)
+        seen = None
         while high - low > 1:
             middle = (low + high) // 2
             left, *moved = motion(name, frequency, LEVELS[middle])

@@ -159,7 +159,8 @@ def picture(series: dict, found: dict, path: Path) -> Path:
                 f"{frequency:g} Hz, {LEVELS[frequency][0]} to {LEVELS[frequency][-1]} g"
             )
             column[2].set_xlabel("time [s]")
-        seen, column = series[143.0], axes[:, 2]
+        seen = series[143.0]
+        column = axes[:, 2]
         last = (seen.time * 143 >= 2 * EACH - 3) & (seen.time * 143 <= 2 * EACH)
         for axis, value in zip(
             column, (seen.base_acceleration / G, seen.acceleration / G, seen.output / MIL)

@@ -102,7 +102,8 @@ def critical(sweeps: list) -> np.ndarray:
     logs = np.log(np.maximum([one.distortion for one in sweeps], 1e-6) / DISTORTED)
     first = np.argmax(logs > 0, axis=0)
     k = np.arange(logs.shape[1])
-    low, high = logs[first - 1, k], logs[first, k]
+    low = logs[first - 1, k]
+    high = logs[first, k]
     levels = np.array([one.level for one in sweeps])
     return levels[first - 1] + (levels[first] - levels[first - 1]) * low / (low - high)
 
@@ -142,7 +143,8 @@ def main(path: Path | None = HERE / "sweeps.svg", models=tuple(MODELS)) -> list:
     sweeps = [swept(model, level) for model in models for level in LEVELS]
     for model in models:
         mine = [one for one in sweeps if one.model == model]
-        level, still = critical(mine), mine[0]
+        level = critical(mine)
+        still = mine[0]
         above = level[still.frequency > 136]
         low, high = (
             still.displacement[part].max()

@@ -51,7 +51,8 @@ def constant(tree: ast.Module, name: str) -> str | None:
 
 def studies() -> list:
     """Every script of the gallery of studies/README.md, in its order."""
-    found, seen = [], set()
+    found = []
+    seen = set()
     for line in (STUDIES / "README.md").read_text("utf-8").splitlines():
         named = re.match(r"\| \[([\w/]+\.py)\]", line)
         if named is None or named[1] in seen:

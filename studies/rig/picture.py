@@ -23,7 +23,9 @@ HERE = Path(__file__).parent
 def main(path: Path = HERE / "rig.svg") -> Path:
     """Run rig.toml, draw pressure, shear, loop and the measured accelerations at 143 Hz; the file written."""
     found = runner.run(runner.plan(scene.load(HERE / "rig.toml")), estimate=False)
-    x, fields, window = found.patch.x * 1e3, found.fields, found.window
+    x = found.patch.x * 1e3
+    fields = found.fields
+    window = found.window
     rows = [
         r
         for r in read_table(HERE / "table1.csv")

@@ -66,7 +66,8 @@ def picture(found: dict, path: Path) -> Path:
 
 def main(cycles: float = 200, path: Path | None = HERE / "readings.svg") -> dict:
     """(reading, elastic) -> {measure: (value, error)} after so many cycles from rest."""
-    found, out = {}, {}
+    found = {}
+    out = {}
     for elastic in (False, True):
         for reading in ("stretch", "report"):
             begin = process_time()

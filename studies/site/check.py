@@ -23,7 +23,9 @@ class _Page(HTMLParser):
 
     def __init__(self):
         super().__init__()
-        self.links, self.names, self.mute = [], set(), []
+        self.links = []
+        self.names = set()
+        self.mute = []
 
     def handle_starttag(self, tag, attrs):
         of = dict(attrs)
@@ -56,7 +58,8 @@ def mute(folder: Path) -> list:
 
 def links(folder: Path) -> tuple:
     """(how many links inside a built site were tried, those that lead nowhere as "page: link")."""
-    tried, dead = 0, []
+    tried = 0
+    dead = []
     for path in _pages(folder):
         for link in read(path).links:
             target, _, name = unquote(link).partition("#")

@@ -56,10 +56,8 @@ def write(folder: Path) -> None:
     files = sorted(
         [*(ROOT / "patchfem").rglob("*.py"), guide_file(), *Path(__file__).parent.glob("*.py")]
     )
-    state, kept = (
-        sha256(b"".join(file.read_bytes() for file in files)).hexdigest(),
-        folder / "made_from",
-    )
+    state = sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+    kept = folder / "made_from"
     if kept.exists() and kept.read_text("utf-8") == state:
         return
     for name, text in examples.FILES.items():
@@ -305,7 +303,8 @@ def limits(name: str) -> list:
 def beside(name: str, other: str) -> list:
     """Sentences with which the scene of an effect refuses another one for not being built yet."""
     start, more = examples.EXAMPLES[name]
-    blocks, own = examples.blocks(start) | examples.blocks(more), examples.blocks(more)
+    blocks = examples.blocks(start) | examples.blocks(more)
+    own = examples.blocks(more)
     added = examples.blocks(examples.EXAMPLES[other][1])
     if not added or set(added) & (
         set(own) | {"[accuracy]", "[drive]", "[slide]", "[measured]", "[sweep]"}

@@ -80,47 +80,53 @@ def loop(limit, turn, part, steps, cycles, out):
     """The loop of thirty lines: amplitude out (n,) of n blocks, LANES side by side; limit (n,); turn (4, n): what a
     step without push makes of place and speed; part (n,): cosine part of the motion without friction; n in LANES."""
     # one array, so that a compiler knows all distances
-    h, n, room = (
-        2 * np.pi / steps,
-        LANES,
-        np.zeros(11 * LANES),
-    )
+    h = 2 * np.pi / steps
+    n = LANES
+    room = np.zeros(11 * LANES)
     for first in range(0, len(limit), n):
         room[:] = 0.0
         for i in range(n):
-            room[5 * n + i], room[6 * n + i] = limit[first + i], part[first + i]
+            room[5 * n + i] = limit[first + i]
+            room[6 * n + i] = part[first + i]
             for m in range(4):
                 room[(7 + m) * n + i] = turn[m, first + i]
         for k in range(cycles * steps):
-            s0, c0, s1, c1 = np.sin(h * k), np.cos(h * k), np.sin(h * (k + 1)), np.cos(h * (k + 1))
+            s0 = np.sin(h * k)
+            c0 = np.cos(h * k)
+            s1 = np.sin(h * (k + 1))
+            c1 = np.cos(h * (k + 1))
             last = 1.0 if k >= (cycles - 1) * steps else 0.0
             for i in range(n):
-                y, u, w, f, p = (
-                    room[i],
-                    room[n + i],
-                    room[2 * n + i],
-                    room[5 * n + i],
-                    room[6 * n + i],
-                )
-                e, d = y - p * c0 + w * f, u + p * s0  # beside the motion without friction
+                y = room[i]
+                u = room[n + i]
+                w = room[2 * n + i]
+                f = room[5 * n + i]
+                p = room[6 * n + i]
+                # beside the motion without friction
+                e = y - p * c0 + w * f
+                d = u + p * s0
                 y1 = room[7 * n + i] * e + room[8 * n + i] * d + p * c1 - w * f
                 u1 = room[9 * n + i] * e + room[10 * n + i] * d - p * s1
                 # where it stops, the speed a straight line
                 t = u / (u - u1) if w * u1 < 0.0 else 1.0
                 ys = y + 0.5 * h * t * u if w * u1 < 0.0 else y1
-                rest, need = (1.0 - t) * h, -(s0 + t * (s1 - s0)) - ys
+                rest = (1.0 - t) * h
+                need = -(s0 + t * (s1 - s0)) - ys
                 back = 1.0 if w * u1 < 0.0 and abs(need) > f else 0.0  # it turns without a stick
-                n0, n1 = -s0 - y, -s1 - y
+                n0 = -s0 - y
+                n1 = -s1 - y
                 goes = 1.0 if w == 0.0 and abs(n1) > f else 0.0
                 share = (abs(n1) - f) / abs(n1 - n0) if goes > 0.0 else 0.0
-                r, jerk = h * (share if share < 1.0 else 1.0), (n1 - n0) / h
+                r = h * (share if share < 1.0 else 1.0)
+                jerk = (n1 - n0) / h
                 moved = ys + back * 0.5 * (need + w * f) * rest * rest
                 fast = back * (need + w * f) * rest if w * u1 < 0.0 else u1
                 room[i] = moved if w != 0.0 else y + jerk * r * r * r / 6
                 room[n + i] = fast if w != 0.0 else jerk * r * r / 2
                 side = 1.0 if n1 > 0.0 else -1.0
                 room[2 * n + i] = goes * side if w == 0.0 else -w * back if w * u1 < 0.0 else w
-                top, low = (ys if ys > room[i] else room[i]), (ys if ys < room[i] else room[i])
+                top = ys if ys > room[i] else room[i]
+                low = ys if ys < room[i] else room[i]
                 room[3 * n + i] = (
                     top if top * last > room[3 * n + i] or last == 0.0 else room[3 * n + i]
                 )
@@ -134,9 +140,14 @@ def loop(limit, turn, part, steps, cycles, out):
 def by_loop(cases: np.ndarray, steps: int) -> np.ndarray:
     """Amplitudes (n,) of the loop."""
     whole = np.resize(cases, (-(-len(cases) // LANES) * LANES, 2))
-    limit, zeta, h, out = whole[:, 0].copy(), whole[:, 1], 2 * np.pi / steps, np.empty(len(whole))
+    limit = whole[:, 0].copy()
+    zeta = whole[:, 1]
+    h = 2 * np.pi / steps
+    out = np.empty(len(whole))
     w = np.sqrt(1 - zeta**2)
-    decay, c, s = np.exp(-zeta * h), np.cos(w * h), np.sin(w * h) / w
+    decay = np.exp(-zeta * h)
+    c = np.cos(w * h)
+    s = np.sin(w * h) / w
     turn = decay * np.array([c + zeta * s, s, -s, c - zeta * s])
     loop(limit, turn, 1 / (2 * zeta), steps, CYCLES, out)
     return out[: len(cases)]
@@ -320,11 +331,14 @@ def families(seed: int = 1, names=tuple(FAMILIES), goes: int = 3, share: float =
     for name in names:
         count = max(8, int(FAMILIES[name][1] * share))
         of_family(name, min(count, 64), seed + 1000)
-        took, good, tolerance = [], [], loads(FAMILIES[name][0], RIG).accuracy.tolerance
+        took = []
+        good = []
+        tolerance = loads(FAMILIES[name][0], RIG).accuracy.tolerance
         for go in range(goes):
             found, seconds = timed(partial(of_family, name, count, seed + go))
             measure = AMPLITUDE if AMPLITUDE in found.values else "pressure_peak"
-            error, value = found.errors[measure], found.values[measure]
+            error = found.errors[measure]
+            value = found.values[measure]
             good.append(np.mean(error <= tolerance * np.abs(value) + found.floors[measure]))
             took.append(seconds)
         rows.append(

@@ -50,7 +50,8 @@ class Row:
 
     def miss(self, name: str, other: str = "march") -> float:
         """Difference of a measure from the steady motion's over it; 0 where nothing slips in either."""
-        found, truth = getattr(self, other)[name], self.steady[name]
+        found = getattr(self, other)[name]
+        truth = self.steady[name]
         return abs(found - truth) / abs(truth) if truth else abs(found)
 
 

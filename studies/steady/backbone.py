@@ -80,9 +80,11 @@ def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
         if model.patch is not None
         else None
     )
-    contact, amplitude = contact_model(model, choose(model), patch), size * np.asarray(shares)
+    contact = contact_model(model, choose(model), patch)
+    amplitude = size * np.asarray(shares)
     free = [find_backbone(modes, contact, amplitude, harmonics=h) for h in (1, 9)]
-    w, zeta = modes.omega[0], modes.zeta[0]
+    w = modes.omega[0]
+    zeta = modes.zeta[0]
     stiffness, area = np.array([loop(text, float(a), steps) for a in amplitude]).T
     omega = np.sqrt(w**2 + stiffness / modes.mass)
     damping = zeta * w / omega + area / (2 * np.pi * modes.mass * omega**2 * amplitude**2)

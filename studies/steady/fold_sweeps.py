@@ -90,12 +90,11 @@ def sweep(
     frequency = first + (last - first) * seen.time[turn] / seen.time[-1]
     amplitude = np.abs(seen.output[turn])
     f, a = steady.branch(True)
-    upper, lower = np.interp(steady.folds, f, a)[0], steady.branch(False)
+    upper = np.interp(steady.folds, f, a)[0]
+    lower = steady.branch(False)
     middle = (upper + lower[1][0]) / 2
-    past, started = (
-        amplitude < middle if up else amplitude > middle,
-        np.abs(frequency - first) > 1.0,
-    )
+    past = amplitude < middle if up else amplitude > middle
+    started = np.abs(frequency - first) > 1.0
     past &= started
     jump = float(frequency[np.argmax(past)]) if past.any() else np.nan
     f, a = steady.branch(up)

@@ -74,7 +74,8 @@ def rods(share: float, mass: float) -> list:
     first mode stays at 143 Hz; the gage reads the tip, by the factor of a static test. Modes have the mass of both, so
     that the squares of their shares of the base motion sum to 1.
     """
-    flexure, rod = 1 / (1 - share), 1 / share
+    flexure = 1 / (1 - share)
+    rod = 1 / share
     root = np.sqrt([1.0, mass])
     stiffness = np.array([[rod, -rod], [-rod, rod + flexure]]) / np.outer(root, root)
     square, turned = np.linalg.eigh(stiffness)
@@ -114,7 +115,9 @@ class Worn(ModelReadings):
     """
 
     def _run(self, values, conditions) -> dict:
-        first, depth, found = float(values[0]), 0.0, {}
+        first = float(values[0])
+        depth = 0.0
+        found = {}
         load = self.asked.scene.normal.load
         for row in range(max(conditions) + 1):
             static = first * max(1 + (values[-1] - 1) * depth / DEPTH, 0.05)

@@ -85,7 +85,9 @@ def fitted(
     reading, displacement [mil] at every condition), the valleys, the training rms at the end of every start, motions
     computed and CPU seconds.
     """
-    begin, one, cells = time.process_time(), RUNGS[rung], cells_for(rung)
+    begin = time.process_time()
+    one = RUNGS[rung]
+    cells = cells_for(rung)
     seen = training(cells, protocol)
     computed = computed_for(rung, reading, cells, seen, placebo)
     begins = [] if placebo else contained(rung, reading, protocol, computed.asked.wanted, known())
@@ -153,13 +155,12 @@ def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
     valleys: {"starts", "best": how many of them ended in the best valley, "tied": of every other valley within TIED of
     the best training score its training score and the scores of the readings that were not fitted}.
     """
-    wanted, residual = computed.asked.wanted, make_residual(cells, computed, seen, "bound")
+    wanted = computed.asked.wanted
+    residual = make_residual(cells, computed, seen, "bound")
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
-    quick, drawn, random = (
-        CubeResidual(residual, box, is_quick=True),
-        np.random.default_rng(SEED),
-        0,
-    )
+    quick = CubeResidual(residual, box, is_quick=True)
+    drawn = np.random.default_rng(SEED)
+    random = 0
     ends = run_descents(quick, [box.unit(one) for one in begins], before_descent=computed.forget)
     while True:
         points = drawn.random((starts - random, SCREEN, len(wanted)))
@@ -203,14 +204,17 @@ def screened(quick, points, forget) -> np.ndarray:
 def valleys_of(cells, computed, seen, last, ends) -> tuple:
     """(number of ends in the best valley, the other valleys near it) of (values, rms) at the ends of the starts; last:
     the Descent to the bottom of the best."""
-    wanted, residual = computed.asked.wanted, make_residual(cells, computed, seen, "bound")
+    wanted = computed.asked.wanted
+    residual = make_residual(cells, computed, seen, "bound")
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
 
     def at(values) -> np.ndarray:
         computed.forget()
         return residual(values)
 
-    least, count, known = at(box.values(last.u)), 0, []
+    least = at(box.values(last.u))
+    count = 0
+    known = []
     for values, score in sorted(ends, key=lambda one: (not one[1] < np.inf, one[1])):
         if not score <= TIED * last.rms:
             continue
@@ -292,7 +296,8 @@ def better(cells, logs, null, among) -> dict | None:
     """{kind: share of draws in which logs (n,) score better than those of a null}, None where that predicts nothing."""
     if not among.any():
         return None
-    often, out = drawn(cells, among), {}
+    often = drawn(cells, among)
+    out = {}
     for kind in KIND:
         one, other = (resampled(cells, each, often, kind) for each in (logs, null))
         there = np.isfinite(one) & np.isfinite(other)

@@ -30,7 +30,8 @@ from table import tables
 def main(minutes: float = 0.0) -> dict:
     """Fit what is not yet known, in the order of the recipe, for so many minutes; print the tables and return all that
     is known: (rung, reading, protocol, placebo) -> record."""
-    rows, until = known(), time.monotonic() + 60 * minutes
+    rows = known()
+    until = time.monotonic() + 60 * minutes
     for variant in variants():
         if variant in rows or time.monotonic() >= until:
             continue

@@ -35,7 +35,8 @@ FREQUENCIES = (135.0, 143.0, 150.0, 155.0)
 
 def main(path: Path = HERE / "ladder.svg") -> Path:
     """Draw accelerations at four frequencies and displacements at the two where a gauge worked; the file written."""
-    rows, cells = known(), read_readings(TABLE)
+    rows = known()
+    cells = read_readings(TABLE)
     with drawing(path, (9.6, 5.4), 2, 4, sharex=True) as (figure, axes):
         for panel, frequency in zip(axes[0], FREQUENCIES):
             _panel(panel, rows, cells, frequency, 0, G_N)

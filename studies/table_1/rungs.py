@@ -117,16 +117,12 @@ class Rung:
 
         Grooves of another wavelength are searched between the amplitudes that bend alike, as far as they do not lock.
         """
-        scene, wanted = (
-            self.text(reading, *more),
-            read_ranges((*self.free, *READINGS[reading][1]))[0],
-        )
+        scene = self.text(reading, *more)
+        wanted = read_ranges((*self.free, *READINGS[reading][1]))[0]
         grooves = scene.normal.grooves if scene.normal is not None else None
         if grooves is not None:
-            bends, most = (
-                (grooves.wavelength / 80e-6) ** 2,
-                0.9 * grooves.wavelength / (2 * pi * scene.friction.static),
-            )
+            bends = (grooves.wavelength / 80e-6) ** 2
+            most = 0.9 * grooves.wavelength / (2 * pi * scene.friction.static)
             wanted = [
                 replace(one, low=bends * one.low, high=min(bends * one.high, most))
                 if one.key == AMPLITUDE[0]

@@ -48,8 +48,10 @@ def question(point: bool = False) -> FitRequest:
 
 def as_it_stands(point: bool = False) -> dict:
     """Scores of the scene's own numbers and the seconds of its 27 readings, the second time that they are asked."""
-    cells, asked = read_readings(TABLE), question(point)
-    held, computed = cells.select(HELD), ModelReadings(asked.condition_models(cells.conditions))
+    cells = read_readings(TABLE)
+    asked = question(point)
+    held = cells.select(HELD)
+    computed = ModelReadings(asked.condition_models(cells.conditions))
     own = asked.scene
     values = [
         own.friction.static,

@@ -180,8 +180,10 @@ def found(row: dict) -> str:
 
 def nulls() -> list:
     """Rows (name, numbers of the accelerations, fitted to 143 Hz, held out, left out, all) of scores."""
-    cells, out = read_readings(TABLE), []
-    seen, every = training(cells, "143"), np.ones(cells.row.size, bool)
+    cells = read_readings(TABLE)
+    out = []
+    seen = training(cells, "143")
+    every = np.ones(cells.row.size, bool)
     for name in NULL_MODELS:
         logs, (whole, made) = (
             fit_null_model(cells, name, seen)[0],
@@ -272,7 +274,8 @@ def _left(rows: dict) -> list:
         (f"without mechanics: {told[name]}", "", None, logs) for name, logs in null.items()
     ] + shared(rows)
     for rung, reading, folds, logs in listed:
-        own, drawn = scores(cells, logs, every), intervals(cells, logs, every)
+        own = scores(cells, logs, every)
+        drawn = intervals(cells, logs, every)
         cellular = [
             f"{short(own[kind])} ({short(drawn[kind][0])} to {short(drawn[kind][1])})"
             for kind in KIND
@@ -333,10 +336,8 @@ def _placebos(rows: dict) -> list:
         "|---|---|---|---|",
     ]
     for rung, reading, protocol, placebo in variants():
-        row, real = (
-            rows.get((rung, reading, protocol, placebo)),
-            rows.get((rung, reading, protocol, "")),
-        )
+        row = rows.get((rung, reading, protocol, placebo))
+        real = rows.get((rung, reading, protocol, ""))
         if not placebo or row is None:
             continue
         kind, _, value = placebo.rpartition(".")[2].partition("=")

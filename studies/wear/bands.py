@@ -79,7 +79,8 @@ def pairs(one, other) -> np.ndarray:
 
 def row(stroke: int, worn: float, before, after) -> Row:
     """Row from the amplitudes of all areas (2, k, traces) [m] before and after."""
-    ratios, single = whole(after[0]) / whole(after[1]), pairs(*after)
+    ratios = whole(after[0]) / whole(after[1])
+    single = pairs(*after)
     fallen = [(whole(after[axis]) / whole(before[axis])).mean() for axis in (0, 1)]
     return Row(
         stroke * STEP,
@@ -102,13 +103,16 @@ def wear(strokes, seeds: int, bite: float) -> tuple:
         [report_area((POINTS, POINTS), STEP, 2 * seed + piece)[2] for piece in (0, 1)]
         for seed in range(seeds)
     ]
-    before, shown = amplitudes([z for pair in new for z in pair]), {}
+    before = amplitudes([z for pair in new for z in pair])
+    shown = {}
     rows = [row(0, 0.0, before, before)]
     for stroke in strokes:
-        worn, done = new, 0.0
+        worn = new
+        done = 0.0
         for depth in DEPTHS:
             out = [rub(*pair, STEP, stroke * STEP, 2 * (depth - done), bite=bite) for pair in worn]
-            worn, done = [(one.lower, one.upper) for one in out], depth
+            worn = [(one.lower, one.upper) for one in out]
+            done = depth
             rows.append(row(stroke, depth, before, amplitudes([z for pair in worn for z in pair])))
         shown[stroke] = worn[0][0]
     return rows, (new[0][0], shown)
@@ -116,7 +120,8 @@ def wear(strokes, seeds: int, bite: float) -> tuple:
 
 def picture(rows: list, shown: tuple, path: Path) -> Path:
     """Left: traces of one surface, new and worn at 6.4 um. Right: band ratio over stroke."""
-    new, worn = shown[0], shown[1][2]
+    new = shown[0]
+    worn = shown[1][2]
     with drawing(path, (9.6, 3.8), 1, 2, width_ratios=(1.25, 1)) as (_, (left, right)):
         x = 1e3 * STEP * np.arange(POINTS)
         for z, up, colour, text in (

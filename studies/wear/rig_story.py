@@ -88,7 +88,8 @@ def worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> Ro
     found = runner.run(
         scene.loads(text, SCENE, [f"accuracy.tolerance={tolerance}", f"drive.cycles={motion}"])
     )
-    depth, fields = found.fields["worn_depth"][-1], found.fields["normal_stress"]
+    depth = found.fields["worn_depth"][-1]
+    fields = found.fields["normal_stress"]
     values = {name: found.measures[name].value for name in SHOWN}
     return Row(
         coefficient,

@@ -20,7 +20,8 @@ def model(law: str, **sets):
 
 def segalman(u):
     """Force [N] and loss [J] of the joint IWAN by Segalman's closed form at slides below phi_max = 2.7 mm."""
-    r, scale = u / 2.7e-3, 30 / (0.5 + 1 / 3)
+    r = u / 2.7e-3
+    scale = 30 / (0.5 + 1 / 3)
     force = scale * (1.5 * r - r**1.5 / 1.5)
     return force, 8 * scale * 2.7e-3 * (0.75 * r**2 - r**2.5 / 3.75) - 4 * u * force
 
@@ -82,7 +83,8 @@ def test_exact_rigid_friction_by_balance_and_by_decay():
     the balance has loss over 2 pi m omega^2 A^2 but for what one harmonic leaves out, of the order of the ratio."""
     h = 30 / (0.5 * OMEGA**2)
     found = backbone(model('law = "coulomb"'), "", np.geomspace(20 * h, 80 * h, 4))
-    decay, balance = found.curves["decay"], found.curves["balance"]
+    decay = found.curves["decay"]
+    balance = found.curves["balance"]
     assert (
         list(found.missing) == ["quasi-static"]
         and "has no finite stiffness" in found.missing["quasi-static"]
@@ -216,8 +218,11 @@ between = [1, 0]
 coefficient = "40 N s/m"
 """ + shaken(PLASTIC)[shaken(PLASTIC).index("[drive]") :]
     one = backbone(pf.build(scene), "2", [1e-4]).curves
-    k, m, c = np.array([[3e5, -1e5], [-1e5, 1e5]]), np.diag([0.5, 0.3]), np.diag([40.0, 0])
-    w, zeta = 2 * np.pi * one["balance"].frequency[0], one["balance"].damping[0]
+    k = np.array([[3e5, -1e5], [-1e5, 1e5]])
+    m = np.diag([0.5, 0.3])
+    c = np.diag([40.0, 0])
+    w = 2 * np.pi * one["balance"].frequency[0]
+    zeta = one["balance"].damping[0]
     assert abs(
         np.linalg.det(k - m * w**2 + 1j * w * (c - 2 * zeta * w * m))
     ) < 1e-9 * np.linalg.det(k)
@@ -314,7 +319,8 @@ def test_beyond_a_fold_the_curve_goes_on():
         backbone(pf.build(FOLDED, **{"accuracy.tolerance": 0.1}), "", one, ("balance",))
         for one in (a, a[1:])
     )
-    whole, beyond = found.curves["balance"], alone.curves["balance"]
+    whole = found.curves["balance"]
+    beyond = alone.curves["balance"]
     assert whole.amplitude == pytest.approx(a) and beyond.amplitude == pytest.approx(a[1:])
     assert (
         not any("left out" in note for note in found.notes) and (np.diff(whole.frequency) < 0).all()
@@ -354,25 +360,22 @@ def test_two_modes_in_gross_slip_lose_the_same_by_decay_and_by_balance():
 def test_exact_a_decay_goes_on_where_the_contact_holds(two):
     """A contact that holds on a spring is no end: where nothing slips the decay is that of the held modes, zeta
     omega/omega_held of one mode. Of 13 points there were 7, of two modes 3."""
-    a, text = (
-        np.geomspace(1e-7, 2e-3, 13),
-        (TWO.replace("1 um", "0.1 mm") if two else shaken(PLASTIC.replace("1 mm", "10 um"))),
-    )
+    a = np.geomspace(1e-7, 2e-3, 13)
+    text = TWO.replace("1 um", "0.1 mm") if two else shaken(PLASTIC.replace("1 mm", "10 um"))
     found = backbone(pf.build(text), "", a, ("decay",))
     one = found.curves["decay"]
     assert one.amplitude.size == 13 and not any("have a result" in note for note in found.notes)
     # the other mode rings there: up to 2e-4 of the damping ratio
     still = one.amplitude < (1e-4 if two else 2e-6)
     if two:
-        own, shape, phi = (
-            np.array([1, 4.7]) * OMEGA,
-            np.diag([0.004, 0.006 * 4.7]) * OMEGA,
-            np.array([1, 0.8]),
-        )
+        own = np.array([1, 4.7]) * OMEGA
+        shape = np.diag([0.004, 0.006 * 4.7]) * OMEGA
+        phi = np.array([1, 0.8])
         stiff = np.diag(own**2) + 3e5 / 0.5 * np.outer(phi, phi)
         roots = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-stiff, -shape]]))
         root = roots[np.argmin(np.abs(roots))]
-        zeta, omega = -root.real / abs(root), abs(root.imag)
+        zeta = -root.real / abs(root)
+        omega = abs(root.imag)
     else:
         omega = np.sqrt(OMEGA**2 + 3e6 / 0.5)
         zeta = 0.002 * OMEGA / omega
@@ -409,7 +412,8 @@ def test_a_decay_in_which_another_mode_rings_is_not_given_as_that_of_this_mode()
     found = backbone(
         pf.build(NEAR), "axial", a := np.geomspace(2e-3, 6e-2, 7), ("balance", "decay")
     )
-    balance, decay = found.curves["balance"], found.curves["decay"]
+    balance = found.curves["balance"]
+    decay = found.curves["decay"]
     assert balance.amplitude.size == a.size and decay.amplitude == pytest.approx(a[4:])
     assert (
         decay.damping == pytest.approx(balance.damping[4:], rel=0.04)
@@ -448,9 +452,11 @@ def test_always_the_mesh_is_in_the_bars_of_micro_slip():
         )
         for one in (1e-2, 2e-4)
     )
-    one, other = coarse.curves["quasi-static"], fine.curves["quasi-static"]
+    one = coarse.curves["quasi-static"]
+    other = fine.curves["quasi-static"]
     for name in ("frequency", "damping"):
-        off, bar = abs(getattr(one, name) - getattr(other, name)), getattr(one, f"{name}_error")
+        off = abs(getattr(one, name) - getattr(other, name))
+        bar = getattr(one, f"{name}_error")
         assert np.mean(off <= bar + getattr(other, f"{name}_error")) >= 0.95, name
     own = one.damping[0] * one.frequency[0] / 100
     # no slip is seen

@@ -104,7 +104,8 @@ def test_a_decay_below_the_limit_cycle_is_read_where_larger_releases_grow():
     found = backbone(
         rig("elastic-plastic", -0.02), "", np.geomspace(1e-3, 8e-3, 4), ("balance", "decay")
     )
-    decay, balance = found.curves["decay"], found.curves["balance"]
+    decay = found.curves["decay"]
+    balance = found.curves["balance"]
     assert decay.amplitude[-1] < found.flutter < balance.amplitude[-1]
     assert decay.damping == pytest.approx(
         balance.damping[balance.amplitude <= decay.amplitude[-1]], rel=0.05

@@ -179,10 +179,8 @@ def test_exact_a_line_says_which_tolerance_is_missed_and_with_which_steps_it_is_
             made(label, steps / 800, error), tolerance=tolerance, steps=steps, remedies=remedies
         )
 
-    met, missed = (
-        run_at(1e-2, 2e-3, 800),
-        run_at(1e-4, 4e-4, 800, ("set accuracy.steps_per_cycle = 3200",)),
-    )
+    met = run_at(1e-2, 2e-3, 800)
+    missed = run_at(1e-4, 4e-4, 800, ("set accuracy.steps_per_cycle = 3200",))
     cured = replace(run_at(1e-4, 8e-5, 3200), label="0.0001, 3200 steps per cycle")
     stays = replace(
         run_at(1e-4, 2e-4, 6400, ("use the value",)), label="0.0001, 6400 steps per cycle"

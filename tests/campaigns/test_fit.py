@@ -81,7 +81,10 @@ def dahl(slide, mu, eps):
 
 def grown(time, slide, mu, kinetic, eps0, rest, slip, floor=1e-5):
     """z' = v - |v| z/eps beside 2.10, by a Runge-Kutta method of order 8 along straight legs; force in N."""
-    out, eps, z, m = [0.0], eps0, 0.0, 1.0
+    out = [0.0]
+    eps = eps0
+    z = 0.0
+    m = 1.0
     for dt, dq in zip(np.diff(time), np.diff(slide)):
         v = dq / dt
 
@@ -266,7 +269,8 @@ def test_exact_intervals_of_a_noisy_loop_are_those_of_its_normal_equations(tmp_p
         table(tmp_path / "loop.csv", time, slide, force),
         free_of(*TRUTH[law]),
     )
-    best, names = found.keys.fit.values, list(TRUTH[law])
+    best = found.keys.fit.values
+    names = list(TRUTH[law])
 
     def at(k, share):
         return forces(
@@ -334,7 +338,8 @@ def test_exact_keys_without_effect_are_named(tmp_path):
 def test_exact_rows_held_out_are_driven_through_but_not_fitted(tmp_path):
     """The second cycle reads twice the force: held out, it changes nothing but its own rms."""
     time, slide = rows(40)
-    force, cycle = play(slide, 0.31, 2.3e-6), 1 + (np.arange(81) > 40)
+    force = play(slide, 0.31, 2.3e-6)
+    cycle = 1 + (np.arange(81) > 40)
     wrong = table(tmp_path / "wrong.csv", time, slide, force * cycle, cycle)
     scene = scene_of(tmp_path, "elastic-plastic")
     found = fit_loop(
@@ -497,7 +502,8 @@ def test_refuses_a_broken_loop_by_line(asked, text, says, tmp_path):
 def test_refuses_a_faulty_slide_file_as_check_does(tmp_path, table, says):
     """The reason was lost on the way: an internal fault, for the scene itself was right."""
     (tmp_path / "slide.csv").write_text(table)
-    scene, loop = tmp_path / "bench.toml", tmp_path / "loop.csv"
+    scene = tmp_path / "bench.toml"
+    loop = tmp_path / "loop.csv"
     scene.write_text(POINT + LAWS["coulomb"] + '[slide]\nkind = "file"\nfile = "slide.csv"\n')
     time, slide = rows(8, 1)
     np.savetxt(

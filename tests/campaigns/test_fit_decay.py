@@ -28,10 +28,8 @@ def written(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=AMPLI
     curve = pf.backbone(text, amplitudes=amplitudes, method="balance")
     a, f, z = (curve[f"balance_{name}"].values for name in ("amplitude", "frequency", "damping"))
     rng = np.random.default_rng(seed)
-    f, z = (
-        f * (1 + noise / 100 * rng.normal(size=f.size)),
-        z * (1 + noise * rng.normal(size=z.size)),
-    )
+    f = f * (1 + noise / 100 * rng.normal(size=f.size))
+    z = z * (1 + noise * rng.normal(size=z.size))
     rows = [
         f"{x!r},{y!r},{0.02 * (noise or 1e-4) * y!r},{w!r},{2 * (noise or 1e-4) * w!r}"
         for x, y, w in zip(a.tolist(), f.tolist(), z.tolist())

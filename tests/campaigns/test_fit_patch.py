@@ -142,10 +142,8 @@ def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
         own = rows[f"patch_{name}_{unit}"]  # there is no loss at 10 nm, where no element slips
         off = rows[f"{law}_{name}_{unit}"] / np.where(own > 0, own, np.nan) - 1
         k = np.nanargmax(np.abs(off))
-        size, at = (
-            f"{'+' if off[k] > 0 else ''}{format_number(100 * off[k], 2)} %",
-            format_quantity(rows["slide_m"][k], "m", 3),
-        )
+        size = f"{'+' if off[k] > 0 else ''}{format_number(100 * off[k], 2)} %"
+        at = format_quantity(rows["slide_m"][k], "m", 3)
         assert f"{size} of the {part} (at {at})" in answer.out.split("\n")[0]
     assert {"scene.bouc-wen.toml", "scene.elastic-plastic.toml", "scene.iwan.toml"} <= {
         one.name for one in (tmp_path / "out").iterdir()

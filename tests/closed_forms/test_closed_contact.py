@@ -19,7 +19,8 @@ TITANIUM, CARBIDE, THICKNESS = (121e9, 0.32), (250e9, 0.24), 152.4e-6
 
 def _over(lo, hi, integrand, kinks=()):
     """Integral over lo..hi of a function that may be infinite like 1/sqrt at its ends; `kinks` inside split it."""
-    middle, half = (lo + hi) / 2, (hi - lo) / 2
+    middle = (lo + hi) / 2
+    half = (hi - lo) / 2
     size = abs(integrand(middle + 0.3 * half)) * half
     points = sorted(
         {-np.pi / 2, np.pi / 2, *(np.arcsin((k - middle) / half) for k in kinks if lo < k < hi)}
@@ -139,7 +140,8 @@ def test_exact_rounded_punch_follows_its_shape(load, share):
 
 @pytest.mark.parametrize("load, radius", [(1e4, 2e-4), (1e3, 1e-5)])
 def test_order_a_rounded_corner_is_the_limit_of_the_rounded_punch(load, radius):
-    flat, modulus = 4e-3, 1e11
+    flat = 4e-3
+    modulus = 1e11
     reach, peak = exact.rounded_corner_contact(load / np.pi / np.sqrt(2 * flat), radius, modulus)
     x = flat + np.linspace(-2, 1, 3001) * reach
     assert exact.rounded_punch_half_width(load, flat, radius, modulus) - flat == pytest.approx(
@@ -251,7 +253,8 @@ def transfer_compliance(k, coating, substrate, thickness):
     """C(k) from the 4 x 4 state (u, v, syy, sxy) carried through the layer and matched to decaying states below."""
 
     def state_matrix(young, poisson):
-        young, poisson = mpmath.mpf(young), mpmath.mpf(poisson)
+        young = mpmath.mpf(young)
+        poisson = mpmath.mpf(poisson)
         mu = young / (2 * (1 + poisson))
         lam = 2 * mu * poisson / (1 - 2 * poisson)
         stiff = lam + 2 * mu
@@ -270,7 +273,8 @@ def transfer_compliance(k, coating, substrate, thickness):
         grown = (below - k * mpmath.eye(4)) ** 2  # its columns span the decaying states
         decaying = mpmath.matrix(4, 2)
         for row in range(4):
-            decaying[row, 0], decaying[row, 1] = grown[row, 0], grown[row, 1]
+            decaying[row, 0] = grown[row, 0]
+            decaying[row, 1] = grown[row, 1]
         top = mpmath.expm(-state_matrix(*coating) * mpmath.mpf(thickness)) * decaying
         share = mpmath.lu_solve(
             mpmath.matrix([[top[2, 0], top[2, 1]], [top[3, 0], top[3, 1]]]), mpmath.matrix([-1, 0])
@@ -313,7 +317,9 @@ def test_exact_layered_compliance_limits():
 @pytest.mark.parametrize("place", [-0.7, 0.2, 0.95])
 def test_exact_cattaneo_sticks_inside_and_slips_outside(share, place):
     """The tangential kernel of half planes is the normal one: no slope of the slide within the stick zone."""
-    line, radius, mu = 1e5, 1.0, 0.35
+    line = 1e5
+    radius = 1.0
+    mu = 0.35
     shear = share * mu * line
     half = exact.hertz_half_width(line, radius, MODULUS)
     stick = exact.cattaneo_stick_half_width(shear, line, radius, MODULUS, mu)
@@ -348,7 +354,9 @@ DECAY = 2.5e-6
 @pytest.mark.parametrize("tilt", [1e-6, 2e-5, 2.32e-5, 1e-4, -3e-4, 3e-3])
 def test_exact_wedge_by_sinking_a_pad(tilt):
     """The pad sinks until springs under it carry the load; fraction, centre and pressures are then read off."""
-    length, width, kn = PAD["length"], PAD["width"], PAD["stiffness"]
+    length = PAD["length"]
+    width = PAD["width"]
+    kn = PAD["stiffness"]
     zero = [0.0]
 
     def total(sink, arm=0.0):
@@ -368,10 +376,8 @@ def test_exact_wedge_by_sinking_a_pad(tilt):
 
 def test_exact_wedge_begins_to_open():
     opening = exact.wedge_opening_tilt(**PAD)
-    below, above = (
-        exact.wedge_on_linear_foundation(opening * (1 - 1e-9), **PAD),
-        exact.wedge_on_linear_foundation(opening * (1 + 1e-9), **PAD),
-    )
+    below = exact.wedge_on_linear_foundation(opening * (1 - 1e-9), **PAD)
+    above = exact.wedge_on_linear_foundation(opening * (1 + 1e-9), **PAD)
     assert opening == pytest.approx(2.32e-5, rel=1e-12)
     assert below[0] == 1 and above[0] < 1 and np.allclose(below, above, rtol=1e-8, atol=1)
     assert (
@@ -414,7 +420,9 @@ def test_exact_skin_by_quadrature(tilt):
 @pytest.mark.parametrize("tilt", [1e-5, 1e-4, 1e-3])
 @pytest.mark.parametrize("ratio", [0.5, 1.0, 3.0, 30.0])
 def test_exact_wedge_loop_is_the_sum_of_its_strips(tilt, ratio):
-    mu, kt, area = 0.4, 8e12, 1e-4
+    mu = 0.4
+    kt = 8e12
+    area = 1e-4
     fraction, _, least, largest = exact.wedge_on_linear_foundation(tilt, **PAD)
     amplitude = ratio * mu * PAD["load"] / (kt * area)
 
@@ -429,7 +437,9 @@ def test_exact_wedge_loop_is_the_sum_of_its_strips(tilt, ratio):
 
 
 def test_exact_wedge_loop_closed_form_above_and_below_its_last_slip():
-    mu, kt, area = 0.4, 8e12, 1e-4
+    mu = 0.4
+    kt = 8e12
+    area = 1e-4
     fraction, _, least, largest = exact.wedge_on_linear_foundation(1e-3, **PAD)
     last = mu * largest / kt
     above, below = exact.wedge_loop_area(
@@ -458,7 +468,8 @@ def test_exact_tilt_of_the_assumed_pad(tilt, linear, at3, at30, skin, centre):
     """10 x 10 mm, 116 N, k_n 1e13 Pa/m, k_t 0.8 k_n, mu 0.4, u_0 2.5 um; the truths are a count of strips:
     fractions in contact and loops at 3 and 30 times the slip of the level pad, over its own."""
     fraction, _, least, largest = exact.wedge_on_linear_foundation(tilt, **PAD)
-    mu, kt = 0.4, 8e12
+    mu = 0.4
+    kt = 8e12
     slip = mu * PAD["load"] / (kt * 1e-4)
     loops = [
         exact.wedge_loop_area(n * slip, mu, kt, fraction * 1e-4, least, largest)

@@ -209,7 +209,8 @@ def test_exact_reversal_far_away_is_full_friction_the_other_way():
 
 def _triangle_force(slide, amplitude, decay, count):
     """Steady-cycle force at `slide` on the way up: strips of earlier strokes, newest first, shares 1 - decay."""
-    total, path = 0.0, 0.0
+    total = 0.0
+    path = 0.0
     ends = [(-amplitude, slide, 1)] + [
         (-amplitude, amplitude, (-1) ** (k + 1)) for k in range(count)
     ]
@@ -248,7 +249,8 @@ def test_exact_jenkins_loop_by_walking_it(amplitude):
     path = amplitude * np.concatenate(
         [np.linspace(0, 1, 1001), np.linspace(1, -1, 2001)[1:], np.linspace(-1, 1, 2001)[1:]]
     )
-    stretch, force = 0.0, [0.0]
+    stretch = 0.0
+    force = [0.0]
     for dq in np.diff(path):
         stretch = float(np.clip(stretch + dq, -0.2, 0.2))
         force.append(stretch / 0.2)
@@ -263,7 +265,9 @@ def test_exact_jenkins_loop_by_walking_it(amplitude):
 
 def _coulomb_ivp(start, friction, omega, times):
     """Release and decay by half cycles of an integrator with events; stops where |x| <= friction at a turn."""
-    out, t0, x0 = np.full(times.size, np.nan), 0.0, start
+    out = np.full(times.size, np.nan)
+    t0 = 0.0
+    x0 = start
     while abs(x0) > friction:
         sign = np.sign(x0)
 
@@ -273,7 +277,8 @@ def _coulomb_ivp(start, friction, omega, times):
         def turn(_, y, sign=sign):
             return y[1] * sign
 
-        turn.direction, turn.terminal = 1, True
+        turn.direction = 1
+        turn.terminal = True
         run = solve_ivp(
             rhs,
             (t0, t0 + 2 * np.pi / omega),
@@ -286,7 +291,8 @@ def _coulomb_ivp(start, friction, omega, times):
         )
         here = (times >= t0) & (times <= run.t[-1])
         out[here] = run.sol(times[here])[0]
-        t0, x0 = run.t[-1], run.y[0, -1]
+        t0 = run.t[-1]
+        x0 = run.y[0, -1]
     out[times >= t0] = x0
     return out, t0, x0
 
@@ -334,7 +340,8 @@ def test_always_a_decay_rests_inside_the_friction_band_and_is_continuous(start, 
     [(135, 6, 5.22698, 4.83011), (150, 7, 6.66151, 6.21040), (155, 8, 4.29575, 4.15965)],
 )
 def test_exact_sliding_amplitude_is_den_hartog(hertz, input_g, bare, damped):
-    r, friction = hertz / 143, 4 / input_g
+    r = hertz / 143
+    friction = 4 / input_g
     u = np.sin(np.pi / r) / (r * (1 + np.cos(np.pi / r)))
     got = sliding_amplitude(r, friction)
     assert got == pytest.approx(np.sqrt(1 / (1 - r * r) ** 2 - (u * friction) ** 2), rel=1e-12)

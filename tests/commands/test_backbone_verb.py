@@ -116,7 +116,8 @@ def test_the_largest_damping_is_told_of_the_amplitudes_that_were_computed(scene,
 
 def test_exact_a_frequency_that_its_error_exceeds_is_in_the_table_alone():
     """One of 3.6 +- 9.8 kHz beside others of 100 Hz stretched the axis of the picture."""
-    a, none = np.array([1e-6, 2e-6, 3e-6]), np.full(3, np.nan)
+    a = np.array([1e-6, 2e-6, 3e-6])
+    none = np.full(3, np.nan)
     one = Curve(
         a,
         np.array([100.0, 90.0, 3.6e3]),

@@ -77,7 +77,8 @@ def test_always_a_template_says_no_warning(kind, tmp_path):
     "scene", [one if one in CHEAP else pytest.param(one, marks=pytest.mark.slow) for one in SCENES]
 )
 def test_always_a_shipped_scene_says_what_is_meant(scene, tmp_path):
-    found, meant = ran(ROOT / scene, tmp_path / "out", "run"), MEANT.get(scene, ())
+    found = ran(ROOT / scene, tmp_path / "out", "run")
+    meant = MEANT.get(scene, ())
     assert len(found) == len(meant) and all(
         text.startswith(start) for text, start in zip(found, meant, strict=True)
     )

@@ -70,7 +70,8 @@ def test_exact_volume_mean_and_area_are_those_of_the_whole_patch(runs, before):
     assert set(NAMES) | {"hidden_wear", "worn_share", "track", "registration", "removed"} <= set(
         found
     )
-    track, deepest = found["track"], found["worn_depth_max"]["value"]
+    track = found["track"]
+    deepest = found["worn_depth_max"]["value"]
     width = track["to"]["value"] - track["from"]["value"]
     assert track["depth_mean"]["value"] == pytest.approx(
         track["area_gross"]["value"] / width, rel=1e-12
@@ -89,11 +90,13 @@ def test_exact_volume_mean_and_area_are_those_of_the_whole_patch(runs, before):
 def test_exact_a_wedge_is_told_apart_from_what_a_trace_shows(runs):
     """Between two states in full contact all points wear nearly alike; from the new one on, a stretch is unworn."""
     found = pf.compare(runs / "new", runs / "worn")
-    mean, hidden = found["worn_depth_mean"]["value"], found["hidden_wear"]["value"]
+    mean = found["worn_depth_mean"]["value"]
+    hidden = found["hidden_wear"]["value"]
     assert 0.8 * mean < hidden < mean and "a trace alone could not show" in found["verdict"]
     found = pf.compare(runs / "new", runs / "half")
     assert found["hidden_wear"]["value"] == 0
-    track, end = found["track"], pf.compare(runs / "new", runs / "half")["track"]["to"]["value"]
+    track = found["track"]
+    end = pf.compare(runs / "new", runs / "half")["track"]["to"]["value"]
     assert (
         0.5 * track["depth_mean"]["value"]
         < track["hidden_wear"]["value"]
@@ -107,7 +110,8 @@ def test_exact_a_wedge_is_told_apart_from_what_a_trace_shows(runs):
 
 def test_exact_hidden_wear_is_the_highest_line_below_the_depth():
     """Against the best of many lines."""
-    x, rng = np.linspace(-1, 2, 41), np.random.default_rng(3)
+    x = np.linspace(-1, 2, 41)
+    rng = np.random.default_rng(3)
     for k in range(12):
         depth = rng.uniform(0, 1, x.size) + rng.uniform(-0.2, 2) * (x + 1)
         depth = np.maximum(depth, 0.0) * (x < 1.5 if k % 4 == 0 else 1)
@@ -263,10 +267,8 @@ def test_exact_a_table_of_results_folders_beside_traces(runs, tmp_path):
 
 
 def test_exact_strips_before_and_after_are_compared_over_x_and_the_width(runs):
-    found, one = (
-        pf.compare(runs / "rolled", runs / "rolled_worn"),
-        compare_runs(runs / "rolled", runs / "rolled_worn"),
-    )
+    found = pf.compare(runs / "rolled", runs / "rolled_worn")
+    one = compare_runs(runs / "rolled", runs / "rolled_worn")
     volume = found["worn_volume"]
     assert volume["value"] == pytest.approx(PER_CYCLE * MANY, rel=1e-11)
     assert float((one.depth * one.after.surface.area).sum()) == pytest.approx(
@@ -285,7 +287,8 @@ def test_exact_strips_before_and_after_are_compared_over_x_and_the_width(runs):
 
 
 def test_exact_the_hidden_plane_lies_below_every_depth_and_is_the_highest():
-    x, y = np.array([-3.0, -2.0, 0.0, 1.0, 3.0]), np.array([-1.0, 0.0, 1.0])
+    x = np.array([-3.0, -2.0, 0.0, 1.0, 3.0])
+    y = np.array([-1.0, 0.0, 1.0])
     plane = 5 + 0.5 * x + 2 * y[:, None]
     corners = (1.5, 4.5, 5.5, 8.5)
     assert hidden_plane(x, y, plane) == pytest.approx(corners, rel=1e-9)

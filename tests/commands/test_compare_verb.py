@@ -50,7 +50,8 @@ def written(path: Path, trace: Profile) -> Path:
 @pytest.fixture(scope="module")
 def files(tmp_path_factory) -> tuple:
     """Before, after with half of it worn, and the pair."""
-    p, place = pair(30077, share=0.5), tmp_path_factory.mktemp("traces")
+    p = pair(30077, share=0.5)
+    place = tmp_path_factory.mktemp("traces")
     return written(place / "before.csv", p.before), written(place / "after.csv", p.after), p
 
 
@@ -157,10 +158,8 @@ def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
         "before",
         "after",
     }
-    page, ratio = (
-        (tmp_path / "out" / "report.html").read_text("utf-8"),
-        found["anisotropy"]["after"]["amplitude_ratio"],
-    )
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    ratio = found["anisotropy"]["after"]["amplitude_ratio"]
     assert page.index("<h2>x over y</h2>") < page.index("<h2>What changed along x</h2>")
     assert re.search(rf"amplitude before \S+ \S+ .. \S+; after {ratio['value']:.3g}", page)
     x, y, z = report_area((64, 64), 4 * UM, 1)

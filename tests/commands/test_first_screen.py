@@ -164,7 +164,8 @@ def test_always_the_first_screen_has_an_example_of_every_verb_that_is_read():
 def test_always_a_plan_says_what_does_not_run_where_it_is_asked(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text(read_template("rig"), "utf-8")
-    short, long = cli("plan", path).out, cli("plan", path, "-v").out
+    short = cli("plan", path).out
+    long = cli("plan", path, "-v").out
     assert (
         "\nabsent" not in short
         and long.startswith(short)
@@ -224,7 +225,8 @@ def tolerance_said(tolerance=1e-2, **measures):
 
 def test_exact_a_level_between_two_others_does_not_claim_the_tolerance():
     """A jump at 5 g between levels 2 g apart; all that the tolerance steers is known to it."""
-    jump, fine = Measure(5 * 9.80665, "m s-2", 9.80665, 9.80665), Measure(2.0, "J", 1e-2)
+    jump = Measure(5 * 9.80665, "m s-2", 9.80665, 9.80665)
+    fine = Measure(2.0, "J", 1e-2)
     between = " (jump_level: one step between the drive levels of the scene)"
     least = "0.005 of the value (loop_area, 2.000 ± 0.010 J)."
     meets = "Every measure with an error estimate meets the tolerance 0.01"
@@ -261,7 +263,8 @@ def test_exact_a_limit_that_is_no_part_of_the_value_is_said_with_its_measure():
 
 def test_exact_the_largest_error_is_that_of_a_value_that_a_reader_sees():
     """Not the one that a floor holds, nor one that reads 0."""
-    small, large = Measure(1.0, "J", 2e-3, 0.0), Measure(1.0, "N", 8e-3, 1.0)
+    small = Measure(1.0, "J", 2e-3, 0.0)
+    large = Measure(1.0, "N", 8e-3, 1.0)
     said = tolerance_said(
         loop_area=small, friction_force_peak=large, moment=Measure(1e-12, "N m", 5e-3, 1e-2)
     )
@@ -398,9 +401,11 @@ def test_exact_the_loss_factor_of_an_elastic_plastic_bench():
         + '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "1 Hz"\ncycles = 2\n'
     )
     slide = result.plan.model.slide.amplitude
-    pull, k = result.plan.model.friction.static * result.measures["normal_load"].value, 1e7
+    pull = result.plan.model.friction.static * result.measures["normal_load"].value
+    k = 1e7
     a = np.arccos(1 - 2 * pull / (k * slide))
-    work, stiffness = 4 * pull * (slide - pull / k), k * (a - np.sin(a) * np.cos(a)) / np.pi
+    work = 4 * pull * (slide - pull / k)
+    stiffness = k * (a - np.sin(a) * np.cos(a)) / np.pi
     found = loop_entry(result)["loop"]
     truth = work / (np.pi * stiffness * slide**2)
     assert (

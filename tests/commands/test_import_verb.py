@@ -60,7 +60,8 @@ def test_exact_one_table_of_all_channels_serves_slide_drive_and_fit(tmp_path):
         "acceleration [in/s^2]": np.cos(time),
         "base_acceleration [g]": time,
     }
-    source, out = tmp_path / "lab.csv", tmp_path / "table.csv"
+    source = tmp_path / "lab.csv"
+    out = tmp_path / "table.csv"
     np.savetxt(
         source, np.transpose([*table.values()]), delimiter=",", header=",".join(table), comments=""
     )

@@ -79,7 +79,8 @@ def test_exact_the_table(trace):
 
 
 def test_exact_definitions_where_asked(trace):
-    plain, long = cli("profile", trace).out, cli("profile", trace, "-v").out
+    plain = cli("profile", trace).out
+    long = cli("profile", trace, "-v").out
     assert "mean of the absolute heights" not in plain and "mean of the absolute heights" in long
     assert "no cut-off, so no roughness profile" in plain and "  Ra " not in plain
 
@@ -113,7 +114,8 @@ def test_exact_the_page_and_its_numbers(trace, tmp_path):
     out = tmp_path / "out"
     answer = cli("profile", trace, "--cutoff", "0.25 mm", "-o", out)
     assert answer.out.splitlines()[-1] == f"results: {out}"
-    page, data = (out / "report.html").read_text(), json.loads((out / "profile.json").read_text())
+    page = (out / "report.html").read_text()
+    data = json.loads((out / "profile.json").read_text())
     assert page.count("<figure>") == 3 == page.count('role="img" aria-label="')
     assert all(f"<td>{name}</td>" in page for name in data["profiles"][0]["measures"])
     assert "http" not in page.replace("http://www.w3.org", "")
@@ -121,7 +123,9 @@ def test_exact_the_page_and_its_numbers(trace, tmp_path):
 
 def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_path, scan):
     """Three sines of other heights and a scan: Student's t by the table of 4.302653 for two degrees of freedom."""
-    heights, names, out = (4.0, 5.0, 6.5), [], tmp_path / "out"
+    heights = (4.0, 5.0, 6.5)
+    names = []
+    out = tmp_path / "out"
     for k, high in enumerate(heights):
         names.append(tmp_path / f"{k}.csv")
         z = high * np.sin(2 * np.pi * np.arange(800) / 8) + 0.01 * np.arange(800)
@@ -129,14 +133,13 @@ def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_pat
             "x [um],z [um]\n" + "".join(f"{a},{b:.17g}\n" for a, b in enumerate(z))
         )
     assert cli("profile", *names, scan, "-o", out).code == 0
-    data, rows = (
-        json.loads((out / "profile.json").read_text()),
-        (out / "profile.csv").read_text().splitlines(),
-    )
+    data = json.loads((out / "profile.json").read_text())
+    rows = (out / "profile.csv").read_text().splitlines()
     assert [(one["kind"], one["files"], one["notes"]) for one in data["means"]] == [
         ("profile", 3, [])
     ]
-    found, off = data["means"][0]["measures"]["Pq"], 4.302653 * np.std(heights, ddof=1) / np.sqrt(6)
+    found = data["means"][0]["measures"]["Pq"]
+    off = 4.302653 * np.std(heights, ddof=1) / np.sqrt(6)
     assert found["value"] == pytest.approx(np.mean(heights) * UM / np.sqrt(2), rel=2e-3)
     assert found["high"] - found["value"] == pytest.approx(off * UM, rel=5e-3)
     assert "<h2>Mean of 3 traces</h2>" in (out / "report.html").read_text()

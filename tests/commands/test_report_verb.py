@@ -44,7 +44,8 @@ def amplitudes(data: dict) -> np.ndarray:
 
 
 def test_exact_the_page_of_a_sweep_holds_its_table(swept):
-    data, table = data_of((swept / "first" / "report.html").read_text()), rows(swept / "first")
+    data = data_of((swept / "first" / "report.html").read_text())
+    table = rows(swept / "first")
     assert [one["name"] for one in data["keys"]] == ["normal.load", "drive.acceleration"] and data[
         "grid"
     ]

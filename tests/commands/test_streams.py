@@ -79,7 +79,8 @@ def test_exact_results_name_no_folder_of_this_machine(tmp_path):
     rows = "".join(f"{13 * k},{abs(k % 400 - 200) / 400 + 1e-4 * k:.4f}\n" for k in range(1100))
     (tmp_path / "trace.csv").write_text("x [um],z [um]\n" + rows)
     (tmp_path / "a.toml").write_text(PATCH + '[contact.profile]\nfile = "trace.csv"\n')
-    answer, out = cli("run", tmp_path / "a.toml", "-o", tmp_path / "out"), tmp_path / "out"
+    answer = cli("run", tmp_path / "a.toml", "-o", tmp_path / "out")
+    out = tmp_path / "out"
     assert answer.code == 0 and "trace.csv: x runs from " in (out / "summary.json").read_text()
     assert {
         one.name for one in out.iterdir() if str(tmp_path).encode() in one.read_bytes()

@@ -175,7 +175,8 @@ def test_exact_a_resumed_sweep_runs_what_is_missing(swept, scene, tmp_path, monk
 )
 def test_refuses_to_resume_into_a_whole_sweep_of_another(scene, tmp_path, change, why):
     """The tables of the older sweep were once replaced without a word."""
-    out, over = tmp_path / "out", ("--over", "normal.load=10 N,20 N")
+    out = tmp_path / "out"
+    over = ("--over", "normal.load=10 N,20 N")
     assert cli("sweep", scene, *over, "-o", out).code == 0
     before = {one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()}
     told = cli(
@@ -370,7 +371,9 @@ def test_exact_whole_results_folders_are_kept(scene, tmp_path):
 
 @pytest.mark.slow
 def test_exact_pages_are_drawn_where_they_are_asked_for(scene, tmp_path):
-    out, over, page = tmp_path / "swept", ("--over", "friction.static=0.1"), "report.html"
+    out = tmp_path / "swept"
+    over = ("--over", "friction.static=0.1")
+    page = "report.html"
     for words, own, each in (
         ((), True, False),
         (("--no-page",), False, False),
@@ -485,7 +488,8 @@ def test_exact_the_printed_command_of_drawn_cases_draws_them_again(tmp_path, mon
 def test_exact_the_answer_begins_with_the_measure_that_is_asked_for(tmp_path):
     """Of a slide of 1 mm with gross slip the secant stiffness is mu N/1 mm, the largest force over the slide; the load
     has 0 % of it where it hardly changes. A measure that no case has, or that cannot be ranked, is told as that."""
-    scene, data = tmp_path / "bench.toml", tmp_path / "a/sweep.json"
+    scene = tmp_path / "bench.toml"
+    data = tmp_path / "a/sweep.json"
     scene.write_text(BENCH, encoding="utf-8")
     drawn = (
         "--over",
@@ -576,7 +580,8 @@ def test_exact_the_plan_of_a_sweep_names_the_case_whose_values_it_prints(scene):
 def test_always_a_sweep_says_how_long_its_first_case_takes(capsys, monkeypatch):
     """A sweep of costly cases printed nothing for five minutes."""
     monkeypatch.setattr(Progress, "WAIT", 0.02)
-    line, silent = Progress(False), Progress(True)
+    line = Progress(False)
+    silent = Progress(True)
     for one in (line, silent):
         one(0, 11, None)
     sleep(0.4)

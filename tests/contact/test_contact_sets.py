@@ -70,7 +70,8 @@ def test_exact_forces_are_those_of_the_solver(room):
     """Along motions that change the set, lift off and return; room for 16 sets, or for all of them."""
     sets, state = crowned()
     kept, slot = compiled_sets(sets, room)
-    force, apart = np.zeros(sets.x.size), 0
+    force = np.zeros(sets.x.size)
+    apart = 0
     for d, t in path(sets, state, 80):
         slot = PRESS.find_set(kept, slot, d, t)
         check_state(sets, PRESS.press_state(kept, slot, d, t, force), force, d, t, 1e-12)

@@ -30,8 +30,11 @@ def springs(count: int = 41, stiffness: float = 1e12) -> Compliance:
 @pytest.mark.parametrize("load", [3.0, 3.7, 4.4, 5.1, 2.1])
 def test_exact_a_wedge_on_springs_ends_where_its_gap_says(load):
     """p = k (delta - angle x): the edge lies at delta/angle, and the stiffness is that of the length in contact."""
-    pieces, angle, k = springs(), 1e-5, 1e12
-    x, weight = pieces.interface.x, pieces.interface.weight
+    pieces = springs()
+    angle = 1e-5
+    k = 1e12
+    x = pieces.interface.x
+    weight = pieces.interface.weight
     found = press(pieces, angle * x, load)
     force = found.sigma_n * weight
     (end,) = edges.find_edges(pieces.normal, x, force, found.gap, softness=np.diag(pieces.normal))
@@ -59,7 +62,8 @@ def block_of(grid) -> tuple:
 
 def ends_of(block, load: float, radius: float = 57.7e-3) -> tuple:
     pieces, row = block
-    x, weight = pieces.interface.x, pieces.interface.weight
+    x = pieces.interface.x
+    weight = pieces.interface.weight
     found = press(pieces, x**2 / (2 * radius), load)
     force = found.sigma_n * weight
     return force, edges.find_edges(pieces.normal, x, force, found.gap, row_height=row)
@@ -86,7 +90,8 @@ def test_always_edges_of_hertz_do_not_jump_where_short_cells_meet_long_ones(bloc
     even = refined_middle(1.5 * A, A / 10, WIDTH, 6e-3, 1.06)
     inside = np.abs(even.x) < 0.9 * A - 1e-9
     x = np.sort(np.concatenate([even.x, even.x[inside] + A / 20, [-0.85 * A]]))
-    pair, modulus = block_of(replace(even, x=x)), TITANIUM[0] / (1 - TITANIUM[1] ** 2) / 2
+    pair = block_of(replace(even, x=x))
+    modulus = TITANIUM[0] / (1 - TITANIUM[1] ** 2) / 2
     for load in np.linspace(60.0, 100.0, 14):
         half = hertz_half_width(load / WIDTH, 57.7e-3, modulus)
         assert ends_of(pair, load)[1][1].position == pytest.approx(
@@ -97,7 +102,9 @@ def test_always_edges_of_hertz_do_not_jump_where_short_cells_meet_long_ones(bloc
 def test_always_edges_and_stiffness_go_on_where_a_node_enters(block):
     """Over five nodes that enter, neither jumps: steps stay within a twentieth of what a node would bring."""
     x = block[0].interface.x
-    places, stiff, sizes = [], [], []
+    places = []
+    stiff = []
+    sizes = []
     for load in np.linspace(80.0, 130.0, 401):
         force, found = ends_of(block, load)
         places.append(found[1].position)
@@ -121,7 +128,8 @@ def test_exact_a_pressure_that_fades_ends_where_its_logarithm_does():
 
 
 def test_exact_ends_of_full_contact_and_of_islands():
-    x, force = np.linspace(-1.0, 1.0, 9), np.array([1.0, 1, 0, 0, 1, 1, 0, 1, 1])
+    x = np.linspace(-1.0, 1.0, 9)
+    force = np.array([1.0, 1, 0, 0, 1, 1, 0, 1, 1])
     gap = np.where(force > 0, 0.0, 1e-6)
     found = edges.find_edges(np.eye(9) * 1e-6, x, force, gap, np.full(9, 1e-6))
     assert [(end.node, end.side) for end in found] == [(1, 1), (4, -1), (5, 1), (7, -1)]

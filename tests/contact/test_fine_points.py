@@ -44,7 +44,8 @@ def hold_ends(stencil, component: int) -> np.ndarray:
 @pytest.mark.parametrize("held", [0, 1])
 def test_order_waves_of_a_strip_are_those_of_cells_between_lines_without_friction(held, plane):
     """Pressure (held 0) and shear (held 1) of a coated piece; an even face moves as bars do to round-off."""
-    layers, errors = Layers(COATED.coating, COATED.substrate, plane), []
+    layers = Layers(COATED.coating, COATED.substrate, plane)
+    errors = []
     for cells in (40, 80):
         x = np.linspace(0, LENGTH, cells + 1)
         depth = np.concatenate(
@@ -81,7 +82,8 @@ def row(count: int, area: float = LENGTH) -> PointCompliance:
 
 
 def test_exact_products_are_symmetric_and_their_equations_solved():
-    points, draw = row(300), np.random.default_rng(1)
+    points = row(300)
+    draw = np.random.default_rng(1)
     one, other = draw.normal(size=(2, 300))
     assert one @ points.product(other) == pytest.approx(other @ points.product(one), rel=1e-12)
     active = draw.random(300) < 0.4
@@ -99,7 +101,8 @@ def test_exact_edges_between_points_are_those_of_a_row_eight_times_as_fine(count
         force, _ = solve_by_gradients(
             points, patch_problem(points.x, gap - gap.min(), 2e4), 1e-10, 3000
         )
-        active, one = force > 0, np.ones(points.x.size)
+        active = force > 0
+        one = np.ones(points.x.size)
         moved = gap + points.product(force)
         edges = find_edges(
             points,

@@ -84,9 +84,11 @@ def test_exact_full_contact_is_one_wave(share):
 @pytest.mark.parametrize("period", [8, 16, 64])
 def test_exact_hertz_on_a_wide_period(period):
     """The images of a period L raise the peak by (pi a/L)^2/12; the rest is Hertz."""
-    half, load = 0.1e-3, 9107.0
+    half = 0.1e-3
+    load = 9107.0
     radius = np.pi * MODULUS * half**2 / (4 * load)
-    length, points = period * half, 256 * period
+    length = period * half
+    points = 256 * period
     x = places(points, length)
     state = press_periodic(half_planes(points, length), crown(x, radius), length, load)
     hertz = exact.hertz_pressure(x, load, radius, MODULUS)
@@ -160,7 +162,8 @@ def test_always_the_dense_active_set_finds_the_same(points, seed, load, height, 
     rng = np.random.default_rng(seed)
     gap = 10**height * rng.normal(size=points)
     gap = np.cumsum(gap) if smooth else gap
-    length, load = 1e-3, 10**load
+    length = 1e-3
+    load = 10**load
     compliance = coated(points, length)
     compliance[0] = compliance[1]
     state = press_periodic(compliance, gap, length, load)

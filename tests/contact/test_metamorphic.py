@@ -38,7 +38,8 @@ SPRING = st.one_of(st.just(0.0), st.floats(-2, 8).map(lambda power: 10.0**power)
 
 def gap_of(seed, height):
     """White noise, waves or a few steps on the interface of CELLS columns."""
-    rng, x = np.random.default_rng(seed), coated_pair(CELLS).interface.x
+    rng = np.random.default_rng(seed)
+    x = coated_pair(CELLS).interface.x
     kind = rng.integers(3)
     if kind == 0:
         return 10.0**height * rng.normal(size=x.size)
@@ -78,7 +79,9 @@ def test_exact_twice_the_load_on_twice_the_gap_doubles_the_pressure(
     seed, height, power, line, spring
 ):
     """Twice the numbers, the same digits."""
-    pair, gap, load = coated_pair(CELLS), gap_of(seed, height), 10.0**power
+    pair = coated_pair(CELLS)
+    gap = gap_of(seed, height)
+    load = 10.0**power
     one = press(pair, gap, load, moment_of(load, line), spring=spring)
     two = press(pair, 2 * gap, 2 * load, moment_of(2 * load, line), spring=spring)
     assert near(two.sigma_n, 2 * one.sigma_n, 1e-13)
@@ -89,7 +92,9 @@ def test_exact_twice_the_load_on_twice_the_gap_doubles_the_pressure(
 @RUNS
 @given(SEED, HEIGHTS, st.floats(-3, 4), LINE, SPRING)
 def test_exact_mirror_of_gap_and_moment_mirrors_the_pressure(seed, height, power, line, spring):
-    pair, gap, load = coated_pair(CELLS), gap_of(seed, height), 10.0**power
+    pair = coated_pair(CELLS)
+    gap = gap_of(seed, height)
+    load = 10.0**power
     one = press(pair, gap, load, moment_of(load, line), spring=spring)
     two = press(
         pair,
@@ -107,10 +112,8 @@ def test_exact_mirror_of_gap_and_moment_mirrors_the_pressure(seed, height, power
 @cache
 def pieces() -> tuple:
     """(x, nodal areas, compliances per width) of a coated and an uncoated piece on the same columns."""
-    coated, plain = (
-        graded_grid(LENGTH, HEIGHT, LENGTH / CELLS, COATING),
-        graded_grid(LENGTH, HEIGHT, LENGTH / CELLS),
-    )
+    coated = graded_grid(LENGTH, HEIGHT, LENGTH / CELLS, COATING)
+    plain = graded_grid(LENGTH, HEIGHT, LENGTH / CELLS)
     both = [
         interface_compliance(make_piece(grid.x, grid.depth, grid.coating_rows, layers))
         for grid, layers in ((coated, COATED), (plain, bare(TITANIUM)))
@@ -122,7 +125,8 @@ def pieces() -> tuple:
 @given(SEED, HEIGHTS, st.floats(-3, 4), LINE)
 def test_exact_swapped_bodies_change_nothing(seed, height, power, line):
     x, weight, both = pieces()
-    gap, load = gap_of(seed, height), 10.0**power
+    gap = gap_of(seed, height)
+    load = 10.0**power
     one, two = (
         press(
             Compliance(
@@ -144,13 +148,15 @@ def test_exact_swapped_bodies_change_nothing(seed, height, power, line):
 @RUNS
 @given(SEED, st.floats(-3, 3), st.floats(1.01, 100), st.floats(-2e-4, 2e-4))
 def test_always_more_load_never_shrinks_the_contact_of_a_convex_gap(seed, power, more, angle):
-    pair, rng = coated_pair(CELLS), np.random.default_rng(seed)
+    pair = coated_pair(CELLS)
+    rng = np.random.default_rng(seed)
     x = pair.interface.x
     gap = crown(x - rng.uniform(-4e-3, 4e-3), 10.0 ** rng.uniform(-1, 2)) + tilt(x, angle)
     # the larger of two convex ones is convex
     gap = np.maximum(gap, tilt(x, rng.uniform(-1e-3, 1e-3)))
     load = LOAD * 10.0**power
-    less, larger = press(pair, gap, load).sigma_n > 0, press(pair, gap, load * more).sigma_n > 0
+    less = press(pair, gap, load).sigma_n > 0
+    larger = press(pair, gap, load * more).sigma_n > 0
     assert np.all(larger[less])
     assert press(pair, gap, load * more).approach > press(pair, gap, load).approach
 
@@ -162,7 +168,9 @@ def test_exact_controls_agree_on_one_contact(seed, height, power, line, spring):
 
     What is handed on is a rounded rotation and approach: as far as the gap outweighs the closing, digits go.
     """
-    pair, gap, load = coated_pair(CELLS), gap_of(seed, height), 10.0**power
+    pair = coated_pair(CELLS)
+    gap = gap_of(seed, height)
+    load = 10.0**power
     x = pair.interface.x
     free = press(pair, gap, load, moment_of(load, line), spring=spring)
     turned = gap + tilt(x, free.rotation)
@@ -182,10 +190,14 @@ def test_exact_controls_agree_on_one_contact(seed, height, power, line, spring):
 @given(SEED, HEIGHTS, st.floats(-3, 4), LINE, SPRING)
 def test_always_balance_and_the_conditions_of_contact(seed, height, power, line, spring):
     """sum f = N, sum f x = M + K theta, f >= 0, w >= 0, f w = 0, all to 1e-12."""
-    pair, gap, load = coated_pair(CELLS), gap_of(seed, height), 10.0**power
-    x, moment = pair.interface.x, moment_of(load, line)
+    pair = coated_pair(CELLS)
+    gap = gap_of(seed, height)
+    load = 10.0**power
+    x = pair.interface.x
+    moment = moment_of(load, line)
     state = press(pair, gap, load, moment, spring=spring)
-    force, bent = forces(pair, state), pair.normal @ forces(pair, state)
+    force = forces(pair, state)
+    bent = pair.normal @ forces(pair, state)
     assert abs(force.sum() - load) <= 1e-12 * load and force.min() >= 0
     if moment is not None:
         back = spring * state.rotation

@@ -70,7 +70,8 @@ GAPS = {
 def test_order_one_a_stiff_linear_skin_tends_to_bare_contact(offset):
     pair = coated_pair(100)
     c, x, weight = bodies()
-    gap, moment = GAPS["tilt"](x), None if offset is None else offset * LOAD
+    gap = GAPS["tilt"](x)
+    moment = None if offset is None else offset * LOAD
     bare = press(pair, gap, LOAD, moment)
     off = [
         np.abs(
@@ -221,7 +222,8 @@ def test_exact_skin_and_bodies_in_series():
 def test_exact_spring_of_the_holder_is_the_moment_it_gives(skin, spring):
     """The rotation against a spring, sum f x = M + K theta, is the free rotation under the moment M + K theta."""
     c, x, weight = bodies(60)
-    gap, moment = 1e-4 * x, 2e-3 * LOAD
+    gap = 1e-4 * x
+    moment = 2e-3 * LOAD
     held = solve(skin, c, x, weight, gap, LOAD, moment, rotation=1e-4, spring=spring)
     turned = held.theta - 1e-4
     free = solve(skin, c, x, weight, gap, LOAD, moment + spring * turned)

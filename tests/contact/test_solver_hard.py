@@ -41,8 +41,10 @@ def forces(pair, state):
 
 def by_enumeration(c, x, gap, load=None, moment=None, spring=0.0):
     """(forces, delta, theta): every subset of the nodes is tried, as a saddle-point system of LU."""
-    m, r = x.size, 0 if load is None else 1 if moment is None else 2
-    rigid, best = np.stack([np.ones(m), x], axis=1)[:, :r], (np.inf, None)
+    m = x.size
+    r = 0 if load is None else 1 if moment is None else 2
+    rigid = np.stack([np.ones(m), x], axis=1)[:, :r]
+    best = (np.inf, None)
     for size in range(max(r if spring == 0 else 1, 0), m + 1):
         for part in map(list, combinations(range(m), size)):
             system = np.block(
@@ -80,8 +82,10 @@ def test_exact_the_only_subset_of_nodes_that_obeys_contact(size, seed, control):
     c = factor @ factor.T + 0.05 * np.eye(size)
     x = np.cumsum(rng.uniform(0.1, 1, size))
     x = x - (x[0] + x[-1]) / 2
-    gap, pair = 100 * rng.normal(size=size), pair_on(x, c)
-    line, spring = rng.uniform(-0.49, 0.49) * np.ptp(x), 10.0 ** rng.uniform(-3, 3)
+    gap = 100 * rng.normal(size=size)
+    pair = pair_on(x, c)
+    line = rng.uniform(-0.49, 0.49) * np.ptp(x)
+    spring = 10.0 ** rng.uniform(-3, 3)
     if control == "by":
         state = press_to_approach(pair, gap, gap.min() + 100)
         (wanted,) = by_enumeration(c, x, gap - gap.min() - 100)
@@ -102,7 +106,8 @@ def test_exact_the_only_subset_of_nodes_that_obeys_contact(size, seed, control):
 def test_exact_one_node_below_the_line_carries_all(node):
     """The rotation is not unique then; any that opens the others is an answer, and none is preferred to some."""
     pair = coated_pair(100)
-    x, c = pair.interface.x, pair.normal
+    x = pair.interface.x
+    c = pair.normal
     gap = 1e-2 * np.abs(x - x[node])
     for moment in (None, LOAD * x[node]):
         state = press(pair, gap, LOAD, moment)
@@ -177,8 +182,10 @@ def test_refuses_a_free_rotation_that_nothing_determines_with_the_keys_that_hold
 @pytest.mark.parametrize("control", ["load", "line", "spring"])
 def test_exact_spikes_of_a_metre_are_as_if_their_nodes_were_not_there(control):
     pair = coated_pair(100)
-    x, rng = pair.interface.x, np.random.default_rng(4)
-    gap, spikes = rough(rng, x, 3e-7), np.zeros(101, bool)
+    x = pair.interface.x
+    rng = np.random.default_rng(4)
+    gap = rough(rng, x, 3e-7)
+    spikes = np.zeros(101, bool)
     spikes[rng.choice(np.arange(1, 100), 30, replace=False)] = True
     moment, spring = {
         "load": (None, 0.0),
@@ -201,7 +208,8 @@ def test_exact_a_gap_a_kilometre_away(offset, moment):
     pair = coated_pair(100)
     far = offset + crown(pair.interface.x, 1.0)
     near = far - offset  # exact: they are within a factor of two
-    one, two = press(pair, far, LOAD, moment), press(pair, near, LOAD, moment)
+    one = press(pair, far, LOAD, moment)
+    two = press(pair, near, LOAD, moment)
     assert np.abs(one.sigma_n - two.sigma_n).max() <= 1e-12 * two.sigma_n.max()
     assert one.approach == pytest.approx(offset + two.approach, rel=1e-15)
     assert max(one.residuals.values()) <= RESIDUAL_TOL
@@ -217,7 +225,8 @@ def test_exact_a_gap_a_kilometre_away(offset, moment):
 @pytest.mark.parametrize("side", [1, -1])
 def test_exact_a_load_line_at_the_edge_of_tipping(share, side):
     pair = coated_pair(100)
-    x, line = pair.interface.x, side * share * LENGTH
+    x = pair.interface.x
+    line = side * share * LENGTH
     for gap in (np.zeros(101), crown(x, 1.0), 1e-6 * np.random.default_rng(1).normal(size=101)):
         state = press(pair, gap, LOAD, LOAD * line)
         force = forces(pair, state)
@@ -265,7 +274,8 @@ def test_exact_a_spring_holds_a_load_line_beyond_the_end():
 def test_exact_equal_heights_share_as_their_compliance_says(moment):
     """A flat top of 21 equal nodes between deep valleys: the forces of the block alone."""
     pair = coated_pair(100)
-    gap, top = np.full(101, 1e-3), slice(40, 61)
+    gap = np.full(101, 1e-3)
+    top = slice(40, 61)
     gap[top] = 0.0
     share = np.linalg.solve(pair.normal[top, top], np.ones(21))
     state = press(pair, gap, LOAD, moment)
@@ -295,7 +305,8 @@ CYCLE = 1e-9 * np.array([[144.0, -60, 108], [-60, 54, -69], [108, -69, 101]])
 
 
 def test_exact_sets_that_come_back_are_left_to_the_gradients():
-    gap, x = np.array([2e-9, -8e-9, 8e-9]), np.array([-1e-3, 0, 1e-3])
+    gap = np.array([2e-9, -8e-9, 8e-9])
+    x = np.array([-1e-3, 0, 1e-3])
     ask = patch_problem(x, gap)
     for start in (gap < 0, np.ones(3, bool)):
         assert solve_primal_dual(StripCompliance(CYCLE), ask, start)[0] is None
@@ -383,10 +394,8 @@ def test_exact_nearest_forces_are_a_projection(seed, size):
     """f - y = rigid q on f > 0 and y + rigid q <= 0 elsewhere: the conditions of the nearest point."""
     rng = np.random.default_rng(seed)
     rigid = np.stack([np.ones(size), np.linspace(-1, 1, size)], axis=1)
-    y, sums = (
-        rng.normal(size=size) * 10.0 ** rng.uniform(-3, 3),
-        np.array([1.0, rng.uniform(-0.99, 0.99)]),
-    )
+    y = rng.normal(size=size) * 10.0 ** rng.uniform(-3, 3)
+    sums = np.array([1.0, rng.uniform(-0.99, 0.99)])
     f = project_forces(y, rigid, sums)
     assert np.abs(rigid.T @ f - sums).max() <= 1e-12 and f.min() >= 0
     if np.count_nonzero(f) > 1:
@@ -413,7 +422,8 @@ def random_operator(rng, size):
             if kind
             else np.arange(first, first + size)
         )
-        x, c = _real().interface.x[index], _real().normal[np.ix_(index, index)]
+        x = _real().interface.x[index]
+        c = _real().normal[np.ix_(index, index)]
     else:
         x = np.sort(rng.uniform(-0.5, 0.5, size)) + np.linspace(-1e-3, 1e-3, size)
         x = x * LENGTH / np.ptp(x)
@@ -425,7 +435,8 @@ def random_operator(rng, size):
 
 def random_gap(rng, x):
     """White noise, waves, spikes, steps or mixed scales of 1e-12 to 1e-2 m."""
-    size, m = 10.0 ** rng.uniform(-12, -2), x.size
+    size = 10.0 ** rng.uniform(-12, -2)
+    m = x.size
     return (
         lambda: size * rng.normal(size=m),
         lambda: rough(rng, x, size),
@@ -439,9 +450,11 @@ def random_state(seed, control):
     """(pair, gap, state) of a random question; loads from almost one node to almost all."""
     rng = np.random.default_rng([seed, control])
     x, c = random_operator(rng, rng.integers(5, 202))
-    pair, gap = pair_on(x, c), random_gap(rng, x)
+    pair = pair_on(x, c)
+    gap = random_gap(rng, x)
     depth = np.ptp(gap) * 10.0 ** rng.uniform(-3, 3) if np.ptp(gap) > 0 else 1e-6
-    load, line = depth / c.max(), rng.uniform(-0.499, 0.499) * np.ptp(x)
+    load = depth / c.max()
+    line = rng.uniform(-0.499, 0.499) * np.ptp(x)
     if control == 0:
         return pair, gap, press(pair, gap, load)
     if control == 1:
@@ -454,7 +467,9 @@ def random_state(seed, control):
 def campaign(control, seeds):
     for seed in seeds:
         pair, gap, state = random_state(seed, control)
-        x, force, base = pair.interface.x, forces(pair, state), gap.min()
+        x = pair.interface.x
+        force = forces(pair, state)
+        base = gap.min()
         assert state.outcome is Outcome.DONE and max(state.residuals.values()) <= RESIDUAL_TOL, (
             control,
             seed,

@@ -67,7 +67,8 @@ def softer(skin, c, weight):
 def whole(skin, cells, gap, moment=None, spring=0.0, load=LOAD):
     """(nodal forces, delta, theta) of the undivided patch."""
     pair = coated_pair(cells)
-    x, weight = pair.interface.x, pair.interface.weight
+    x = pair.interface.x
+    weight = pair.interface.weight
     if skin is None or isinstance(skin, LinearAsperities):
         pair = Compliance(pair.interface, softer(skin, pair.normal, weight), pair.tangential)
         state = press(pair, gap, load, moment, spring=spring)
@@ -106,10 +107,8 @@ def dense_cases(number):
         count = int(rng.integers(2, 6))
         c, x, weight, y = real(count, 30)
         gap = random_gaps(rng, x, count, 10 ** rng.uniform(-8, -6))
-        roll, load = (
-            10 ** rng.uniform(-6, -3) * rng.choice([-1, 1]),
-            LOAD * 10 ** rng.uniform(-1, 1),
-        )
+        roll = 10 ** rng.uniform(-6, -3) * rng.choice([-1, 1])
+        load = LOAD * 10 ** rng.uniform(-1, 1)
         moment = None if k % 3 == 0 else load * LENGTH / 2 * rng.uniform(-0.8, 0.8)
         yield (
             c,
@@ -156,7 +155,8 @@ def test_exact_answer_is_that_of_one_block_diagonal_operator(skin, own):
             spring=spring,
             asperities=skin,
         )
-        places, opened = np.tile(x, y.size), (gap + roll * y[:, None]).ravel()
+        places = np.tile(x, y.size)
+        opened = (gap + roll * y[:, None]).ravel()
         if not is_linear:
             whole = solve(
                 skin,
@@ -219,7 +219,8 @@ def test_order_two_rigid_pad_of_any_opening():
 @pytest.mark.parametrize("ratio", [0.1, 2.0, 30.0])
 def test_exact_rolled_pad_on_the_exponential_skin(ratio):
     """Centre L(1/2 - 1/B + 1/(exp(B) - 1)), B = roll L/u0; the sum over the middles of the strips is geometric."""
-    count, u0 = 200, 2.5e-6
+    count = 200
+    u0 = 2.5e-6
     roll = ratio * u0 / WIDTH
     state = press_strips(
         *rigid(count), np.zeros(1), roll, load=LOAD, asperities=ExponentialAsperities(u0)
@@ -274,7 +275,8 @@ def law_of(skin, weight, opening, load, count):
 def check(state, skin, c, x, weight, gap, roll, load, moment=None, spring=0.0, free=None):
     """Every definition with its own arithmetic."""
     free = state.theta if free is None else free
-    force, y = state.force, state.offsets
+    force = state.force
+    y = state.offsets
     assert max(state.residuals.values()) <= STRIP_RESIDUAL_TOL
     assert force.sum() == pytest.approx(load, rel=1e-9)
     if moment is not None:
@@ -335,7 +337,8 @@ def test_always_any_gap_in_every_strip_is_solved(
     gap = random_gaps(rng, x, count, 10**size) + rng.choice([0, 1]) * 10**size * rng.normal(
         size=(count, x.size)
     )
-    roll, load = 10**roll * rng.choice([-1, 0, 1]), LOAD * 10**load
+    roll = 10**roll * rng.choice([-1, 0, 1])
+    load = LOAD * 10**load
     moment = None if where is None else where * load * LENGTH / 2
     state = press_strips(
         c,
@@ -437,7 +440,8 @@ def test_order_two_tangent_is_the_difference_of_loads(skin):
 def test_exact_stiffnesses_without_roll_are_those_of_one_patch():
     pair = coated_pair(60)
     c, tangential, weight = split_into_strips(pair, 8)
-    y, gap = strip_offsets(WIDTH, 8), 1e-4 * pair.interface.x
+    y = strip_offsets(WIDTH, 8)
+    gap = 1e-4 * pair.interface.x
     bare = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD)
     active = bare.force[0] > 0
     assert strips_stiffness(c, weight, bare) == pytest.approx(
@@ -532,7 +536,9 @@ def test_exact_a_free_roll_under_the_moment_of_a_held_one_is_that_roll(skin, con
 def test_exact_a_free_roll_closes_a_lateral_wedge():
     """Rigid pieces on a linear skin: the wedge closes, and a load line at e adds the pressure N e y / sum A y^2."""
     c, x, weight, y = rigid(9, 5)
-    wedge, skin, arm = 3e-5 * y[:, None] + np.zeros(x.size), LinearAsperities(1e13), 0.4e-3
+    wedge = 3e-5 * y[:, None] + np.zeros(x.size)
+    skin = LinearAsperities(1e13)
+    arm = 0.4e-3
     shut = press_strips(c, x, weight, y, wedge, load=LOAD, asperities=skin, roll_moment=0.0)
     assert shut.roll == pytest.approx(-3e-5, rel=1e-12) and shut.pressure == pytest.approx(
         MEAN, rel=1e-10

@@ -90,10 +90,8 @@ def test_exact_zero_load_touches_and_carries_nothing(moment):
 def test_exact_an_approach_is_counted_from_a_gap_that_lies_below_zero():
     pair = coated_pair(100)
     gap = crown(pair.interface.x, 1.0)
-    above, below = (
-        press_to_approach(pair, gap, 2e-6),
-        press_to_approach(pair, gap - 8e-6, 2e-6 - 8e-6),
-    )
+    above = press_to_approach(pair, gap, 2e-6)
+    below = press_to_approach(pair, gap - 8e-6, 2e-6 - 8e-6)
     assert below.load == pytest.approx(above.load, rel=1e-9)
     assert below.sigma_n == pytest.approx(above.sigma_n, rel=1e-6, abs=1e-9 * above.sigma_n.max())
 
@@ -111,7 +109,8 @@ TWO_BODIES = {
 @pytest.mark.parametrize("angle", TILTS)
 def test_exact_coated_pair_agrees_with_two_whole_bodies(angle):
     pair = coated_pair(200)
-    x, weight = pair.interface.x, pair.interface.weight
+    x = pair.interface.x
+    weight = pair.interface.weight
     state = press(pair, tilt(x, angle), LOAD)
     fraction, stiffness, peak, approach = TWO_BODIES[angle]
     active = state.sigma_n > 0

@@ -111,7 +111,8 @@ def test_refuses_a_second_writer_until_the_first_is_gone(tmp_path):
 
 
 def test_exact_an_owner_is_a_number_a_start_and_a_machine(tmp_path):
-    path, pid = tmp_path / "lock", os.getppid()
+    path = tmp_path / "lock"
+    pid = os.getppid()
     own = FolderLock(path, "out", "run")
     for text, free in (
         (f"{pid} {read_start_ticks(pid)} {HOST_HASH}", False),
@@ -200,12 +201,14 @@ def test_exact_exchange_leaves_nothing_behind(tmp_path, monkeypatch, can):
 
 def test_always_there_is_a_folder_at_every_instant_of_an_exchange(tmp_path):
     """A reader in a thread never misses the folder: with two renames it would."""
-    place, new = tmp_path / "out", tmp_path / "new"
+    place = tmp_path / "out"
+    new = tmp_path / "new"
     for one in place, new:
         one.mkdir()
     if not exchange.exchange_folders(new, place):
         pytest.skip("this file system cannot exchange two folders")
-    missed, end = [], threading.Event()
+    missed = []
+    end = threading.Event()
 
     def look():
         while not end.is_set():

@@ -86,13 +86,16 @@ def test_always_a_kill_at_any_step_leaves_older_or_newer_results_whole(tmp_path,
 @pytest.mark.slow
 def test_always_runs_killed_at_random_times_leave_whole_results(tmp_path):
     """Fifty runs into a folder of older results, killed anywhere from their start to behind their end."""
-    scene, out, chance = tmp_path / "scene.toml", tmp_path / "out", random.Random(17)
+    scene = tmp_path / "scene.toml"
+    out = tmp_path / "out"
+    chance = random.Random(17)
     scene.write_text(BENCH, "utf-8")
     assert cli("run", scene, "-o", out).code == 0
     words = [sys.executable, "-m", "patchfem", "run", scene, "-q", "-o", out]
     begin = time.perf_counter()
     assert subprocess.run(words, check=True).returncode == 0
-    span, killed = time.perf_counter() - begin, 0
+    span = time.perf_counter() - begin
+    killed = 0
     for _ in range(50):
         run = subprocess.Popen(words)
         time.sleep(chance.uniform(0.2, 1.1) * span)

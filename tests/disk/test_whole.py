@@ -44,7 +44,8 @@ def results(tmp_path_factory):
 def test_always_a_run_without_room_names_path_need_and_room_and_keeps_the_older_results(
     results, tmp_path, size
 ):
-    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    scene = tmp_path / "scene.toml"
+    out = tmp_path / "out"
     scene.write_text(COATED, "utf-8")
     out.mkdir()
     (out / "summary.json").write_text("older")
@@ -161,7 +162,8 @@ def test_exact_what_is_not_whole_replaces_nothing(tmp_path, raised):
 
 
 def test_exact_what_a_killed_writer_left_goes_with_the_next_one_of_the_name(tmp_path):
-    path, name = tmp_path / "a.vtu", make_partial_path(tmp_path / "a.vtu").name
+    path = tmp_path / "a.vtu"
+    name = make_partial_path(tmp_path / "a.vtu").name
     # beyond the largest number of a process
     dead = tmp_path / name.replace(str(os.getpid()), "4194305")
     living = tmp_path / name.replace(str(os.getpid()), str(os.getppid()))

@@ -24,7 +24,8 @@ def test_always_straight_lines_miss_a_peak_by_the_share(zeta, ends):
         and np.isin(np.linspace(*ends, 121), places).all()
     )
     assert [one[1] for one in found] == list(places) and places.size < 260
-    order, fine = np.argsort(places), np.linspace(61, 210, 100001)
+    order = np.argsort(places)
+    fine = np.linspace(61, 210, 100001)
     lines = np.interp(fine, places[order], np.array([one[0] for one in found])[order])
     assert np.abs(lines / mode(fine, zeta) - 1).max() < 0.01
     assert max(one[0] for one in found) == pytest.approx(

@@ -29,9 +29,11 @@ def rates(modes: ModalBasis, y, force: float):
 @pytest.mark.parametrize("zeta", [-1e-4, -0.002, -0.05, -0.3])
 def test_a_block_on_rigid_friction_has_its_closed_form(zeta):
     """Every half swing loses 2 F/k and gains by exp(pi |zeta|/sqrt(1 - zeta^2)); to the first order 4 F/(pi |c| w)."""
-    modes, force = modes_of([750.0], [zeta], [1.0], [2.0]), 9.0
+    modes = modes_of([750.0], [zeta], [1.0], [2.0])
+    force = 9.0
     [found] = limit_cycles.find_relay_cycles(modes, modes.slide, force, force)
-    gain, half = np.exp(np.pi * abs(zeta) / np.sqrt(1 - zeta**2)), force / (0.5 * 750.0**2)
+    gain = np.exp(np.pi * abs(zeta) / np.sqrt(1 - zeta**2))
+    half = force / (0.5 * 750.0**2)
     assert found.amplitude == pytest.approx(2 * half * (gain + 1) / (gain - 1), rel=1e-9)
     assert not found.is_stable and found.omega == pytest.approx(
         750.0 * np.sqrt(1 - zeta**2), rel=1e-10
@@ -68,7 +70,9 @@ def test_a_second_mode_rings_with_the_cycle():
     def stops(t, y):
         return y[2:] @ modes.slide
 
-    stops.terminal, stops.direction = True, 1.0  # it slides down
+    # it slides down
+    stops.terminal = True
+    stops.direction = 1.0
     run = solve_ivp(
         lambda t, y: np.concatenate([y[2:], rates(modes, y, -9.0)]),
         (0.0, 0.02),
@@ -107,8 +111,10 @@ def test_a_cycle_that_would_hold_on_the_way_is_none():
 
 def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not():
     """A cycle of DOP853 from both amplitudes repeats; around them the swing is drawn to one and away from the other."""
-    stiffness, yields = np.array([2e4, 1e4, 3e4]), np.array([1e-4, 2e-4, 4e-4])
-    modes, limit = modes_of([750.0], [-0.01], [1.0], [1.0]), float(stiffness @ yields)
+    stiffness = np.array([2e4, 1e4, 3e4])
+    yields = np.array([1e-4, 2e-4, 4e-4])
+    modes = modes_of([750.0], [-0.01], [1.0], [1.0])
+    limit = float(stiffness @ yields)
     (low, high), least = limit_cycles.find_balance_cycles(
         modes, LawGroup(modes, Jenkins(stiffness, yields)), modes.slide, limit
     )
@@ -142,7 +148,8 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
                 atol=1e-13,
                 max_step=2e-5,
             )
-            state, at = run.y[:, -1].copy(), run.t[-1]
+            state = run.y[:, -1].copy()
+            at = run.t[-1]
         return state[0]
 
     for cycle in (low, high):
@@ -158,7 +165,9 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
 def test_exact_the_backbone_of_rigid_friction_has_its_closed_form():
     """At an amplitude A a block that loses h = F/k at every swing wants the gain G = (A/h + 1)/(A/h - 1) from each:
     pi z/sqrt(1 - z^2) = ln G for the net ratio -z, over the frequency of the damped block."""
-    modes, force, zeta = modes_of([750.0], [0.003], [1.0], [2.0]), 9.0, 0.003
+    modes = modes_of([750.0], [0.003], [1.0], [2.0])
+    force = 9.0
+    zeta = 0.003
     h = force / (0.5 * 750.0**2)
     places = h * np.array([3.0, 10.0, 200.0])
     gain = np.log((places + h) / (places - h))

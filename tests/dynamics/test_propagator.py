@@ -27,8 +27,10 @@ DRIVES = {
 
 
 def basis(omega, zeta, slide=(1.0,), base=(1.0,), mass=2.0, damping=None):
-    omega, zeta = np.atleast_1d(np.array(omega, float)), np.atleast_1d(np.array(zeta, float))
-    slide, base = np.array(slide, float), np.array(base, float)
+    omega = np.atleast_1d(np.array(omega, float))
+    zeta = np.atleast_1d(np.array(zeta, float))
+    slide = np.array(slide, float)
+    base = np.array(base, float)
     return ModalBasis(tuple("abcdef"[: omega.size]), omega, zeta, slide, base, slide, mass, damping)
 
 
@@ -42,10 +44,13 @@ def coupled():
 
 def by_dop853(modes, drive, start, state, force, dt):
     """(z, z') after dt, work of the drive and viscous loss [J] meanwhile, from `state` at time `start`."""
-    n, d = modes.omega.size, modes.damping_matrix
+    n = modes.omega.size
+    d = modes.damping_matrix
 
     def rate(t, y):
-        z, v, a = y[:n], y[n : 2 * n], float(drive.values(np.array([start + t]))[0])
+        z = y[:n]
+        v = y[n : 2 * n]
+        a = float(drive.values(np.array([start + t]))[0])
         push = -modes.base * a - modes.slide * force / modes.mass
         return [
             *v,
@@ -60,13 +65,16 @@ def by_dop853(modes, drive, start, state, force, dt):
 
 def by_step(modes, prop, drive, number, state, force):
     """The same by the coefficients of step `number`, in NumPy; also the slide increment by reach and beta."""
-    n, row = modes.omega.size, prop.tables(drive, number, 1)[0]
+    n = modes.omega.size
+    row = prop.tables(drive, number, 1)[0]
     push = -modes.slide * force / modes.mass
     x = np.concatenate([state, push])
     if prop.dense.size:
-        new, quadratic = prop.dense @ x + row[: 2 * n], x @ prop.dense_loss @ x
+        new = prop.dense @ x + row[: 2 * n]
+        quadratic = x @ prop.dense_loss @ x
     else:
-        z, v = state[:n], state[n:]
+        z = state[:n]
+        v = state[n:]
         zz, zv, vz, vv = prop.free
         new = np.concatenate(
             [zz * z + zv * v + prop.push[0] * push, vz * z + vv * v + prop.push[1] * push]
@@ -93,7 +101,9 @@ def by_step(modes, prop, drive, number, state, force):
 def test_exact_step_against_dop853(kind, drive, steps):
     drive = DRIVES[drive]
     modes = coupled() if kind == "coupled" else basis(*MODES[kind], (0.7,), (0.9,))
-    prop, n, number = make_propagator(modes, drive, steps), modes.omega.size, 7
+    prop = make_propagator(modes, drive, steps)
+    n = modes.omega.size
+    number = 7
     state = np.concatenate([2e-5 * np.cos(np.arange(n)), -0.013 * np.sin(1 + np.arange(n))])
     want, work, lost = by_dop853(modes, drive, number * prop.dt, state, 31.0, prop.dt)
     new, w, d, moved = by_step(modes, prop, drive, number, state, 31.0)
@@ -111,7 +121,8 @@ def test_exact_recorded_line_and_levels():
     prop = make_propagator(rigid, line, 5)
     added = prop.tables(line, 0, 1)[0]
     np.testing.assert_allclose(added[:2], [-3 * 0.1**3 / 6, -3 * 0.1**2 / 2], rtol=1e-12)
-    sine, two = SineDrive(4.0, W), make_levels([4.0, 6.0], W, 3)
+    sine = SineDrive(4.0, W)
+    two = make_levels([4.0, 6.0], W, 3)
     prop = make_propagator(coupled(), sine, 20)
     own = prop.tables(sine, 0, 20)
     np.testing.assert_allclose(prop.tables(two, 40, 20), own, rtol=0, atol=1e-13)
@@ -153,7 +164,8 @@ def test_exact_energy_of_a_step_that_is_long_beside_stiff_modes(modes):
     step, loss = as_dense(make_propagator(modes, SineDrive(1.0, W), 100))
     n = modes.omega.size
     energy = 0.5 * modes.mass * np.diag([*modes.omega**2, *np.ones(n)])
-    begun, work = np.zeros((3 * n, 3 * n)), np.zeros((3 * n, 3 * n))
+    begun = np.zeros((3 * n, 3 * n))
+    work = np.zeros((3 * n, 3 * n))
     begun[: 2 * n, : 2 * n] = energy
     work[2 * n :] = modes.mass * (step[:n] - np.eye(2 * n, 3 * n)[:n])
     miss = step.T @ energy @ step - begun + (loss + loss.T) / 2 - (work + work.T) / 2
@@ -170,17 +182,20 @@ def test_exact_doubled_step_is_the_step_itself(monkeypatch):
         made = make_propagator(modes, drive, 300, modes.interfaces)
         monkeypatch.undo()
         for name in ("free", "push", "dense", "reach", "beta", "loss", "dense_loss"):
-            one, other = getattr(direct, name), getattr(made, name)
+            one = getattr(direct, name)
+            other = getattr(made, name)
             assert (
                 np.abs(one - other).max(initial=0.0) <= 1e-12 * np.abs(one).max(initial=0.0) + 1e-15
             ), name
-        one, other = direct.tables(drive, 3, 5), made.tables(drive, 3, 5)
+        one = direct.tables(drive, 3, 5)
+        other = made.tables(drive, 3, 5)
         assert np.all(np.abs(one - other).max(axis=0) <= 1e-10 * np.abs(one).max(axis=0))
 
 
 def test_exact_the_same_steps_are_made_once():
     """The runs that show an error march the same steps again; steps, modes or a drive of their own are made anew."""
-    modes, drive = basis(*MODES["damped"]), DRIVES["sine"]
+    modes = basis(*MODES["damped"])
+    drive = DRIVES["sine"]
     first = make_propagator(modes, drive, 100)
     assert make_propagator(modes, drive, 100) is first
     for other in (

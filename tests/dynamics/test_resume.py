@@ -65,7 +65,8 @@ RIGS = {
 def often(monkeypatch):
     """Marches keep their state after every second cycle; the list has a number per state."""
     monkeypatch.setattr(march, "MAX_PIECE_CYCLES", 2)
-    saved, save = [], checkpoint.save_checkpoint
+    saved = []
+    save = checkpoint.save_checkpoint
 
     def counted(*of):
         saved.append(1)
@@ -102,7 +103,8 @@ def test_exact_an_interrupted_march_goes_on_to_the_same_bits(tmp_path, often, ki
     assert cli(*words, tmp_path / "whole").code == 0
     count = len(often.saved)
     assert count >= 15 and sorted(one.name for one in tmp_path.iterdir()) == ["scene.toml", "whole"]
-    out, partial = tmp_path / "out", tmp_path / "out.partial"
+    out = tmp_path / "out"
+    partial = tmp_path / "out.partial"
     for stop in (1, count // 3, 1, count // 4):  # each counts from where the one before it stopped
         often.saved.clear()
         often.stop = stop
@@ -186,7 +188,8 @@ def test_always_a_march_goes_on_where_its_state_has_no_room(tmp_path, often):
 )
 def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):
     """In a process of its own that marches every cycle; one that is killed says nothing and leaves its state too."""
-    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    scene = tmp_path / "scene.toml"
+    out = tmp_path / "out"
     scene.write_text(RIGS["one slide"].replace("cycles = 16.3", "cycles = 4000"), "utf-8")
     code = (
         "from patchfem.dynamics import checkpoint as c; c.MIN_WRITE_INTERVAL = 0.05; c.MAX_WRITE_FRACTION = 1.0; "

@@ -66,7 +66,8 @@ def test_exact_halves_of_a_mirrored_piece_give_the_whole(columns):
     piece = of_size(columns, 17)
     assert piece.is_mirrored
     whole, halves = (condense(piece.stencil, mirrored) for mirrored in (False, True))
-    one, two = whole.compliance(), halves.compliance()
+    one = whole.compliance()
+    two = halves.compliance()
     assert np.abs(one - two).max() <= 1e-11 * np.abs(one).max()
     assert np.array_equal(two, two.T)
     assert halves.inner_factor.n_entries <= 0.7 * whole.inner_factor.n_entries

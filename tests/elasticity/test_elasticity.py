@@ -50,10 +50,13 @@ def test_exact_patch_a_linear_field_needs_only_its_edge_tractions(material, plan
     x, y = np.meshgrid(UNEVEN.x, UNEVEN.depth, indexing="ij")
     field = np.stack([ux * x + uy * y, vx * x + vy * y], axis=-1)
     lam, mu = lame(*material, plane)
-    sxx, syy, sxy = lam * (ux + vy) + 2 * mu * ux, lam * (ux + vy) + 2 * mu * vy, mu * (uy + vx)
+    sxx = lam * (ux + vy) + 2 * mu * ux
+    syy = lam * (ux + vy) + 2 * mu * vy
+    sxy = mu * (uy + vx)
     found = (stiffness_of(piece) @ field[:, :-1].ravel()).reshape(UNEVEN.x.size, -1, 2)
     wanted = np.zeros_like(found)
-    across, down = shares(UNEVEN.x), shares(UNEVEN.depth)[:-1]
+    across = shares(UNEVEN.x)
+    down = shares(UNEVEN.depth)[:-1]
     wanted[:, 0] -= across[:, None] * [sxy, syy]
     wanted[0] -= down[:, None] * [sxx, sxy]
     wanted[-1] += down[:, None] * [sxx, sxy]

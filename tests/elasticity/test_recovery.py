@@ -112,7 +112,8 @@ def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(see
     )
     assert np.abs(found(stress)[0] - exact).max() <= 1e-11 * np.abs(exact).max()
     corner = cells.points[piece.cells]
-    wide, tall = corner[:, 1, 0] - corner[:, 0, 0], corner[:, 3, 1] - corner[:, 0, 1]
+    wide = corner[:, 1, 0] - corner[:, 0, 0]
+    tall = corner[:, 3, 1] - corner[:, 0, 1]
     # a bilinear cell has the terms in x y; it misses a0 x^2 and b0 x^2 along x, a2 y^2 and b2 y^2 along y
     lam, mu = lame(*TITANIUM, plane)
     missed = (
@@ -136,7 +137,8 @@ def test_always_rounding_to_the_harmless_step_adds_the_wanted_share_of_the_error
     piece = tensor(graded_grid(4e-3, 1e-3, 4e-5, COATING), layers)
     found = fit_recovery(get_cells(piece))
     u = np.random.default_rng(seed).normal(size=(1, len(piece.nodes), 2)) * 1e-6
-    stress, rules = centre_stress(get_cells(piece), u), make_points(found.cells, "gauss")
+    stress = centre_stress(get_cells(piece), u)
+    rules = make_points(found.cells, "gauss")
     error = estimate_error(found, u, stress, rules)
     step = choose_rounding_step(found, error, rules, 1e-3)
     change = np.round(stress[0] / step) * step - stress[0]
@@ -157,7 +159,8 @@ def test_exact_energy_is_the_work_of_the_load_and_shares_add_up(split):
         face = np.arange(SMALL.x.size) * SMALL.depth.size
     else:
         mesh = of_grid(SMALL, split, seed=2)
-        piece, face = substructure.Substructure(mesh, COATED), mesh.interface
+        piece = substructure.Substructure(mesh, COATED)
+        face = mesh.interface
     u = elasticity.compute_displacement(piece, *force)
     cells = get_cells(piece)
     rules = make_points(cells, "gauss")
@@ -176,7 +179,8 @@ def hertz_axis(depth):
     """Stresses (n, 4) under the middle of Hertz's pressure, z = depth/a (Johnson 1985, 4.46), plane strain."""
     z = depth / A
     root = np.sqrt(1 + z**2)
-    xx, yy = -P0 * ((1 + 2 * z**2) / root - 2 * z), -P0 / root
+    xx = -P0 * ((1 + 2 * z**2) / root - 2 * z)
+    yy = -P0 / root
     return np.stack([xx, yy, TOUGH[1] * (xx + yy), 0 * z], axis=-1)
 
 
@@ -184,7 +188,8 @@ def hertz_inside(x, depth):
     """(yy, xy) under Hertz's pressure (McEwen 1949, Johnson 1985, 4.49)."""
     one = A**2 - x**2 + depth**2
     root = np.sqrt(one**2 + 4 * x**2 * depth**2)
-    m, n = np.sqrt((root + one) / 2), np.sqrt((root - one) / 2) * np.sign(x)
+    m = np.sqrt((root + one) / 2)
+    n = np.sqrt((root - one) / 2) * np.sign(x)
     share = (depth**2 + n**2) / (m**2 + n**2)
     return -P0 / A * m * (1 - share), -P0 / A * n * (m**2 - depth**2) / (m**2 + n**2)
 
@@ -224,7 +229,8 @@ def test_exact_hertz_stress_peaks_under_the_surface():
         values = of(axis)
         assert values.max() / P0 == pytest.approx(known, abs=5e-4)
         assert depth[values.argmax()] / A == pytest.approx(place, abs=5e-4)
-        smooth, at = of(found(stress[0])), found.cells.points[found.node]
+        smooth = of(found(stress[0]))
+        at = found.cells.points[found.node]
         top = at[int(np.argmax(smooth))]
         assert smooth.max() == pytest.approx(values.max(), rel=5e-3)
         assert top == pytest.approx([0.0, depth[values.argmax()]], abs=A / 16)  # a cell
@@ -262,14 +268,16 @@ def test_exact_bond_line_is_the_stress_at_its_depth():
 def test_exact_bond_line_carries_the_load_and_its_moment(kind, seed, plane):
     layers = Layers(CARBIDE, TITANIUM, plane)
     if kind == "tensor":
-        piece, x = tensor(SMALL, layers), SMALL.x
+        piece = tensor(SMALL, layers)
+        x = SMALL.x
     else:
         mesh = (
             of_grid(SMALL, 0.5, seed=2)
             if kind == "mixed"
             else cloud(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
         )
-        piece, x = substructure.Substructure(mesh, layers), mesh.x
+        piece = substructure.Substructure(mesh, layers)
+        x = mesh.x
     shear, normal = np.random.default_rng(seed).normal(size=(2, 2, x.size))
     cells = get_cells(piece)
     bond = compute_coating_traction(cells, elasticity.compute_displacement(piece, shear, normal))
@@ -335,7 +343,8 @@ def test_exact_indicator_of_any_mesh_is_the_energy_a_finer_mesh_adds(split):
     hats = np.array([np.interp(finest.x, mesh.x, unit) for unit in np.eye(mesh.x.size)])
     fine = substructure.Substructure(finest, COATED)
     energy = force @ elasticity.compute_displacement(fine, 0 * force, force)[0, finest.interface, 1]
-    piece, load = substructure.Substructure(mesh, COATED), hats @ force
+    piece = substructure.Substructure(mesh, COATED)
+    load = hats @ force
     u = elasticity.compute_displacement(piece, 0 * load, load)
     true = (energy - load @ u[0, mesh.interface, 1]) * 16 / 15
     cells = get_cells(piece)

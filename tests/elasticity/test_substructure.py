@@ -63,7 +63,8 @@ def test_exact_compliance_of_a_stiff_coating_is_known_to_its_round_off_error():
     grid = graded_grid(LENGTH, HEIGHT, LENGTH / 40, 1e-6)
     sweep = elasticity.make_piece(grid.x, grid.depth, grid.coating_rows, layers)
     factors = Substructure(of_grid(grid, seed=1), layers)
-    wanted, mine = condense(sweep)[0], condense(factors)[0]
+    wanted = condense(sweep)[0]
+    mine = condense(factors)[0]
     assert 1e-12 < factors.round_off_error <= MAX_REFINEMENT_CHANGE
     bound = 3 * (sweep.round_off_error + factors.round_off_error) * np.abs(wanted).max()
     assert 1e-3 * bound < np.abs(mine - wanted).max() <= bound
@@ -126,7 +127,8 @@ def test_exact_fields_are_those_of_the_compliance_and_of_the_tensor_grid(split):
 @cache
 def hertz(per_half_width):
     """A crowned block of triangles on its mirror image; a = 0.1 mm at 9107 N/m."""
-    a, load = 0.1e-3, 9107.0
+    a = 0.1e-3
+    load = 9107.0
     fine = a / per_half_width
     mesh = cloud(
         6e-3,
@@ -159,7 +161,8 @@ def harmonic_error(wave, cells):
     fine = wave / 2 / cells
     mesh = cloud(wave / 4, 2 * wave, lambda x, y: 0 * x + min(fine + 0.05 * y, wave / 16), COATING)
     piece = Substructure(mesh, COATED)
-    x, k = mesh.x, 2 * np.pi / wave
+    x = mesh.x
+    k = 2 * np.pi / wave
     gauss, weight = np.polynomial.legendre.leggauss(5)
     force = np.zeros(x.size)
     for left in range(x.size - 1):
@@ -185,7 +188,10 @@ def test_exact_layers_of_triangles_within_one_percent_and_never_too_soft(wave):
 def test_refuses_a_bare_piece_too_slender_for_its_cells_by_their_length_and_longer_ones_serve():
     """A column of 0.1 mm x 20 m on cells of 1/96 and of 1/3 of its length; a unit of even load shortens it by
     H/(E L) where nu = 0."""
-    young, nu, length, height = 200e9, 0.0, 1e-4, 20.0
+    young = 200e9
+    nu = 0.0
+    length = 1e-4
+    height = 20.0
     layers = Layers((young, nu), (young, nu), "stress")
     fine, coarse = (
         of_grid(graded_grid(length, height, length / cells), seed=1) for cells in (96, 3)

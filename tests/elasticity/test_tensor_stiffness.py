@@ -70,11 +70,10 @@ def test_exact_a_tensor_grid_has_the_stiffness_of_scikit_fem_s_own_form(
     across, down, coating, plane
 ):
     x, depth = (np.append(0, np.cumsum(part)) * 1e-4 for part in (across, down))
-    layers, coating = Layers(CARBIDE, TITANIUM, plane), min(coating, len(down))
-    mine, theirs = (
-        make_piece(x, depth, coating, layers),
-        assemble_nodes(grid_nodes(x, depth), coating, layers),
-    )
+    layers = Layers(CARBIDE, TITANIUM, plane)
+    coating = min(coating, len(down))
+    mine = make_piece(x, depth, coating, layers)
+    theirs = assemble_nodes(grid_nodes(x, depth), coating, layers)
     scale = np.abs(theirs.stencil).max()
     # scikit-fem takes a cell's length from its map, which knows the coordinates to round-off only
     lost = max(np.ptp(points) / np.diff(points).min() for points in (x, depth))
@@ -112,7 +111,9 @@ def test_exact_only_the_first_run_on_a_machine_imports_scikit_fem(tmp_path):
 @pytest.mark.parametrize("split", [0.0, 0.4, 1.0])
 def test_exact_a_mesh_of_any_cells_has_the_stiffness_of_scikit_fem_s_own_form(split):
     mesh = of_grid(graded_grid(4e-3, 2e-3, 3e-4, COATING), split, seed=3)
-    piece, first, whole = Substructure(mesh, COATED), len(mesh.triangles), 0
+    piece = Substructure(mesh, COATED)
+    first = len(mesh.triangles)
+    whole = 0
     for shape, element, cells, coated, degree in (
         (MeshTri, ElementTriP1, mesh.triangles, mesh.is_coating[:first], 1),
         (MeshQuad, ElementQuad1, mesh.quads, mesh.is_coating[first:], 2),

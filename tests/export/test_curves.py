@@ -59,7 +59,8 @@ cycles = 100
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """scene text -> (folder of its results, dataset), each once."""
-    base, kept = tmp_path_factory.mktemp("curves"), {}
+    base = tmp_path_factory.mktemp("curves")
+    kept = {}
 
     def of(text):
         if text not in kept:

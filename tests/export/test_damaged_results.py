@@ -123,7 +123,8 @@ def judged(place: Path, folder: Path) -> list:
     "share", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["share", "all"]
 )
 def test_always_arrays_of_another_shape_are_refused_in_words(made, tmp_path, share):
-    wrong, tried = [], damages(made)
+    wrong = []
+    tried = damages(made)
     shutil.copytree(made / "b", tmp_path / "b")
     for number, (folder, file, name, what) in enumerate(tried):
         if share and number % SHARE:

@@ -80,7 +80,9 @@ def rubbing(tmp_path_factory):
         + '[contact.tilt]\nangle = "0.1 mrad"\n',
         "utf-8",
     )
-    pressed, kept, write = patchfem.run(scene), {}, vtkhdf.write_series
+    pressed = patchfem.run(scene)
+    kept = {}
+    write = vtkhdf.write_series
     fields = {name: np.repeat(values, 9, axis=0) for name, values in pressed.fields.items()}
     fields["time"] = np.arange(9) * 1e-3
     fields["shear_stress"] = (
@@ -129,7 +131,9 @@ def test_always_packing_errs_as_little_as_it_says_and_less_than_the_elements(rub
     assert {name for _, name in said} == {"displacement", "stress", "von_mises"}
 
     def energy(stress):
-        xx, yy, xy = stress[:, 0], stress[:, 1], stress[:, 3]
+        xx = stress[:, 0]
+        yy = stress[:, 1]
+        xy = stress[:, 3]
         return (
             area * (xx**2 + yy**2 + 2 * xy**2 - lam / (2 * (lam + mu)) * (xx + yy) ** 2) / (2 * mu)
         ).sum()
@@ -212,15 +216,14 @@ def test_always_a_killed_writer_leaves_its_whole_frames_and_no_file_of_the_name(
 @pytest.mark.usefixtures("always_large")
 def test_always_an_exported_series_is_about_as_small_as_the_fields(tmp_path):
     """zlib and a mesh in every frame made it 2.4 times as large; every number is that of the fields."""
-    piece, line = waves(12, 90, 60), waves(12, 90, 1)
+    piece = waves(12, 90, 60)
+    line = waves(12, 90, 1)
     piece.cell_data["material"] = np.zeros((1, 90 * 60), np.int8)
     line.point_data.update(
         dict.fromkeys(("gap", "normal_stress"), np.zeros((1, len(line.points)), np.float32))
     )
-    blocks, steps = (
-        {"lower": piece, "upper": piece, "interface": line},
-        {"stress": 4096.0, "von_mises": 5000.0, "displacement": 2e-10},
-    )
+    blocks = {"lower": piece, "upper": piece, "interface": line}
+    steps = {"stress": 4096.0, "von_mises": 5000.0, "displacement": 2e-10}
     vtkhdf.write_series(
         tmp_path / NAME, blocks, np.arange(12) * 1e-4, UNITS, dict.fromkeys(blocks, steps)
     )

@@ -163,7 +163,8 @@ def test_exact_vtu_is_read_by_vtk_and_by_meshio(tmp_path, number):
     )
     assert cli(*words).code == 0
     frame = 2 if number is None else number
-    grid, mesh = through_vtk(tmp_path / "one.vtu"), meshio.read(tmp_path / "one.vtu")
+    grid = through_vtk(tmp_path / "one.vtu")
+    mesh = meshio.read(tmp_path / "one.vtu")
     points, nodes, at_points, in_cells = joined(given, frame)
     assert np.array_equal(vtk_to_numpy(grid.GetPoints().GetData()), points) and np.array_equal(
         mesh.points, points
@@ -178,7 +179,8 @@ def test_exact_vtu_is_read_by_vtk_and_by_meshio(tmp_path, number):
         assert data.GetNumberOfArrays() == len(theirs) and other.keys() == theirs.keys()
         for name, wanted in theirs.items():
             array = data.GetArray(name)
-            read, again = vtk_to_numpy(array), other[name]
+            read = vtk_to_numpy(array)
+            again = other[name]
             again = np.concatenate(again) if isinstance(again, list) else again
             assert read.dtype == again.dtype == wanted.dtype
             assert np.array_equal(read, wanted, equal_nan=wanted.dtype.kind == "f"), name

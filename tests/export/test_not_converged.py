@@ -23,7 +23,8 @@ UNBOUNDED = (
 
 
 def test_exact_the_pressed_patch_is_kept_and_marked(tmp_path):
-    scene, out = tmp_path / "rig.toml", tmp_path / "out"
+    scene = tmp_path / "rig.toml"
+    out = tmp_path / "out"
     scene.write_text(SMALL_PATCH + PLASTIC + MODE + DRIVE)
     answer = cli("run", scene, "-o", out, *UNBOUNDED)
     assert answer.code == 3 and "undamped mode" in answer.err and f"results: {out}" in answer.out
@@ -48,7 +49,8 @@ def test_exact_the_pressed_patch_is_kept_and_marked(tmp_path):
 
 
 def test_exact_where_nothing_was_computed_before_the_line_says_so(tmp_path):
-    scene, out = tmp_path / "rig.toml", tmp_path / "out"
+    scene = tmp_path / "rig.toml"
+    out = tmp_path / "out"
     scene.write_text(POINT + PLASTIC + MODE + DRIVE)
     answer = cli("run", scene, "-o", out, *UNBOUNDED)
     assert answer.code == 3 and answer.out == "" and len(answer.err.strip().splitlines()) == 1

@@ -145,7 +145,8 @@ def test_exact_a_script_shows_where_the_interface_sticks_and_slips(bench, tmp_pa
         table.Annotations == ["0", "open", "1", "sticks", "2", "slips"]
         and len(table.IndexedColors) == 9
     )
-    files, seen = times_and_files(clock.Input), set()
+    files = times_and_files(clock.Input)
+    seen = set()
     with Series(bench) as series:
         for (_, file), number in zip(files, make_film(series).numbers):
             known = series.frame(number).blocks["interface"].point_data["status"]
@@ -219,7 +220,8 @@ def test_always_paraview_itself_draws_every_frame_of_the_cycle(bench, tmp_path):
         [*screen, "pvpython", "cycle.py", "cycle.png"], cwd=tmp_path, check=True, timeout=300
     )
     with Series(bench) as series:
-        count, every = len(make_film(series).numbers), len(series)
+        count = len(make_film(series).numbers)
+        every = len(series)
     drawn = [plt.imread(path)[..., :3] for path in sorted(tmp_path.glob("cycle.*.png"))]
     assert len(drawn) == count and all(one.shape == (800, 1280, 3) for one in drawn)
     ground = drawn[0][700, 100]

@@ -128,7 +128,8 @@ def test_exact_the_page_of_limits_says_what_a_scene_is_answered():
     )
     assert {law.partition(",")[0] for law, _ in cells} == set(LAWS)
     said = limits.FILE.read_text("utf-8")
-    lugre, lower = 'stiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"\n', "shapes on the lower piece"
+    lugre = 'stiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"\n'
+    lower = "shapes on the lower piece"
     for law, keys_of, beside, sets, more in (
         ("coulomb", "", "`[contact.shear]`", [], "[contact.shear]\n"),
         ("lugre", lugre, "`[contact.shear]`", [], "[contact.shear]\n"),

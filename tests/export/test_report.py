@@ -50,7 +50,8 @@ def base(kind, outcome, effects, measures, title="a title") -> RunData:
 
 def patch(load=1.0, frames=1, effects=("contact",)) -> RunData:
     """A Hertzian pressure over a tenth of 10 mm, and a stress that fades with depth."""
-    x, depth = np.linspace(-5e-3, 5e-3, 201), np.linspace(0, 5e-3, 21)
+    x = np.linspace(-5e-3, 5e-3, 201)
+    depth = np.linspace(0, 5e-3, 21)
     sigma = load * 5e7 * np.sqrt(np.maximum(0, 1 - (x / 0.5e-3) ** 2))
     data = base(
         "patch",
@@ -86,7 +87,8 @@ def rig(
     early = (np.arange(0, 2 * (cycles - keep)) / 2 + 0.25) * PERIOD
     time = np.concatenate([early, late])
     wave = {t.size: np.sin(2 * np.pi * t / PERIOD) for t in (late, time)}
-    whole, end = 1.4808e-5 * wave[time.size], wave[late.size]
+    whole = 1.4808e-5 * wave[time.size]
+    end = wave[late.size]
     data = patch(frames=5, effects=effects)
     summary = data.verdict.summary
     summary |= {"kind": "rig", "outcome": "steady", "title": title}
@@ -136,7 +138,8 @@ def bench() -> RunData:
         {"friction_ratio_peak": measure(0.3, "1", 1e-6), "loop_area": measure(1e-3, "J", 1e-9)},
     )
     time = np.linspace(0, 0.02, 401)
-    slide, force = 1e-5 * np.sin(200 * np.pi * time), 30 * np.cos(200 * np.pi * time)
+    slide = 1e-5 * np.sin(200 * np.pi * time)
+    force = 30 * np.cos(200 * np.pi * time)
     motion = Motion(
         {"time": time, "displacement": slide, "force": force},
         {"slide": slide, "force": force, "time": time},
@@ -163,7 +166,10 @@ class Parsed(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.ids, self.links, self.tags, self.cells = [], [], [], []
+        self.ids = []
+        self.links = []
+        self.tags = []
+        self.cells = []
         self.feed(text)
 
     def handle_starttag(self, tag, attributes):
@@ -227,7 +233,8 @@ def test_exact_the_pictures_hold_the_numbers_of_the_run(pages):
         60 * PERIOD * 1e3 if whole["x"]["unit"] == "ms" else 60 * PERIOD
     )
     pressure = found["Pressure on the interface", "normal stress"]
-    x, sigma = np.array(pressure["marks"][1]["x"]), np.array(pressure["marks"][1]["y"])
+    x = np.array(pressure["marks"][1]["x"])
+    sigma = np.array(pressure["marks"][1]["y"])
     assert pressure["x"]["unit"] == "um" and pressure["y"]["unit"] == "MPa"
     np.testing.assert_allclose(sigma, 50 * np.sqrt(np.maximum(0, 1 - (x / 500) ** 2)), atol=1e-5)
     # the part in contact
@@ -264,13 +271,12 @@ def test_exact_a_sentence_on_a_page_has_its_quoted_words_as_code(text, html):
 
 def test_always_no_sentence_of_a_page_shows_back_quotes(pages):
     """Notes, warnings, captions and meanings of measures; a scene or a command is shown as it is written."""
-    key, stick = "`structure.travel`", MOTION["stick_fraction"].text
+    key = "`structure.travel`"
+    stick = MOTION["stick_fraction"].text
     assert "`slip_amplitude`" in stick
     data = base("rig", "steady", ["friction"], {"stick_fraction": measure(0.5, "1", 0.01)})
-    data.verdict.summary["notes"], data.verdict.summary["warnings"] = (
-        [f"raise {key}"],
-        [f"lower {key}"],
-    )
+    data.verdict.summary["notes"] = [f"raise {key}"]
+    data.verdict.summary["warnings"] = [f"lower {key}"]
     data.verdict.means["stick_fraction"] = stick
     text = report.page_html(data)
     assert (
@@ -359,7 +365,8 @@ def test_exact_units_follow_the_size(name, value, unit, error, text):
 
 def test_exact_the_band_joins_the_reversals_of_each_cycle():
     number = np.arange(20)
-    time, high = (number / 2 + 0.25) * PERIOD, 1 + number // 2
+    time = (number / 2 + 0.25) * PERIOD
+    high = 1 + number // 2
     gone = (number // 2 != 3) & (number // 2 != 4)
     middle, low, top = charts.cycle_envelope(time[gone], ((-1.0) ** number * high)[gone], PERIOD)
     assert middle == pytest.approx((np.arange(10) + 0.5) * PERIOD)

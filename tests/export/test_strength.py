@@ -42,8 +42,10 @@ OWN = '{young = "210 GPa", poisson = 0.30, density = "7850 kg/m^3"}'
 
 def under_the_middle(depth):
     """von Mises stress over the peak pressure on the axis of Hertz's line contact, depth over its half-width."""
-    root, poisson = np.hypot(1, depth), MATERIALS["steel"].poisson
-    x, y = 2 * depth - (1 + 2 * depth**2) / root, -1 / root
+    root = np.hypot(1, depth)
+    poisson = MATERIALS["steel"].poisson
+    x = 2 * depth - (1 + 2 * depth**2) / root
+    y = -1 / root
     z = poisson * (x + y)
     return np.sqrt(((x - y) ** 2 + (y - z) ** 2 + (z - x) ** 2) / 2)
 

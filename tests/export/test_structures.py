@@ -41,7 +41,8 @@ def test_exact_an_exported_structure_is_read_back_as_the_same_rig(tmp_path, text
     head, tail = text.split("[structure]")
     again = head + f'[structure]\nfile = "{path.name}"\n[drive]' + tail.split("[drive]")[1]
     (tmp_path / "again.toml").write_text(again)
-    one, two = model.rig.modes, build(pf.load(tmp_path / "again.toml")).rig.modes
+    one = model.rig.modes
+    two = build(pf.load(tmp_path / "again.toml")).rig.modes
     scale = np.sqrt(one.mass)  # modes of a file have 1 kg
     for name, factor in (
         ("omega", 1.0),
@@ -63,7 +64,9 @@ def test_exact_an_exported_structure_is_read_back_as_the_same_rig(tmp_path, text
 
 def loop_of(stiffness, limit, slide):
     """Force (k,) of parallel elements that stretch and slip along a slide (k,), from a rest without force."""
-    stretch, out, last = np.zeros(len(limit)), [], 0.0
+    stretch = np.zeros(len(limit))
+    out = []
+    last = 0.0
     for x in slide:
         stretch = np.clip(stretch + stiffness * (x - last), -limit, limit)
         out.append(stretch.sum())
@@ -94,7 +97,8 @@ def test_exact_matlab_has_the_structures_of_nlvib(tmp_path):
     """A cell array of structures with type, direction and numbers, a D and an Fex1 of the drive; several interfaces."""
     model, path = written(tmp_path, PAIR + DRIVE, ".mat")
     found = loadmat(path)
-    modes, drive = model.rig.modes, model.rig.drive.signal
+    modes = model.rig.modes
+    drive = model.rig.drive.signal
     omega = drive.omega
     stiff = found["K"] + 1j * omega * found["D"] - omega**2 * found["M"]
     moved = found["T_out"] @ np.linalg.solve(stiff, found["Fex1"])

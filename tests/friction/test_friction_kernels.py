@@ -33,10 +33,13 @@ def jenkins_numpy(dq, stretch, stiffness, limit):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_exact_jenkins_is_a_clip(seed):
     rng = np.random.default_rng(seed)
-    stiffness, limit = rng.uniform(0.1, 3, 29), rng.uniform(0.05, 2, 29)
+    stiffness = rng.uniform(0.1, 3, 29)
+    limit = rng.uniform(0.05, 2, 29)
     element = parallel_element(stiffness, limit)
-    num, mem = element.numbers[None], element.memory[None].copy()
-    stretch, now = mem[0, 3:], mem[0, :3]
+    num = element.numbers[None]
+    mem = element.memory[None].copy()
+    stretch = mem[0, 3:]
+    now = mem[0, :3]
     for dq in rng.normal(0, 1, 60) * 10.0 ** rng.uniform(-3, 1, 60):
         want, new, loss = jenkins_numpy(dq, stretch, stiffness, limit)
         force, slope = elastic_plastic_kernels.mean_force(num[0], mem[0], 0.0, dq, 0.0, 1.0)
@@ -64,10 +67,8 @@ def test_exact_jenkins_is_a_clip(seed):
 
 def test_exact_a_tiny_step_of_stretched_elements_keeps_its_force():
     """No difference of large numbers: a step of 1e-12 of the stretch, elastic, has its force to 1e-15 of itself."""
-    num, mem = (
-        parallel_element(np.full(4, 3.0), np.full(4, 1.0)).numbers[None],
-        np.array([[0, 0, 0, 0.3, -0.7, 0.9, 0.1]]),
-    )
+    num = parallel_element(np.full(4, 3.0), np.full(4, 1.0)).numbers[None]
+    mem = np.array([[0, 0, 0, 0.3, -0.7, 0.9, 0.1]])
     for dq in (1e-12, -1e-13, 1e-300, 0.0):
         force, slope = elastic_plastic_kernels.mean_force(num[0], mem[0], 0.0, dq, 0.0, 1.0)
         assert force == pytest.approx(3 * (0.6 + 2 * dq), rel=1e-14) and slope == pytest.approx(

@@ -16,7 +16,8 @@ def test_exact_friction_work_by_quadrature(mu, steep):
     rng = np.random.default_rng(1)
     g = Grooves(80e-6, steep * 80e-6 / (2 * np.pi), rng.uniform(0, 6))
     for q0, q1 in (*rng.uniform(-3e-4, 3e-4, (3, 2)), (1e-5, 1.1e-5), (1e-5, 1e-5)):
-        way, edges = np.sign(q1 - q0), np.linspace(q0, q1, 30)
+        way = np.sign(q1 - q0)
+        edges = np.linspace(q0, q1, 30)
         true = sum(
             way
             * quad(
@@ -35,7 +36,9 @@ def test_exact_friction_work_by_quadrature(mu, steep):
 @pytest.mark.parametrize("way", [-1, 1])
 def test_exact_ratio_by_the_statics_of_the_flank(way):
     """Normal force R and friction mu R on a flank of angle a carry V upwards and F along x: the angle of friction."""
-    g, q, mu = Grooves(80e-6, 7.5e-6, 0.7), np.linspace(-1e-4, 1e-4, 9), 0.35
+    g = Grooves(80e-6, 7.5e-6, 0.7)
+    q = np.linspace(-1e-4, 1e-4, 9)
+    mu = 0.35
     angle = np.arctan(g.slope(q))
     push = np.sin(angle) + way * mu * np.cos(angle)
     carried = np.cos(angle) - way * mu * np.sin(angle)
@@ -46,7 +49,10 @@ def test_exact_ratio_by_the_statics_of_the_flank(way):
 
 
 def test_exact_slope_stiffness_and_capacity():
-    g, load, mu, d = Grooves(80e-6, 7.5e-6), 115.65, 0.4, 1e-10
+    g = Grooves(80e-6, 7.5e-6)
+    load = 115.65
+    mu = 0.4
+    d = 1e-10
     q = np.linspace(0, 80e-6, 2001)
     np.testing.assert_allclose(g.slope(q), (g.height(q + d) - g.height(q - d)) / (2 * d), atol=1e-5)
     assert g.stiffness(load) == pytest.approx(load * (g.slope(d) - g.slope(-d)) / (2 * d), rel=1e-9)
@@ -62,7 +68,9 @@ def test_exact_slope_stiffness_and_capacity():
 @pytest.mark.parametrize("share", [0.5, 0.2])
 def test_exact_what_is_worn_off_is_what_the_flanks_lose(share):
     """Per area: the volume between the cosines of both pieces and their valleys, before and after a mean depth."""
-    q, depth, g = np.linspace(0, 80e-6, 1000, endpoint=False), 3e-6, Grooves(80e-6, 7.5e-6)
+    q = np.linspace(0, 80e-6, 1000, endpoint=False)
+    depth = 3e-6
+    g = Grooves(80e-6, 7.5e-6)
     pieces = [
         g.after_wear(depth, share) if larger else g.after_wear(depth * part / (1 - part), share)
         for larger, part in ((True, max(share, 1 - share)), (False, min(share, 1 - share)))

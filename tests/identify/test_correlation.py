@@ -9,7 +9,8 @@ from patchfem.identify.least_squares import fit
 
 def process(count, tie, seed):
     """First-order autoregressive noise of unit variance."""
-    rng, out = np.random.default_rng(seed), np.empty(count)
+    rng = np.random.default_rng(seed)
+    out = np.empty(count)
     out[0] = rng.normal()
     for k in range(1, count):
         out[k] = tie * out[k - 1] + np.sqrt(1 - tie * tie) * rng.normal()
@@ -28,7 +29,8 @@ def test_rows_of_a_first_order_process(tie):
 
 def test_cycles_that_repeat_count_once():
     """A residual that is the same in each of four cycles tells as much as in one of them, four others as 800/8 rows."""
-    alike, other = [], []
+    alike = []
+    other = []
     for seed in range(400):
         rng = np.random.default_rng(seed)
         cycles = [np.convolve(rng.normal(size=207), np.ones(8), "valid") for _ in range(4)]
@@ -43,7 +45,8 @@ def test_cycles_that_repeat_count_once():
 
 def covered(bars, seeds, tie):
     """Share of 95 % intervals of a straight line's two numbers that hold them."""
-    x, inside = np.linspace(-1, 1, 200), []
+    x = np.linspace(-1, 1, 200)
+    inside = []
     for seed in seeds:
         y = 0.35 + 0.2 * x + 0.05 * process(200, tie, seed)
         found = fit(

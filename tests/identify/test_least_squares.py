@@ -52,10 +52,13 @@ def test_exact_a_linear_problem_has_the_closed_form_intervals():
 
 @given(st.integers(0, 10_000), st.floats(-3, 3), st.integers(-8, 8))
 def test_always_scaling_rows_and_values_changes_nothing(seed, shift, power):
-    rng, scale = np.random.default_rng(seed), 10.0**power
-    design, data = rng.normal(size=(12, 2)), rng.normal(size=12)
+    rng = np.random.default_rng(seed)
+    scale = 10.0**power
+    design = rng.normal(size=(12, 2))
+    data = rng.normal(size=12)
     values, half, *_ = linear(design, data)
-    low, high = values - 20 * half + shift * half, values + 20 * half + shift * half
+    low = values - 20 * half + shift * half
+    high = values + 20 * half + shift * half
     found = fit(
         lambda v: scale * (design @ (v / scale) - data),
         scale * low,
@@ -93,7 +96,8 @@ def test_exact_the_profile_of_a_bent_value_is_that_of_what_it_stands_for():
     """A constant w = v^3 has the ends mean -+ t s/sqrt(k), so v has their cube roots, which no straight line gives."""
     data = 1.0 + 1.5 * RNG.normal(size=12)
     half = student.ppf(0.975, 11) * data.std(ddof=1) / np.sqrt(12)
-    low, high = data.mean() - half, data.mean() + half
+    low = data.mean() - half
+    high = data.mean() + half
     found = fit(lambda v: v[0] ** 3 - data, [-4], [4])
     assert found.intervals.methods == ("profile",)
     assert found.values[0] == pytest.approx(np.cbrt(data.mean()), rel=1e-6)

@@ -11,12 +11,11 @@ from patchfem.response.decay_curve import compute_swing_curve
 
 def viscous(rng):
     """(times, values, frequency(A), ratio(A)) of a decay that is exponential."""
-    f, zeta, per = (
-        10 ** rng.uniform(1, 2.5),
-        10 ** rng.uniform(-2.5, -1.2),
-        10 ** rng.uniform(1.2, 2),
-    )
-    t, own = np.arange(int(rng.uniform(12, 60) * per)) / (per * f), np.sqrt(1 - zeta**2)
+    f = 10 ** rng.uniform(1, 2.5)
+    zeta = 10 ** rng.uniform(-2.5, -1.2)
+    per = 10 ** rng.uniform(1.2, 2)
+    t = np.arange(int(rng.uniform(12, 60) * per)) / (per * f)
+    own = np.sqrt(1 - zeta**2)
     w = 2 * np.pi * f
     y = np.exp(-zeta * w * t) * np.cos(w * own * t + rng.uniform(0, 6))
     return t, y, lambda a: f * own + 0 * a, lambda a: zeta + 0 * a
@@ -24,7 +23,9 @@ def viscous(rng):
 
 def rubbed(rng):
     """The same of a block that Coulomb friction alone brings to rest."""
-    f, h, per = 10 ** rng.uniform(1, 2.5), 10 ** rng.uniform(-2.3, -1.3), 10 ** rng.uniform(1.2, 2)
+    f = 10 ** rng.uniform(1, 2.5)
+    h = 10 ** rng.uniform(-2.3, -1.3)
+    per = 10 ** rng.uniform(1.2, 2)
     t = np.arange(int(min(0.45 / h, 120) / 2 * per)) / (per * f)
     k = np.floor(2 * f * t)
     return (
@@ -60,7 +61,8 @@ def test_intervals_hold(kind):
 @pytest.mark.parametrize("name, power", [("displacement", 0), ("velocity", 1), ("acceleration", 2)])
 def test_exact_any_trace_gives_the_amplitude_of_the_displacement(name, power):
     """Without noise: a displacement A leaves A w in the velocity, A w^2 in the acceleration."""
-    zeta, w = 0.02, 500.0
+    zeta = 0.02
+    w = 500.0
     t = np.arange(2000) / 10000
     pole = w * complex(-zeta, np.sqrt(1 - zeta**2))
     found, _ = compute_decay_curve({"time": t, name: (pole**power * 1e-3 * np.exp(pole * t)).real})
@@ -70,7 +72,8 @@ def test_exact_any_trace_gives_the_amplitude_of_the_displacement(name, power):
 
 
 def test_refuses_what_holds_no_decay():
-    rng, t = np.random.default_rng(0), np.arange(500) / 1000
+    rng = np.random.default_rng(0)
+    t = np.arange(500) / 1000
     with pytest.raises(PatchfemError, match=r"rise above the noise|samples per cycle"):
         find_half_swings(t, rng.normal(size=t.size))
     with pytest.raises(PatchfemError, match="the free decay has 9 samples"):

@@ -28,7 +28,8 @@ def test_refuses_a_matlab_file_that_is_too_large_before_it_is_read(tmp_path):
 
 def test_exact_rows_of_numbers_without_mass_at_the_end_fit_a_larger_stiffness(tmp_path):
     """Lines of row, column and number do not state the size of the matrix, so the mass is extended by zeros."""
-    stiffness, mass = tmp_path / "k.mtx", tmp_path / "m.mtx"
+    stiffness = tmp_path / "k.mtx"
+    mass = tmp_path / "m.mtx"
     stiffness.write_text("1 1 4.0\n1 2 -1.0\n2 2 3.0\n")
     mass.write_text("1 1 2.5\n")
     pair = (matrices.read_matrix(stiffness, "stiffness"), matrices.read_matrix(mass, "mass"))

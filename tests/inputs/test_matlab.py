@@ -30,7 +30,8 @@ def written(packed: bool, only=tuple(WRITTEN)) -> bytes:
 @pytest.mark.parametrize("packed", [False, True])
 def test_exact_every_array_is_the_one_that_scipy_reads(packed):
     data = written(packed)
-    found, known = read_variables("a.mat", data), loadmat(io.BytesIO(data))
+    found = read_variables("a.mat", data)
+    known = loadmat(io.BytesIO(data))
     assert {name: one.kind for name, one in found.items()} == {
         "full": "number",
         "scalar": "number",
@@ -82,11 +83,9 @@ def damaged(seed: bytes, rng: random.Random) -> bytes:
 
 def refused(count: int, packed: bool) -> int:
     """How many of `count` damaged files are refused; all others give arrays of the shapes that they name."""
-    seed, rng, out = (
-        written(packed, ("full", "scattered", "cells", "letters", "scalar")),
-        random.Random(5),
-        0,
-    )
+    seed = written(packed, ("full", "scattered", "cells", "letters", "scalar"))
+    rng = random.Random(5)
+    out = 0
     for _ in range(count):
         try:
             for one in read_variables("a.mat", damaged(seed, rng)).values():

@@ -119,7 +119,8 @@ def test_exact_fields_of_structures_are_named_and_mapped(data, tmp_path):
 def test_exact_a_rig_of_version_73_is_that_of_version_7(tmp_path):
     """Cells of texts and a sparse matrix among its arrays."""
     rig = {"M": np.diag([1.0, 2.0]), "C": np.zeros((2, 2)), "slide": [[1.0, 0.0]]}
-    stiff, names = np.array([[3e6, -1e6], [-1e6, 1e6]]), ("tip", "base é")
+    stiff = np.array([[3e6, -1e6], [-1e6, 1e6]])
+    names = ("tip", "base é")
 
     def more(file):
         group = file.create_group("K")
@@ -133,7 +134,8 @@ def test_exact_a_rig_of_version_73_is_that_of_version_7(tmp_path):
         put(file, "#refs#/a", names[0])
         put(file, "#refs#/b", names[1])
         cells = file.create_dataset("names", (2, 1), h5py.ref_dtype)
-        cells[0, 0], cells[1, 0] = file["#refs#/a"].ref, file["#refs#/b"].ref
+        cells[0, 0] = file["#refs#/a"].ref
+        cells[1, 0] = file["#refs#/b"].ref
         cells.attrs["MATLAB_class"] = np.bytes_("cell")
 
     (tmp_path / "new.mat").write_bytes(written(rig, more))
@@ -181,7 +183,8 @@ def test_refuses_what_unpacks_too_large_and_follows_no_links(tmp_path):
 
 def damaged(count: int, seeds: list) -> int:
     """How many of `count` damaged files are refused; all others give arrays of the shapes that they name."""
-    rng, refused = random.Random(11), 0
+    rng = random.Random(11)
+    refused = 0
     for number in range(count):
         data = bytearray(seeds[number % len(seeds)])
         for _ in range(rng.randint(1, 3)):

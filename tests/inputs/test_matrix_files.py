@@ -18,7 +18,8 @@ PLACES = [(7, 1), (7, 6), (12, 1), (900, 0)]  # of the rows, in the order in whi
 
 def output4_text(name: str, matrix, sparse_rows: bool, big: bool) -> str:
     """An OUTPUT4 file in text, its columns from the first to the last number or by strings of rows."""
-    n, out = len(matrix), []
+    n = len(matrix)
+    out = []
     out.append(f"{n:8d}{-n if big else n:8d}{6:8d}{2:8d}{name:8s}1P,3E23.16")
 
     def numbers(values):
@@ -48,7 +49,9 @@ def output4_binary(
     name: str, matrix, order: str, sparse_rows: bool, big: bool, wide: int = 4
 ) -> bytes:
     """The same in records of Fortran, with words of 4 or 8 bytes."""
-    n, whole, out = len(matrix), "i" if wide == 4 else "q", []
+    n = len(matrix)
+    whole = "i" if wide == 4 else "q"
+    out = []
 
     def record(*ints, data=b""):
         body = struct.pack(f"{order}{len(ints)}{whole}", *ints) + data
@@ -285,7 +288,8 @@ def test_refuses_each_bad_file_with_its_sentence(tmp_path, name):
 
 def test_always_refuses_damaged_binary_matrices_by_a_sentence(tmp_path):
     """Every cut of a file, and every byte of its first records changed, is refused or read, never a traceback."""
-    whole, path = output4_binary("KAAX", K, "<", True, False), tmp_path / "k.op4"
+    whole = output4_binary("KAAX", K, "<", True, False)
+    path = tmp_path / "k.op4"
     for change in [whole[:cut] for cut in range(0, len(whole), 7)] + [
         whole[:k] + bytes([whole[k] ^ 0x5A]) + whole[k + 1 :] for k in range(120)
     ]:

@@ -161,10 +161,8 @@ def twin(m, node):
 
 def loosen(m):
     """The upper coating gets nodes of its own, as a drawing whose faces were not glued gives them."""
-    mine, top = (
-        m.quad_tags == CELL_TAGS["upper_coating"],
-        m.edge_tags == EDGE_TAGS["upper_interface"],
-    )
+    mine = m.quad_tags == CELL_TAGS["upper_coating"]
+    top = m.edge_tags == EDGE_TAGS["upper_interface"]
     own = np.unique(m.quads[mine])
     m.quads[mine] = np.searchsorted(own, m.quads[mine]) + len(m.points)
     m.edges[top] = np.searchsorted(own, m.edges[top]) + len(m.points)

@@ -32,7 +32,8 @@ SIZES = {"length": 4e-3, "height": 2e-3, "coating": 1.524e-4, "fine": 4e-5, "coa
 @pytest.mark.parametrize("radius, flat", [(20e-3, 1e-3), (0.5e-3, None)], ids=["shallow", "fillet"])
 def test_exact_geometry_of_rounded_pieces(radius, flat, quads, tmp_path):
     pair = rounded_pair(**SIZES, radius=radius, flat=flat, quads=quads)
-    piece, flat = pair.lower, flat or 1.5e-3
+    piece = pair.lower
+    flat = flat or 1.5e-3
     assert np.array_equal(piece.points[piece.interface], pair.upper.points[pair.upper.interface])
     beyond = np.maximum(np.abs(piece.x) - flat, 0)
     assert piece.interface_depths == pytest.approx(
@@ -61,12 +62,15 @@ def test_exact_geometry_of_rounded_pieces(radius, flat, quads, tmp_path):
 @pytest.mark.parametrize("quads", [False, True])
 def test_exact_rounded_punch_within_one_percent(quads):
     """Two alike pieces: the gaps add up to the radius R/2 on the modulus E'/2."""
-    flat, radius, modulus = 0.1e-3, 61e-3, TITANIUM[0] / (1 - TITANIUM[1] ** 2) / 2
+    flat = 0.1e-3
+    radius = 61e-3
+    modulus = TITANIUM[0] / (1 - TITANIUM[1] ** 2) / 2
     load = 0.5 * flat**2 * modulus / radius
     pair = rounded_pair(12e-3, 6e-3, 0.0, radius, flat / 40, 0.6e-3, flat=flat, quads=quads)
     low = condense(Substructure(pair.lower, Layers(TITANIUM, TITANIUM, "strain")))
     nn, tt = (2 * part for part in low[:2])
-    x, weight = pair.lower.x, pair.lower.tributary_lengths()
+    x = pair.lower.x
+    weight = pair.lower.tributary_lengths()
     state = press(
         Compliance(Interface(x, weight, 1.0), nn, tt),
         pair.lower.interface_depths + pair.upper.interface_depths,

@@ -151,7 +151,8 @@ def test_always_a_coating_that_is_no_layer_leaves_no_tensor_grid(tmp_path):
 
 def together(lower, upper):
     """The lower piece of one grid and the upper piece of another as one pair."""
-    lower, upper = pair_mesh(lower), pair_mesh(upper)
+    lower = pair_mesh(lower)
+    upper = pair_mesh(upper)
     out = {}
     for part, tags, codes in (("quads", "tags", CELL_TAGS), ("edges", "edge_tags", EDGE_TAGS)):
         kept = [
@@ -204,7 +205,8 @@ def test_exact_coatings_of_unlike_thickness_on_the_same_grid_are_two_grids(tmp_p
 @pytest.mark.parametrize("wrong", ["0", "-1"])
 def test_refuses_a_text_whose_cell_names_a_node_below_one(wrong, tmp_path):
     """A reader that counts back from the end takes node 0 for the last one, which lies in the upper piece."""
-    path, mesh = tmp_path / "pair.msh", drawn("quads")
+    path = tmp_path / "pair.msh"
+    mesh = drawn("quads")
     write_msh22(mesh, path, binary=False)
     assert read_grid(path)
     lines = path.read_text().split("\n")

@@ -75,7 +75,8 @@ def test_refuses_twin_nodes_and_tags_of_the_wrong_piece_or_inside_it_in_every_fo
 def test_exact_the_fixed_length_follows_a_far_face_up_to_its_corners():
     piece = of_grid(GRID, 0.5, 3)
     assert measure_fixed_length(piece) == pytest.approx((2e-3, 2e-3), rel=1e-12)
-    bottom, left = piece.points[:, 1] == 1e-3, piece.points[:, 0] == -1e-3
+    bottom = piece.points[:, 1] == 1e-3
+    left = piece.points[:, 0] == -1e-3
     sides = replace(piece, far=np.flatnonzero(left & (piece.points[:, 1] > 0)))
     first = piece.points[left, 1]
     first = np.sort(first)[1]  # the edge that touches the interface is held at one end alone
@@ -100,7 +101,9 @@ def test_exact_holes_are_the_area_of_the_cells_left_out_inside_and_a_notch_is_no
     middle = np.concatenate(
         [piece.points[cells].mean(axis=1) for cells in (piece.triangles, piece.quads)]
     )
-    x, depth, turn = GRID.x, GRID.depth, len(piece.triangles)
+    x = GRID.x
+    depth = GRID.depth
+    turn = len(piece.triangles)
 
     def inside(column, row):
         there = (middle[:, 0] > x[column]) & (middle[:, 0] < x[column + 1])

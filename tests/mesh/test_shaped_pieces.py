@@ -26,9 +26,11 @@ def made(end, shorter=0.0, cell=0.31e-3, coating=COATING):
 
 
 def test_exact_a_rounded_end_is_a_circle_to_sixty_degrees_then_its_tangent():
-    end, start = ENDS["radius"], LENGTH / 2 - ENDS["radius"].size
+    end = ENDS["radius"]
+    start = LENGTH / 2 - ENDS["radius"].size
     s = np.linspace(0, 1, 200) * end.size
-    drop, last = end.face_depth(start + s, LENGTH), np.sqrt(3) / 2 * end.size
+    drop = end.face_depth(start + s, LENGTH)
+    last = np.sqrt(3) / 2 * end.size
     on = s <= last
     assert np.allclose(s[on] ** 2 + (end.size - drop[on]) ** 2, end.size**2, rtol=1e-12)
     assert np.allclose(drop[~on], end.size / 2 + np.sqrt(3) * (s[~on] - last), rtol=1e-12)
@@ -41,7 +43,8 @@ def test_exact_a_rounded_end_is_a_circle_to_sixty_degrees_then_its_tangent():
 @pytest.mark.parametrize("kind", ENDS)
 def test_exact_the_face_that_can_touch_ends_at_the_corner_or_where_it_is_steep(kind):
     end = ENDS[kind]
-    half, step = end.half_contact_length(LENGTH), 1e-9
+    half = end.half_contact_length(LENGTH)
+    step = 1e-9
     slope = (end.face_depth(half + step, LENGTH) - end.face_depth(half - step, LENGTH)) / (2 * step)
     flat = {"sharp": LENGTH / 2, "chamfer": LENGTH / 2 - end.size}
     assert (
@@ -68,7 +71,8 @@ def test_exact_cells_fill_the_outline_and_a_sprayed_coating_is_as_thick_everywhe
 
 def test_exact_a_piece_without_ends_or_overhang_is_its_tensor_grid():
     grid = graded_grid(LENGTH, HEIGHT, 0.31e-3, COATING)
-    body, wanted = shaped_grid(grid, LENGTH, SHARP_END), as_piece(grid)
+    body = shaped_grid(grid, LENGTH, SHARP_END)
+    wanted = as_piece(grid)
     for name in ("points", "quads", "is_coating", "interface", "far"):
         assert np.array_equal(getattr(body, name), getattr(wanted, name)), name
     assert body.base_grid is grid and wanted.base_grid is None

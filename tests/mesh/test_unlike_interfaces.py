@@ -54,7 +54,8 @@ def test_exact_both_pieces_keep_their_own_nodes(form, tmp_path):
 
 def test_exact_alike_pieces_match_and_one_node_aside_does_not(tmp_path):
     assert stored(drawn("mixed"), tmp_path).has_matching_nodes
-    near, aside = drawn("quads"), drawn("quads")
+    near = drawn("quads")
+    aside = drawn("quads")
     move(near, interface_node(near), (1e-13, 0))
     move(aside, interface_node(aside), (1e-7, 0))
     assert stored(near, tmp_path).has_matching_nodes

@@ -125,7 +125,8 @@ def test_exact_right_files_pass(tmp_path):
     assert code == 0 and all(line.startswith("note: scan.csv: ") for line in lines), lines
     answer = cli("check", tmp_path / "scene.toml", "--json")
     assert json.loads(answer.out)["kind"] == "patch"
-    M, K = np.eye(2), np.array([[200.0, -100.0], [-100.0, 100.0]])
+    M = np.eye(2)
+    K = np.array([[200.0, -100.0], [-100.0, 100.0]])
     np.savez(tmp_path / "a.npz", M=M, K=K, output=[0, 1])
     assert checked(tmp_path, ARRAYS, "a.npz", None) == (0, [])
 

@@ -142,7 +142,8 @@ def test_always_the_speed_of_a_released_rig_can_be_written():
 def test_exact_the_run_of_a_model_is_the_run_of_its_scene(text, sets):
     scene = loads(text, sets=sets)
     model = build(scene)
-    ours, want = run(model), run(scene)
+    ours = run(model)
+    want = run(scene)
     assert seen(ours) == seen(want) == seen(run(plan(model)))
     assert ours.plan.model is model and ours.measures
 
@@ -187,13 +188,15 @@ CHANGES = {
 def test_exact_an_exchanged_part_is_the_scene_with_that_set(text, sets, change):
     exchanged, value, one = CHANGES[change]
     before = build(loads(text, sets=sets))
-    ours, want = run(exchanged(before, value)), run(loads(text, sets=[*sets, one]))
+    ours = run(exchanged(before, value))
+    want = run(loads(text, sets=[*sets, one]))
     assert seen(ours) == seen(want) != seen(run(before))
 
 
 def test_exact_another_law_is_the_scene_with_that_set():
     """The first interface of the rig and the law of the model are one law in two places: both are exchanged."""
-    text, sets = SMALL_PATCH + SHEAR + COULOMB + SHORT, ["accuracy.steps_per_cycle=100"]
+    text = SMALL_PATCH + SHEAR + COULOMB + SHORT
+    sets = ["accuracy.steps_per_cycle=100"]
     before = build(loads(text, sets=sets))
     less = before.friction.model_copy(update={"static": 0.2, "kinetic": 0.2})
     friction = before.rig.friction
@@ -222,7 +225,8 @@ STILL = STRUCTURE.replace("slide = 1.0", "slide = 1.0\nbase = 0.0")
 def test_refuses_with_file_and_line_once_whoever_asks(text, key, line, says):
     """The same sentence from the scene, its model and its plan; file and line of the key once, at the beginning."""
     where = f"a.toml:{line_of(text, line)}: {key}: " if key else "a.toml: "
-    scene, messages = loads(text, "a.toml"), set()
+    scene = loads(text, "a.toml")
+    messages = set()
     for act in (lambda: run(scene), lambda: run(build(scene)), lambda: run(plan(scene))):
         with pytest.raises(PatchfemError) as caught:
             act()

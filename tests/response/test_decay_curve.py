@@ -21,7 +21,8 @@ RELEASED = DRIVE[: DRIVE.index("kind")] + 'kind = "free"\ndisplacement = "2 mm"\
 
 @pytest.mark.parametrize("zeta", [1e-4, 0.02, 0.3])
 def test_exact_a_viscous_decay_has_one_frequency_and_one_ratio(zeta):
-    k, own = np.arange(30), 700.0 * np.sqrt(1 - zeta**2)
+    k = np.arange(30)
+    own = 700.0 * np.sqrt(1 - zeta**2)
     found = compute_swing_curve(
         half_swings_between(np.pi * k / own, (-1.0) ** k * np.exp(-zeta * 700.0 * np.pi * k / own))
     )
@@ -45,9 +46,12 @@ def test_exact_a_release_has_the_amplitude_of_its_last_whole_cycle():
         + RELEASED
     )
     found = pf.run(text.replace("cycles = 30", "cycles = 60"))
-    main, mode = found.measures["relative_displacement_amplitude"], found.plan.model.rig.modes
-    omega, zeta = float(mode.omega[0]), float(mode.zeta[0])
-    own, end = omega * np.sqrt(1 - zeta**2), found.response.time[-1]
+    main = found.measures["relative_displacement_amplitude"]
+    mode = found.plan.model.rig.modes
+    omega = float(mode.omega[0])
+    zeta = float(mode.zeta[0])
+    own = omega * np.sqrt(1 - zeta**2)
+    end = found.response.time[-1]
     at = np.pi * np.arange(1, 200) / own  # released at rest: it turns every half period
     at = at[at < end * (1 - 1e-9)][-3:-1]
     assert main.value == pytest.approx(2e-3 * np.exp(-zeta * omega * at).mean(), rel=1e-6)
@@ -87,7 +91,8 @@ def test_always_intervals_hold_a_loss_that_bends_with_the_amplitude():
     held = []
     for seed in range(16):
         r = np.random.default_rng(seed)
-        p, c = r.uniform(0.1, 1.5), 2 * 10 ** r.uniform(-3, -0.8)
+        p = r.uniform(0.1, 1.5)
+        c = 2 * 10 ** r.uniform(-3, -0.8)
 
         def fall(a, p=p, c=c):
             return np.pi * c * a**p / (1 + a**p)
@@ -131,7 +136,8 @@ def test_exact_a_release_under_coulomb_friction():
     data = pf.run(
         POINT + friction_of("coulomb") + KILOGRAM.replace("0.003", "0.0") + RELEASED
     ).to_xarray()
-    h, a = 0.3 * 115.6541 / (286 * np.pi) ** 2, data.decay_amplitude.values
+    h = 0.3 * 115.6541 / (286 * np.pi) ** 2
+    a = data.decay_amplitude.values
     assert data.decay_frequency.values == pytest.approx(143.0, rel=1e-8)
     off = np.abs(data.decay_damping.values - 2 * h / (np.pi * a))
     assert a.size > 8 and (off < data.decay_damping_error.values)[1:].all()
@@ -153,7 +159,8 @@ def test_a_release_of_an_iwan_joint_follows_its_balance():
         text, amplitudes=a, method="quasi-static", **{"friction.stiffness": "1e6 N/m"}
     )
     for name in ("frequency", "damping"):
-        ours, bar = data[f"decay_{name}"].values[k], data[f"decay_{name}_error"].values[k]
+        ours = data[f"decay_{name}"].values[k]
+        bar = data[f"decay_{name}_error"].values[k]
         other = beside[f"quasi_static_{name}"].values[::-1]
         assert (
             np.isfinite(bar).all()
@@ -193,7 +200,8 @@ cycles = 60
 def test_exact_a_release_that_ends_stuck_has_the_eigenvalue_of_the_stuck_rig():
     """Another mode rings beside it, so the turns of the output tell of neither. No point is as uncertain as large."""
     done = pf.run(TWO_MODES)
-    omega, slide = 2 * np.pi * np.array([40.0, 131.0]), np.array([1.0, 0.7])
+    omega = 2 * np.pi * np.array([40.0, 131.0])
+    slide = np.array([1.0, 0.7])
     matrix = np.block(
         [
             [np.zeros((2, 2)), np.eye(2)],
@@ -201,8 +209,10 @@ def test_exact_a_release_that_ends_stuck_has_the_eigenvalue_of_the_stuck_rig():
         ]
     )
     values = np.linalg.eigvals(matrix)
-    frequency, damping = values.imag / (2 * np.pi), -values.real / np.abs(values)
-    decay, ring = done.extra["decay"], done.measures
+    frequency = values.imag / (2 * np.pi)
+    damping = -values.real / np.abs(values)
+    decay = done.extra["decay"]
+    ring = done.measures
     k = np.argmin(np.abs(frequency - decay.frequency[-1]))
     rings = decay.frequency == decay.frequency[-1]
     assert str(done.outcome) == "stuck" and rings.sum() > 40 and 3 < np.sum(~rings)
@@ -242,12 +252,11 @@ def mindlins(amplitude, stuck: float, slide: float):
 
     A crown gives way by du/dQ = 1/K - ln(1 - Q/(mu P))/(pi E* b) under a force Q (Jaeger 1998: as under the normal load
     P of a half-plane, whose stiffness goes with its half width a, a^2 with P), and unloads by Masing's rule."""
-    held, own = (2 * np.pi * stuck) ** 2, (2 * np.pi * 150) ** 2
-    stiffness, limit, modulus = (
-        2.0 * (held - own) / slide**2,
-        0.2 * 8e3,
-        2.1e11 / (2 * (1 - 0.3**2)),
-    )
+    held = (2 * np.pi * stuck) ** 2
+    own = (2 * np.pi * 150) ** 2
+    stiffness = 2.0 * (held - own) / slide**2
+    limit = 0.2 * 8e3
+    modulus = 2.1e11 / (2 * (1 - 0.3**2))
     soft = np.pi * modulus * 0.03
 
     def way(q):
@@ -270,7 +279,8 @@ def test_a_decay_holds_mindlins_damping_where_nodes_stick(slide):
     found = backbone(
         pf.build(CROWNED.replace("slide = 1.0", f"slide = {slide}")), "", a, ("decay",)
     )
-    one, law = found.curves["decay"], mindlins(a, found.frequencies.stuck, slide)
+    one = found.curves["decay"]
+    law = mindlins(a, found.frequencies.stuck, slide)
     assert one.amplitude.size == a.size
     assert (np.abs(one.damping - law) <= one.damping_error).all()
     assert one.damping[0] == pytest.approx(0.002 * 150 / found.frequencies.stuck, rel=2e-3)
@@ -281,7 +291,8 @@ def test_a_decay_holds_mindlins_damping_where_nodes_stick(slide):
 
 def test_a_release_and_what_rings_hold_mindlins_damping():
     result = pf.run(CROWNED)
-    decay, ring = result.extra["decay"], result.measures["ring_damping"]
+    decay = result.extra["decay"]
+    ring = result.measures["ring_damping"]
     stuck = result.measures["ring_frequency"].value
     known = np.flatnonzero(np.isfinite(decay.damping_error))[::20]
     law = mindlins(decay.amplitude[known], stuck, 1.0)
@@ -307,10 +318,8 @@ cycles = 12
 
 
 def test_a_release_states_what_its_errors_leave_out():
-    result, said = (
-        pf.run(BEHIND_BONDS),
-        "the errors of ring_frequency and ring_damping and of the decay curve include ",
-    )
+    result = pf.run(BEHIND_BONDS)
+    said = "the errors of ring_frequency and ring_damping and of the decay curve include "
     (note,) = [one for one in result.notes if one.startswith("the errors of")]
     assert note.startswith(
         said + "the change on a coarser mesh, but not the energy that is lost in slip"
@@ -350,11 +359,13 @@ def test_exact_a_reversal_at_which_the_force_jumps_is_extrapolated_from_both_sid
     """Two parabolas that meet at their crests, of accelerations 1 and 3: the cubic across the jump is bent by it."""
     crests = begin + np.array([0.2537, 0.7421])
     time = begin + np.arange(0.0, 1.0, 0.02)
-    place, speed = np.empty(time.size), np.empty(time.size)
+    place = np.empty(time.size)
+    speed = np.empty(time.size)
     for crest, sign, part in zip(crests, (1, -1), (time < begin + 0.5, time >= begin + 0.5)):
         off = time[part] - crest
         rate = np.where(off < 0, 1.0, 3.0)
-        place[part], speed[part] = -sign * rate * off**2 / 2, -sign * rate * off
+        place[part] = -sign * rate * off**2 / 2
+        speed[part] = -sign * rate * off
     near, exact = (
         one(time, place, speed)[0] for one in (find_turning_points, find_turning_points_outside)
     )

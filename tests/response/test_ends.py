@@ -14,11 +14,10 @@ PERIOD, STEPS = 1.0, 4000
 def window(end, cycles):
     """Samples of a growing motion that drifts, with a force of its own, over the last `cycles` before a time."""
     t = np.linspace(end - cycles, end, max(round(cycles * STEPS), 4) + 1)
-    y, v = (
-        np.exp(0.3 * t) * np.sin(5 * t),
-        np.exp(0.3 * t) * (0.3 * np.sin(5 * t) + 5 * np.cos(5 * t)),
-    )
-    a, force = 40 * np.exp(0.2 * t), np.tanh(3 * v)
+    y = np.exp(0.3 * t) * np.sin(5 * t)
+    v = np.exp(0.3 * t) * (0.3 * np.sin(5 * t) + 5 * np.cos(5 * t))
+    a = 40 * np.exp(0.2 * t)
+    force = np.tanh(3 * v)
     return Response(t, y[:, None], v[:, None], y, v, y, v, a, 0 * t, force, y - 0.1 * force)
 
 

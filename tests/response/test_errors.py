@@ -70,7 +70,8 @@ def random_scene(rng):
 
 def coverage(count, seed, finest=12800):
     """Share of stated errors of random rigs at 400 steps a cycle that hold, off `finest` steps."""
-    rng, held = np.random.default_rng(seed), []
+    rng = np.random.default_rng(seed)
+    held = []
     for _ in range(count):
         model = build(random_scene(rng))
         numerics = choose(model)
@@ -132,10 +133,8 @@ def test_exact_two_runs_take_the_order_that_is_declared(ratio, order):
 
 
 def test_exact_instants_of_events_are_of_first_order_in_the_cells_and_other_measures_of_second():
-    fine, coarse = (
-        {"stick_fraction": 0.2, "loop_area": 1.0},
-        {"stick_fraction": 0.21, "loop_area": 1.15},
-    )
+    fine = {"stick_fraction": 0.2, "loop_area": 1.0}
+    coarse = {"stick_fraction": 0.21, "loop_area": 1.15}
     found = merged_cell_errors(fine, coarse, fine)
     assert found == {"stick_fraction": pytest.approx(0.01), "loop_area": pytest.approx(0.03)}
 
@@ -187,7 +186,8 @@ def test_exact_a_small_drive_is_met_as_a_large_one():
         run(scene.loads(RUBBING.format(load=30 * size, size=5 * size))) for size in (1.0, 1e-9)
     )
     assert small.extra["steps_per_cycle"] == large.extra["steps_per_cycle"]
-    one, other = small.measures[NAME], large.measures[NAME]
+    one = small.measures[NAME]
+    other = large.measures[NAME]
     assert one.value == pytest.approx(1e-9 * other.value, rel=1e-9)
     assert one.error == pytest.approx(1e-9 * other.error, rel=1e-3) and one.error < 1e-3 * one.value
     assert other.floor == 1e-10 and one.floor == pytest.approx(

@@ -13,7 +13,8 @@ from patchfem.response.run_events import select_last_cycle
 def stick_slip(period=1.0, cycles=3, steps=800, rest=0.25):
     """(time, slip): a cosine way to and fro with a rest of `rest` of the period at either end."""
     time = np.linspace(0, cycles * period, cycles * steps + 1)
-    phase, half = time / period % 1.0, 0.5 - rest
+    phase = time / period % 1.0
+    half = 0.5 - rest
     rise = 0.5 - 0.5 * np.cos(np.pi * np.clip(phase / half, 0, 1))
     fall = 0.5 - 0.5 * np.cos(np.pi * np.clip((phase - 0.5) / half, 0, 1))
     return time, rise - fall

@@ -54,7 +54,9 @@ def coefficients(time, slide, force):
 def jenkins_loop(amplitude, length, steps):
     """(time, slide, rate, force) of the second of two cycles of a slider of length 1 behind a spring 1/length."""
     time, phase = evenly(2, steps)
-    slide, force, stretch = amplitude * np.sin(phase), np.zeros(phase.size), 0.0
+    slide = amplitude * np.sin(phase)
+    force = np.zeros(phase.size)
+    stretch = 0.0
     for k in range(1, phase.size):
         stretch = min(max(stretch + slide[k] - slide[k - 1], -length), length)
         force[k] = stretch / length
@@ -138,7 +140,8 @@ def test_exact_secant_of_a_reversal_that_no_step_resolves(length, early):
     """A slider gives way over a length far below a step at the turn, and holds its limit there all the same; one that
     holds has its own stiffness."""
     phase = 2 * pi * (np.arange(3 * 100 + 1) + early) / 100
-    slide, force = np.sin(phase), np.zeros(phase.size)
+    slide = np.sin(phase)
+    force = np.zeros(phase.size)
     for k in range(1, phase.size):
         force[k] = np.clip(force[k - 1] + (slide[k] - slide[k - 1]) / length, -1, 1)
     turns = loops.find_reversals(
@@ -149,7 +152,8 @@ def test_exact_secant_of_a_reversal_that_no_step_resolves(length, early):
 
 def test_always_no_secant_without_slide_or_sides():
     time = np.linspace(0, PERIOD, 9)
-    zero, force = np.zeros(9), np.arange(9.0)
+    zero = np.zeros(9)
+    force = np.arange(9.0)
     assert (
         loops.secant_stiffness(loops.find_reversals(time, zero, zero, force, PERIOD, "jumps"))
         is None
@@ -185,7 +189,8 @@ def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
     from patchfem.dynamics.events.elements import make_coulomb_elements
     from patchfem.dynamics.events.histories import evaluate_motion
 
-    model, rig = done.plan.model, done.plan.model.rig
+    model = done.plan.model
+    rig = done.plan.model.rig
     times = (begin + (np.arange(samples) + 0.5) / samples) * PERIOD
     return evaluate_motion(
         rig.modes,
@@ -202,7 +207,8 @@ def test_exact_range_and_drift_of_an_exact_run(more, drive):
     bars hold; they did not while A came from Gauss nodes and the drift from a mean of uneven samples."""
     done = run(BLOCK.format(more=more, drive=drive, cycles=21))
     slides = [dense(done, begin) for begin in (19, 20)]
-    drift, damping = done.measures["drift_per_cycle"], done.measures["equivalent_damping"]
+    drift = done.measures["drift_per_cycle"]
+    damping = done.measures["equivalent_damping"]
     rough = 1e-8 * np.ptp(slides[0]) * 1e-3  # of the midpoint rule across stops: 1/20000^2
     assert abs(drift.value - (slides[1].mean() - slides[0].mean())) <= drift.error + rough
     wide = np.mean([np.ptp(one) / 2 for one in slides])

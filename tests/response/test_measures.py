@@ -99,7 +99,8 @@ def test_refuses_the_mean_of_several_slips_per_half_cycle(degrees):
 @pytest.mark.parametrize("shift", [0.3, 0.4, 0.5])
 def test_order_acceleration_peak_between_samples(shift):
     """The top lies `shift` steps beside a sample; the parabola through three samples misses it by O(h^4)."""
-    errors, steps = [], (50, 100, 200)
+    errors = []
+    steps = (50, 100, 200)
     for count in steps:
         time, phase = cycles_of(2, count)
         top = (7 + shift) * 2 * pi / count
@@ -128,7 +129,8 @@ def test_exact_acceleration_peak_of_a_parabola_and_of_a_jump():
 
 
 def test_exact_window_amplitudes():
-    low, high = -np.arange(1.0, 8.0), 2 * np.arange(1.0, 8.0)
+    low = -np.arange(1.0, 8.0)
+    high = 2 * np.arange(1.0, 8.0)
     extremes = np.column_stack([low, high])
     # seven cycles in windows of three: the first one is left out; cycles count from 1
     np.testing.assert_array_equal(

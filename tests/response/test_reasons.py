@@ -39,7 +39,8 @@ cycles = {cycles}
 
 def seen(stored: float, lost: float) -> SimpleNamespace:
     """Two cycles in which an interface stores and dissipates so much [J]."""
-    time, rise = np.linspace(0.3, 0.5, 5), np.linspace(0, 1, 5)
+    time = np.linspace(0.3, 0.5, 5)
+    rise = np.linspace(0, 1, 5)
     ledger = np.stack([(stored + lost) * rise, 7.0 + stored * rise, 2.0 + lost * rise, 0 * rise])
     return SimpleNamespace(time=time, extra={"ledger": ledger})
 

@@ -66,7 +66,9 @@ def signal(t, omega, own, zeta, size=1.0, phase=0.3):
 def test_exact_the_basis_of_nearly_equal_sinusoids_is_orthonormal():
     """Poles that differ by 1e-5 of their frequency have columns that are parallel to 5 digits."""
     kernels = load_uncompiled("patchfem.response.ringing_kernels")
-    columns, basis, corner = np.zeros((6, 200)), np.zeros((6, 200)), np.zeros((6, 6))
+    columns = np.zeros((6, 200))
+    basis = np.zeros((6, 200))
+    corner = np.zeros((6, 6))
     poles = 50.0 * np.array([1, 0.02, 1 + 1e-5, 0.02, 1 + 2e-5, 0.02])
     kernels.fill_sinusoids(np.linspace(0, 1, 200), poles, columns, 0)
     kernels.factor_qr(columns, 6, basis, corner)
@@ -105,7 +107,10 @@ def test_exact_the_stronger_of_two_rings():
 
 def test_exact_the_error_holds_under_noise():
     """Forty rings in noise of 1 %: the error bars hold the truth in 19 of 20, and are not idle."""
-    source, t, held, wide = np.random.default_rng(7), np.linspace(0, 1.0, 301), 0, []
+    source = np.random.default_rng(7)
+    t = np.linspace(0, 1.0, 301)
+    held = 0
+    wide = []
     for _ in range(40):
         found = fit_ring(
             t, signal(t, 3.0, 2 * np.pi * 7, 0.01) + 0.01 * source.normal(size=t.size), 3.0
@@ -132,7 +137,9 @@ def test_exact_nothing_rings(own, zeta, size):
 
 
 def test_exact_the_median_over_sticks_outvotes_a_stray_one():
-    t, parts, spans = np.linspace(0, 1.0, 201), [], []
+    t = np.linspace(0, 1.0, 201)
+    parts = []
+    spans = []
     for k, own in enumerate((9.0, 9.01, 8.99, 13.0, 9.0)):
         parts.append(signal(t, 3.0, 2 * np.pi * own, 0.02))
         spans.append((2.0 * k, 2.0 * k + 1))
@@ -161,7 +168,8 @@ def test_exact_the_second_mode_rings_while_the_interface_holds():
     """The eigenvalue of the two modes held together at the interface."""
     scene = load(TWO_MODES.format(load=10))
     result = run(scene)
-    modes, found = result.plan.model.rig.modes, result.measures
+    modes = result.plan.model.rig.modes
+    found = result.measures
     assert result.extra["engine"] == "exact" and 0.1 < found["stick_fraction"].value < 1
     across = np.array([-modes.slide[1], modes.slide[0]]) / np.hypot(*modes.slide)
     own = np.sqrt(across @ np.diag(modes.omega**2) @ across)

@@ -52,7 +52,9 @@ def test_always_no_estimate_without_a_shrinking_change():
 @pytest.mark.parametrize("map_", [[[0.7, 0.3], [-0.4, 0.6]], [[0.9, 0.2], [0.0, 0.5]]])
 def test_exact_a_map_of_the_plane_is_summed(map_):
     """Against the sum of its Neumann series, (1 - M)^-1 M d; one turns, one shrinks along two lines."""
-    map_, end, away = np.array(map_), np.array([2.0, 1.0]), [np.array([0.3, -0.5])]
+    map_ = np.array(map_)
+    end = np.array([2.0, 1.0])
+    away = [np.array([0.3, -0.5])]
     for _ in range(6):
         away.append(map_ @ away[-1])
     p = (np.array(away) + end) @ [1, 1j]
@@ -222,10 +224,8 @@ CREST = {
 @pytest.mark.parametrize("cycles", [24, 25, 26, 27])
 def test_exact_a_rig_at_the_crest_of_its_ring_up_is_not_steady(cycles):
     """Called steady at 445.05 +- 0.24 um after 25 cycles, tolerance 1e-3; the harmonic balance gives 443.852 um."""
-    name, scene = (
-        "relative_displacement_amplitude",
-        CREST | {"drive": CREST["drive"] | {"cycles": float(cycles)}},
-    )
+    name = "relative_displacement_amplitude"
+    scene = CREST | {"drive": CREST["drive"] | {"cycles": float(cycles)}}
     truth = pf.run(scene, **{"accuracy.method": "harmonic"}).measures[name]
     done = pf.run(scene)
     steady = done.measures[f"{name}_steady"]
@@ -322,7 +322,8 @@ tolerance = 1e-2
 def test_exact_a_motion_that_sticks_and_rings_on_is_said_to_be_transient(cycles, settled):
     """Of a held linear rig the steady amplitude is a/|w_1^2 - w^2 + 2 i z_1 w_1 w|."""
     done = pf.run(HOLDS.format(cycles=cycles))
-    own, omega = 2 * np.pi * 100, 2 * np.pi * 150
+    own = 2 * np.pi * 100
+    omega = 2 * np.pi * 150
     steady = 1 / abs(own**2 + 1e6 - omega**2 + 0.02j * own * omega)
     amplitude = done.measures["relative_displacement_amplitude"].value
     told = [one for one in done.warnings if one.startswith(UNSETTLED)]

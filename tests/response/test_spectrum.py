@@ -45,7 +45,8 @@ def test_exact_harmonics_of_an_acceleration_that_jumps(steps):
     t = np.unique(np.concatenate([uneven(2, steps), np.arange(5) * PERIOD / 2]))
     half, part = np.divmod(t, PERIOD / 2)
     way = 1 - 2 * (half % 2)
-    speed, place = way * (part - PERIOD / 4), way * (part**2 / 2 - PERIOD / 4 * part)
+    speed = way * (part - PERIOD / 4)
+    place = way * (part**2 / 2 - PERIOD / 4 * part)
     for n in (1, 3):
         found = spectrum.acceleration_harmonic(t, place, speed, n * OMEGA)
         assert found == pytest.approx(-4j / (pi * n), abs=1e-3 if steps == 8 else 1e-9)
@@ -109,7 +110,8 @@ def test_exact_friction_harmonic_is_that_of_the_force(kind, size, kinetic):
     text = SCENE.format(kinetic=kinetic, kind=kind, size=size)
     model = build(text)
     found = EXACT.run(model, choose(model), None)
-    w, drive = found.window, model.rig.drive.signal
+    w = found.window
+    drive = model.rig.drive.signal
     slide = spectrum.motion_harmonic(w.time, w.slide, w.slide_rate, drive.omega)
     stiffness = (spectrum.friction_harmonic(w, model.rig.modes, drive) / slide).real
     assert stiffness == pytest.approx(found.values["equivalent_stiffness"], abs=1e-8)

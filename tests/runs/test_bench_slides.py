@@ -190,7 +190,8 @@ def test_exact_results_of_both_kinds_are_written(tmp_path, kind):
 def test_exact_coulomb_breaks_away_at_its_static_friction():
     """At the first instant and after a rest the force is mu_s N, while sliding mu_k N; the work knows only mu_k."""
     run_ = sliding(POINT + COULOMB + "kinetic = 0.2\n" + DWELL)
-    load, force = run_.load[0], run_.force
+    load = run_.load[0]
+    force = run_.force
     moves = np.diff(run_.slide) > 0
     ends = np.flatnonzero(moves & ~np.append(False, moves[:-1]))
     assert ends.size == 2 and force[ends] == pytest.approx(0.3 * load, rel=1e-14)

@@ -65,14 +65,13 @@ def test_exact_two_modes_and_a_bonded_spring():
     tail = POINT + friction_of("iwan") + spring + DRIVE
     text = tail + MODES % ("", 143.0, 0.8, 0.9) + SECOND % (400.0, 0.5, -0.2)
     free = pf.build(text).rig.modes
-    rows, k = free.interfaces, 1e7
+    rows = free.interfaces
+    k = 1e7
     square, shapes = np.linalg.eigh(np.diag(free.omega**2) + k * rows.T @ rows / free.mass)
-    f, slide, output, base = (
-        (np.sqrt(square) / (2 * np.pi)).tolist(),
-        (rows[0] @ shapes).tolist(),
-        (free.output @ shapes).tolist(),
-        (free.base @ shapes).tolist(),
-    )
+    f = (np.sqrt(square) / (2 * np.pi)).tolist()
+    slide = (rows[0] @ shapes).tolist()
+    output = (free.output @ shapes).tolist()
+    base = (free.base @ shapes).tolist()
     held = (
         MODES % (STUCK, f[0], slide[0], output[0])
         + f"base = {base[0]!r}\n"
@@ -88,11 +87,9 @@ def test_exact_two_modes_and_a_bonded_spring():
 
 def test_exact_several_interfaces_of_a_file(tmp_path):
     """Matrices of two coordinates with two joints: with both held and taken off as without."""
-    M, K, faces = (
-        np.diag([1.0, 2.0]),
-        np.array([[5e5, -2e5], [-2e5, 4e5]]),
-        np.array([[1.0, 0.0], [1.0, -1.0]]),
-    )
+    M = np.diag([1.0, 2.0])
+    K = np.array([[5e5, -2e5], [-2e5, 4e5]])
+    faces = np.array([[1.0, 0.0], [1.0, -1.0]])
     joints = np.diag([1e5, 3e5])
     np.savez(tmp_path / "free.npz", M=M, K=K, C=M * 2.0)
     np.savez(tmp_path / "stuck.npz", M=M, K=K + faces.T @ joints @ faces, C=M * 2.0)

@@ -43,7 +43,8 @@ tolerance = 0.003
 def test_always_a_moment_beside_an_approach_is_in_the_load_that_a_plan_counts_with():
     """Without it 155 N stood for 2.6e6 N, 60 steps per cycle for 230000: 1.9 s were planned and 14 s taken."""
     scene = load(TURNED)
-    foreseen, found = plan(scene), run(scene, estimate=False)
+    foreseen = plan(scene)
+    found = run(scene, estimate=False)
     assert foreseen.model.nominal_load == pytest.approx(
         found.measures["normal_load"].value, rel=0.1
     )
@@ -86,10 +87,8 @@ tolerance = 0.01
 def test_always_the_plan_estimates_the_list_of_bonds_of_a_block_under_a_step():
     """It hardly moves on its bonds: one strip of each step, 3800 of them, was kept where 66 were planned."""
     scene = load(PUSHED.format(cycles=12))
-    foreseen, book = (
-        plan(scene).unknowns["bond_list_about"],
-        run(scene, estimate=False).extra["book"],
-    )
+    foreseen = plan(scene).unknowns["bond_list_about"]
+    book = run(scene, estimate=False).extra["book"]
     assert book["strips"] <= 1.2 * foreseen
 
 
@@ -139,7 +138,8 @@ def test_always_the_plan_estimates_the_work_of_a_stuck_block():
         .replace('"levels"', '"sine"')
     )
     scene = load(sine)
-    model, book = plan(scene).model, run(scene, estimate=False).extra["book"]
+    model = plan(scene).model
+    book = run(scene, estimate=False).extra["book"]
     counted = 2.5e-7 * book["iterations"] * book["strips"] / 2
     assert counted / 12 <= list_cost(model, choose(model))[1] <= 12 * counted
 
@@ -173,7 +173,8 @@ def test_always_the_plan_estimates_the_list_of_bonds_of_a_barely_stuck_block(ord
     """Its limit is 1.13 times what holds it. Bonds of order 0 pull alike at any stretch: it turns back in every step,
     and each leaves a strip. 55 and 61 strips were planned."""
     scene = load(JUST_HELD.format(order=order))
-    found, book = plan(scene), run(scene, estimate=False).extra["book"]
+    found = plan(scene)
+    book = run(scene, estimate=False).extra["book"]
     model = found.model
     assert book["strips"] / 3 <= list_cost(model, choose(model))[0] <= 3 * book["strips"]
     assert any(
@@ -207,7 +208,8 @@ def test_exact_the_kinetic_coefficient_decides_whether_a_slipping_block_sticks_a
     kinetic, sticks
 ):
     text = SLIDES.format(kinetic=kinetic)
-    found, run_ = plan(text), run(load(text))
+    found = plan(text)
+    run_ = run(load(text))
     said = next(one for one in found.verdict if one.startswith("D = 0.9 is below 1"))
     assert (
         (run_.measures["stick_fraction"].value > 0)

@@ -33,15 +33,15 @@ def wide(r, low, high):
 def scene(seed: int) -> tuple:
     """(law, text without a drive, low and high end of the sweep [Hz], force [N]) of a random rig of 1 to 3 modes under
     a force, or of a chain of three masses of which the last one rubs."""
-    r, law = np.random.default_rng(seed), LAWS[seed % len(LAWS)]
-    own, mass, force, damping = (
-        wide(r, 60, 300),
-        wide(r, 0.2, 2),
-        wide(r, 0.5, 50),
-        wide(r, 2e-3, 2e-2),
-    )
+    r = np.random.default_rng(seed)
+    law = LAWS[seed % len(LAWS)]
+    own = wide(r, 60, 300)
+    mass = wide(r, 0.2, 2)
+    force = wide(r, 0.5, 50)
+    damping = wide(r, 2e-3, 2e-2)
     reach = force / (mass * (2 * np.pi * own) ** 2 * 2 * damping)
-    limit, slips = force * wide(r, 0.05, 3.0), f"{reach * wide(r, 0.003, 0.3)!r} m"
+    limit = force * wide(r, 0.05, 3.0)
+    slips = f"{reach * wide(r, 0.003, 0.3)!r} m"
     if law == "chain":
         k = mass * (2 * np.pi * own) ** 2
         masses = ", ".join(f'"{mass * r.uniform(0.3, 2)!r} kg"' for _ in range(3))
@@ -113,7 +113,9 @@ def outside(seed: int) -> list:
     """(name, error over its bar) of the measures of a random scene."""
     curve, at = swept(seed)
     place = largest(at, curve)
-    true, mine, out = at(place).measures, curve.measures, []
+    true = at(place).measures
+    mine = curve.measures
+    out = []
     peak = mine["peak_frequency"]
     out.append(("peak_frequency", abs(peak.value - place) / (peak.error + 2e-7 * place)))
     for name in MAIN:
@@ -143,7 +145,8 @@ def test_exact_the_curve_of_a_stuck_interface_has_the_peak_of_the_bonded_structu
     text = read_template("damper")
     one = text[: text.index("\n[sweep]")] + text[text.index("\n[accuracy]") :]
     found = pf.run(one, **{"structure.interface[1].load": "100 kN"}).measures
-    mass, damp = np.diag([0.15, 0.25]), np.array([[2.0, -2], [-2, 12]])
+    mass = np.diag([0.15, 0.25])
+    damp = np.array([[2.0, -2], [-2, 12]])
     stiff = np.array([[1e6, -1e6], [-1e6, 6e6 + 70e6]])
 
     def height(f):
@@ -151,7 +154,8 @@ def test_exact_the_curve_of_a_stuck_interface_has_the_peak_of_the_bonded_structu
         return -20 * abs(np.linalg.inv(stiff - w**2 * mass + 1j * w * damp)[0, 0])
 
     true = minimize_scalar(height, bounds=(405, 415), method="bounded", options={"xatol": 1e-10})
-    size, place = found[MAIN[0]], found["peak_frequency"]
+    size = found[MAIN[0]]
+    place = found["peak_frequency"]
     assert abs(size.value + true.fun) <= size.error < 1e-6 * size.value
     assert abs(place.value - true.x) <= place.error < 1e-2
 
@@ -163,10 +167,8 @@ def settles(seed: int) -> tuple | None:
     r = np.random.default_rng(seed + 1)
     f = low / 0.15 * r.uniform(0.4, 0.7) if law == "chain" else low / 0.7 * r.uniform(0.9, 1.1)
     text += f'[drive]\nkind = "force"\n{force}frequency = "{f!r} Hz"\ncycles = {int(r.integers(40, 250))}\n'
-    run, steady = (
-        pf.run(text + "[accuracy]\ntolerance = 1e-2\n"),
-        pf.run(text + '[accuracy]\ntolerance = 1e-4\nmethod = "harmonic"\n'),
-    )
+    run = pf.run(text + "[accuracy]\ntolerance = 1e-2\n")
+    steady = pf.run(text + '[accuracy]\ntolerance = 1e-4\nmethod = "harmonic"\n')
     if (run.outcome, steady.outcome) != ("steady", "steady"):
         return None
     return run.measures[MAIN[0]], run.measures.get(f"{MAIN[0]}_steady"), steady.measures[MAIN[0]]

@@ -37,7 +37,8 @@ ZETA, LEVEL = 0.003, 0.980665
 
 def amplitude(f):
     """Sum over both modes of output base a/(omega_r^2 - omega^2 + 2 i zeta omega_r omega)."""
-    w, own = 2 * np.pi * np.atleast_1d(f)[:, None], 2 * np.pi * np.array([143.0, 73.0])
+    w = 2 * np.pi * np.atleast_1d(f)[:, None]
+    own = 2 * np.pi * np.array([143.0, 73.0])
     return np.abs(
         LEVEL * np.sum(np.array([0.9, 0.005]) / (own**2 - w**2 + 2j * ZETA * own * w), axis=1)
     )

@@ -55,7 +55,8 @@ tolerance = 1e-2
 
 def ratio(result):
     """loop_area/(2 pi m w^2 Z^2) by the run's own modal coordinate, Z half of what it moves in a cycle, as written."""
-    modal, time = result.window.modal[:, 0], result.window.time
+    modal = result.window.modal[:, 0]
+    time = result.window.time
     cycles = round((time[-1] - time[0]) * 110)
     half = np.mean(
         [

@@ -30,7 +30,8 @@ LEAST = {
 
 def settings(seed: int, kind: str) -> list:
     """A random scene: load, coating, tilt, crown or step, holder or load line, unlike pieces, plane state, skin."""
-    r, out = np.random.default_rng(seed), []
+    r = np.random.default_rng(seed)
+    out = []
 
     def wide(low, high):
         return 10 ** r.uniform(np.log10(low), np.log10(high))
@@ -86,7 +87,8 @@ def compared(seed: int, kind: str) -> dict:
     found = measures(
         *series, tolerance=model.accuracy.tolerance if model.patch.mesh.is_automatic else None
     )
-    grids, finest = [series[0].pair.grid, series[0].pair.upper_grid], [values(series[0])]
+    grids = [series[0].pair.grid, series[0].pair.upper_grid]
+    finest = [values(series[0])]
     same = grids[0] is grids[1]
     for _ in range(2):
         grids = [grid.refine() for grid in grids[: 2 - same]]
@@ -100,7 +102,8 @@ def compared(seed: int, kind: str) -> dict:
 
 def truth(first, second, third) -> float:
     """Where a series under two halvings goes, if its changes have one sign and shrink; else its last value."""
-    before, last = second - first, third - second
+    before = second - first
+    last = third - second
     if before * last <= 0 or abs(before) < 1.15 * abs(last):
         return third
     return third + last / (min(max(before / last, 1.2), 4.0) - 1)
@@ -147,7 +150,8 @@ def campaign(kind: str, first: int, count: int) -> dict:
 def test_exact_the_limit_of_a_geometric_series(ratio):
     """1 + 1/r + 1/r^2 + ... = r/(r - 1); 1.8 times what the finest value lacks is its error."""
     sums = np.cumsum(ratio ** -np.arange(4.0))
-    found, end = extrapolate(sums), ratio / (ratio - 1)
+    found = extrapolate(sums)
+    end = ratio / (ratio - 1)
     assert found.extrapolated == pytest.approx(end, rel=1e-12)
     assert found.error == pytest.approx(1.8 * (end - sums[-1]), rel=1e-12)
     assert found.left == pytest.approx((end - sums[-1]) / (4 if ratio > 2.6 else 2), rel=1e-12)

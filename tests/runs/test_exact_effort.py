@@ -82,7 +82,8 @@ def pieces(model) -> int:
 )
 def test_always_pieces_are_foreseen_within_a_factor_of_four(text):
     model = pf.plan(text).model
-    expected, took = costs.pieces_per_cycle(model) * model.rig.drive.cycles, pieces(model)
+    expected = costs.pieces_per_cycle(model) * model.rig.drive.cycles
+    took = pieces(model)
     assert took / 4 < expected < 4 * took
 
 
@@ -111,7 +112,8 @@ def test_exact_one_mode_under_a_drive_far_below_it(frequency, kinetic):
     result = pf.run(text, **({"friction.kinetic": str(kinetic)} if kinetic else {}))
     model = result.plan.model
     assert costs.seconds_of_pieces(model) < 20
-    limit, k = 0.3 * 26 * 4.4482216152605, 0.884 * (2 * np.pi * 143) ** 2
+    limit = 0.3 * 26 * 4.4482216152605
+    k = 0.884 * (2 * np.pi * 143) ** 2
     wanted = 0.884 * 18 * 9.80665 / k - limit / k
     if kinetic is None:
         assert result.measures["relative_displacement_amplitude"].value == pytest.approx(

@@ -147,7 +147,8 @@ def test_cases_with_such_a_mode_run_by_themselves():
     scenes = [pf.load(driven.replace("-0.02", damping)) for damping in ("-0.02", "0.02")]
     gains, loses = (pf.build(one) for one in scenes)
     assert "gain energy" in lumped.refuses(gains) and not lumped.refuses(loses)
-    both, single = batches.solve_models([gains, loses]), pf.run(scenes[0])
+    both = batches.solve_models([gains, loses])
+    single = pf.run(scenes[0])
     assert both.outcome[0] == single.outcome
     for name in ("relative_displacement_amplitude", "flutter_amplitude"):
         assert both.values[name][0] == single.measures[name].value

@@ -111,7 +111,8 @@ def test_exact_a_run_of_centuries_is_refused_with_its_key():
 
 
 def test_exact_a_group_with_a_limit_leaves_what_it_has_not_used(tmp_path):
-    groups, root = tmp_path / "cgroup", tmp_path / "fs"
+    groups = tmp_path / "cgroup"
+    root = tmp_path / "fs"
     for place, most, used, old in (("a", 9000, 5000, 600), ("a/b", "max", 4000, 0)):
         (root / place).mkdir(parents=True)
         (root / place / "memory.max").write_text(f"{most}\n")

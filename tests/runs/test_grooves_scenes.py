@@ -154,7 +154,8 @@ def test_exact_a_patch_under_a_rigid_slide_is_the_point():
 @pytest.mark.parametrize("text", [BENCH, RIG])
 def test_exact_flat_grooves_are_the_law_itself(text):
     """Amplitude 0 gives every number of the scene without grooves."""
-    there, here = run(text, **{"normal.grooves.amplitude": "0 um"}), run(flat(text))
+    there = run(text, **{"normal.grooves.amplitude": "0 um"})
+    here = run(flat(text))
     assert {name: one.value for name, one in there.measures.items()} == {
         name: one.value for name, one in here.measures.items()
     }

@@ -95,7 +95,9 @@ def test_exact_the_multipliers_of_next_to_no_friction_are_those_of_the_valley():
         "drive.acceleration=1e-3 m/s^2",
     )
     found, (model, _) = pf.run(asked).extra["multipliers"], contact_of(asked)
-    modes, drive, kept = model.rig.modes, model.rig.drive.signal, 0.003 * model.rig.modes.omega[0]
+    modes = model.rig.modes
+    drive = model.rig.drive.signal
+    kept = 0.003 * model.rig.modes.omega[0]
     own = np.sqrt(modes.omega[0] ** 2 + model.grooves.stiffness(115.0) / modes.mass - kept**2)
     np.testing.assert_allclose(np.abs(found), np.exp(-kept * drive.period), rtol=1e-4)
     assert np.abs(np.angle(found)) == pytest.approx(
@@ -121,6 +123,7 @@ def test_always_elastic_pieces_move_as_in_a_march():
             marched.measures[name].value, rel=1e-5
         )
     area = balanced.patch.pieces.interface.weight
-    fields, time = balanced.fields["shear_stress"], balanced.fields["time"]
+    fields = balanced.fields["shear_stress"]
+    time = balanced.fields["time"]
     force = np.interp(time, balanced.response.time, balanced.response.force)
     np.testing.assert_allclose(fields[1:] @ area, force[1:], rtol=1e-6, atol=1e-6 * 115)

@@ -64,7 +64,8 @@ def path(amplitude, reach=15e-6):
 @pytest.mark.parametrize("share", [0.5, 0.3])
 def test_exact_the_amplitude_by_its_own_differential_equation(share):
     """dA/dn = -share kappa N int R ds/N over the area, of the piece that loses more; the volume is what left both."""
-    found, more = run(PIECES + SLIDE, **{"wear.upper_share": share}), max(share, 1 - share)
+    found = run(PIECES + SLIDE, **{"wear.upper_share": share})
+    more = max(share, 1 - share)
     way = solve_ivp(
         lambda n, a: -more * KAPPA * LOAD * path(a[0]) / AREA,
         (0, 4e6),
@@ -72,7 +73,8 @@ def test_exact_the_amplitude_by_its_own_differential_equation(share):
         rtol=1e-9,
         atol=1e-15,
     )
-    left, volume = found.measures["groove_amplitude"], value(found, "worn_volume")
+    left = found.measures["groove_amplitude"]
+    volume = value(found, "worn_volume")
     assert abs(left.value - way.y[0, -1]) <= left.error < 2e-3 * left.value
     assert (7.5e-6 - left.value) * AREA == pytest.approx(more * volume, rel=1e-12)
     steep = left.value * WAVE

@@ -100,7 +100,8 @@ def two_stops(d):
 
 def _through(begin, x, d):
     """x(t), x'(t) of x'' + x = sin t - d from (x, 0) at `begin`."""
-    one, two = x + d + begin * cos(begin) / 2, cos(begin) / 2 - begin * sin(begin) / 2
+    one = x + d + begin * cos(begin) / 2
+    two = cos(begin) / 2 - begin * sin(begin) / 2
 
     def place(t):
         return -d - t * cos(t) / 2 + one * cos(t - begin) + two * sin(t - begin)
@@ -145,7 +146,8 @@ def test_exact_below_the_resonance_threshold():
 
 def test_exact_a_rigid_mode_slides_under_a_force():
     """A block on a table under F sin w t: from rest it slides (cos a - cos b) - D (b - a) F/(m w^2) ... and stops."""
-    d, w = 0.8, 2 * pi * 50
+    d = 0.8
+    w = 2 * pi * 50
     text = rig(
         "static = 0.3",
         f'kind = "force"\nfrequency = "50 Hz"\nforce = "{30 / d!r} N"\ncycles = 30',
@@ -227,7 +229,8 @@ def test_exact_many_cycles_keep_their_phase(cycles):
 def test_exact_static_above_kinetic_is_bistable():
     """6 g at 135 Hz of 143 Hz under friction of 7 g at rest, 4 g in motion: at rest for ever, or 4.83011 a/omega^2."""
     text = rig("static = 0.7\nkinetic = 0.4", base(60.0, 400, 135 / 143))
-    rest, moving = result_of(text), result_of(text, 'structure.start={velocity = ["0.5 m/s"]}')
+    rest = result_of(text)
+    moving = result_of(text, 'structure.start={velocity = ["0.5 m/s"]}')
     assert rest.outcome == "stuck" and value(rest) == 0.0
     assert moving.outcome == "steady"
     # the printed number is over omega_n^2

@@ -115,7 +115,8 @@ def test_always_a_load_and_gap_a_billionth_as_large_give_the_same_patch(sets):
         number, unit = number.split()
         factor = 1e-9 if "tilt" in name else 1e9
         small.append(f"{name}={float(number) * factor!r} {unit}")
-    one, other = solved(*sets, COARSE), solved(*small, f"contact.load={LOAD * 1e-9!r} N", COARSE)
+    one = solved(*sets, COARSE)
+    other = solved(*small, f"contact.load={LOAD * 1e-9!r} N", COARSE)
     assert np.array_equal(one.patch.active, other.patch.active)
     for name, power in (
         ("pressure_peak", 1),
@@ -129,7 +130,10 @@ def test_always_a_load_and_gap_a_billionth_as_large_give_the_same_patch(sets):
 def test_exact_a_soft_thin_coating_is_a_bed_of_springs():
     """A bonded layer 1000 times softer, far wider than thick, yields p t/(lambda + 2 mu): under a crown
     p = k (a^2 - x^2)/(2 R), a^3 = 3 P R/(2 k), k of two layers in series; the layers' ends are a/t = 60 away."""
-    young, nu, thick, radius = 121e6, 0.3, 50e-6, 1.0
+    young = 121e6
+    nu = 0.3
+    thick = 50e-6
+    radius = 1.0
     stiff = young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / thick / 2
     half = (3 * LOAD / WIDTH * radius / (2 * stiff)) ** (1 / 3)
     found = solved(
@@ -145,8 +149,12 @@ def test_exact_a_soft_thin_coating_is_a_bed_of_springs():
 
 def test_exact_a_stiff_coating_carries_a_small_contact_alone(cheap):
     """A layer 1000 times stiffer, 20 half widths thick: Hertz with the layer's own modulus."""
-    young, nu, thick, radius = 121e12, 0.2, 0.5e-3, 0.1
-    modulus, line = young / (1 - nu**2) / 2, LOAD / WIDTH
+    young = 121e12
+    nu = 0.2
+    thick = 0.5e-3
+    radius = 0.1
+    modulus = young / (1 - nu**2) / 2
+    line = LOAD / WIDTH
     half = hertz_half_width(line, radius, modulus)
     found = solved(
         "contact.crown.radius=0.1 m",
@@ -243,7 +251,8 @@ EXPONENTIAL = "contact.asperities.law=exponential"
 def test_exact_strips_across_a_step_that_bears_are_the_whole_patch_and_its_peak_has_no_bound():
     """Level strips are pressed alike, so that their number changes nothing; nothing bounds the peak at the step."""
     step = ("contact.step.height=1 um", "contact.step.at=2 mm")
-    found, alone = solved("contact.strips.count=4", *step, COARSE), solved(*step, COARSE)
+    found = solved("contact.strips.count=4", *step, COARSE)
+    alone = solved(*step, COARSE)
     for name in ("pressure_peak", "loaded_fraction"):
         assert (
             value(found, name) is None

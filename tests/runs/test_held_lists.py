@@ -160,7 +160,8 @@ tolerance = 0.2
 
 def test_always_the_plan_estimates_the_list_of_growing_bonds_under_levels():
     """D 1.2 of the largest level: one strip per step, and one of each piece that a step is cut into."""
-    foreseen, found = plan(LEVELS), run(load(LEVELS), estimate=False)
+    foreseen = plan(LEVELS)
+    found = run(load(LEVELS), estimate=False)
     book = found.extra["book"]
     assert lists_grow(foreseen.model) and not chatters(foreseen.model)
     assert foreseen.unknowns["bond_list_about"] == pytest.approx(

@@ -20,7 +20,8 @@ def bench(law, *sets):
 
 def test_exact_coulomb_behind_a_spring_is_one_jenkins_element():
     found = bench('"coulomb"')
-    force, last = [], 0.0
+    force = []
+    last = 0.0
     for step in np.diff(found.slide, prepend=0.0):
         last = min(max(last + STIFF * step, -LIMIT), LIMIT)
         force.append(last)
@@ -81,9 +82,12 @@ def test_exact_a_rig_feels_the_spring():
     text = text.replace('"nonlocal"', '"coulomb"').replace('bond_length = "1 um"\n', "")
     text = text.replace("slide = 0.8", "slide = 1.0")
     found = run(loads(text, "a.toml", sets), estimate=False)
-    mass, omega = 0.884, 2 * np.pi * 143
-    own, drive = np.sqrt(omega**2 + STIFF / mass), 40 * np.pi
-    t, z = found.response.time, found.response.slide
+    mass = 0.884
+    omega = 2 * np.pi * 143
+    own = np.sqrt(omega**2 + STIFF / mass)
+    drive = 40 * np.pi
+    t = found.response.time
+    z = found.response.slide
     damp = 0.003 * omega
     high = np.sqrt(own**2 - damp**2)
     gain = 1 / complex(own**2 - drive**2, 2 * damp * drive)

@@ -34,13 +34,13 @@ def solved(keys=LOAD, tables=""):
 
 
 def test_exact_a_soft_holder_is_a_free_piece_and_a_stiff_one_a_clamp():
-    line, tilt = '[contact.load_line]\noffset = "0.5 mm"\n', '[contact.tilt]\nangle = "0.1 mrad"\n'
+    line = '[contact.load_line]\noffset = "0.5 mm"\n'
+    tilt = '[contact.tilt]\nangle = "0.1 mrad"\n'
     spring = '[contact.holder]\nrotational_stiffness = "{} N m/rad"\n'
-    free, clamped = solved(tables=line)[1], solved(tables=tilt)[1]
-    soft, stiff = (
-        solved(tables=line + spring.format("1e-6"))[1],
-        solved(tables=tilt + spring.format("1e13"))[1],
-    )
+    free = solved(tables=line)[1]
+    clamped = solved(tables=tilt)[1]
+    soft = solved(tables=line + spring.format("1e-6"))[1]
+    stiff = solved(tables=tilt + spring.format("1e13"))[1]
     for name in ("contact_fraction", "rotation", "moment", "approach", "pressure_peak"):
         assert soft[name] == pytest.approx(free[name], rel=1e-8)
         assert stiff[name] == pytest.approx(clamped[name], rel=1e-6)
@@ -95,7 +95,9 @@ def test_exact_a_step_lifts_one_side():
 @pytest.mark.parametrize("angle", [5e-6, 1e-4, 1e-3])
 def test_exact_a_soft_linear_skin_is_the_wedge_on_a_foundation(angle):
     """Bodies a thousand times stiffer than the skin: contact length sqrt(2 N/(k theta b)), full below 2 p/(k L)."""
-    stiffness, load, size = 1e10, 26 * 4.4482216152605, 12.7e-3
+    stiffness = 1e10
+    load = 26 * 4.4482216152605
+    size = 12.7e-3
     found = solved(
         tables=f'[contact.tilt]\nangle = "{angle} rad"\n[contact.asperities]\nlaw = "linear"\n'
         f'normal_stiffness = "{stiffness} Pa/m"\ntangential_ratio = 0.8\n'

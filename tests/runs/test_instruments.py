@@ -98,12 +98,11 @@ def test_exact_a_linear_rig_in_closed_form():
     found, (acceleration, displacement) = values(
         text, *sets("accelerometer", FELT), *sets("gauge", SEEN), "accuracy.method=harmonic"
     )
-    w, a = 2 * np.pi * 140, 5 * 9.80665
-    own, zeta, base = (
-        2 * np.pi * np.array([143.0, 129.0]),
-        np.array([0.02, 0.03]),
-        np.array([0.9, 0.3]),
-    )
+    w = 2 * np.pi * 140
+    a = 5 * 9.80665
+    own = 2 * np.pi * np.array([143.0, 129.0])
+    zeta = np.array([0.02, 0.03])
+    base = np.array([0.9, 0.3])
     z = -a * base / (own**2 - w**2 + 2j * zeta * own * w)
     felt = abs(a - w**2 * z @ [1.0, -0.4])
     assert acceleration.value == pytest.approx(felt, rel=1e-6)
@@ -129,9 +128,8 @@ def test_refuses_instruments_where_the_output_is_judged(more, said):
 
 def test_exact_half_a_swing_of_cubics():
     t = np.array([0.0, 1.0, 3.0])
-    y, v = t**3 - 4 * t**2 + 2 * t, 3 * t**2 - 8 * t + 2
-    peak, valley = (
-        (lambda x: x**3 - 4 * x**2 + 2 * x)((8 - np.sqrt(40)) / 6),
-        (lambda x: x**3 - 4 * x**2 + 2 * x)((8 + np.sqrt(40)) / 6),
-    )
+    y = t**3 - 4 * t**2 + 2 * t
+    v = 3 * t**2 - 8 * t + 2
+    peak = (lambda x: x**3 - 4 * x**2 + 2 * x)((8 - np.sqrt(40)) / 6)
+    valley = (lambda x: x**3 - 4 * x**2 + 2 * x)((8 + np.sqrt(40)) / 6)
     assert measure_half_swing(t, y, v) == pytest.approx((peak - valley) / 2, rel=1e-14)

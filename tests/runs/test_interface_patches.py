@@ -68,7 +68,8 @@ def rig_of_one(law: str = LAW) -> str:
 def test_exact_one_interface_with_a_patch_is_the_rig_of_that_patch(law, method):
     """Every measure and every error, of both ways to write one scene."""
     more = f'[accuracy]\nmethod = "{method}"\n'
-    mine, want = pf.run(ALONE.replace(LAW, law) + more), pf.run(rig_of_one(law) + more)
+    mine = pf.run(ALONE.replace(LAW, law) + more)
+    want = pf.run(rig_of_one(law) + more)
     assert mine.outcome == want.outcome and mine.measures.keys() == want.measures.keys()
     for name, one in want.measures.items():
         ours = mine.measures[name]
@@ -121,7 +122,8 @@ def test_exact_the_order_of_interfaces_does_not_matter(chain):
         # of the first interface alone
         if one.startswith(("slip_start", "equivalent", "secant", "drift")):
             continue
-        ours, want = other.measures[two], chain.measures[one]
+        ours = other.measures[two]
+        want = chain.measures[one]
         assert ours.value == pytest.approx(want.value, rel=1e-8, abs=want.floor), one
         # the secant stiffness of the first alone is among the signs
         assert ours.error <= 3 * want.error + want.floor
@@ -132,7 +134,9 @@ def slipping_nodes(giving, limit) -> tuple:
     """(stiffness, yield slide) of what nodes (m,) of a compliance (m, m) [m/N] and of friction limits [N] do under one
     rising slide: those that stick carry t of giving t = q - what the others bend them, and one after the other slips.
     """
-    sticks, slides, forces = np.ones(limit.size, bool), [0.0], [0.0]
+    sticks = np.ones(limit.size, bool)
+    slides = [0.0]
+    forces = [0.0]
     while sticks.any():
         per = np.linalg.solve(
             giving[np.ix_(sticks, sticks)],
@@ -155,13 +159,19 @@ def integrated(model, cycles: int, steps: int) -> tuple:
     sets = []
     for one in model.rig.friction.interfaces:
         patch = faces.press_on_meshes(one, model.accuracy.tolerance)[0]
-        bears, load = patch.active, patch.pressure.sigma_n * patch.pieces.interface.weight
+        bears = patch.active
+        load = patch.pressure.sigma_n * patch.pieces.interface.weight
         sets.append(
             slipping_nodes(patch.giving[np.ix_(bears, bears)], one.numbers.static * load[bears])
         )
-    rows, omega, peak = np.array([[1.0, 0.0], [-1.0, 1.0]]), 2 * np.pi * 240, 8 * 9.80665
+    rows = np.array([[1.0, 0.0], [-1.0, 1.0]])
+    omega = 2 * np.pi * 240
+    peak = 8 * 9.80665
     h = 1 / (240 * steps)
-    place, half, work, held = np.zeros(2), np.zeros(2), 0.0, [np.zeros(k.size) for k, _ in sets]
+    place = np.zeros(2)
+    half = np.zeros(2)
+    work = 0.0
+    held = [np.zeros(k.size) for k, _ in sets]
     total = np.zeros(2)
     for n in range(cycles * steps):
         before = total
@@ -174,7 +184,8 @@ def integrated(model, cycles: int, steps: int) -> tuple:
             rate = (half + after) / 2 if n else np.zeros(2)
         half = after
         place = place + h * half
-        move, total = rows @ half * h, np.zeros(2)
+        move = rows @ half * h
+        total = np.zeros(2)
         for k, (stiffness, most) in enumerate(sets):
             held[k] = np.clip(held[k] + move[k], -most, most)
             total[k] = stiffness @ held[k]
@@ -189,7 +200,8 @@ def test_an_integration_of_its_own_agrees():
     found = pf.run(CHAIN, **{"drive.cycles": float(cycles)})
     model = pf.build(pf.load(CHAIN))
     coarse, fine = (np.array(integrated(model, cycles, steps)) for steps in (4000, 8000))
-    best, open_ = fine + (fine - coarse) / 3, np.abs(fine - coarse)
+    best = fine + (fine - coarse) / 3
+    open_ = np.abs(fine - coarse)
     response = found.response
     ours = np.array([response.extra["slides"][-1, 0], found.measures["friction_work"].value])
     assert (open_ < 1e-5 * np.abs(fine)).all()
@@ -205,7 +217,8 @@ def test_the_march_and_the_balance_agree_with_the_exact_motion(chain):
             "loop_area_2",
             "slip_amplitude_2",
         ):
-            one, two = chain.measures[name], other.measures[name]
+            one = chain.measures[name]
+            two = other.measures[name]
             assert abs(one.value - two.value) <= one.error + two.error, (method, name)
 
 
@@ -264,7 +277,8 @@ def test_a_rigid_patch_moves_as_a_point_with_a_warning():
         + f'[[structure.interface]]\nbetween = [1, 0]\n{LAW}load = "100 N"\n'
         + DRIVE
     )
-    one, two = pf.run(rigid), pf.run(point)
+    one = pf.run(rigid)
+    two = pf.run(point)
     for name, want in two.measures.items():
         found = one.measures[name]
         assert found.reason == want.reason, name

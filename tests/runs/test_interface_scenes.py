@@ -112,7 +112,8 @@ def loop(monkeypatch):
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """(scene text, *words) -> (summary, dataset) of a run through the command line, each once."""
-    base, kept = tmp_path_factory.mktemp("interfaces"), {}
+    base = tmp_path_factory.mktemp("interfaces")
+    kept = {}
 
     def of(text, *words):
         if (text, words) not in kept:
@@ -163,11 +164,9 @@ def test_exact_two_equal_masses_side_by_side_move_as_one(written, method):
     pair, data = written(SIDE_BY_SIDE + DRIVE, *words)
     one, alone = written(ONE + DRIVE, *words)
     for name in ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area"):
-        mine, first, second = (
-            one["measures"][name],
-            pair["measures"][name],
-            pair["measures"][f"{name}_2"],
-        )
+        mine = one["measures"][name]
+        first = pair["measures"][name]
+        second = pair["measures"][f"{name}_2"]
         assert first["value"] == pytest.approx(mine["value"], rel=1e-8), name
         # the second loop is read from samples
         near = 1e-4 if (method, name) == ("march", "loop_area") else 1e-8

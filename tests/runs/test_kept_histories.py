@@ -58,7 +58,8 @@ DRIVES = {
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
     """(engine, drive) -> (scene, Result), each once."""
-    folder, kept = tmp_path_factory.mktemp("histories"), {}
+    folder = tmp_path_factory.mktemp("histories")
+    kept = {}
     time = np.linspace(0, 0.1, 800)
     value = 6 * G_N * np.sin(2 * np.pi * (130 * time + 100 * time**2))
     rows = "\n".join(f"{t:.9g},{a:.9g}" for t, a in zip(time, value))
@@ -87,7 +88,8 @@ CASES = [(engine, drive) for engine in ENGINES for drive in DRIVES]
 @pytest.mark.parametrize(("engine", "drive"), CASES)
 def test_always_kept_are_the_ends_and_a_hundred_a_cycle_of_the_last_two(done, engine, drive):
     _, result = done(engine, drive)
-    r, sine = result.response, result.plan.model.rig.drive.signal
+    r = result.response
+    sine = result.plan.model.rig.drive.signal
     end = result.window.time[-1]
     assert np.all(np.diff(r.time) > 0) and r.time[0] == 0 and r.time[-1] == end
     assert r.time.size >= 100
@@ -107,7 +109,8 @@ def test_always_a_release_is_kept_evenly_all_along(done, engine):
         assert result.extra["engine"] == "smooth"
     else:
         _, result = done(engine, "release")
-    r, period = result.response, result.plan.model.rig.drive.signal.period
+    r = result.response
+    period = result.plan.model.rig.drive.signal.period
     assert r.time[0] == 0 and r.time[-1] == result.window.time[-1] and (np.diff(r.time) > 0).all()
     assert np.diff(r.time).max() <= period / 20 * (1 + 1e-6)
     # between samples the motion is the cubic of both ends: there is nothing else beside it

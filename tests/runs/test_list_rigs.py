@@ -63,7 +63,8 @@ def drawn(rng) -> str:
 
 def books(seed, count) -> list:
     """(energy_balance, work_check, of stretch what is created over what passes, scene) of random rigs."""
-    rng, out = np.random.default_rng(seed), []
+    rng = np.random.default_rng(seed)
+    out = []
     for _ in range(count):
         text = drawn(rng)
         found = run(load(text), estimate=False)

@@ -22,7 +22,8 @@ tolerance = {}
 def test_always_a_value_of_another_engine_is_not_that_of_the_mesh():
     """A measure has the value of the finest mesh where that is named, and another one where another engine is."""
     result = run(PATCH.format(1e-3))
-    on_mesh, named = values(result.patch), summarise_run(result)["numerics"]["measures"]
+    on_mesh = values(result.patch)
+    named = summarise_run(result)["numerics"]["measures"]
     assert named.keys() == {name for name, one in result.measures.items() if one.value is not None}
     assert patch_rows.EXTRAPOLATED_SOURCE in named.values()
     for name, words in named.items():

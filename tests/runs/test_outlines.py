@@ -61,7 +61,8 @@ def towards(place: float, half: float, fine: float, growth: float = 1.2) -> np.n
     if half > place:
         right.append(place + np.cumsum(graded_rows(fine, half - place, growth)))
     x = np.concatenate(right)
-    x[0], x[-1] = 0.0, half
+    x[0] = 0.0
+    x[-1] = half
     return frozen_array(np.concatenate([-x[:0:-1], x]))
 
 
@@ -108,7 +109,11 @@ def test_order_pressure_grows_towards_a_corner_with_the_power_of_its_wedges(
 
 
 def test_order_rounded_ends_on_a_long_block_are_the_punch_in_closed_form():
-    flat, radius, load, young, poisson = 1e-3, 1e-3, 2e6, 120e9, 0.3
+    flat = 1e-3
+    radius = 1e-3
+    load = 2e6
+    young = 120e9
+    poisson = 0.3
     text = BLOCK.replace("24 mm", "80 mm").replace("8 mm", "40 mm").replace("100 kN", "2000 kN")
     model = asked(
         text + '[contact.upper]\nlength = "4 mm"\nheight = "2 mm"\nend_radius = "1 mm"\n'
@@ -120,7 +125,8 @@ def test_order_rounded_ends_on_a_long_block_are_the_punch_in_closed_form():
     for halvings in (0, 1):
         patch = graded(model, towards(half, model.pieces.length / 2, 2e-6), halvings=halvings)
         wanted = rounded_punch_pressure(patch.x, load, flat, radius, modulus)
-        off, weight = patch.pressure.sigma_n - wanted, patch.pieces.interface.weight
+        off = patch.pressure.sigma_n - wanted
+        weight = patch.pieces.interface.weight
         misses.append(np.sqrt((weight * off**2).sum() / (weight * wanted**2).sum()))
     # first order, by the nodes where the contact ends
     assert misses[1] < 4e-3 and misses[0] / misses[1] > 1.8
@@ -182,7 +188,8 @@ def test_exact_the_written_mesh_of_shaped_pieces_is_read_back_as_the_same_patch(
             tmp_path / "scene.toml",
         )
     ).patch
-    a, b = values(solve(model, *bodies)), values(solve(again, *make_piece_meshes(again)))
+    a = values(solve(model, *bodies))
+    b = values(solve(again, *make_piece_meshes(again)))
     assert b == pytest.approx(a, rel=1e-8)
 
 

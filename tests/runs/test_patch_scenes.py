@@ -92,7 +92,8 @@ def test_exact_normal_stiffness_is_the_slope_of_the_load_over_the_approach(law, 
     """Behind a linear skin the slope of the mesh jumps from node to node; over a dozen of them it is the measure."""
     tables = TILT.format(2e-5) + SKINS[law] + strips
     _, here = solved(tables)
-    step, loads_ = 3e-9 if law == "linear" else 1e-13, []
+    step = 3e-9 if law == "linear" else 1e-13
+    loads_ = []
     for sign in (-1, 1):
         closing = f'[contact.approach]\ndistance = "{here["approach"] + sign * step!r} m"\n'
         loads_.append(solved(tables + closing, keys='element_size = "0.127 mm"')[1]["normal_load"])
@@ -111,7 +112,8 @@ def test_exact_asperities_deform_in_shear_also_under_rigid_pieces(law):
     )
     patch, found = solved(SKINS[law])
     crush = 1e13 if patch.skin is None else patch.skin.stiffness
-    rigid, both = 0.8 * np.sum(crush * patch.pieces.interface.weight), found["tangential_stiffness"]
+    rigid = 0.8 * np.sum(crush * patch.pieces.interface.weight)
+    both = found["tangential_stiffness"]
     assert both < rigid
     for tables, stiffness in (("", rigid), ("[contact.shear]\n", both)):
         found = run(scene(SKINS[law] + tables + bench), estimate=False)
@@ -136,7 +138,8 @@ def test_exact_strips_of_a_rigid_pad_on_a_linear_skin(count):
 
 def test_exact_a_load_line_beside_the_middle_rolls_a_rigid_pad():
     """The pressure is N/A + N e y / I, the roll -N e / (k I), with I = L W^3 (1 - 1/count^2) / 12 of the strips."""
-    arm, count = 0.8e-3, 6
+    arm = 0.8e-3
+    count = 6
     tables = SKINS["linear"] + f'[contact.strips]\ncount = {count}\noffset = "{arm} m"\n'
     patch, found = solved(tables, material=RIGID)
     spread = LENGTH * WIDTH**3 / 12 * (1 - 1 / count**2)
@@ -160,7 +163,8 @@ def test_always_the_bars_of_a_free_roll_hold_the_count_of_strips(count, arm):
 
 def test_exact_strips_without_roll_are_the_patch():
     tables = TILT.format(1e-4)
-    one, strips = solved(tables)[1], solved(tables + "[contact.strips]\ncount = 4\n")[1]
+    one = solved(tables)[1]
+    strips = solved(tables + "[contact.strips]\ncount = 4\n")[1]
     for name, value in one.items():
         assert strips[name] == pytest.approx(value, rel=1e-9, abs=1e-15), name
     assert strips["pressure_centre_lateral"] == pytest.approx(0.0, abs=1e-12)
@@ -290,7 +294,8 @@ def test_exact_a_rounded_mesh_is_the_flat_mesh_with_the_rounding_in_its_gap(tmp_
     patch = solve(found, *make_piece_meshes(found))
     x = patch.x
     assert patch.gap == pytest.approx(x**2 / (2 * 5.0), rel=1e-9, abs=1e-18)
-    mine, crown = values(patch), solved('[contact.crown]\nradius = "5 m"\n')[1]
+    mine = values(patch)
+    crown = solved('[contact.crown]\nradius = "5 m"\n')[1]
     for name in ("pressure_peak", "contact_fraction", "normal_stiffness", "approach"):
         assert mine[name] == pytest.approx(crown[name], rel=1e-3), name
 
@@ -415,10 +420,8 @@ def test_exact_the_summary_states_the_places_of_the_contact(tmp_path, shape, end
     answer = cli("run", path, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 0 and re.search(told, answer.out, re.M), answer.out[:300]
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    contact, known = (
-        summary["contact"],
-        {name: one["value"] for name, one in summary["measures"].items()},
-    )
+    contact = summary["contact"]
+    known = {name: one["value"] for name, one in summary["measures"].items()}
     parts = np.array(contact["stretches"])
     assert [contact["from"], contact["to"]] == pytest.approx([-LENGTH / 2, LENGTH / 2])
     assert (parts[0, 0] == contact["from"], parts[-1, 1] == contact["to"]) == ends

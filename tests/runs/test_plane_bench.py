@@ -72,13 +72,15 @@ def test_exact_every_point_of_a_patch_stepped_on_its_own(table, strips):
     found = law_bench.run(model, patch, 60, 6)
     pressure = patch.strips.pressure if strips else patch.pressure.sigma_n[None]
     offsets = patch.strips.offsets if strips else np.zeros(1)
-    count, flat = len(pressure), pressure.ravel()
+    count = len(pressure)
+    flat = pressure.ravel()
     time = model.slide.samples(60)[0]
     corners = 1e-3 * np.array([0, 2, 6, 8])
     ways = 1e-6 * np.array([[0, 10, 10, 4], [0, 0, 20, 24]])
     path = np.stack([np.interp(time, corners, way) for way in ways], axis=1)
     law = FirstOrderBonds(Bonds(0.3, 2e-6))
-    state, tractions = law.start(flat, 2), [np.zeros((2, flat.size))]
+    state = law.start(flat, 2)
+    tractions = [np.zeros((2, flat.size))]
     for move, span in zip(np.diff(path, axis=0), np.diff(time)):
         state = law.step(state, move, flat, flat, span).state
         tractions.append(law.traction(state))

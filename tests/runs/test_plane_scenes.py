@@ -42,8 +42,10 @@ TURN = np.pi / 6
 def matrices(folder, name: str, turn: float, soft: float = 1.0) -> None:
     """Two nodes with x and y each, of which the second's directions are turned; soft: stiffness along y over that along
     x."""
-    ground, link = np.diag([5e4, 5e4 * soft]), np.diag([8e4, 8e4 * soft])
-    c, s = np.cos(turn), np.sin(turn)
+    ground = np.diag([5e4, 5e4 * soft])
+    link = np.diag([8e4, 8e4 * soft])
+    c = np.cos(turn)
+    s = np.sin(turn)
     R = np.eye(4)
     R[2:, 2:] = [[c, s], [-s, c]]  # directions of the second node in terms of x and y
     K = R @ np.block([[ground + link, -link], [-link, link]]) @ R.T

@@ -28,7 +28,9 @@ def pressed(tmp_path, x, z, text, *settings):
 def test_a_punch_with_rounded_ends_from_a_file_is_that_in_closed_form(tmp_path, tolerance):
     """Its flat is a sixteenth of the pieces, which lowers the peak of half planes by some 1.7e-3. The averages over
     a two-hundredth of the length were 12 % off behind a bar of 0.1 %."""
-    flat, radius, load = 0.5e-3, 20e-3, 5e4
+    flat = 0.5e-3
+    radius = 20e-3
+    load = 5e4
     x = np.linspace(-8e-3, 8e-3, 8001)
     z = np.maximum(np.abs(x) - flat, 0) ** 2 / (2 * radius)
     text = (
@@ -105,10 +107,8 @@ def test_points_as_fine_as_a_file_hold_an_independent_program(tmp_path):
 def test_points_and_cells_agree_within_their_bars(tmp_path, pieces):
     """A wave of a tenth of the length under a free rotation, of unlike pieces, in plane stress."""
     x = np.linspace(-6.35e-3, 6.35e-3, 1271)
-    z, text = (
-        0.1e-6 * np.cos(2 * np.pi * x / 1.27e-3),
-        PIECE + 'load = "500 N"\nsubstrate = "steel"\n' + COATING,
-    )
+    z = 0.1e-6 * np.cos(2 * np.pi * x / 1.27e-3)
+    text = PIECE + 'load = "500 N"\nsubstrate = "steel"\n' + COATING
     points = on_points(tmp_path, x, z, text, pieces)
     even = pressed(tmp_path, x, z, text, pieces, "contact.element_size=16 um").measures
     # the shear of unlike pieces is left to the cells

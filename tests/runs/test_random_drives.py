@@ -33,7 +33,9 @@ SHAKEN = (
 def test_exact_the_motion_is_that_of_its_record():
     """The same record through scipy's linear filter gives the motion, its root mean square and its spectrum."""
     result = pf.run(RIG)
-    drive, omega, zeta = result.plan.model.rig.drive.signal, 2 * np.pi * 100, 0.02
+    drive = result.plan.model.rig.drive.signal
+    omega = 2 * np.pi * 100
+    zeta = 0.02
     _, place, _ = lsim(
         lti([[0, 1], [-(omega**2), -2 * zeta * omega]], [[0], [-1]], [[1, 0]], [[0]]),
         drive.value,

@@ -39,7 +39,8 @@ WITH_FIELDS = ["patch", "bench patch", "rig patch"]
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
     """name -> (results folder, answer of --json) of every scene, each run once."""
-    base, out = tmp_path_factory.mktemp("runs"), {}
+    base = tmp_path_factory.mktemp("runs")
+    out = {}
 
     def of(name):
         if name not in out:
@@ -89,7 +90,8 @@ class Fields:
 
     @staticmethod
     def _block(grid):
-        points, cells = grid.GetPointData(), grid.GetCellData()
+        points = grid.GetPointData()
+        cells = grid.GetCellData()
         ends, nodes = (
             vtk_to_numpy(a).copy()
             for a in (grid.GetCells().GetOffsetsArray(), grid.GetCells().GetConnectivityArray())
@@ -180,7 +182,8 @@ def test_exact_measures_of_the_kind(done, name):
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_resolved_scene_is_the_scene(done, name):
     folder, _ = done(name)
-    first, again = load(folder.with_suffix(".toml")), load(folder / "scene.resolved.toml")
+    first = load(folder.with_suffix(".toml"))
+    again = load(folder / "scene.resolved.toml")
     assert again.effect_names() == first.effect_names() and again.resolved() == first.resolved()
 
 
@@ -188,7 +191,9 @@ def test_exact_resolved_scene_is_the_scene(done, name):
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_netcdf(done, name):
     folder, answer = done(name)
-    data, kind, summary = netcdf(folder), name.split()[0], json.loads(answer.out)
+    data = netcdf(folder)
+    kind = name.split()[0]
+    summary = json.loads(answer.out)
     assert all(
         "units" in variable.attrs
         for variable in data.variables.values()
@@ -232,7 +237,8 @@ def test_exact_netcdf(done, name):
 @pytest.mark.parametrize("name", ["rig", "rig march", "rig patch", "linear"])
 def test_exact_newton_holds_at_every_sample(done, name):
     """m (a_abs) = -k q - c v - F at each kept sample."""
-    data, mass = netcdf(done(name)[0]), 0.884
+    data = netcdf(done(name)[0])
+    mass = 0.884
     force = data.friction_force if name != "linear" else 0.0
     wanted = (
         -(OMEGA**2) * data.relative_displacement
@@ -259,7 +265,8 @@ def test_exact_shear_frames_carry_the_friction_force(done):
 @pytest.mark.parametrize("name", WITH_FIELDS)
 def test_exact_the_interface_closes_where_it_is_pressed(done, name):
     folder, _ = done(name)
-    fields, data = Fields(folder), netcdf(folder)
+    fields = Fields(folder)
+    data = netcdf(folder)
     for step in (0, fields.steps - 1):
         frame = fields.frame(step)
         low, high = (np.flatnonzero(body.place[:, 1] == 0) for body in (frame.lower, frame.upper))
@@ -280,7 +287,8 @@ def test_exact_the_interface_closes_where_it_is_pressed(done, name):
 def test_exact_every_row_of_cells_carries_the_load(done, name):
     """A horizontal cut through either body balances the load and the friction force, tension > 0."""
     folder, _ = done(name)
-    fields, data = Fields(folder), netcdf(folder)
+    fields = Fields(folder)
+    data = netcdf(folder)
     for step in range(0, fields.steps, 5):
         frame = fields.frame(step)
         shear = (
@@ -290,7 +298,8 @@ def test_exact_every_row_of_cells_carries_the_load(done, name):
         )
         for body in (frame.lower, frame.upper):
             corners = body.place[np.array(body.cells)]
-            width, height = np.ptp(corners[:, :, 0], axis=1), corners[:, :, 1].mean(axis=1)
+            width = np.ptp(corners[:, :, 0], axis=1)
+            height = corners[:, :, 1].mean(axis=1)
             stress = body.stress.astype(float)
             _, row = np.unique(height.round(9), return_inverse=True)
             assert row.max() > 5
@@ -324,7 +333,8 @@ def test_exact_pressure_on_the_upper_piece_is_one_point(monkeypatch):
     ):
         assert each.measures[name].value == pytest.approx(point.measures[name].value, rel=1e-10)
     for name in ("slide", "force", "slip", "acceleration"):
-        mine, other = getattr(each.response, name), getattr(point.response, name)
+        mine = getattr(each.response, name)
+        other = getattr(point.response, name)
         np.testing.assert_allclose(mine, other, rtol=0, atol=1e-10 * np.abs(other).max())
     assert any("the shape of the patch does not affect" in sentence for sentence in lumped.warnings)
     assert lumped.measures["loop_area"].value == pytest.approx(
@@ -429,7 +439,8 @@ def test_refuses_what_takes_too_long_or_cannot_be_written(written, tmp_path):
 
 
 def test_exact_an_old_folder_survives_a_failing_run(written, tmp_path):
-    scene, out = written(SCENES["rig patch"]), tmp_path / "out"
+    scene = written(SCENES["rig patch"])
+    out = tmp_path / "out"
 
     def state():
         return {path.name: path.read_bytes() for path in out.iterdir()}
@@ -466,7 +477,8 @@ def test_exact_a_run_that_misses_its_residual_is_kept_and_marked(written, tmp_pa
 
 
 def test_refuses_to_replace_what_is_not_a_results_folder(written, tmp_path, monkeypatch):
-    scene, mine = written(POINT + COULOMB + SLIDE), tmp_path / "mine"
+    scene = written(POINT + COULOMB + SLIDE)
+    mine = tmp_path / "mine"
     mine.mkdir()
     (mine / "data.txt").write_text("years of work", "utf-8")
     for target in (mine, mine / "data.txt", tmp_path):

@@ -45,7 +45,8 @@ def test_exact_a_case_is_the_cold_run_on_the_shared_mesh(angle):
         m for m in with_shared_meshes(family(1e-6, 1e-5, 1e-3)) if m.patch.gap.angle == angle
     )
     run(one)
-    warm, cold = run(one), run(one, fresh=True)
+    warm = run(one)
+    cold = run(one, fresh=True)
     assert warm.patch.x.size == cold.patch.x.size
     for name, m in cold.measures.items():
         same = warm.measures[name]
@@ -54,10 +55,8 @@ def test_exact_a_case_is_the_cold_run_on_the_shared_mesh(angle):
 
 
 def test_exact_other_geometries_and_lonely_cases_keep_their_own_mesh():
-    plane, fault = (
-        family(1e-4, 1e-5, keys='plane = "stress"\n'),
-        PatchfemError("a case that was refused"),
-    )
+    plane = family(1e-4, 1e-5, keys='plane = "stress"\n')
+    fault = PatchfemError("a case that was refused")
     found = with_shared_meshes(
         [*family(1e-4), fault, *plane, *family(1e-4, keys='element_size = "0.4 mm"\n')]
     )
@@ -106,7 +105,8 @@ def test_always_cases_of_a_sweep_have_the_remedies_of_single_runs():
     text = JOINT.replace("tolerance = 1e-2", "tolerance = 1e-3")
     cases = [build(scene.loads(text.format(size))) for size in (0.2, 1.4)]
     for own, shared in zip(cases, with_shared_meshes(cases), strict=True):
-        alone, found = run(own), run(shared)
+        alone = run(own)
+        found = run(shared)
         assert any("the mesh (" in one for one in alone.warnings)
         assert [one.rpartition("; ")[2] for one in found.warnings] == [
             one.rpartition("; ")[2] for one in alone.warnings

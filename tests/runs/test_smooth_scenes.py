@@ -62,7 +62,8 @@ def test_exact_what_the_integrator_lacks_is_marched(old, new):
 @pytest.mark.parametrize("law", [LENGTH, GROWTH])
 def test_always_the_integrator_and_the_march_agree_within_their_bars(law):
     text = SCENE.replace(LENGTH, law)
-    fine, march = pf.run(text), pf.run(text, **{"accuracy.steps_per_cycle": 1600})
+    fine = pf.run(text)
+    march = pf.run(text, **{"accuracy.steps_per_cycle": 1600})
     assert (fine.extra["engine"], march.extra["engine"]) == (
         "smooth",
         "march",
@@ -96,7 +97,8 @@ frequency = "143 Hz"
 acceleration = "33.333333333333336 m/s^2"
 cycles = 20
 """
-    found, marched = pf.run(text), pf.run(text, **{"accuracy.method": "march"})
+    found = pf.run(text)
+    marched = pf.run(text, **{"accuracy.method": "march"})
     one, other = (run.measures["relative_displacement_amplitude"] for run in (found, marched))
     assert (
         found.extra["engine"] == "smooth"

@@ -59,7 +59,8 @@ def measures(text: str, tolerance: float) -> dict:
 def test_exact_a_pad_beside_a_step_bears_its_load_evenly():
     """Rigid pieces on a skin, 8.35 of 12.7 mm touch: an even pressure, which no node and no parabola exceeds."""
     run = pf.run(PAD)
-    even, found = 2000 / (8.35e-3 * 12.7e-3), run.measures
+    even = 2000 / (8.35e-3 * 12.7e-3)
+    found = run.measures
     truths = {
         "pressure_peak": even,  # to the 1e-5 that the pieces give
         "contact_fraction": 8.35 / 12.7,
@@ -128,7 +129,8 @@ def test_bars_of_steps_hold_and_do_not_widen_where_a_stretch_comes_on_a_finer_me
     seed, name, truth, own
 ):
     """Truths by the reference. A stretch of one cell that two of three meshes saw was 6 bars off in the stiffnesses."""
-    last, text = np.inf, text_of(drawn(seed))
+    last = np.inf
+    text = text_of(drawn(seed))
     for tolerance in (1e-3, 1e-4) if seed == 7017 else (1e-2, 1e-3):
         found = measures(text, tolerance)[name]
         assert (

@@ -51,7 +51,8 @@ def rig(law: str, seed: int) -> str:
 
 def bars(text: str) -> list:
     """(error, true error, what the truth leaves open, value) of the measures of a scene."""
-    run, fine = pf.run(text).measures, pf.run(text, **{"accuracy.tolerance": "1e-5"}).measures
+    run = pf.run(text).measures
+    fine = pf.run(text, **{"accuracy.tolerance": "1e-5"}).measures
     both = [(m, fine[name]) for name, m in run.items() if name in fine and name not in LEFT_OUT]
     return [
         (m.error, abs(m.value - t.value), t.error, abs(m.value))
@@ -65,7 +66,8 @@ def test_always_the_bars_of_a_balance_hold_and_are_sharp():
     found = np.array([row for law in LAWS for seed in (400, 401) for row in bars(rig(law, seed))])
     error, true, open_, value = found.T
     assert np.mean(true <= error + open_) >= 0.97
-    narrow, told = error <= ROUND * value, true > 2 * open_
+    narrow = error <= ROUND * value
+    told = true > 2 * open_
     assert np.mean((narrow | (error <= SHARP * true))[narrow | told]) >= 0.7
 
 
@@ -92,10 +94,8 @@ def test_exact_the_force_where_the_slide_turns():
         < 1e-6 * slides["loop_area"].value / slides["relative_displacement_amplitude"].value ** 2
     )
     holds = pf.run(rig("stiffening", 4), **{"drive.acceleration": "0.1 g"}).measures
-    limit, length = (
-        0.3 * 116,
-        float(rig("stiffening", 4).split('bond_length = "')[1].split()[0]) * 1e-6,
-    )
+    limit = 0.3 * 116
+    length = float(rig("stiffening", 4).split('bond_length = "')[1].split()[0]) * 1e-6
     assert holds["secant_stiffness"].value == pytest.approx(limit / length, rel=1e-12)
     assert holds["friction_force_peak"].value == pytest.approx(
         limit / length * holds["relative_displacement_amplitude"].value, rel=1e-9

@@ -22,7 +22,8 @@ def curve_of(text, **keys):
 
 def linear(frequency, rows=(1.0,), own=(143.0,), zeta=(0.003,), base=(1.0,), level=3 * G):
     """Amplitude [m] and absolute acceleration [m s-2] of the sum `rows` of the motions of modes without friction."""
-    w, own = 2 * np.pi * np.asarray(frequency)[:, None], 2 * np.pi * np.array(own)
+    w = 2 * np.pi * np.asarray(frequency)[:, None]
+    own = 2 * np.pi * np.array(own)
     z = -level * np.array(base) / (own**2 - w**2 + 2j * np.array(zeta) * own * w)
     return np.abs(z @ rows), np.abs(level - w[:, 0] ** 2 * (z @ rows))
 
@@ -75,8 +76,10 @@ def test_exact_levels_are_those_of_a_long_run(law):
         + MODE.replace("0.003", "0.05")
         + LEVELS.format('"3 g", "5 g", "7 g", "5 g"', 150)
     )
-    steady, run = pf.run(text, **STEADY), pf.run(text, **{"accuracy.method": "exact"})
-    ours, theirs = steady.extra["levels"], run.extra["levels"]
+    steady = pf.run(text, **STEADY)
+    run = pf.run(text, **{"accuracy.method": "exact"})
+    ours = steady.extra["levels"]
+    theirs = run.extra["levels"]
     assert [one.outcome for one in ours] == ["stuck", "steady", "steady", "steady"]
     assert (
         [one.drive for one in ours]
@@ -105,7 +108,9 @@ def test_exact_the_onset_of_slip_of_an_element_in_closed_form():
     a slip of 1e-3 bond lengths."""
     text = POINT + GIVES + MODE + LEVELS.format('"0.2 g", "6 g"', 12) + 'onset = "slip"\n'
     found = pf.run(text, **STEADY).measures["onset_level"]
-    own, w, stiffness = (2 * np.pi * 143, 2 * np.pi * 143, LIMIT / 20e-6)
+    own = 2 * np.pi * 143
+    w = 2 * np.pi * 143
+    stiffness = LIMIT / 20e-6
     size = 1 / abs(own**2 + stiffness / 0.884 - w**2 + 2j * 0.003 * own * w)
     first = 20e-6 / size
     assert (
@@ -154,7 +159,8 @@ def test_exact_of_several_balanced_motions_the_stable_one_is_shown():
         "3 steady motions exist" in said and "1 of them stable" in said for said in steady.warnings
     )
     for name in ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area"):
-        ours, theirs = steady.measures[name], march.measures[name]
+        ours = steady.measures[name]
+        theirs = march.measures[name]
         assert abs(ours.value - theirs.value) <= ours.error + theirs.error, name
 
 
@@ -203,5 +209,6 @@ def test_exact_coulomb_behind_shear_balances_beside_a_spring_that_bends(spring):
         "absolute_acceleration_fundamental",
         "loop_area",
     ):
-        ours, theirs = steady.measures[name], march.measures[name]
+        ours = steady.measures[name]
+        theirs = march.measures[name]
         assert abs(ours.value - theirs.value) <= ours.error + theirs.error < 0.1 * ours.value, name

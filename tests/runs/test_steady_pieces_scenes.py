@@ -57,7 +57,8 @@ def test_exact_a_long_run_ends_in_the_steady_motion(text, cycles):
 
 
 def test_exact_the_balance_of_named_harmonics_is_within_its_bars():
-    exact, balance = pf.run(RIG, **STEADY), pf.run(RIG, **STEADY, **{"accuracy.harmonics": "31"})
+    exact = pf.run(RIG, **STEADY)
+    balance = pf.run(RIG, **STEADY, **{"accuracy.harmonics": "31"})
     assert "map" not in summarise_run(balance)["numerics"] and balance.extra["harmonics"] == 31
     assert summarise_run(exact)["numerics"]["map"] == "yields"
     for name in (
@@ -66,7 +67,8 @@ def test_exact_the_balance_of_named_harmonics_is_within_its_bars():
         "loop_area",
         "friction_force_peak",
     ):
-        mine, other = exact.measures[name], balance.measures[name]
+        mine = exact.measures[name]
+        other = balance.measures[name]
         assert abs(mine.value - other.value) <= other.error + mine.error, name
     first = np.abs(exact.extra["multipliers"][:2]), np.abs(balance.extra["multipliers"][:2])
     assert first[0] == pytest.approx(first[1], rel=1e-2)
@@ -74,14 +76,16 @@ def test_exact_the_balance_of_named_harmonics_is_within_its_bars():
 
 def test_exact_a_patch_behind_its_shear_shows_its_own_stress():
     """The frames of the steady motion are those of a long run, node by node."""
-    text, keys = COATED + SHEAR + PLASTIC + KILOGRAM + DRIVE, {"contact.element_size": "0.4 mm"}
+    text = COATED + SHEAR + PLASTIC + KILOGRAM + DRIVE
+    keys = {"contact.element_size": "0.4 mm"}
     keys |= {"drive.frequency": "120 Hz", "structure.mode.axial.damping": "0.05"}
     steady, run = (
         pf.run(text, **keys, **more)
         for more in (STEADY, {"accuracy.method": "exact", "drive.cycles": "120"})
     )
     assert steady.extra["map"] == "yields" and agree(steady, run, 1e-7) == []
-    ours, theirs = steady.fields["shear_stress"][1:], run.fields["shear_stress"][1:]
+    ours = steady.fields["shear_stress"][1:]
+    theirs = run.fields["shear_stress"][1:]
     np.testing.assert_allclose(ours, theirs, atol=1e-7 * np.abs(theirs).max())
     assert steady.measures["relative_displacement_amplitude"].error > 0  # the mesh has its share
 

@@ -29,7 +29,8 @@ RUNS = {
 
 def both(text: str) -> tuple:
     """The scene with the stiffness, and with the bond length."""
-    stiff, length = f'stiffness = "{STIFF} N/m"\n', 'bond_length = "{!r} m"\n'
+    stiff = f'stiffness = "{STIFF} N/m"\n'
+    length = 'bond_length = "{!r} m"\n'
     if "%s" in text:
         return text.replace("%s", stiff), text.replace("%s", length.format(0.3 * 60 / STIFF))
     return text.replace(LAW, LAW + stiff), text.replace(
@@ -90,7 +91,8 @@ def test_exact_a_sweep_of_the_load_leaves_the_stiffness():
     ],
 )
 def test_refuses_a_stiffness_that_is_not_one(sets, key, says):
-    text, found = both(RIG)[0], mistakes(both(RIG)[0], *sets)
+    text = both(RIG)[0]
+    found = mistakes(both(RIG)[0], *sets)
     assert len(found) == 1 and f": {key}: " in found[0] and says in found[0]
     if "give" in says:  # what it says serves
         loads(text.replace(f'stiffness = "{STIFF} N/m"', 'bond_length = "5 um"'), "a.toml", sets)

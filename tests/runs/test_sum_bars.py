@@ -25,7 +25,8 @@ PRINTED = 'reading = "report"\ninitial_bonds = 0\nkinetic = 0.2\nrest_growth = "
 def test_exact_the_bars_of_a_rig_hold_the_error_of_the_sum(law, knobs):
     """Against the sum of every bond at the same steps: a tail of 5 % moves the amplitude by 7 %, which the bars of the
     steps alone did not hold, nor those of ten other measures."""
-    text, fine = RIG.format(law=law), ["accuracy.quadrature=truncated", "accuracy.tail=1e-9"]
+    text = RIG.format(law=law)
+    fine = ["accuracy.quadrature=truncated", "accuracy.tail=1e-9"]
     whole = run(loads(text, sets=fine), estimate=False).measures
     found = run(loads(text, sets=knobs)).measures
     for name, one in found.items():

@@ -26,18 +26,21 @@ PLASTIC = {
 
 def from_rest(t, omega, zeta, parts):
     """Displacement of an oscillator from rest under tones (f, a, phase) of the base, in closed form."""
-    own, out = omega * np.sqrt(1 - zeta**2), 0.0
+    own = omega * np.sqrt(1 - zeta**2)
+    out = 0.0
     for f, a, phi in parts:
         w = 2 * np.pi * f
         steady = -a * np.exp(1j * phi) / (omega**2 - w * w + 2j * zeta * omega * w)
-        place, rate = steady.imag, (1j * w * steady).imag
+        place = steady.imag
+        rate = (1j * w * steady).imag
         free = place * np.cos(own * t) + (rate + zeta * omega * place) / own * np.sin(own * t)
         out = out + (steady * np.exp(1j * w * t)).imag - np.exp(-zeta * omega * t) * free
     return out
 
 
 def test_exact_tones_on_a_linear_rig_are_the_sum_of_each():
-    result, parts = pf.run(RIG), ((96, 9.80665, 0), (102, 9.80665 / 2, np.radians(40)))
+    result = pf.run(RIG)
+    parts = ((96, 9.80665, 0), (102, 9.80665 / 2, np.radians(40)))
     true = from_rest(result.response.time, 2 * np.pi * 100, 0.02, parts)
     assert np.abs(result.response.output - true).max() < 1e-6 * np.abs(true).max()
     # one beat of 1/6 s in cycles of 96 Hz

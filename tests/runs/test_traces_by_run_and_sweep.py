@@ -55,7 +55,8 @@ def test_a_sweep_has_the_numbers_of_the_run(scene, result):
 
 
 def test_fields_pages_and_stretches_show_the_peak_and_the_contact_of_the_measures(result, tmp_path):
-    peak, fraction = result.measures["pressure_peak"], result.measures["contact_fraction"]
+    peak = result.measures["pressure_peak"]
+    fraction = result.measures["contact_fraction"]
     data = result.to_xarray()
     assert abs(float(data.normal_stress.max()) - peak.value) <= peak.error
     assert float((data.weight * data.normal_stress[0]).sum()) == pytest.approx(20.0, rel=1e-10)

@@ -42,7 +42,8 @@ def test_exact_a_pitching_mode_closes_its_energy_and_balances_its_fields(law):
         found.measures["energy_balance"].value <= 1e-10
         and found.measures["energy_created"].value == 0
     )
-    fields, patch = found.fields, found.patch
+    fields = found.fields
+    patch = found.patch
     load = found.response.extra["normal_load"]
     sums = fields["normal_stress"] @ patch.pieces.interface.weight
     assert sums[0] == pytest.approx(patch.pressure.load) and np.ptp(sums) > 0
@@ -57,7 +58,10 @@ def test_exact_the_spring_of_the_holder_is_in_series_with_the_pitch():
     """Forces at a turn of the holder: the piece turns by the moment over the spring less than the holder."""
     words = ["contact.tilt.angle=0.01 mrad", "contact.holder.rotational_stiffness=2e4 N m/rad"]
     patch = result_of(PITCH, *FEW, *words, "drive.cycles=1").patch
-    found, x, turn, spring = make_contact_sets(patch, 2e4), patch.x, 2e-6, 2e4
+    found = make_contact_sets(patch, 2e4)
+    x = patch.x
+    turn = 2e-6
+    spring = 2e4
     force = solve_forces(found.c, found.x, found.opening + turn * found.x, np.zeros(0))[0]
     own = turn + (force @ x - patch.pressure.moment) / spring
     before = patch.pressure.sigma_n * patch.pieces.interface.weight
@@ -75,7 +79,8 @@ def test_exact_the_spring_of_the_holder_is_in_series_with_the_pitch():
 def test_exact_a_rig_under_a_swinging_load(law):
     """normal_load follows its formula, the balance closes, and friction keeps below mu N."""
     found = result_of(POINT, *SWING, *law, estimate=True)
-    time, load = found.response.time, found.response.extra["normal_load"]
+    time = found.response.time
+    load = found.response.extra["normal_load"]
     assert load == pytest.approx(
         26 * 4.4482216152605 + 60 * np.cos(2 * np.pi * 50 * time), abs=1e-9
     )

@@ -44,7 +44,9 @@ def test_exact_fields_of_a_patch_with_shear():
     """The holder's slide is slip, what the pieces take of the compliance itself and the stretch of the springs, which
     is at most that of springs of stiffness mu sigma/eps_0; friction keeps below mu of the pressure there."""
     found = result_of(*SETS, PLASTIC, "accuracy.shear_modes=65")
-    fields, weight, seen = found.fields, found.patch.pieces.interface.weight, 0
+    fields = found.fields
+    weight = found.patch.pieces.interface.weight
+    seen = 0
     for tau, sigma, slip, slide in zip(
         *(fields[key][1:] for key in ("shear_stress", "normal_stress", "slip", "holder_slide"))
     ):

@@ -184,7 +184,8 @@ def test_exact_bodies_close_over_the_worn_gap_in_every_frame(worn_folder):
             sides.append(
                 body["PointData/displacement"][:].reshape(frames, len(points), 3)[:, flat, 1]
             )
-        apart, expected = sides[1] - sides[0], data.gap.values - data.worn_depth.values
+        apart = sides[1] - sides[0]
+        expected = data.gap.values - data.worn_depth.values
         change = np.ptp(expected, axis=0).max()
         assert np.abs((apart - apart[0]) - (expected - expected[0])).max() < 1e-5 * change
 
@@ -194,19 +195,23 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
     """Cattaneo-Mindlin with Q = 0.6 mu P: the stick zone c = a0 sqrt(0.4) stays, all pressure moves into it, and its
     middle tends to c/a0 + 0.6 P/(pi c p0) of the Hertz peak: Hertz under 0.4 P and a flat punch under the rest.
     Normal and tangential compliance are alike, as of two half-planes (Ciavarella and Hills, 1999)."""
-    width, radius, line, mu, young, cells = 10e-3, 0.05, 1e5, 0.5, 121e9, 24
+    width = 10e-3
+    radius = 0.05
+    line = 1e5
+    mu = 0.5
+    young = 121e9
+    cells = 24
     half = hertz_half_width(line, radius, young / (1 - 0.32**2) / 2)
-    peak, stick = hertz_peak(line, radius, young / (1 - 0.32**2) / 2), half * np.sqrt(0.4)
+    peak = hertz_peak(line, radius, young / (1 - 0.32**2) / 2)
+    stick = half * np.sqrt(0.4)
     grid = refined_middle(1.5 * half, half / cells, 40 * half, 20 * half, 1.15)
     nn, _, _ = interface_compliance(
         make_piece(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32)))
     )
-    x, area, gap, load = (
-        grid.x,
-        grid.tributary_lengths() * width,
-        grid.x**2 / 2 / radius,
-        line * width,
-    )
+    x = grid.x
+    area = grid.tributary_lengths() * width
+    gap = grid.x**2 / 2 / radius
+    load = line * width
     pair = Compliance(Interface(x, area, width), 2 * nn / width, 2 * nn / width)
 
     def press(worn, softening):
@@ -227,10 +232,12 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
         return np.where(slips, 4 * np.abs(slide - pair.tangential @ shear), 0.0)
 
     asked = WearProblem(press, path, area, 1e-13, 1e9)
-    state, count = start_wear(asked), 0
+    state = start_wear(asked)
+    count = 0
     at_first = state.path @ state.force
     while state.cycle < asked.cycles:
-        state, count = take_jump(asked, state, 1e-2), count + 1
+        state = take_jump(asked, state, 1e-2)
+        count = count + 1
     inside = np.abs(x) < stick
     assert count < 60
     assert (state.path[inside] == 0).all() and not state.depth[inside].any()
@@ -292,7 +299,8 @@ def test_always_a_motion_without_bounds_wears_nothing():
 )
 def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(tmp_path, monkeypatch, text):
     """The last state among them, after which no jump is left."""
-    scene, states = tmp_path / "worn.toml", []
+    scene = tmp_path / "worn.toml"
+    states = []
     scene.write_text(text)
 
     save = evolve.save_state
@@ -326,7 +334,8 @@ def test_exact_a_coating_worn_through_ends_the_run_at_its_cycle(more):
     """The volume is that of the cycles so far, the depth at the deepest place the coating of the piece that loses
     most."""
     found = ran(THIN_COAT + more)
-    cycle, coating = found.measures["worn_through_cycle"], 6 * 25.4e-6
+    cycle = found.measures["worn_through_cycle"]
+    coating = 6 * 25.4e-6
     share = 0.8 if "share" in more else 0.5
     assert found.outcome == "worn_through" and 0 < cycle.value < 1e9
     assert found.measures["worn_depth_max"].value * share == pytest.approx(coating, rel=1e-6)
@@ -350,7 +359,8 @@ def test_exact_a_coating_worn_through_ends_the_run_at_its_cycle(more):
 
 
 def test_refuses_to_resume_the_run_of_another_scene(tmp_path, monkeypatch):
-    scene, save = tmp_path / "worn.toml", evolve.save_state
+    scene = tmp_path / "worn.toml"
+    save = evolve.save_state
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
 
     def interrupted(*asked):

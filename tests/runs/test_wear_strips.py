@@ -57,7 +57,9 @@ def test_exact_a_rolled_pad_on_springs_evens_its_pressure_out():
         + 'load = "26 lbf"\nelement_size = "4 mm"\nsubstrate = {young = "1e17 Pa", poisson = 0.3, '
         'density = "1000 kg/m^3"}\n'
     )
-    skin, k, n = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e12 Pa/m"\n', 1e12, 5e4
+    skin = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e12 Pa/m"\n'
+    k = 1e12
+    n = 5e4
     found = ran(
         stiff
         + skin
@@ -67,7 +69,8 @@ def test_exact_a_rolled_pad_on_springs_evens_its_pressure_out():
         + WEAR.replace("135723", "5e4")
         + "[accuracy]\ntolerance = 1e-4\n"
     )
-    y, mean = (np.arange(4) - 1.5) * 12.7e-3 / 4, LOAD / 12.7e-3**2
+    y = (np.arange(4) - 1.5) * 12.7e-3 / 4
+    mean = LOAD / 12.7e-3**2
     first = -k * 0.05e-3 * y
     assert (mean + first > 0).all()
     share = 1e-14 * 40e-6 * n
@@ -88,10 +91,8 @@ def test_exact_a_rig_wears_its_strips_by_their_own_slides(yaw):
         + "jumps = 1\n"
         + LOOSE
     )
-    slides, last = (
-        found.window.extra.get("slides"),
-        found.window.time >= found.window.time[-1] - (1 + 1e-9) / 143,
-    )
+    slides = found.window.extra.get("slides")
+    last = found.window.time >= found.window.time[-1] - (1 + 1e-9) / 143
     volumes = worn(found).mean(axis=1) * 12.7e-3**2 / 4
     if yaw == "0":
         assert slides is None

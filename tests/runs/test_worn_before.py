@@ -32,7 +32,8 @@ def ran(folder, *sets):
 def test_exact_two_halves_are_the_closed_form_of_the_whole(place):
     found = ran(place, HALF, "wear.start=one/result.nc")
     depth = DEPTH * -np.expm1(-ALPHA * MU * LOAD / AREA * PATH * 2e6 / DEPTH)
-    volume, one = found.measures["worn_volume"], pf.load(place / "a.toml")
+    volume = found.measures["worn_volume"]
+    one = pf.load(place / "a.toml")
     assert abs(volume.value - depth * AREA) <= volume.error < 1e-3 * volume.value
     assert abs(found.measures["static_coefficient"].value - MU * (1 - depth / DEPTH)) <= 1e-3 * MU
     first = ran(place, HALF).measures["worn_volume"]
@@ -53,11 +54,10 @@ def test_exact_compare_states_the_cycles_of_the_run_before(place):
 
 def test_exact_volumes_add_where_the_path_and_the_friction_stay(place):
     """V = kappa N s n: of two runs under other strokes the sum, to 1e-12; the note tells what the run goes on from."""
-    archard, stroke = (
-        [HALF, "wear.form=archard", "wear.friction.coefficient_factor=[1, 1]"],
-        "slide.amplitude=5 um",
-    )
-    one, two = ran(place, *archard), ran(place, *archard, stroke)
+    archard = [HALF, "wear.form=archard", "wear.friction.coefficient_factor=[1, 1]"]
+    stroke = "slide.amplitude=5 um"
+    one = ran(place, *archard)
+    two = ran(place, *archard, stroke)
     one.save(place / "archard")
     found = ran(place, *archard, stroke, "wear.start=archard/result.nc")
     volume = sum(each.measures["worn_volume"].value for each in (one, two))

@@ -56,7 +56,8 @@ def ran(*sets):
 def test_exact_friction_that_falls_with_wear_runs_in_exponentially(tolerance):
     """dh/dn = alpha mu_0 (1 - h/H) p s of the mean depth: h = H (1 - exp(-alpha mu_0 p s n/H)), at every jump."""
     found = ran(f"accuracy.tolerance={tolerance}")
-    law, volume = found.measures["static_coefficient"], found.measures["worn_volume"]
+    law = found.measures["static_coefficient"]
+    volume = found.measures["worn_volume"]
     history = found.extra["wear"]
     depth = DEPTH * -np.expm1(-ALPHA * MU * LOAD / AREA * PATH * history["cycle"] / DEPTH)
     assert abs(volume.value - depth[-1] * AREA) <= volume.error < tolerance * volume.value

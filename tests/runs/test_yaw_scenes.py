@@ -59,7 +59,8 @@ def test_exact_strips_by_events_and_by_the_march(one_loop):
         "friction_work",
         "absolute_acceleration_peak",
     ):
-        a, b = exact[name], march[name]
+        a = exact[name]
+        b = march[name]
         assert abs(a.value - b.value) <= a.error + 3 * b.error + 1e-3 * abs(a.value), name
     extra = result.window.extra
     assert extra["slides"].shape[1] == 4
@@ -154,7 +155,9 @@ def test_exact_rolled_strips_behind_shear_turn_by_the_forces_of_their_own_elemen
     """Slide q - y yaw, force of a set of elements made by hand of C = 4 C_t and the strip's own forces, torque
     sum y f, and a yaw mode that this torque alone drives; at 0.2 mrad strips are open."""
     result = behind_shear(law, STRIPS.format(roll), TURNS)
-    extra, patch, found = result.response.extra, result.patch, result.response
+    extra = result.response.extra
+    patch = result.patch
+    found = result.response
     assert found.time.size == 201 and (patch.strips.force.sum(axis=1) == 0).any() == (
         roll == "0.2 mrad"
     )
@@ -164,7 +167,8 @@ def test_exact_rolled_strips_behind_shear_turn_by_the_forces_of_their_own_elemen
         found.modal[:, :1] - 30 * np.outer(found.modal[:, 1], y),
         atol=1e-13 * np.abs(extra["slides"]).max(),
     )
-    length, most = (1e-6 if "elastic" in law else 0.0), np.abs(extra["forces"]).max()
+    length = 1e-6 if "elastic" in law else 0.0
+    most = np.abs(extra["forces"]).max()
     for k, normal in enumerate(patch.strips.force):
         force = by_hand(
             4 * patch.pair.compliance.tangential, 0.3 * normal, length, extra["slides"][:, k]
@@ -182,12 +186,15 @@ def by_hand(compliance, limit, length, slide):
     """Force [N] along a slide (k,) [m] of points that yield at limit (m,) [N] behind compliance (m, m) [m/N] and a
     stretch of `length` [m] at the limit: each step a linear problem with bounds, solved set by set."""
     points = np.flatnonzero(limit > 0)
-    most, carried, out = limit[points], np.zeros(points.size), [0.0]
+    most = limit[points]
+    carried = np.zeros(points.size)
+    out = [0.0]
     if not points.size:
         return np.zeros(slide.size)
     inner = compliance[np.ix_(points, points)] + np.diag(length / most)
     for move in np.diff(slide):
-        free, left = np.ones(points.size, bool), move
+        free = np.ones(points.size, bool)
+        left = move
         while left:
             rate = np.zeros(points.size)
             rate[free] = (

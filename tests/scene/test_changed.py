@@ -108,11 +108,10 @@ def test_exact_load_of_a_scene_takes_si_values():
 
 def test_exact_tables_that_came_before_stand_beside_others():
     """Cases of a product share the tables of each axis, whatever order they come in; a mistake is kept of none."""
-    base, r = BaseScene(loads(RIG, "scene.toml")), np.random.default_rng(8)
-    loads_, sizes = (
-        ["normal.load=1 N", "normal.load=2 N", "normal.load=-3 N"],
-        ["drive.acceleration=1 g", "title=x"],
-    )
+    base = BaseScene(loads(RIG, "scene.toml"))
+    r = np.random.default_rng(8)
+    loads_ = ["normal.load=1 N", "normal.load=2 N", "normal.load=-3 N"]
+    sizes = ["drive.acceleration=1 g", "title=x"]
     more = [
         "drive.frequency=99 Hz",
         "drive.acceleration=0 g",

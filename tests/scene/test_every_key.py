@@ -153,9 +153,11 @@ def answer(text: str) -> tuple:
 def silent(scene: str) -> list:
     """Keys that stand in a scene without a word and change no bit, at none of their values."""
     tables = tomllib.loads(SCENES[scene])
-    base, out = answer(text_of(tables)), []
+    base = answer(text_of(tables))
+    out = []
     for path, tried in leaves():
-        name, taken = ".".join(map(str, path)), False
+        name = ".".join(map(str, path))
+        taken = False
         for value in tried:
             if (changed := with_key(tables, path, value)) is None:
                 continue

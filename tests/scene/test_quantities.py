@@ -55,7 +55,9 @@ def test_exact_values(text, kind, value):
 
 
 def test_exact_pound_force_per_inch_and_its_relatives():
-    pound, inch, gravity = Fraction("0.45359237"), Fraction("0.0254"), Fraction("9.80665")
+    pound = Fraction("0.45359237")
+    inch = Fraction("0.0254")
+    gravity = Fraction("9.80665")
     assert parse_quantity("1 lbf", "force") == float(pound * gravity)
     assert parse_quantity("1 lbf/in", "stiffness") == float(pound * gravity / inch)
     assert parse_quantity("1 lbf in", "moment") == float(pound * gravity * inch)

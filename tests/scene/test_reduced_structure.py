@@ -40,10 +40,12 @@ WHOLE = SCENE[: SCENE.index("[structure.reduced]")].replace(
 @pytest.fixture
 def folder(tmp_path):
     """Matrices of a chain of 40 masses, held at one end."""
-    k, m = 1e7, 0.02
+    k = 1e7
+    m = 0.02
     K = k * (2 * np.eye(COUNT) - np.eye(COUNT, k=1) - np.eye(COUNT, k=-1))
     K[-1, -1] = k
-    M, C = m * np.eye(COUNT), 1e-6 * K
+    M = m * np.eye(COUNT)
+    C = 1e-6 * K
     mmwrite(tmp_path / "k.mtx", sparse.coo_array(K), symmetry="symmetric")
     mmwrite(tmp_path / "mm.mtx", sparse.coo_array(K / 1e3), symmetry="symmetric")
     np.savez(tmp_path / "both.npz", M=M, C=C)
@@ -101,7 +103,8 @@ def test_always_bars_hold_the_run_of_the_whole_matrices(folder, method):
 
 
 def test_exact_all_modes_kept_are_the_whole_matrices(folder):
-    small, whole = run_of(folder, SCENE, **{"structure.reduced.modes": 100}), run_of(folder, WHOLE)
+    small = run_of(folder, SCENE, **{"structure.reduced.modes": 100})
+    whole = run_of(folder, WHOLE)
     for name, one in whole.measures.items():
         if one.value is not None:
             np.testing.assert_allclose(

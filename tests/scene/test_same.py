@@ -20,7 +20,8 @@ class Held:
 def test_exact_asked_once_of_an_object_and_again_of_an_equal_one():
     asked = []
     number = memoize(lambda what, *more: asked.append(what) or (what.number, *more))
-    one, other = Held(1), Held(2)
+    one = Held(1)
+    other = Held(2)
     assert [number(one), number(one), number(other)] == [(1,), (1,), (2,)]
     assert [number(one, "a"), number(one)] == [(1, "a"), (1,)]
     assert len(asked) == 3

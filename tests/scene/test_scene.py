@@ -33,7 +33,8 @@ def test_exact_rig_in_si():
 
 def test_exact_defaults():
     scene = loads(RIG)
-    contact, friction = scene.contact, scene.friction
+    contact = scene.contact
+    friction = scene.friction
     assert (contact.pairs, contact.plane, contact.element_size, contact.tilt.on) == (
         1,
         "strain",

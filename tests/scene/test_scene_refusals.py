@@ -257,7 +257,8 @@ def test_refuses_load_lines_outside_the_patch():
 
 
 def test_refuses_a_free_roll_without_a_load_or_a_second_strip():
-    at, text = "contact.strips.offset", PATCH + '[contact.strips]\ncount = 4\noffset = "1 mm"\n'
+    at = "contact.strips.offset"
+    text = PATCH + '[contact.strips]\ncount = 4\noffset = "1 mm"\n'
     assert loads(text).contact.strips.offset == 1e-3
     assert "keep only one of these two keys" in only(text, "contact.strips.roll=1 mrad")
     assert "raise contact.strips.count" in only(text, "contact.strips.count=1")

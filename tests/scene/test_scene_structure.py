@@ -93,7 +93,8 @@ stiffness = "{0.884 * w * w!r} N/m"
 between = [0, 1]
 coefficient = "{2 * 0.003 * w * 0.884!r} N s/m"
 {STRUCTURE[STRUCTURE.index("[drive]") :]}"""
-    ours, want = run(plan(loads(mass))), run(plan(loads(STRUCTURE)))
+    ours = run(plan(loads(mass)))
+    want = run(plan(loads(STRUCTURE)))
     same(ours, want, 1e-9)
     assert ours.plan.chain["mode"] == pytest.approx(want.plan.chain["mode"], rel=1e-12)
 
@@ -106,7 +107,8 @@ def test_exact_bonded_spring_in_a_run():
     )
     scene = loads(text)
     result = run(plan(scene))
-    w0, w = 2 * np.pi * 143, 2 * np.pi * 143
+    w0 = 2 * np.pi * 143
+    w = 2 * np.pi * 143
     k = 0.884 * w0 * w0 + 4e6
     x = 0.884 * 5 * 9.80665 / abs(k - 0.884 * w * w + 2j * 0.003 * w0 * w * 0.884)
     assert result.measures["relative_displacement_amplitude"].value == pytest.approx(x, rel=1e-9)
@@ -289,7 +291,8 @@ def test_exact_modes_of_a_file_run_as_written_ones(tmp_path):
     scene = write_scene(
         tmp_path, '[structure]\nfile = "rig.mat"\nmoving_mass = "0.884 kg"\n' + POINT + text
     )
-    ours, want = run(plan(scene)), run(plan(loads(POINT + STRUCTURE)))
+    ours = run(plan(scene))
+    want = run(plan(loads(POINT + STRUCTURE)))
     same(ours, want, 1e-9)
     assert ours.plan.groups == pytest.approx(want.plan.groups)
 
@@ -299,7 +302,8 @@ def test_exact_responses_of_a_file_run_as_the_mode_behind_them(tmp_path):
     import pyuff
 
     f = np.arange(100.0, 200.0, 0.25)
-    w, w0 = 2 * np.pi * f, 2 * np.pi * 143
+    w = 2 * np.pi * f
+    w0 = 2 * np.pi * 143
     data = -(w**2) / 0.884 / (w0**2 - w**2 + 2j * 0.003 * w0 * w)
     one = {
         "type": 58,

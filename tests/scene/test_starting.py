@@ -44,7 +44,8 @@ def test_exact_the_linear_scene_is_a_resonance_curve():
     from math import pi
 
     measured = pf.run(loads(read_template("linear"))).measures["relative_displacement_amplitude"]
-    w0, w = 2 * pi * 143, 2 * pi * 140
+    w0 = 2 * pi * 143
+    w = 2 * pi * 140
     assert measured.value == pytest.approx(
         0.5 * 9.80665 / abs(w0**2 - w**2 + 2j * 0.003 * w0 * w), rel=1e-4
     )
@@ -83,18 +84,19 @@ def peak_of(limit: float, places, count: int = 8, samples: int = 256) -> float:
     [N]: odd harmonics of the platform, balanced by a root finder, the force played through two periods."""
     stiff, mass, damp = BLADE
     order = np.arange(1, 2 * count, 2)
-    wave, best, start = (
-        np.exp(1j * np.outer(order, 2 * np.pi * np.arange(samples) / samples)),
-        0.0,
-        None,
-    )
+    wave = np.exp(1j * np.outer(order, 2 * np.pi * np.arange(samples) / samples))
+    best = 0.0
+    start = None
 
     def force(slide):
-        out, now, last = np.zeros(samples), 0.0, slide[0]
+        out = np.zeros(samples)
+        now = 0.0
+        last = slide[0]
         for _ in range(2):
             for k, place in enumerate(slide.tolist()):
                 now = min(max(now + FLATS * (place - last), -limit), limit)
-                last, out[k] = place, now
+                last = place
+                out[k] = now
         return 2 / samples * (wave.conj() @ out)
 
     for place in places:

@@ -45,7 +45,8 @@ def test_exact_large_slides_lose_as_before_but_for_the_widths():
 def test_exact_mirrored_nodes_that_round_off_parts_have_the_grain_of_one():
     """Nodes of a symmetric contact yield in twos, which solvers part by 1e-10 and a small tilt by more: the ranges
     were then half as wide, and the bar a quarter. Parted by a tilt they now keep three fifths of it."""
-    k, y = np.array([1e6, 2e6, 3e6, 4e6, 5e6]), np.array([2e-8, 5e-8, 9e-8, 14e-8, 16e-8])
+    k = np.array([1e6, 2e6, 3e6, 4e6, 5e6])
+    y = np.array([2e-8, 5e-8, 9e-8, 14e-8, 16e-8])
     slides = 1e-8, 6e-8, 2e-7
     whole = [work(*spread_elements(k, y), at) - work(k, y, at) for at in slides]
     for apart, within in ((1e-10, 1e-6), (1e-4, 0.4)):  # the middle node stands alone

@@ -35,11 +35,10 @@ def friction_limit(cells, angle):
 @pytest.mark.parametrize("factor", (0.37, 1.0, 2.6))
 def test_exact_another_coefficient_is_the_same_springs(factor):
     """Points that yield at another multiple of their load: computed anew, and from those of the first."""
-    pair, limit = coated_pair(20), friction_limit(20, 1e-4)
-    mine, anew = (
-        scale_limits(jenkins_set(pair.tangential, limit), factor),
-        jenkins_set(pair.tangential, factor * limit),
-    )
+    pair = coated_pair(20)
+    limit = friction_limit(20, 1e-4)
+    mine = scale_limits(jenkins_set(pair.tangential, limit), factor)
+    anew = jenkins_set(pair.tangential, factor * limit)
     assert np.array_equal(mine.points, anew.points) and mine.n_reluctant == anew.n_reluctant
     for name in ("yield_displacement", "limit"):
         assert getattr(mine, name) == pytest.approx(getattr(anew, name), rel=1e-11)
@@ -82,7 +81,9 @@ def box_problem(c, limit, pull, force):
 
 def point_by_point(c, limit, path):
     """Resultant at every reversal [N] of points behind the compliance c, one box problem per stroke."""
-    settled, force, out = np.zeros(limit.size), np.zeros(limit.size), []
+    settled = np.zeros(limit.size)
+    force = np.zeros(limit.size)
+    out = []
     for q in path:
         force, moved = box_problem(c, limit, q - settled, force)
         settled = settled + moved
@@ -93,7 +94,8 @@ def point_by_point(c, limit, path):
 @pytest.mark.parametrize("cells", [100, 200])
 @pytest.mark.parametrize("angle", TILTS)
 def test_exact_elements_carry_the_friction_limit_and_start_at_the_stick_stiffness(cells, angle):
-    pair, limit = coated_pair(cells), friction_limit(cells, angle)
+    pair = coated_pair(cells)
+    limit = friction_limit(cells, angle)
     group = jenkins_set(pair.tangential, limit)
     assert group.stiffness @ group.yield_displacement == pytest.approx(limit.sum(), rel=1e-12)
     assert group.stiffness.sum() == pytest.approx(
@@ -107,7 +109,8 @@ def test_exact_elements_carry_the_friction_limit_and_start_at_the_stick_stiffnes
 @pytest.mark.parametrize("angle", TILTS)
 def test_exact_elements_repeat_the_problem_point_by_point(angle):
     """20 histories of 40 reversals at 101 nodes; the worst difference seen is 9e-15 of mu N."""
-    pair, limit = coated_pair(100), friction_limit(100, angle)
+    pair = coated_pair(100)
+    limit = friction_limit(100, angle)
     group = jenkins_set(pair.tangential, limit)
     assert group.n_reluctant == 0
     touching = limit > 0
@@ -121,7 +124,8 @@ def test_exact_elements_repeat_the_problem_point_by_point(angle):
 @pytest.mark.parametrize("angle", [0.0, 1e-4])
 def test_exact_elements_with_bonds_repeat_the_problem_point_by_point(angle, length):
     """Elastic-plastic points: a bond of stiffness limit/length in series with the shear of the pieces."""
-    pair, limit = coated_pair(100), friction_limit(100, angle)
+    pair = coated_pair(100)
+    limit = friction_limit(100, angle)
     group = jenkins_set(pair.tangential, limit, length)
     touching = limit > 0
     c = pair.tangential[np.ix_(touching, touching)] + np.diag(length / limit[touching])
@@ -134,7 +138,8 @@ def test_exact_elements_with_bonds_repeat_the_problem_point_by_point(angle, leng
 @pytest.mark.parametrize("angle", [0.0, 1e-5])
 def test_exact_corner_nodes_with_a_negative_row_sum_wait_for_their_neighbours(angle):
     """At 201 nodes the free corners carry the wrong sign at first; 6e-10 of mu N seen against every node kept."""
-    pair, limit = coated_pair(200), friction_limit(200, angle)
+    pair = coated_pair(200)
+    limit = friction_limit(200, angle)
     group = jenkins_set(pair.tangential, limit)
     assert group.n_reluctant > 0 and group.stiffness.min() > 0
     touching = limit > 0
@@ -145,14 +150,13 @@ def test_exact_corner_nodes_with_a_negative_row_sum_wait_for_their_neighbours(an
 
 
 def test_exact_the_force_of_every_point_is_its_share_of_the_elements():
-    pair, limit = coated_pair(100), friction_limit(100, 1e-4)
+    pair = coated_pair(100)
+    limit = friction_limit(100, 1e-4)
     group = jenkins_set(pair.tangential, limit)
     c = pair.tangential[np.ix_(group.points, group.points)]
-    settled, force, own = (
-        np.zeros(group.points.size),
-        np.zeros(group.points.size),
-        np.zeros(group.stiffness.size),
-    )
+    settled = np.zeros(group.points.size)
+    force = np.zeros(group.points.size)
+    own = np.zeros(group.stiffness.size)
     for q in np.array([0.3, 0.9, -0.4, 0.1, -2.0]) * group.yield_displacement[-1]:
         force, moved = box_problem(c, group.limit, q - settled, force)
         settled = settled + moved
@@ -197,13 +201,15 @@ def test_exact_identity_of_ciavarella_and_jaeger(shape):
     "angle, bonded", [*zip(TILTS, (4.04955667e8, 4.04942844e8, 2.30395570e8, 1.22044346e8))]
 )
 def test_exact_stick_stiffness_agrees_with_two_whole_bodies(angle, bonded):
-    pair, limit = coated_pair(200), friction_limit(200, angle)
+    pair = coated_pair(200)
+    limit = friction_limit(200, angle)
     assert tangential_stiffness(pair.tangential, limit > 0) == pytest.approx(bonded, rel=1e-8)
 
 
 def saturating(c, limit, length, slide):
     """Forces limit (1 - exp(-xi/length)) with xi + C f = slide, Newton in the local slide xi of every point."""
-    inverse, local = np.linalg.inv(c), np.zeros(limit.size)
+    inverse = np.linalg.inv(c)
+    local = np.zeros(limit.size)
     for _ in range(500):
         missing = inverse @ (slide - local) + limit * np.expm1(-local / length)
         step = np.linalg.solve(inverse + np.diag(limit * np.exp(-local / length) / length), missing)
@@ -215,7 +221,8 @@ def saturating(c, limit, length, slide):
 
 def few_modes(modes, limit, length, slide):
     """The same resultant with the compliance of `modes` only: unknowns are the mode coordinates."""
-    bound, coordinate = limit[modes.points], np.zeros(modes.stiffness.size)
+    bound = limit[modes.points]
+    coordinate = np.zeros(modes.stiffness.size)
     for _ in range(200):
         local = slide - modes.shape @ coordinate
         missing = modes.stiffness * coordinate + modes.shape.T @ (bound * np.expm1(-local / length))
@@ -231,7 +238,8 @@ def few_modes(modes, limit, length, slide):
 
 @pytest.mark.parametrize("angle", TILTS)
 def test_exact_all_modes_hold_the_whole_compliance(angle):
-    pair, limit = coated_pair(100), friction_limit(100, angle)
+    pair = coated_pair(100)
+    limit = friction_limit(100, angle)
     modes = shear_modes(pair.tangential, limit, 1e-6, 10**6)
     touching = np.flatnonzero(limit > 0)
     assert np.array_equal(modes.points, touching)
@@ -248,7 +256,8 @@ def test_exact_all_modes_hold_the_whole_compliance(angle):
 @pytest.mark.parametrize("cells", [100, 240])
 def test_exact_the_first_modes_are_the_softest_of_all(cells):
     """Those of D^1/2 C D^1/2, D the friction limits; from 200 points on they are found without the others."""
-    pair, limit = coated_pair(cells), friction_limit(cells, 1e-5)
+    pair = coated_pair(cells)
+    limit = friction_limit(cells, 1e-5)
     modes = shear_modes(pair.tangential, limit, 1e-6, 8)
     root = np.sqrt(limit[modes.points])
     values, vectors = np.linalg.eigh(
@@ -263,7 +272,8 @@ def test_exact_the_first_modes_are_the_softest_of_all(cells):
 @pytest.mark.parametrize("length", [1e-7, 1e-6])
 @pytest.mark.parametrize("angle", TILTS)
 def test_always_more_modes_never_worsen_the_backbone(angle, length):
-    pair, limit = coated_pair(200), friction_limit(200, angle)
+    pair = coated_pair(200)
+    limit = friction_limit(200, angle)
     errors = np.array(
         [shear_modes(pair.tangential, limit, length, n).backbone_error for n in (1, 2, 4, 8, 16)]
     )
@@ -277,7 +287,8 @@ def test_always_more_modes_never_worsen_the_backbone(angle, length):
 def test_always_short_bonds_have_the_modes_that_they_need(angle):
     """Bonds a hundredth and a thousandth of the slide at which the patch lets go: shares of the limit that fall with
     the modes; where the bonds are too short to tell, all that are allowed."""
-    pair, limit = coated_pair(60), friction_limit(60, angle)
+    pair = coated_pair(60)
+    limit = friction_limit(60, angle)
     reach = limit.sum() / tangential_stiffness(pair.tangential, limit > 0)
     for share, most in ((1e-2, 1e-3), (1e-3, 5e-3)):
         errors = [
@@ -293,7 +304,8 @@ def test_always_short_bonds_have_the_modes_that_they_need(angle):
 @pytest.mark.parametrize("angle", [0.0, 1e-4])
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
 def test_always_the_fewest_modes_meet_a_tolerance_that_one_fewer_misses(angle, tolerance):
-    pair, limit = coated_pair(100), friction_limit(100, angle)
+    pair = coated_pair(100)
+    limit = friction_limit(100, angle)
     found = fewest_modes(pair.tangential, limit, 1e-6, tolerance)
     count = found.stiffness.size
     fewer = shear_modes(pair.tangential, limit, 1e-6, count - 1)
@@ -307,7 +319,8 @@ def test_always_the_fewest_modes_meet_a_tolerance_that_one_fewer_misses(angle, t
 def test_exact_backbone_error_is_the_error_of_the_resultant(angle):
     """Against the points themselves, on the 24 slides that the error is taken over."""
     length = 1e-6
-    pair, limit = coated_pair(100), friction_limit(100, angle)
+    pair = coated_pair(100)
+    limit = friction_limit(100, angle)
     touching = limit > 0
     c = pair.tangential[np.ix_(touching, touching)]
     slides = (6 * length + 2 * np.abs(c @ limit[touching]).max()) * (np.arange(1, 25) / 24) ** 2
@@ -323,7 +336,8 @@ def test_exact_backbone_error_is_the_error_of_the_resultant(angle):
 @pytest.mark.parametrize("count", [4, 9])
 def test_exact_gauss_points_of_a_sum(count):
     r = np.random.default_rng(count)
-    x, weight = np.sort(r.uniform(-2e-3, 5e-3, 60)), r.uniform(0.1, 1.0, 60)
+    x = np.sort(r.uniform(-2e-3, 5e-3, 60))
+    weight = r.uniform(0.1, 1.0, 60)
     place, share = gauss_rule(x, weight, count)
     assert (share > 0).all() and x[0] < place.min() and place.max() < x[-1]
     for power in range(2 * count):
@@ -335,7 +349,8 @@ def test_exact_gauss_points_of_a_sum(count):
 @pytest.mark.parametrize("angle", [0.0, 1e-4])
 def test_always_gathered_points_leave_the_backbone(angle):
     """On three times as many slides as they are chosen by; where nothing can be left out all points stay."""
-    pair, limit = coated_pair(200), friction_limit(200, angle)
+    pair = coated_pair(200)
+    limit = friction_limit(200, angle)
     modes = shear_modes(pair.tangential, limit, 1e-6, 4)
     few, share, _ = fewest_gauss_points(modes, pair.interface.x[modes.points], 1e-5)
     assert few.points.size in (16, 32) and share.sum() == pytest.approx(limit.sum(), rel=1e-12)
@@ -347,7 +362,8 @@ def test_always_gathered_points_leave_the_backbone(angle):
 
 
 def test_refuses_a_patch_that_could_jump_by_itself():
-    pair, limit = coated_pair(100), friction_limit(100, 1e-4)
+    pair = coated_pair(100)
+    limit = friction_limit(100, 1e-4)
     length = 1e-7
     touching = limit > 0
     stiffness = limit[touching] / length

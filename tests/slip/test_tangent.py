@@ -33,7 +33,8 @@ def test_exact_stiffness_is_that_of_the_pieces_less_what_closing_gives_way():
     pieces, coupling = unlike_pieces()
     active = np.random.default_rng(4).random(len(coupling)) < 0.6
     here = np.ix_(active, active)
-    cross, one = coupling[here], np.ones(active.sum())
+    cross = coupling[here]
+    one = np.ones(active.sum())
     schur = pieces.tangential[here] - cross.T @ np.linalg.solve(pieces.normal[here], cross)
     found = coupled_stiffness(pieces, coupling, active)
     assert found == pytest.approx(np.linalg.solve(schur, one).sum(), rel=1e-11)
@@ -42,7 +43,8 @@ def test_exact_stiffness_is_that_of_the_pieces_less_what_closing_gives_way():
 
 def test_exact_alike_pieces_and_no_contact():
     pair = coated_pair(60)
-    none, active = 0 * pair.normal, np.arange(pair.interface.x.size) < 40
+    none = 0 * pair.normal
+    active = np.arange(pair.interface.x.size) < 40
     assert coupled_stiffness(pair, none, active) == pytest.approx(
         tangential_stiffness(pair.tangential, active), rel=1e-12
     )

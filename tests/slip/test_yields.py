@@ -11,7 +11,11 @@ from patchfem.slip.shear_modes import jenkins_set
 def yielded(c, limit):
     """(slides (t,) [m] at which points behind the compliance c (n, n) yield at `limit` (n,) [N], rates (t, n) [N/m] of
     the points before each)."""
-    stick, carried, slide, at, rates = np.ones(limit.size, bool), np.zeros(limit.size), 0.0, [], []
+    stick = np.ones(limit.size, bool)
+    carried = np.zeros(limit.size)
+    slide = 0.0
+    at = []
+    rates = []
     while stick.any():
         rate = np.zeros(limit.size)
         rate[stick] = np.linalg.solve(c[np.ix_(stick, stick)], np.ones(stick.sum()))
@@ -19,7 +23,8 @@ def yielded(c, limit):
             stick & (rate > 0), (limit - carried) / np.where(rate > 0, rate, 1.0), np.inf
         )
         first = max(wait.min(), 0.0)
-        slide, carried = slide + first, carried + rate * first
+        slide = slide + first
+        carried = carried + rate * first
         at.append(slide)
         rates.append(rate)
         stick &= wait > first * (1 + 1e-9)
@@ -50,7 +55,8 @@ def test_exact_the_order_is_that_of_a_system_solved_anew_after_every_yield(
     monkeypatch.setattr(shear_modes, "MAX_SORTING_PASSES", tries)
     monkeypatch.setattr(shear_modes, "MAX_EXCHANGES", swaps)
     r = np.random.default_rng(count)
-    limit, c = r.uniform(0.5, 2, count), half_plane(count)
+    limit = r.uniform(0.5, 2, count)
+    c = half_plane(count)
     group = jenkins_set(c, limit, local)
     at, rates = yielded(c + np.diag(local / limit), limit)
     assert group.yield_displacement == pytest.approx(at, rel=1e-11)

@@ -35,10 +35,8 @@ def test_exact_file_is_its_arrays(tmp_path, ending):
         np.savez(path, **data)
     else:
         savemat(path, data | {"K": csc_matrix(K)})
-    found, want = (
-        arrays.build_basis(arrays.read_arrays(path)),
-        matrices.build_basis(M, K, C, faces=[0, 1], normal=[0.1, 0]),
-    )
+    found = arrays.build_basis(arrays.read_arrays(path))
+    want = matrices.build_basis(M, K, C, faces=[0, 1], normal=[0.1, 0])
     for key in ("omega", "zeta", "damping", "slide", "base", "output", "normal", "shapes"):
         np.testing.assert_array_equal(getattr(found, key), getattr(want, key))
     assert found.names == ("1", "2") and found.faces is None

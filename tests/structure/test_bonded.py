@@ -22,7 +22,9 @@ def one(omega=3.0, zeta=0.01, slide=0.8, mass=2.0):
 def test_always_equals_a_spring_that_was_there(seed):
     """Masses with the spring and damper across the interface, and folded in later: same frequencies, same responses."""
     rng = np.random.default_rng(seed)
-    m, k, c = rng.uniform(0.5, 2, 3), rng.uniform(1, 9, 3), rng.uniform(0, 0.3, 2)
+    m = rng.uniform(0.5, 2, 3)
+    k = rng.uniform(1, 9, 3)
+    c = rng.uniform(0, 0.3, 2)
     springs = [((1, 0), k[0]), ((1, 2), k[1]), ((2, 3), k[2])]
     dampers = [((1, 0), c[0]), ((2, 3), c[1])]
     late = add_spring(masses.build_basis(m, springs, dampers, [(3, 1)], 2), 4.0, 0.2)
@@ -52,8 +54,11 @@ def test_exact_no_spring_changes_nothing():
 def test_always_what_a_joint_adds_comes_off_again(seed):
     """Springs along up to two interfaces and a damper worked into up to four modes, then taken off: the same basis."""
     rng = np.random.default_rng(seed)
-    n, faces = int(rng.integers(1, 5)), int(rng.integers(1, 3))
-    rows, k, c = rng.uniform(-1, 1, (faces, n)), rng.uniform(0.1, 5, faces), rng.uniform(0, 0.3)
+    n = int(rng.integers(1, 5))
+    faces = int(rng.integers(1, 3))
+    rows = rng.uniform(-1, 1, (faces, n))
+    k = rng.uniform(0.1, 5, faces)
+    c = rng.uniform(0, 0.3)
     omega = np.sort(rng.uniform(1, 4, n))
     base = ModalBasis(
         tuple("abcd"[:n]),

@@ -49,7 +49,8 @@ def test_exact_the_phase_of_a_sweep_is_the_integral_of_its_frequency(low, high, 
 
 
 def test_exact_levels_go_on_in_phase():
-    drive, sine = make_levels([2.0, 3.0], W, 2.5), SineDrive(1.0, W)
+    drive = make_levels([2.0, 3.0], W, 2.5)
+    sine = SineDrive(1.0, W)
     t = np.linspace(0, 5 * sine.period, 101)[:-1]
     size = np.where(t < 2.5 * sine.period - 1e-12, 2.0, 3.0)
     assert drive.values(t) == pytest.approx(size * np.sin(W * t), abs=1e-12)
@@ -69,7 +70,8 @@ def free(modes, drive, cycles, steps=200, start=None):
 
 
 def by_dop853(modes, drive, duration, at):
-    w, d = modes.omega[0], 2 * modes.zeta[0] * modes.omega[0]
+    w = modes.omega[0]
+    d = 2 * modes.zeta[0] * modes.omega[0]
     done = solve_ivp(
         lambda t, y: [
             y[1],
@@ -103,7 +105,8 @@ def test_exact_linear_response_to_a_drive_is_that_of_dop853(drive):
 
 def test_exact_a_step_overshoots_and_settles():
     """-a/w^2 (1 - exp(-z w t)(cos + z/sqrt(1 - z^2) sin)); the accelerometer reads 0 - a + a at first, then w^2 z."""
-    drive, zeta = make_step(9.0, 2 * np.pi / W), 0.05
+    drive = make_step(9.0, 2 * np.pi / W)
+    zeta = 0.05
     r = free(one(zeta=zeta), drive, 20, 40).response
     own = W * np.sqrt(1 - zeta**2)
     shape = 1 - np.exp(-zeta * W * r.time) * (
@@ -119,7 +122,9 @@ def test_exact_a_release_decays_and_its_energy_counts_as_work():
     got = free(
         one(), make_release(2 * np.pi / W), 30, 50, InitialState(np.array([1e-3]), np.array([0.2]))
     )
-    r, own, d = got.response, W * np.sqrt(1 - 0.003**2), 0.003 * W
+    r = got.response
+    own = W * np.sqrt(1 - 0.003**2)
+    d = 0.003 * W
     truth = np.exp(-d * r.time) * (
         1e-3 * np.cos(own * r.time) + (0.2 + d * 1e-3) / own * np.sin(own * r.time)
     )

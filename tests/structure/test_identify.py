@@ -13,7 +13,8 @@ BAND = np.arange(20.0, 400.0, 0.5)
 
 def responses(f, zeta, shape, power=0, noise=0.0, absolute=False):
     """(q, p) responses of p places to a force at the first, `power` derivatives, with noise on real and imaginary."""
-    w, w0 = 2 * np.pi * BAND[:, None], 2 * np.pi * np.asarray(f)
+    w = 2 * np.pi * BAND[:, None]
+    w0 = 2 * np.pi * np.asarray(f)
     H = (shape * shape[0]) @ (1 / (w0**2 - w**2 + 2j * np.asarray(zeta) * w0 * w))[:, :, None]
     H = H[:, :, 0] * (1j * w) ** power
     rng = np.random.default_rng(3)
@@ -66,7 +67,9 @@ def test_always_noise_of_one_per_cent_moves_them_little(name, absolute):
 
 def test_always_modes_outside_the_band_go_into_the_rest():
     """A mode at 5 Hz and one at 900 Hz: the two inside stay right to the curvature of the tails."""
-    f, zeta, shape = [5, 100, 200, 900], [0.01] * 4, np.random.default_rng(2).normal(size=(4, 4))
+    f = [5, 100, 200, 900]
+    zeta = [0.01] * 4
+    shape = np.random.default_rng(2).normal(size=(4, 4))
     data = responses(f, zeta, shape, 0, 1e-3)
     measured = {((k + 1, 0), (1, 0)): (data[:, k], 0) for k in range(4)}
     found = identify_modes(BAND, measured, [])

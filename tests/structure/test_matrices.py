@@ -104,10 +104,8 @@ def test_always_dampers_one_by_one_are_their_matrix(seed, n):
     springs, dampers = (
         [(pair, k) for pair, k in zip(pairs, rng.uniform(0.5, 2, n))] for _ in range(2)
     )
-    m, dash = (
-        rng.uniform(0.5, 2, n),
-        masses.make_slide_rows(pairs, n) * np.sqrt([[c] for _, c in dampers]),
-    )
+    m = rng.uniform(0.5, 2, n)
+    dash = masses.make_slide_rows(pairs, n) * np.sqrt([[c] for _, c in dampers])
     ours = masses.build_basis(m, springs, dampers, [(1, 0)], n)
     stretch = masses.make_slide_rows(pairs, n) * np.sqrt([[k] for _, k in springs])
     want = matrices.build_basis(
@@ -130,7 +128,8 @@ def test_always_modal_energy_is_physical_energy(seed, n):
     face = rng.normal(size=(2, n))
     found = matrices.build_basis(M, K, C, faces=face, base=rng.normal(size=n))
     z, v = rng.normal(size=(2, n))
-    x, u = found.shapes @ z, found.shapes @ v
+    x = found.shapes @ z
+    u = found.shapes @ v
     assert v @ v == pytest.approx(u @ M @ u, rel=1e-9)
     assert z @ (found.omega**2 * z) == pytest.approx(x @ K @ x, rel=1e-9)
     assert v @ found.damping_matrix @ v == pytest.approx(u @ C @ u, rel=1e-9)
@@ -141,7 +140,8 @@ def test_always_modal_energy_is_physical_energy(seed, n):
 def test_always_coupled_damping_has_the_eigenvalues_of_the_first_order_form(seed, n):
     M, K, C, _ = some(seed, n)
     found = matrices.build_basis(M, K, C)
-    zero, one = np.zeros((n, n)), np.eye(n)
+    zero = np.zeros((n, n))
+    one = np.eye(n)
     ours = eig(
         np.block([[zero, one], [-np.diag(found.omega**2), -found.damping_matrix]]), right=False
     )

@@ -15,7 +15,8 @@ BOUNDARY = np.array([11, 4])
 def chain(n=12, held=True, seed=1):
     """K, M, C (n, n) of a chain with unequal masses and springs, held at its first mass or loose."""
     rng = np.random.default_rng(seed)
-    k, m = 1e6 * rng.uniform(0.5, 2, n), 0.01 * rng.uniform(0.5, 2, n)
+    k = 1e6 * rng.uniform(0.5, 2, n)
+    m = 0.01 * rng.uniform(0.5, 2, n)
     K = np.diag(k + np.append(k[1:], 0)) - np.diag(k[1:], 1) - np.diag(k[1:], -1)
     K[0, 0] -= 0 if held else k[0]
     return K, np.diag(m), 1e-5 * K + 3 * np.diag(m)
@@ -41,7 +42,8 @@ def test_exact_where_no_mode_is_left_out(method, held):
     assert found.modes.is_complete
     small = reduced.build_basis(found, found.modes.omega.size, [(1, 0), (1, 2)])
     row = np.zeros((2, 12))
-    row[:, 11], row[1, 4] = 1, -1
+    row[:, 11] = 1
+    row[1, 4] = -1
     full = matrices.build_basis(M, K, C, faces=row, output=row[0], base=ones)
     scale = full.omega[-1]
     np.testing.assert_allclose(small.omega, full.omega, atol=1e-10 * scale)
@@ -101,7 +103,8 @@ def test_exact_frequencies_of_a_slender_beam_keep_their_digits(method, links):
     of both reduced matrices erred by 5e-10 behind free modes."""
     n = links
     D = np.eye(n) - 2 * np.eye(n, k=-1) + np.eye(n, k=-2)
-    K, M = D.T @ D, np.diag(np.random.default_rng(4).integers(1, 9, n) / 4.0)
+    K = D.T @ D
+    M = np.diag(np.random.default_rng(4).integers(1, 9, n) / 4.0)
     with mpmath.workdps(40):
         root = mpmath.diag([1 / mpmath.sqrt(one) for one in np.diag(M)])
         square = mpmath.eigsy(root * mpmath.matrix(K.tolist()) * root, eigvals_only=True)

@@ -9,7 +9,9 @@ from patchfem.structure.bonded import add_spring
 
 
 def modes(omega, output):
-    n, omega, output = len(omega), np.array(omega, float), np.array(output, float)
+    n = len(omega)
+    omega = np.array(omega, float)
+    output = np.array(output, float)
     return ModalBasis(tuple("abc"[:n]), omega, np.zeros(n), np.ones(n), output, output, 2.0)
 
 

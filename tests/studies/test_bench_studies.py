@@ -38,7 +38,8 @@ def test_exact_the_whole_study_of_friction_against_speed():
 
 def peak_after(part, start, before):
     """Largest z/eps_0 of z' = 1 - z/eps with 2.10 along the path, from a bond length `start`, force `before`."""
-    rate, slow = 2e-6 / 1e-6 + 1 / (part * 2e-6), before
+    rate = 2e-6 / 1e-6 + 1 / (part * 2e-6)
+    slow = before
     found = solve_ivp(
         lambda y, z: 1 - z / (slow + (start - slow) * np.exp(-rate * y * 2e-6)),
         (0, 20),

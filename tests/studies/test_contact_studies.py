@@ -31,11 +31,10 @@ def test_exact_a_cell_carries_no_force_in_a_rigid_motion(orders, order):
 
 @pytest.mark.parametrize("order", [1, 4])
 def test_exact_dissection_and_condensed_cells_leave_the_compliance_of_all_unknowns(orders, order):
-    xs, ys = (
-        np.array([0.0, 1.0, 1.5, 3.0]) * 1e-3,
-        np.array([0.0, 0.5, 1.0, 3.0, 8.0]) * orders.COATING,
-    )
-    nodes_x, nodes_y = 3 * order + 1, 4 * order + 1
+    xs = np.array([0.0, 1.0, 1.5, 3.0]) * 1e-3
+    ys = np.array([0.0, 0.5, 1.0, 3.0, 8.0]) * orders.COATING
+    nodes_x = 3 * order + 1
+    nodes_y = 4 * order + 1
     full = np.zeros((2, nodes_y * nodes_x, 2, nodes_y * nodes_x))
     row, column = np.divmod(np.arange((order + 1) ** 2), order + 1)
     for j, i in np.ndindex(4, 3):

@@ -28,7 +28,8 @@ def test_exact_the_plateau_begins_half_a_stroke_after_a_reversal():
 )
 def test_one_length_describes_the_plateaus_and_no_law_the_backlash():
     rows = {row.law: row for row in damper.main(FILE, ("coulomb", "elastic-plastic", "stretch"))}
-    stretch, loop = rows["stretch"], rows["stretch"].fitted.loop
+    stretch = rows["stretch"]
+    loop = rows["stretch"].fitted.loop
     scatter = damper.repeat(loop)[1]
     assert stretch.fitted.keys.fit.values[1] == pytest.approx(2.04e-3, rel=0.01)
     assert (

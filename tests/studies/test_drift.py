@@ -59,7 +59,8 @@ def test_exact_creep_and_the_way_of_bouc_wen(table):
     assert (
         rows["tanh, v_0 = 1 mm/s"] == pytest.approx(slow, rel=1e-6) == pytest.approx(1.93, abs=2e-3)
     )
-    z, up = 0.4, 0.0
+    z = 0.4
+    up = 0.0
     while z < 0.6:
         z, up = z + 1e-5, up + 1e-5 / (1 - (z + 5e-6) ** 2)
     assert rows["Bouc-Wen n = 2"] == pytest.approx(up - 0.2, abs=1e-4)
@@ -112,7 +113,8 @@ def test_exact_an_elastic_range_narrows_the_loop(table):
 
 @pytest.mark.parametrize("share", [0.0, 0.1])
 def test_exact_the_elastic_range_in_the_virgin_curve(table, share):
-    law, one = FirstOrderBonds(table.ladder.bonds(breakaway=share)), np.ones(1)
+    law = FirstOrderBonds(table.ladder.bonds(breakaway=share))
+    one = np.ones(1)
     force = law.traction(law.step(law.start(one), 0.8 * table.LENGTH, one, one, 1.0).state)[0]
     assert force == pytest.approx(1 - (1 - share) * np.exp(share - 0.8), abs=1e-14)
 

@@ -27,10 +27,8 @@ def today(ladder):
 
 @pytest.mark.parametrize("amplitude", [0.3, 3.0])
 def test_exact_areas_without_growth(ladder, amplitude):
-    dahl, sharp = (
-        ladder.followed(ladder.points(ladder.bonds()), amplitude),
-        ladder.elastic_plastic(amplitude),
-    )
+    dahl = ladder.followed(ladder.points(ladder.bonds()), amplitude)
+    sharp = ladder.elastic_plastic(amplitude)
     assert dahl.area == pytest.approx(friction_forms.stretch_loop(amplitude, 1.0)[0], rel=2e-6)
     assert sharp.area == pytest.approx(friction_forms.jenkins_loop(amplitude, 1.0)[0], abs=1e-12)
     miss = ladder.error(ladder.coulomb(dahl), dahl)[0]
@@ -56,13 +54,13 @@ def test_exact_rms_of_coulomb_falls_as_the_fourth_root(ladder):
 
 
 def test_exact_lugre_is_the_law_that_grows_at_once(ladder):
-    amplitude, steps, omega = 1.0, ladder.STEPS, 2 * np.pi * ladder.HERTZ
-    length, ratio, rest, slip = (
-        ladder.LENGTH,
-        ladder.RATIO,
-        ladder.GROWTH["rest_growth"],
-        ladder.GROWTH["slip_growth"],
-    )
+    amplitude = 1.0
+    steps = ladder.STEPS
+    omega = 2 * np.pi * ladder.HERTZ
+    length = ladder.LENGTH
+    ratio = ladder.RATIO
+    rest = ladder.GROWTH["rest_growth"]
+    slip = ladder.GROWTH["slip_growth"]
 
     def rate(t, z):
         v = amplitude * length * omega * np.cos(omega * t)
@@ -81,8 +79,10 @@ def test_exact_lugre_is_the_law_that_grows_at_once(ladder):
 
 def test_exact_bouc_wen_of_the_first_power_is_the_constant_length(ladder, today):
     path = np.random.default_rng(1).normal(0, 0.7, 200).cumsum()
-    law, one = FirstOrderBonds(ladder.bonds()), np.ones(1)
-    state, force = law.start(one), [0.0]
+    law = FirstOrderBonds(ladder.bonds())
+    one = np.ones(1)
+    state = law.start(one)
+    force = [0.0]
     for dq in np.diff(path):
         state = law.step(state, dq * ladder.LENGTH, one, one, 1.0).state
         force.append(law.traction(state)[0])

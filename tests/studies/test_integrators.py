@@ -35,7 +35,8 @@ def test_exact_two_masses_by_the_event_engine(failure):
 def test_exact_the_sentences_on_the_report_s_failure(failure, capsys):
     rows, curves = failure.main(draw=False)
     at = {r.name: r for r in rows}
-    loose, speed = at["Fig 17, 18: displacement 1e-2"], at["Fig 19, 20: velocity 1e-4"]
+    loose = at["Fig 17, 18: displacement 1e-2"]
+    speed = at["Fig 19, 20: velocity 1e-4"]
     assert (loose.early, loose.moves, loose.force) == pytest.approx((0.1146, 5.5, 2.56), abs=5e-3)
     assert loose.worst == pytest.approx(5.4, abs=0.05) and loose.failed == 0
     assert (
@@ -47,7 +48,8 @@ def test_exact_the_sentences_on_the_report_s_failure(failure, capsys):
     for tight in (at["displacement 1e-6"], speed):
         assert tight.early < 0.0095 and 0.3 < tight.failed < 0.37 and 0.15 < tight.jumps < 0.25
     assert 0.2 < at["force 1e-3"].failed < 0.26 and at["force 1e-3"].jumps > 0.2
-    held, elastic = at["static branch, force 1e-6"], at["Fig 21, 22: elastic 0.01, velocity 1e-6"]
+    held = at["static branch, force 1e-6"]
+    elastic = at["Fig 21, 22: elastic 0.01, velocity 1e-6"]
     assert held.early < 2e-4 and abs(held.error) < 3e-3 and held.jumps < 0.01
     assert (
         elastic.early == pytest.approx(0.0099, abs=1e-4)
@@ -55,7 +57,8 @@ def test_exact_the_sentences_on_the_report_s_failure(failure, capsys):
         and elastic.failed == 0
     )
     assert at["3.12 as printed, eps 0.03"].error < -90
-    caught, asked = curves[1e-3, False], curves[1e-3, True]
+    caught = curves[1e-3, False]
+    asked = curves[1e-3, True]
     assert [caught[1], caught[3]] == pytest.approx([0.057, -0.19], abs=5e-3)
     assert np.all(np.array(caught[4:]) < -0.99)
     assert asked[4] == pytest.approx(-9e-4, abs=1e-4) and abs(asked[-1]) < 2e-5
@@ -135,7 +138,8 @@ def test_exact_errors_of_the_saved_table(engines, problem, table):
         ):
             run, _, places = engines.OURS[name]
             for knob in knobs if where in places else ():
-                one, saved = problem(where), row(table, where, name, knob)["error"]
+                one = problem(where)
+                saved = row(table, where, name, knob)["error"]
                 assert one.error(run(one, knob)) == pytest.approx(saved, rel=0.02, abs=1e-11)
 
 

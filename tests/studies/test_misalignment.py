@@ -67,10 +67,8 @@ def test_exact_the_docstring_of_fixtures_holds_what_it_prints(tilted, fixtures, 
     )
     found = tilted.measured(fixtures.held(float(tilt), None))
     for name, cell in zip(names, re.sub(r" *± *[\d.]+", "", row).split(), strict=True):
-        value, last = (
-            found[name].value * fixtures.COLUMNS[name][1],
-            10.0 ** -len(cell.partition(".")[2]),
-        )
+        value = found[name].value * fixtures.COLUMNS[name][1]
+        last = 10.0 ** -len(cell.partition(".")[2])
         assert abs(value - float(cell)) <= 0.5001 * last, (name, value, cell)
 
 
@@ -108,7 +106,8 @@ def test_always_meshes_graded_anew_agree_within_the_errors(tilted, angle, skin):
     from patchfem.runs.patch.measures import measures
 
     found = tilted.case(angle, skin)
-    ours, other = tilted.measured(found), measures(*solve_all(found, 1e-3), tolerance=1e-3)
+    ours = tilted.measured(found)
+    other = measures(*solve_all(found, 1e-3), tolerance=1e-3)
     for name in (
         "contact_fraction",
         "loaded_fraction",
@@ -224,7 +223,8 @@ def test_always_yaw_moments_of_a_roll(roll):
 
 
 def test_exact_equal_ridges_and_equal_peaks(asperities):
-    flat, modulus = np.zeros(16), exact.combined_modulus(*asperities.CARBIDE)
+    flat = np.zeros(16)
+    modulus = exact.combined_modulus(*asperities.CARBIDE)
     closed = exact.westergaard_stiffness(
         asperities.MEAN, asperities.WAVE, asperities.HEIGHT, modulus
     )
@@ -337,7 +337,8 @@ def moved(maps):
 
 @pytest.mark.slow
 def test_always_the_motion_hardly_feels_the_tilt_that_the_study_tolerates(moving, moved):
-    stuck, slipping = moved.isel(drive_acceleration=0), moved.isel(drive_acceleration=1)
+    stuck = moved.isel(drive_acceleration=0)
+    slipping = moved.isel(drive_acceleration=1)
     assert slipping["contact_fraction"].values == pytest.approx([1.0, 0.49, 0.219], rel=0.03)
     for found, names in (
         (stuck, ("equivalent_stiffness",)),
@@ -362,7 +363,8 @@ def test_always_the_motion_hardly_feels_the_tilt_that_the_study_tolerates(moving
 
 
 def test_always_the_table_of_the_rig_in_motion(moving, moved):
-    stuck, slipping = moved.isel(drive_acceleration=0), moved.isel(drive_acceleration=1)
+    stuck = moved.isel(drive_acceleration=0)
+    slipping = moved.isel(drive_acceleration=1)
     at = [0, 2]
     assert 1e-6 * stuck["equivalent_stiffness"].values[at] == pytest.approx([31.9, 29.2], abs=0.15)
     assert moving.resonance(stuck["equivalent_stiffness"].values[at]) == pytest.approx(

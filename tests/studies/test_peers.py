@@ -47,7 +47,8 @@ def test_exact_errors_of_the_closed_forms_themselves_vanish():
 
 
 def test_exact_mirrored_and_twice_condensed_pairs_are_one(hertz):
-    mirror, pair = hertz.ours(4, "mirror"), hertz.ours(4, "pair")
+    mirror = hertz.ours(4, "mirror")
+    pair = hertz.ours(4, "pair")
     assert hertz.agreement(mirror, pair) <= 1e-12
     assert pair.dofs == 2 * mirror.dofs
 

@@ -14,7 +14,8 @@ PICTURES = sorted(
 
 def letters(text: str) -> dict:
     """{text: its least size [pixel]} of all words of a picture that is WIDTH wide."""
-    wide, out = float(re.search(r'viewBox="0 0 ([\d.]+)', text)[1]), {}
+    wide = float(re.search(r'viewBox="0 0 ([\d.]+)', text)[1])
+    out = {}
     for style, inside in re.findall(r'<text style="([^"]*)"[^>]*>(.*?)</text>', text, re.S):
         words = re.sub(r"<[^>]*>|\s+", " ", inside).strip()
         out[words] = min(

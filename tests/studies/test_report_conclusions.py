@@ -40,7 +40,8 @@ def test_always_what_is_written_is_what_is_computed(ten):
     assert f"begins {90 - ten.phases(5.0)[0]:.0f} degrees before the input's maximum" in ten.ANSWER
     value = ten.block(8.0)[1]["relative_displacement_amplitude"]
     assert f"to {value / ten.MIL:.0f} mil" in ten.ANSWER
-    own, force = 2 * np.pi * 143, 4 / np.pi * 4.14 * ten.G
+    own = 2 * np.pi * 143
+    force = 4 / np.pi * 4.14 * ten.G
     # a square wave of friction
     assert value == pytest.approx((8 * ten.G - force) / (2 * 0.003 * own**2), rel=1e-3)
 

@@ -29,7 +29,8 @@ def test_figures_2_and_3_motions_of_one_block(capsys):
     assert at[4.0, 5.0].q == pytest.approx(0.28704671337871602, rel=1e-9)  # 40-digit marching
     # half-cycle shooting with D = 0.828
     assert at[4.14, 5.0].q == pytest.approx(0.150075, abs=2e-6)
-    five, eight = at[4.14, 5.0], at[4.14, 8.0]
+    five = at[4.14, 5.0]
+    eight = at[4.14, 8.0]
     inside(
         one.ANSWER,
         f"q is {five.q:.3f}",
@@ -56,7 +57,8 @@ def test_figures_2_and_3_where_the_stops_end_and_what_jumps():
     assert one.steady(4.14, 5.28).stuck > 0 == one.steady(4.14, 5.31).stuck
     inside(one.ANSWER, "from 5.3 g on")
     inside(one.REPRODUCED, "in part", "4.14 g", "5.3 g")
-    exact, stopped = one.exact_cycle(4.14), one.newmark_run(one.STICK_SPEED)
+    exact = one.exact_cycle(4.14)
+    stopped = one.newmark_run(one.STICK_SPEED)
     step = 2 * np.pi / (one.CURVE - 1)
     jump = np.abs(np.diff(exact.relative)).max()
     assert jump == pytest.approx(0.704, abs=2 * step)
@@ -168,9 +170,11 @@ def test_figure_15_rest_of_a_released_block():
         f"to rest at the time {first.stop:.3f}",
         "1e-15 of x0",
     )
-    before, after = time < first.stop, time > first.stop + 0.5
+    before = time < first.stop
+    after = time > first.stop + 0.5
     exact = (1 - (2 * (n := np.floor(time / np.pi)) + 1) / 8) * np.cos(time) + (-1.0) ** n / 8
-    off, swing = np.abs(x - exact)[before].max(), np.ptp(x[after]) / 2
+    off = np.abs(x - exact)[before].max()
+    swing = np.ptp(x[after]) / 2
     inside(
         " ".join(one.__doc__.split()),
         f"3.11 to {off:.3f} x0",

@@ -54,7 +54,8 @@ def test_figure_29_stable_at_5_g_and_unstable_at_8(figures, drawn):
 def test_exact_the_block_that_stays_obeys_newton(drawn):
     """m a + K x + c v + F = 0, a absolute, x and v on the base, F the force that the histories tell."""
     seen = drawn[0][0].seen
-    mass, omega = 1.123, 2 * np.pi * 143
+    mass = 1.123
+    omega = 2 * np.pi * 143
     pull = seen.acceleration + omega**2 * seen.output + 0.006 * omega * seen.output_rate
     np.testing.assert_allclose(mass * pull, -seen.force, atol=1e-9 * np.abs(seen.force).max())
 

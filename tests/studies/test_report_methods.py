@@ -43,14 +43,16 @@ def test_exact_maps_of_duhamel_are_those_of_the_equation_of_motion(omega, zeta):
     """z'' + 2 zeta omega z' + omega^2 z = f0 + (f1 - f0) t/h holds at every step h, from any start."""
     modes = problems.basis([omega], [zeta], [1.0], [1.0])
     start = np.array([0.2, -0.4, 0.3, -0.8])  # z, z', f0, f1
-    h, small = 0.7, 1e-4
+    h = 0.7
+    small = 1e-4
 
     def state(time):
         force = start[2] + (start[3] - start[2]) * time / h
         return duhamel_maps(modes, time)[0] @ [*start[:3], force]
 
     z, v = state(h)
-    before, after = state(h - small), state(h + small)
+    before = state(h - small)
+    after = state(h + small)
     assert (after[0] - before[0]) / (2 * small) == pytest.approx(v, abs=1e-6)
     acceleration = (after[1] - before[1]) / (2 * small)
     assert acceleration + 2 * zeta * omega * v + omega**2 * z == pytest.approx(start[3], abs=1e-6)
@@ -105,7 +107,8 @@ def test_exact_a_stick_speed_adds_to_the_friction(needs_force, release_at):
 @pytest.mark.parametrize("needs_force, order", [(True, 2), (False, 1)])
 def test_order_of_the_first_slide(needs_force, order):
     """Released at 11.5 F/k: 1 + 10.5 cos t until t = pi. By speed alone the first step has no acceleration."""
-    start, errors = InitialState(np.array([11.5]), np.zeros(1)), []
+    start = InitialState(np.array([11.5]), np.zeros(1))
+    errors = []
     for steps in (200, 400):
         found = solve_newmark(
             problems.PLAIN,
@@ -217,7 +220,8 @@ def test_exact_figure_5_by_euler(h, peak, within):
 
     The spring and the damper are held to the ground (2.5), so in coordinates of the plate a'' + c a' + a drives it.
     """
-    omega, c = 0.1, 0.04
+    omega = 0.1
+    c = 0.04
     response = 1 - omega**2 + 1j * c * omega
     segment = DriveSegment(0.0, 0.0, abs(response), omega, np.angle(response))
     drive = PiecewiseDrive((segment,), 2 * np.pi / omega)

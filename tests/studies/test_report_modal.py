@@ -45,7 +45,8 @@ def test_always_a_hard_driven_block_is_damped_as_linearisation_says():
 def test_figure_26_the_steady_curve():
     figure = study("report/figure_26.py")
     free = figure.curve()
-    own, share = 2 * np.pi * np.array([143.0, 73.0, 129.0]), np.array([0.99, 0.01, 0.0025])
+    own = 2 * np.pi * np.array([143.0, 73.0, 129.0])
+    share = np.array([0.99, 0.01, 0.0025])
     w = 2 * np.pi * free.f[:, None]
     exact = 1 + np.sum(share * w**2 / (own**2 - w**2 + 0.006j * own * w), axis=1)
     np.testing.assert_allclose(free.h, exact, rtol=1e-12)
@@ -84,7 +85,8 @@ def test_figure_27_the_sentence(tmp_path, capsys):
         case: [rows[case], *(figure.row(*case, seed=seed) for seed in (2, 3, 4))]
         for case in (("grooves", 4.5), ("grooves", 5.1))
     }
-    rigid, second = rows["rigid block", 4.2], rows["second path", 5.1]
+    rigid = rows["rigid block", 4.2]
+    second = rows["second path", 5.1]
     assert np.isnan(rows["rigid block", 1.0].damping)
     critical = [rigid, second, *more["grooves", 5.1]]
     assert all(0.9 < r.damping < 1.1 for r in critical)

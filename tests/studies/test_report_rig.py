@@ -156,7 +156,8 @@ def test_exact_friction_alone_slides_without_a_stop_from_den_hartogs_level_on():
 def test_runaways_the_sentence(tmp_path, capsys):
     ways = study("report/runaways.py")
     rows = {one.name: one for one in ways.main(tmp_path / "x.svg")}
-    near, far = rows["grooves, yaw 0.25"], rows["grooves, yaw 0.30"]
+    near = rows["grooves, yaw 0.25"]
+    far = rows["grooves, yaw 0.30"]
     inside(
         ways.ANSWER,
         f"{near.levels[0]:.1f} to {far.levels[0]:.1f} g at 135",
@@ -184,7 +185,8 @@ def test_runaways_the_sentence(tmp_path, capsys):
     assert len(quarter) == 7 and all(late[name] == 0.25 for name in quarter)
     assert late["grooves worn to 10 um"] == -0.25 and late["interlocking spring"] == 0.5
     assert late["softening spring"] == 0.25 and late["second interface that slips"] == 0
-    alone, aside = rows["friction alone"].levels, rows["grooves, yaw 0.30 at 150 Hz"].levels
+    alone = rows["friction alone"].levels
+    aside = rows["grooves, yaw 0.30 at 150 Hz"].levels
     assert alone == tuple(sorted(alone)) and alone[0] == 5.25 and alone[3] - alone[0] == 0.5
     assert min(aside) == aside[2] == 4.0
     assert (
@@ -210,7 +212,8 @@ def test_exact_a_point_on_the_axis_leaves_the_other_mode_free():
     engaged = study("report/engaged.py")
     one = engaged.turned("yaw", "one point on the axis", engaged.SLIDING, 16.0)
     part = (one.f >= 40) & (one.f <= 110)
-    w, own = 2 * np.pi * one.f[part], 2 * np.pi * 129
+    w = 2 * np.pi * one.f[part]
+    own = 2 * np.pi * 129
     exact = 0.05 / (own**2 - w**2) * engaged.G * 1e6
     assert np.median(one.moved[part] / exact) == pytest.approx(1, abs=0.01)
 
@@ -223,7 +226,8 @@ def test_engaged_the_sentence(tmp_path, capsys):
     left = {
         key: value / peak[key[0], "one point on the axis", key[2]] for key, value in peak.items()
     }
-    one, two = left["yaw", "a patch of 12.7 mm", 5.0], left["yaw", "two patches 20 mm apart", 5.0]
+    one = left["yaw", "a patch of 12.7 mm", 5.0]
+    two = left["yaw", "two patches 20 mm apart", 5.0]
     inside(
         engaged.ANSWER,
         f"{one:.2f} with a patch of 12.7 mm",

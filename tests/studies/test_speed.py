@@ -7,7 +7,8 @@ from study_module import study
 def test_always_lanes_answer_a_hundred_times_the_cases_of_an_integrator_as_well_as_their_bars_say():
     rows = study("speed/cases_per_second.py").main(128, 1, (100, 400), (1e-6,))
     rows = {(one["way"], one["knob"]): one for one in rows}
-    lanes, whole = rows["lanes, with bars", "1e-3"], rows["DOP853 with events", "1e-06"]
+    lanes = rows["lanes, with bars", "1e-3"]
+    whole = rows["DOP853 with events", "1e-06"]
     assert lanes["outside"] <= 4 and lanes["rms"] < 1e-4 and whole["median"] < 1e-4
     # 2000 times in a run of 10 000: here the set-up counts
     assert lanes["rate"] > 30 * whole["rate"]

@@ -15,7 +15,8 @@ STUDIES = Path(__file__).parents[2] / "studies"
 def test_exact_the_docstring_of_tilt_holds_the_figures_of_the_patch():
     """Of a motion of one cycle: what is said of the pressed patch does not hang on it."""
     module = study("rig/tilt.py")
-    said, rows = " ".join(module.__doc__.split()), module.main((0.0, 1e-4, 1e-3), 1)
+    said = " ".join(module.__doc__.split())
+    rows = module.main((0.0, 1e-4, 1e-3), 1)
     (_, some, most), stiff = (
         [row[name][0] for row in rows] for name in ("contact_fraction", "tangential_stiffness")
     )
@@ -58,7 +59,8 @@ def test_always_the_printed_law_holds_the_block_tighter(tmp_path):
 @pytest.mark.slow
 def test_the_sentence_on_the_printed_law_on_elastic_pieces():
     found = study("rig/readings.py").main(200, None)
-    name, more = "relative_displacement_amplitude", "energy_created"
+    name = "relative_displacement_amplitude"
+    more = "energy_created"
     for (reading, elastic), value in (
         (("report", True), 11.949e-6),
         (("stretch", True), 14.803e-6),

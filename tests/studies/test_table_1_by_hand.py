@@ -15,11 +15,15 @@ def marched(conditions, friction, stiffness, damping, arm, seen, cycles=500, ste
     """(peak, first harmonic) of the accelerometer [m/s2] and half the range of the gage [m] in the last of so many
     cycles, (c,) each: x'' + 2 D w x' + w^2 x = -a - T/m, q'' likewise = -arm T/m, T = F + k s + c s', s = x + arm q,
     F' = K s' between -mu N and mu N, K = mu N/STRETCH; the accelerometer reads x'' + a + seen q''."""
-    omega, level, limit = 2 * np.pi * conditions[:, 0], conditions[:, 1], friction * LOAD
-    y, h = np.zeros((5, len(omega))), 2 * np.pi / omega / steps
+    omega = 2 * np.pi * conditions[:, 0]
+    level = conditions[:, 1]
+    limit = friction * LOAD
+    y = np.zeros((5, len(omega)))
+    h = 2 * np.pi / omega / steps
 
     def rates(y, t):
-        force, speed = np.clip(y[4], -limit, limit), y[1] + arm * y[3]
+        force = np.clip(y[4], -limit, limit)
+        speed = y[1] + arm * y[3]
         pull = (force + stiffness * (y[0] + arm * y[2]) + damping * speed) / MASS
         held = np.where(speed > 0, y[4] < limit, y[4] > -limit)
         return np.array(
@@ -32,7 +36,8 @@ def marched(conditions, friction, stiffness, damping, arm, seen, cycles=500, ste
             ]
         )
 
-    felt, shown = np.zeros((steps, len(omega))), np.zeros((steps, len(omega)))
+    felt = np.zeros((steps, len(omega)))
+    shown = np.zeros((steps, len(omega)))
     for step in range(cycles * steps):
         t = step * h
         one = rates(y, t)

@@ -65,7 +65,8 @@ def test_always_a_motion_found_by_harmonics_is_no_start_for_the_map_of_yields(fi
 
     computed = ModelReadings(asked)
     monkeypatch.setattr(steady, "solve_steady", lost)
-    by_balance, after = np.array(computed(values, [0])), np.array(computed(values * 1.0001, [0]))
+    by_balance = np.array(computed(values, [0]))
+    after = np.array(computed(values * 1.0001, [0]))
     assert by_balance == pytest.approx(np.array(ModelReadings(asked)(values, [0])), rel=0.02)
     assert after == pytest.approx(np.array(ModelReadings(asked)(values * 1.0001, [0])), rel=1e-9)
 
@@ -88,7 +89,9 @@ def test_exact_the_gain_of_a_fold_comes_from_its_own_readings(fitting):
 def test_exact_rods_are_the_two_masses_that_they_stand_for(fitting):
     """Without friction, per base acceleration at 150 Hz: block and tip of two masses, and by the modes of `rods`."""
     derived = study("table_1/derived.py")
-    share, mass, omega = 0.3, 0.05, 2 * np.pi * 150
+    share = 0.3
+    mass = 0.05
+    omega = 2 * np.pi * 150
     numbers = dict(one.split("=") for one in derived.rods(share, mass))
     of = {
         name: [
@@ -98,7 +101,8 @@ def test_exact_rods_are_the_two_masses_that_they_stand_for(fitting):
     }
     turn = (2 * np.pi * np.array(of["frequency"])) ** 2
     modal = -np.array(of["base"]) / (turn - omega**2)
-    block, gauge = np.array(of["slide"]) @ modal, np.array(of["gauge"]) @ modal
+    block = np.array(of["slide"]) @ modal
+    gauge = np.array(of["gauge"]) @ modal
     assert of["frequency"][0] == 143 and of["accelerometer"] == of["slide"]
     stiff = np.array([[1 / share, -1 / share], [-1 / share, 1 / share + 1 / (1 - share)]])
     scale = turn[0] / np.linalg.eigvals(np.diag([1, 1 / mass]) @ stiff).min()
@@ -109,8 +113,11 @@ def test_exact_rods_are_the_two_masses_that_they_stand_for(fitting):
 
 def test_exact_friction_that_wear_does_not_change_gives_the_rung_beside_it(fitting):
     """Factor 1: the rows one after the other are those of "spring and yaw"; factor 2 doubles the friction per um."""
-    cells, rows = read_readings(fitting.TABLE), fitting.cells_for("spring and yaw, worn")
-    seen, values, few = fitting.training(cells, "143"), [0.45, 5e6, 0.09], [0, 1]
+    cells = read_readings(fitting.TABLE)
+    rows = fitting.cells_for("spring and yaw, worn")
+    seen = fitting.training(cells, "143")
+    values = [0.45, 5e6, 0.09]
+    few = [0, 1]
     worn = fitting.computed_for("spring and yaw, worn", ROOT2, rows, fitting.training(rows, "143"))
     plain = fitting.computed_for("spring and yaw", ROOT2, cells, seen)
     assert np.array(worn([*values, 1.0], few))[:, few] == pytest.approx(
@@ -129,13 +136,13 @@ def test_exact_friction_that_wear_does_not_change_gives_the_rung_beside_it(fitti
 def test_exact_the_bootstrap_is_that_of_rows_drawn_one_by_one(fitting):
     """Ten draws by hand: whole rows with their acceleration and displacement, and the score of what came up."""
     cells = read_readings(fitting.TABLE)
-    logs, among = np.sin(1.0 + np.arange(cells.row.size)), ~fitting.training(cells, "143")
-    often, rows = fitting.drawn(cells, among), np.unique(cells.row[among])
+    logs = np.sin(1.0 + np.arange(cells.row.size))
+    among = ~fitting.training(cells, "143")
+    often = fitting.drawn(cells, among)
+    rows = np.unique(cells.row[among])
     draws = np.random.default_rng(0).integers(0, rows.size, (fitting.DRAWS, rows.size))
-    whole, felt = (
-        fitting.resampled(cells, logs, often, "all"),
-        fitting.resampled(cells, logs, often, "acceleration"),
-    )
+    whole = fitting.resampled(cells, logs, often, "all")
+    felt = fitting.resampled(cells, logs, often, "acceleration")
     for k in range(10):
         picked = [j for row in rows[draws[k]] for j in np.flatnonzero(cells.row == row)]
         assert whole[k] == pytest.approx(np.sqrt(np.mean(logs[picked] ** 2)), rel=1e-12)
@@ -147,7 +154,8 @@ def test_exact_the_bootstrap_is_that_of_rows_drawn_one_by_one(fitting):
 def test_always_starts_double_until_the_best_valley_is_found_twice(fitting, monkeypatch):
     """A made model with valleys at 0.1 and 0.8, the second 2 % deeper: it wins, and the first is told beside it. One
     start alone has found its valley once."""
-    number, cells = study("table_1/derived.py").Number("x", 0.0, 1.0), read_readings(fitting.TABLE)
+    number = study("table_1/derived.py").Number("x", 0.0, 1.0)
+    cells = read_readings(fitting.TABLE)
 
     class Made:
         asked = type("Asked", (), {"wanted": [number]})
@@ -212,7 +220,8 @@ def test_always_a_fit_sees_nothing_but_its_training_readings(fitting):
     assert found["valleys"]["best"] == sum(
         one < 1.001 * min(found["starts"]) for one in found["starts"]
     )
-    logs, seen = np.array(found["logs"]), fitting.training(read_readings(fitting.TABLE), "143")
+    logs = np.array(found["logs"])
+    seen = fitting.training(read_readings(fitting.TABLE), "143")
     assert found["fitted"]["all"] == pytest.approx(np.sqrt(np.mean(logs[seen] ** 2)), rel=1e-3)
     assert found["others"]["all"] == pytest.approx(np.sqrt(np.mean(logs[~seen] ** 2)), rel=1e-3)
 
@@ -296,7 +305,8 @@ def test_table_1_the_scores_that_the_study_tells(records, fitting):
     table = study("table_1/table.py")
     one = {name: records[*key, "143", ""] for name, key in table.SAID.items()}
     none = {name: (held, left) for name, _, _, held, left, _ in table.nulls()}
-    constant, strong = none["constant"], none["power_input_frequency"]
+    constant = none["constant"]
+    strong = none["power_input_frequency"]
     assert constant[0] == pytest.approx(
         {"all": 0.235, "acceleration": 0.111, "displacement": 0.497}, abs=1e-3
     )
@@ -352,8 +362,10 @@ def test_table_1_onset_runaway_and_slip_of_the_path_of_figure_27(records):
 @pytest.mark.slow
 def test_table_1_the_grooves_run_away_first_where_the_rig_did_last(records):
     """From 8.75 g at 135 Hz down to 8.25 g at 155 Hz; the rig was unstable at 135 Hz from 6 g."""
-    levels, fit = study("table_1/levels.py"), ("grooves, lift and yaw", "fundamental x gain")
-    question, values = levels.RUNGS[fit[0]].question(fit[1]), records[*fit, "143", ""]["values"]
+    levels = study("table_1/levels.py")
+    fit = ("grooves, lift and yaw", "fundamental x gain")
+    question = levels.RUNGS[fit[0]].question(fit[1])
+    values = records[*fit, "143", ""]["values"]
     assert [levels.runaway(question, values, f) for f in (135.0, 143.0, 150.0, 155.0)] == [
         8.75,
         8.75,

@@ -14,11 +14,10 @@ def bands():
 
 def sentence(bands, rows, within):
     """The numbers of the docstring against rows of strokes 6.4 and 12.8 um."""
-    new, found = (
-        rows[0],
-        {(round(r.stroke / bands.STEP), round(r.worn / bands.UM)): r for r in rows[1:]},
-    )
-    six, twelve = found[2, 6], found[4, 6]
+    new = rows[0]
+    found = {(round(r.stroke / bands.STEP), round(r.worn / bands.UM)): r for r in rows[1:]}
+    six = found[2, 6]
+    twelve = found[4, 6]
     assert [*six.after, *twelve.after] == pytest.approx([0.55, 0.67, 0.42, 0.62], abs=within)
     ratios = [six.ratio, twelve.ratio, found[2, 3].ratio, found[4, 3].ratio]
     assert ratios == pytest.approx([0.83, 0.67, 0.92, 0.86], abs=within)

@@ -18,7 +18,8 @@ NO_QUADS = np.empty((0, 4), np.int64)
 
 def of_grid(grid, split=0.0, seed=None):
     """The tensor grid as an unstructured piece, a share of its quads cut in two; nodes renumbered by `seed`."""
-    nx, ny = grid.x.size, grid.depth.size
+    nx = grid.x.size
+    ny = grid.depth.size
     points = np.stack([np.repeat(grid.x, ny), np.tile(grid.depth, nx)], axis=1)
     node = np.arange(nx * ny)
     if seed is not None:
@@ -45,7 +46,8 @@ def of_grid(grid, split=0.0, seed=None):
 
 def cloud(half_length, height, size, coating=0.0):
     """Triangles of Delaunay on rows of points whose spacing is size(x, depth); rows on the coating's lower face."""
-    levels, depth = [0.0], 0.0
+    levels = [0.0]
+    depth = 0.0
     while depth < height:
         step = size(0.0, depth)
         below = coating if depth < coating * (1 - 1e-9) else height
@@ -54,7 +56,8 @@ def cloud(half_length, height, size, coating=0.0):
             below if rest == 1 else depth + min(step, (below - depth) / 2 if rest == 2 else step)
         )
         levels.append(depth)
-    rows, fine = [], np.linspace(-half_length, half_length, 20001)
+    rows = []
+    fine = np.linspace(-half_length, half_length, 20001)
     for k, y in enumerate(levels):
         number = np.concatenate(
             [[0.0], np.cumsum(np.diff(fine) / size((fine[1:] + fine[:-1]) / 2, y))]
@@ -131,7 +134,9 @@ def write_msh41(m, path):
     text += [f'{1 if tag > 10 else 2} {tag} "{name}"' for tag, name in NAMES.items()]
     text += ["$EndPhysicalNames", "$Entities", f"0 {len(curves)} {len(areas)} 0"]
     text += [f"{tag} 0 0 0 1 1 0 1 {tag} 0" for tag in curves + areas]
-    count, number, total = len(m.points), 0, sum(len(c) for _, c, _ in parts)
+    count = len(m.points)
+    number = 0
+    total = sum(len(c) for _, c, _ in parts)
     text += ["$EndEntities", "$Nodes", f"1 {count} 1 {count}", f"2 {areas[0]} 0 {count}"]
     text += [str(k + 1) for k in range(count)] + [f"{x!r} {y!r} 0" for x, y in m.points.tolist()]
     text += ["$EndNodes", "$Elements", f"{len(parts)} {total} 1 {total}"]

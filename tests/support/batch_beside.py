@@ -66,7 +66,8 @@ def held_against(cases, ones, many) -> None:
                     np.testing.assert_array_equal(
                         other[name][case], one[name][case], f"{case}, {name}"
                     )
-            value, bar = ones.values[name][case], ones.errors[name][case]
+            value = ones.values[name][case]
+            bar = ones.errors[name][case]
             near = 1e-12 * conditioned(ones, case) * abs(value)
             if name in LOOPS:  # of the work that goes to and fro
                 near += 1e-14 * passed(ones, case, name)

@@ -158,10 +158,8 @@ def print_score(lines: list) -> None:
                     *row,
                 )
     for name, rows in sorted(by_name.items()):
-        held, sharp = (
-            fraction([row.holds for row in rows]),
-            fraction([row.is_sharp for row in rows]),
-        )
+        held = fraction([row.holds for row in rows])
+        sharp = fraction([row.is_sharp for row in rows])
         print(f"{name:34s} {len(rows):5d} errors, {held:6.1%} hold, {sharp:6.1%} are sharp")
     for engine in [*engines_of(lines), None]:
         some = [line for line in lines if engine in (None, line.get("engine"))]

@@ -42,7 +42,11 @@ class Chromium:
     """A browser with one page; `opened` shows a text of HTML, what was wrong in its scripts is in `faults`."""
 
     def __init__(self, home: Path):
-        self.home, self.number, self.faults, self.events, self.buffer = home, 0, [], [], b""
+        self.home = home
+        self.number = 0
+        self.faults = []
+        self.events = []
+        self.buffer = b""
         (take, self.out), (self.into, give) = os.pipe(), os.pipe()
         # 3 and 4 are where it listens and speaks
         far = [fcntl.fcntl(one, fcntl.F_DUPFD, 10) for one in (take, give)]
@@ -148,7 +152,8 @@ class Chromium:
 
     def _fresh(self) -> None:
         """Another page: the clock of the one before may stand still."""
-        old, self.session = self.target, None
+        old = self.target
+        self.session = None
         self.target = self.ask("Target.createTarget", url="about:blank")["targetId"]
         self.ask("Target.closeTarget", targetId=old)
         self._attach()

@@ -80,7 +80,8 @@ def sliders(law: str, stiffness: float, force: float, chi: float) -> tuple:
 def released(k, limit, damping: float, start: float) -> tuple:
     """(times (n,) [s], motion (n,) [m]) of the block from rest at `start` [m], its joint without force there."""
     step = 2 * np.pi / OWN / STEPS
-    out, force = np.empty(STEPS // KEPT * PERIODS), np.zeros(k.size)
+    out = np.empty(STEPS // KEPT * PERIODS)
+    force = np.zeros(k.size)
     x = start
     before = x + 0.5 * step**2 * OWN**2 * x  # at rest: the motion is even about the beginning
     loss = damping * OWN * step
@@ -91,7 +92,8 @@ def released(k, limit, damping: float, start: float) -> tuple:
             1 + loss
         )
         force = np.clip(force + k * (after - x), -limit, limit)
-        before, x = x, after
+        before = x
+        x = after
     return step * KEPT * np.arange(out.size), out
 
 
@@ -102,9 +104,12 @@ def made(seed: int, place: Path) -> Made:
     def even(low, high) -> float:
         return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
-    law, record = ("iwan", "elastic-plastic")[seed % 2], place.with_name("record.csv")
+    law = ("iwan", "elastic-plastic")[seed % 2]
+    record = place.with_name("record.csv")
     while True:
-        damping, stiffness, force = even(1e-3, 3e-3), even(0.1, 2) * MASS * OWN**2, even(10, 80)
+        damping = even(1e-3, 3e-3)
+        stiffness = even(0.1, 2) * MASS * OWN**2
+        force = even(10, 80)
         chi = float(rng.uniform(-0.8, -0.1))
         start = even(2, 10) * force / stiffness
         time, x = released(*sliders(law, stiffness, force, chi), damping, start)
@@ -129,7 +134,8 @@ def made(seed: int, place: Path) -> Made:
         if law == "iwan"
         else f'bond_length = "{force / stiffness!r} m"'
     )
-    free, begin = {}, {}
+    free = {}
+    begin = {}
     for key, value in truth.items():
         low = value / even(1.5, 60)
         free[key] = (-0.95, 0.0) if key == "friction.chi" else (low, 100 * low)

@@ -11,7 +11,8 @@ def waves(phase, terms: int) -> tuple:
 
     s' = phi' c and c' = -phi' s, so (k + 1) s_(k+1) = sum_j (j + 1) phi_(j+1) c_(k-j), and the like for c.
     """
-    sine, cosine = [sin(phase[0])], [cos(phase[0])]
+    sine = [sin(phase[0])]
+    cosine = [cos(phase[0])]
     slope = [(k + 1) * p for k, p in enumerate(phase[1:])]
     for k in range(terms - 1):
         s = c = 0.0

@@ -78,11 +78,14 @@ def choose(faces, mass, pull, active, signs, static, kinetic, tol, most_sliding=
 
 def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_sliding=False):
     """Return [(time, signs, z, v)] at the start of every stretch and at the end."""
-    faces, mass, n = np.asarray(modes.interfaces), modes.mass, modes.omega.size
+    faces = np.asarray(modes.interfaces)
+    mass = modes.mass
+    n = modes.omega.size
     static, kinetic = (
         np.broadcast_to(np.asarray(x, float), (len(faces),)) for x in (static, kinetic)
     )
-    square, dampers = modes.omega**2, modes.damping_matrix
+    square = modes.omega**2
+    dampers = modes.damping_matrix
     scale = max(abs(s.constant) + abs(s.amplitude) for s in segments) or 1.0
 
     def accel(part, t):
@@ -95,14 +98,18 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
 
     def forces_of(signs, part, t, z, v):
         known = pull(part, t, z, v) - faces.T @ (signs * kinetic) / mass
-        out, stuck = signs * kinetic, np.flatnonzero(signs == 0)
+        out = signs * kinetic
+        stuck = np.flatnonzero(signs == 0)
         if stuck.size:
             rows = faces[stuck]
             out = out.astype(float)
             out[stuck] = np.linalg.lstsq(rows @ rows.T / mass, rows @ known, rcond=1e-10)[0]
         return out
 
-    t, number, out, y = 0.0, 0, [], np.concatenate([z, v])
+    t = 0.0
+    number = 0
+    out = []
+    y = np.concatenate([z, v])
     signs = np.sign(np.where(np.abs(faces @ v) > 1e-13, faces @ v, 0.0)).astype(int)
     active = list(np.flatnonzero(signs == 0))
     fastest = max(modes.omega.max(), *(s.omega for s in segments), np.linalg.norm(dampers, 2))
@@ -141,7 +148,8 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
                         )
                     )
         for f in events:
-            f.terminal, f.direction = True, -1
+            f.terminal = True
+            f.direction = -1
         done = solve_ivp(
             slope,
             (t, stop),
@@ -152,7 +160,8 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
             atol=1e-15 * scale / fastest**2,
             max_step=0.1 / fastest,
         )
-        t, y = done.t[-1], done.y[:, -1].copy()
+        t = done.t[-1]
+        y = done.y[:, -1].copy()
         active = list(np.flatnonzero(signs == 0))
         if done.status == 0:
             number += t >= stop and number + 1 < len(segments)
@@ -163,7 +172,8 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
         force = forces_of(signs, part, t, y[:n], y[n:])
         if side == 0:
             active = sorted({*active, face})
-        speed, size = faces @ y[n:], np.abs(faces) @ np.abs(y[n:])
+        speed = faces @ y[n:]
+        size = np.abs(faces) @ np.abs(y[n:])
         active = sorted(
             {*active, *(c for c, s in enumerate(signs) if s and abs(speed[c]) < 1e-11 * size[c])}
         )
@@ -185,13 +195,17 @@ def march_reference(modes, drive, limit, end, z, v, steps):
     Impulses within +-limit h leave each face without mean slip, or act against it; static = kinetic
     = limit (i,).
     """
-    faces, n, h = np.asarray(modes.interfaces), modes.omega.size, end / steps
+    faces = np.asarray(modes.interfaces)
+    n = modes.omega.size
+    h = end / steps
     left = np.linalg.inv(
         np.eye(n) + h / 2 * modes.damping_matrix + h * h / 4 * np.diag(modes.omega**2)
     )
     gram = faces @ left @ faces.T / modes.mass
-    force, t = np.zeros(len(faces)), h * (np.arange(steps) + 0.5)
-    drives, out = drive.values(t), [z]
+    force = np.zeros(len(faces))
+    t = h * (np.arange(steps) + 0.5)
+    drives = drive.values(t)
+    out = [z]
     for k in range(steps):
         free = left @ (
             v
@@ -214,14 +228,16 @@ def march_reference(modes, drive, limit, end, z, v, steps):
             if np.abs(force - before).max() < 1e-13 * limit.max():
                 break
         new = free - h * left @ (faces.T @ force) / modes.mass
-        z, v = z + h * (v + new) / 2, new
+        z = z + h * (v + new) / 2
+        v = new
         out.append(z)
     return np.linspace(0, end, steps + 1), np.array(out)
 
 
 def basis_of(omega, zeta=0.0, faces=((1.0,),), base=None, output=None, mass=1.0, damping=None):
     omega = np.atleast_1d(np.asarray(omega, float))
-    n, faces = omega.size, np.atleast_2d(np.asarray(faces, float))
+    n = omega.size
+    faces = np.atleast_2d(np.asarray(faces, float))
     base, output = (np.asarray(faces[0] if x is None else x, float) for x in (base, output))
     return ModalBasis(
         tuple(f"m{k}" for k in range(n)),
@@ -237,7 +253,8 @@ def basis_of(omega, zeta=0.0, faces=((1.0,),), base=None, output=None, mass=1.0,
 
 
 def random_basis(rng, n, faces, coupled=True, rigid=False):
-    omega, root = rng.uniform(0.3, 3, n), rng.normal(size=(n, n)) * 0.15
+    omega = rng.uniform(0.3, 3, n)
+    root = rng.normal(size=(n, n)) * 0.15
     if rigid:
         omega[0] = 0.0
     return basis_of(

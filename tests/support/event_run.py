@@ -111,7 +111,8 @@ def rows_of(modes, drive, static, kinetic, cycles, start=None, begin=0) -> tuple
     """(run, rows of all its pieces) from rest or `start`, the clock put to the cycle `begin` at first."""
     groups = groups_of(modes, static, kinetic)
     one = histories.start_event_run(modes, drive, groups, cycles, int(cycles) + 2, start=start)
-    one.time_state.now[0], rows = begin, []
+    one.time_state.now[0] = begin
+    rows = []
     one.run_to(cycles, one._collect_into(rows))
     return one, np.concatenate(rows)
 
@@ -120,7 +121,8 @@ def run(modes, drive, static, kinetic, duration, start=None) -> list:
     """The phases of a run up to `duration` [s]; the last one is cut there."""
     one, rows = rows_of(modes, drive, static, kinetic, duration / drive.period, start)
     begins = np.flatnonzero(rows[:, 4] >= BEGIN.stick_or_slip)
-    n, i = len(modes.omega), len(one.groups)
+    n = len(modes.omega)
+    i = len(one.groups)
     out = []
     for first, end in zip([0, *begins[begins > 0]], [*begins[begins > 0], len(rows)]):
         part = rows[first:end]

@@ -89,7 +89,8 @@ def waves(frames: int, across: int, deep: int) -> Block:
         -1, 4
     )
     points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-    at, turn = points[quads].mean(axis=1), np.sin(2 * np.pi * np.arange(frames) / frames)[:, None]
+    at = points[quads].mean(axis=1)
+    turn = np.sin(2 * np.pi * np.arange(frames) / frames)[:, None]
     mises = 8e6 * np.exp(-(((at[:, 0] - 2e-3 * (2 + turn)) / 3e-3) ** 2) - at[:, 1] / 2e-3)
     move = np.zeros((frames, x.size, 3), np.float32)
     move[..., 0] = 1e-5 * turn + 1e-7 * np.cos(300 * points[:, 0]) * np.exp(-points[:, 1] / 3e-3)

@@ -71,7 +71,8 @@ class Pulled(NamedTuple):
 def pulled(law, path, pressure, dt=1.0) -> Pulled:
     """As `walk`, without means and energies: of a sum over bonds at a tenth of the cost."""
     times = np.broadcast_to(dt, len(path) - 1)
-    state, rows = law.start(pressure(path[0])), []
+    state = law.start(pressure(path[0]))
+    rows = []
     for k, dq in enumerate(np.diff(path)):
         given = state, float(dq), pressure(path[k]), pressure(path[k + 1]), float(times[k])
         state = law.advance(*given) if isinstance(law, Quadrature) else law.step(*given).state
@@ -86,7 +87,8 @@ def rates(law, speed):
 
 def lengths_by_hand(law, path, times):
     """(length at the knots, length half way through each step): 2.10 at constant speed, solved in closed form."""
-    knots, middles = [law.length], []
+    knots = [law.length]
+    middles = []
     for dq, dt in zip(np.diff(path), times):
         if not law.has_growth or dt == 0:
             middles.append(knots[-1])

@@ -31,8 +31,11 @@ class Case(NamedTuple):
 def case_of(seed: int) -> Case:
     """A random case about the rig's: it slips, with and without a lifted mass and a smaller kinetic coefficient."""
     rng = np.random.default_rng(seed)
-    omega, mass, load = 2 * np.pi * rng.uniform(80, 200), rng.uniform(0.5, 2), rng.uniform(50, 200)
-    wavelength, static = rng.uniform(40e-6, 120e-6), rng.uniform(0.1, 0.6)
+    omega = 2 * np.pi * rng.uniform(80, 200)
+    mass = rng.uniform(0.5, 2)
+    load = rng.uniform(50, 200)
+    wavelength = rng.uniform(40e-6, 120e-6)
+    static = rng.uniform(0.1, 0.6)
     steep = rng.uniform(0.1, 0.7)
     acceleration = rng.uniform(0.8, 1.4) * load * (static + rng.uniform(0, 1) * steep) / mass
     return Case(
@@ -63,10 +66,8 @@ def forces(c: Case, t: float, q: float, v: float, way: float, mu: float) -> tupl
     cosine = 1 / np.hypot(1, steep)
     sine = steep * cosine
     # what a newton on the flank gives
-    across, up = (
-        sine + way * mu * cosine,
-        cosine - way * mu * sine,
-    )
+    across = sine + way * mu * cosine
+    up = cosine - way * mu * sine
     free = -2 * c.zeta * c.omega * v - c.omega**2 * q - c.acceleration * np.sin(c.drive * t)
     gain, press = np.linalg.solve(
         [[c.mass, across], [-c.lifted * steep, up]],
@@ -84,7 +85,11 @@ def held(c: Case, t: float, q: float) -> tuple:
 def run(c: Case, end: float, times) -> tuple:
     """(samples (k, 5): slide, speed, friction's loss along the flank, drive's work, work against the load at `times`
     (k,) that end at `end`, time at which the normal force ends: infinite where it stays)."""
-    cone, t, y, out, times = np.arctan(c.static), 0.0, np.zeros(5), [], np.asarray(times)
+    cone = np.arctan(c.static)
+    t = 0.0
+    y = np.zeros(5)
+    out = []
+    times = np.asarray(times)
     angle = held(c, 0.0, 0.0)[1]
     way = 0.0 if abs(angle) <= cone else np.sign(angle)
     while t < end:
@@ -94,14 +99,16 @@ def run(c: Case, end: float, times) -> tuple:
             beyond[0] = False
             stop = end
             if beyond.any():
-                low, high = find[np.argmax(beyond) - 1], find[np.argmax(beyond)]
+                low = find[np.argmax(beyond) - 1]
+                high = find[np.argmax(beyond)]
                 for _ in range(60):
                     mid = 0.5 * (low + high)
                     low, high = (low, mid) if abs(held(c, mid, y[0])[1]) > cone else (mid, high)
                 stop = min(high, end)
             inside = times[(times >= t) & (times < stop)]
             out += [(s, *y) for s in inside]
-            t, way = stop, np.sign(held(c, stop, y[0])[1])
+            t = stop
+            way = np.sign(held(c, stop, y[0])[1])
             continue
 
         def slopes(s, x, way=way):
@@ -121,7 +128,9 @@ def run(c: Case, end: float, times) -> tuple:
         def lifts(s, x, way=way):
             return forces(c, s, x[0], x[1], way, c.kinetic)[1]
 
-        turns.terminal, turns.direction, lifts.terminal = True, -1, True
+        turns.terminal = True
+        turns.direction = -1
+        lifts.terminal = True
         found = solve_ivp(
             slopes,
             (t, end),
@@ -136,7 +145,8 @@ def run(c: Case, end: float, times) -> tuple:
         stop = found.t[-1]
         inside = times[(times >= t) & (times < stop)]
         out += [(s, *found.sol(s)) for s in inside]
-        t, y = stop, found.y[:, -1].copy()
+        t = stop
+        y = found.y[:, -1].copy()
         if found.t_events[1].size:
             return np.array(out)[:, 1:], t
         if t >= end:

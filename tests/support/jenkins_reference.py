@@ -9,12 +9,19 @@ class Reference:
     """Modes (core.ModalBasis) behind elements: (stiffness (t,), yield slide (t,)) of every interface, from rest."""
 
     def __init__(self, modes, drive, elements, rtol=1e-12, atol=1e-14, method="DOP853"):
-        self.modes, self.drive, self.rtol, self.atol, self.method = modes, drive, rtol, atol, method
+        self.modes = modes
+        self.drive = drive
+        self.rtol = rtol
+        self.atol = atol
+        self.method = method
         self.k, self.y = ([np.asarray(one[j], float) for one in elements] for j in (0, 1))
         self.stretch = [np.zeros(k.size) for k in self.k]
         self.way = [np.zeros(k.size) for k in self.k]  # of the elements that slip
-        self.faces, n = np.asarray(modes.interfaces), modes.omega.size
-        self.state, self.time, self.restarts = np.zeros(2 * n), 0.0, 0
+        self.faces = np.asarray(modes.interfaces)
+        n = modes.omega.size
+        self.state = np.zeros(2 * n)
+        self.time = 0.0
+        self.restarts = 0
         self.peak = 0.0
 
     def forces(self, z, frozen):
@@ -30,13 +37,15 @@ class Reference:
 
     def go(self, end: float) -> np.ndarray:
         """State (2 n,) at `end` [s]."""
-        modes, n = self.modes, self.modes.omega.size
+        modes = self.modes
+        n = self.modes.omega.size
         step = 0.05 * self.drive.period
         while self.time < end:
             frozen = self.faces @ self.state[:n]
 
             def rate(t, x, frozen=frozen):
-                z, v = x[:n], x[n:]
+                z = x[:n]
+                v = x[n:]
                 push = self.drive.values(t)
                 return np.concatenate(
                     [
@@ -70,7 +79,8 @@ class Reference:
                         lambda t, x, f=f, sign=way[way != 0][0]: sign * (self.faces[f] @ x[n:])
                     )
             for event in events:
-                event.terminal, event.direction = True, -1
+                event.terminal = True
+                event.direction = -1
             found = solve_ivp(
                 rate,
                 (self.time, end),
@@ -88,8 +98,10 @@ class Reference:
     def _land(self, found, frozen):
         n = self.modes.omega.size
         self.peak = max(self.peak, np.abs(self.modes.output @ found.y[:n]).max())
-        self.time, self.state = float(found.t[-1]), found.y[:, -1]
-        slide, speed = self.faces @ self.state[:n], self.faces @ self.state[n:]
+        self.time = float(found.t[-1])
+        self.state = found.y[:, -1]
+        slide = self.faces @ self.state[:n]
+        speed = self.faces @ self.state[n:]
         for f in range(len(self.k)):
             slips = self.way[f] != 0
             self.stretch[f] = np.where(

@@ -60,11 +60,9 @@ def surface(draw, length: float, style: str):
     step = 0.25e-6
     count = int(2 ** np.ceil(np.log2(length / step)))
     wave = np.fft.rfftfreq(count, step)
-    hurst, roll, tip = (
-        draw.uniform(0.6, 0.9),
-        1 / draw.uniform(60e-6, 300e-6),
-        1 / draw.uniform(4e-6, 10e-6),
-    )
+    hurst = draw.uniform(0.6, 0.9)
+    roll = 1 / draw.uniform(60e-6, 300e-6)
+    tip = 1 / draw.uniform(4e-6, 10e-6)
     power = np.maximum(wave, roll) ** (-1 - 2 * hurst) / (1 + (wave / tip) ** 6)
     power[0] = 0.0
     heights = np.fft.irfft(np.sqrt(power) * np.exp(2j * np.pi * draw.random(wave.size)), count)
@@ -92,7 +90,8 @@ def pair(kind: str, seed: int) -> Pair:
     """The pair of `kind` that `seed` draws."""
     draw = np.random.default_rng([seed, KINDS.index(kind)])
     style = ("self-affine", "turned", "plateau")[draw.integers(3)]
-    length, spacing = draw.uniform(1.5e-3, 6e-3), draw.choice([0.5e-6, 1e-6, 2e-6])
+    length = draw.uniform(1.5e-3, 6e-3)
+    spacing = draw.choice([0.5e-6, 1e-6, 2e-6])
     reach = draw.uniform(-0.04, 0.04) * length
     margin = 0.06 * length
     x, new = surface(draw, (3.2 if kind == "elsewhere" else 1.0) * length + 2 * margin, style)
@@ -123,7 +122,8 @@ def pair(kind: str, seed: int) -> Pair:
             grown = trough(
                 x, a, a + draw.uniform(0.03, 0.12) * length, draw.uniform(0.5, 3) * rms, 30e-6
             )
-            old, wear = old + grown, wear - grown
+            old = old + grown
+            wear = wear - grown
     noise = draw.uniform(1e-9, 8e-9)
     begin = start + reach
     if kind == "elsewhere":
@@ -133,7 +133,8 @@ def pair(kind: str, seed: int) -> Pair:
         points = np.arange(0, length, spacing)
         inside = place + stretch * points
         keep = inside < x[-1]
-        points, inside = points[keep], inside[keep]
+        points = points[keep]
+        inside = inside[keep]
         z = gain * np.interp(inside, x, heights) + noise * draw.normal(size=points.size)
         z += draw.uniform(-0.8e-3, 0.8e-3) * points + draw.uniform(-5e-6, 5e-6)
         return points, np.round(z, 9), inside
@@ -165,7 +166,8 @@ def pair(kind: str, seed: int) -> Pair:
         za = za[::-1].copy()
     if kind == "turned":
         za = -za
-    before, after = (xb, zb), (xa, za)
+    before = (xb, zb)
+    after = (xa, za)
     if kind == "exchanged":
         before, after, worn = after, before, -np.interp(xb + start, inside, worn)
     return Pair(kind, seed, before, after, worn, begin - start, tuple(spoilt))

@@ -66,7 +66,8 @@ def written(path, sets):
 def loop(count=80, cycles=2) -> tuple:
     """(time, slide, force) of an elastic-plastic point along a sine of 10 um at 100 Hz: one clip per straight leg."""
     time = np.arange(count * cycles + 1) / count / 100
-    slide, out = 10e-6 * np.sin(2 * np.pi * 100 * time), [0.0]
+    slide = 10e-6 * np.sin(2 * np.pi * 100 * time)
+    out = [0.0]
     for step in np.diff(slide):
         out.append(min(max(out[-1] + MU * LOAD * step / BOND, -MU * LOAD), MU * LOAD))
     return time, slide, np.array(out)

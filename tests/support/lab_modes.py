@@ -29,7 +29,8 @@ def driven(quantity: str, seed: int = 1) -> tuple:
     power = {"displacement": 0, "velocity": 1, "acceleration": 2}[quantity]
     for w, z, a in zip(OMEGA, ZETA, RESIDUE):
         steady = spectrum * a / (w * w + lines**2 + 2 * z * w * lines)
-        place, speed = np.fft.irfft(steady, SAMPLES)[0], np.fft.irfft(lines * steady, SAMPLES)[0]
+        place = np.fft.irfft(steady, SAMPLES)[0]
+        speed = np.fft.irfft(lines * steady, SAMPLES)[0]
         pole = complex(-z * w, w * np.sqrt(1 - z * z))
         # Re(start e^(pole t)) and its slope at 0
         start = complex(-place, (speed - pole.real * place) / pole.imag)

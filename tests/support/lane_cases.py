@@ -83,11 +83,9 @@ N_SINGLES = 30  # cases that are computed by single runs too
 
 def draw_points(law: str, seed: int, count: int) -> list:
     """Draw models of a law that lanes take: from sliding all the time to sticking, near resonance and away."""
-    r, base, out = (
-        np.random.default_rng(seed),
-        get_base_scene(pf.load(SCENE.format(law=LAWS[law]))),
-        [],
-    )
+    r = np.random.default_rng(seed)
+    base = get_base_scene(pf.load(SCENE.format(law=LAWS[law])))
+    out = []
     while len(out) < count:
         push = 10 ** r.uniform(0.3, 2)
         sets = {
@@ -107,7 +105,8 @@ def draw_points(law: str, seed: int, count: int) -> list:
 
 def draw_patches(family: str, seed: int, count: int) -> list:
     """Draw models of a family of rigs with a patch."""
-    r, base = np.random.default_rng(seed), get_base_scene(pf.load(PATCH))
+    r = np.random.default_rng(seed)
+    base = get_base_scene(pf.load(PATCH))
     sets = [{key: float(draw(r)) for key, draw in FAMILIES[family].items()} for _ in range(count)]
     return [pf.build(base.override(format_assignments(one))) for one in sets]
 

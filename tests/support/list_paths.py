@@ -47,7 +47,8 @@ def empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
 
 def follow_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
     """March the list over the knots `path`, times scalar or one per step."""
-    held, rows = empty_list(law, tail, merge, capacity), []
+    held = empty_list(law, tail, merge, capacity)
+    rows = []
     status = held.status
     for dq, dt in zip(np.diff(path), np.broadcast_to(np.asarray(times, float), len(path) - 1)):
         v = dq / dt if dt > 0 else 0.0

@@ -38,7 +38,8 @@ def follow(model, path, dt=0.3):
     """(force at the samples, step means, slip), (dissipated, stored), unconverged, contact of loops.follow_path."""
     loops = load_instances()
     contact = model.build()
-    energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
+    energies = np.zeros((path.size, 2))
+    forces = np.zeros((path.size, 3))
     bad = loops.follow_path(
         np.ascontiguousarray(path, float),
         dt,

@@ -51,8 +51,10 @@ def stiffness_of(columns, rows, young, poisson):
     young, poisson : (m,) array
         Of each row.
     """
-    hx, hy = np.diff(columns), np.diff(rows)
-    lame, shear = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 + 2 * poisson)
+    hx = np.diff(columns)
+    hy = np.diff(rows)
+    lame = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
+    shear = young / (2 + 2 * poisson)
     mass, stiff, grad = (
         line_matrix(*part)
         for part in ((MASS, hx, hx), (STIFFNESS, hx, 1 / hx), (GRADIENT, hx, np.ones(hx.size)))
@@ -66,10 +68,9 @@ def stiffness_of(columns, rows, young, poisson):
         return kron(stiff, along_y(MASS, hy, a * hy)) + kron(mass, along_y(STIFFNESS, hy, b / hy))
 
     mixed = kron(grad, along_y(GRADIENT, hy, lame).T) + kron(grad.T, along_y(GRADIENT, hy, shear))
-    uu, vv = (
-        terms(lame + 2 * shear, shear),
-        kron(stiff, along_y(MASS, hy, shear * hy))
-        + kron(mass, along_y(STIFFNESS, hy, (lame + 2 * shear) / hy)),
+    uu = terms(lame + 2 * shear, shear)
+    vv = kron(stiff, along_y(MASS, hy, shear * hy)) + kron(
+        mass, along_y(STIFFNESS, hy, (lame + 2 * shear) / hy)
     )
     return csc_matrix(bmat([[uu, mixed], [mixed.T, vv]])), free
 
@@ -135,7 +136,8 @@ def complementary(matrix, right, load=None):
 
 def spaced(start, stop, size):
     """Return positions from start to stop with steps of about size(x)."""
-    x, out = start, [start]
+    x = start
+    out = [start]
     while x < stop:
         x += size(x + size(x) / 2)
         out.append(x)
@@ -149,10 +151,13 @@ class Bench:
     def __init__(self, seed):
         draw = np.random.default_rng(seed)
         self.kind = draw.choice(["crown", "tilt", "both"])
-        self.length, self.width = draw.uniform(10e-3, 60e-3), draw.uniform(5e-3, 45e-3)
-        self.height, self.load = draw.uniform(3e-3, 25e-3), 10 ** draw.uniform(1.5, 4)
+        self.length = draw.uniform(10e-3, 60e-3)
+        self.width = draw.uniform(5e-3, 45e-3)
+        self.height = draw.uniform(3e-3, 25e-3)
+        self.load = 10 ** draw.uniform(1.5, 4)
         self.name, self.young, self.poisson = MATERIALS[draw.integers(3)]
-        self.static, self.thick = draw.uniform(0.1, 0.6), draw.choice([0.0, 1.0], p=[0.6, 0.4])
+        self.static = draw.uniform(0.1, 0.6)
+        self.thick = draw.choice([0.0, 1.0], p=[0.6, 0.4])
         self.thick *= draw.uniform(50e-6, 400e-6)
         plane = self.young / (1 - self.poisson**2)
         reach = draw.uniform(0.15, 1.8) * self.length / 2  # half-width of Hertz
@@ -202,8 +207,11 @@ class Reference:
     """Solution of a bench by this solver; fine: number of cells relative to the coarse grid."""
 
     def __init__(self, bench, fine):
-        self.bench, half = bench, bench.length / 2
-        cells, low, high = spaced(-half, half, lambda x: bench.length / 80), -half, half
+        self.bench = bench
+        half = bench.length / 2
+        cells = spaced(-half, half, lambda x: bench.length / 80)
+        low = -half
+        high = half
         for _ in range(3):  # grids that zoom in on the contact
             centre = (cells[1:] + cells[:-1]) / 2
             chosen = np.flatnonzero((centre > low) & (centre < high))
@@ -212,7 +220,8 @@ class Reference:
             ends = self._ends(cells, chosen, force)
             wide = ends[1] - ends[0]
             cells = spaced(-half, half, self._sizes(ends, 1 / 40, 0.25))
-            low, high = max(ends[0] - 0.2 * wide, -half), min(ends[1] + 0.2 * wide, half)
+            low = max(ends[0] - 0.2 * wide, -half)
+            high = min(ends[1] + 0.2 * wide, half)
         self.ends = ends
         cells = spaced(-half, half, self._sizes(ends, 4e-4 / fine, 0.12 / fine))
         centre = (cells[1:] + cells[:-1]) / 2
@@ -221,7 +230,8 @@ class Reference:
         normal, shear = self._matrices(cells, chosen, fine)
         force, _ = complementary(normal, -bench.gap(centre[chosen]), bench.load)
         index = np.flatnonzero(force > 0)
-        self.shear, self.limit = shear[np.ix_(index, index)], bench.static * force[index]
+        self.shear = shear[np.ix_(index, index)]
+        self.limit = bench.static * force[index]
         self.stiffness = float(np.linalg.solve(self.shear, np.ones(index.size)).sum())
 
     def _sizes(self, ends, least, slope):
@@ -229,7 +239,8 @@ class Reference:
 
         `least` is its fraction of the contact at the open ends.
         """
-        half, wide = self.bench.length / 2, ends[1] - ends[0]
+        half = self.bench.length / 2
+        wide = ends[1] - ends[0]
         inside = wide * max(least, 1 / 60 * slope / 0.12)
         open_ends = [end for end in ends if abs(end) < half * (1 - 1e-9)]
 
@@ -247,11 +258,13 @@ class Reference:
     def _ends(self, cells, chosen, force):
         """Return the ends of the contact [m]."""
         loaded = np.flatnonzero(force > 0)
-        first, last = chosen[loaded[0]], chosen[loaded[-1]]
+        first = chosen[loaded[0]]
+        last = chosen[loaded[-1]]
         return float(cells[first]), float(cells[last + 1])
 
     def _matrices(self, cells, chosen, fine):
-        bench, near = self.bench, float(np.diff(cells)[chosen].min())
+        bench = self.bench
+        near = float(np.diff(cells)[chosen].min())
 
         def size(y):
             far = bench.height * 4e-3 + 0.5 / fine * (bench.height - y)
@@ -272,7 +285,8 @@ class Reference:
 
     def measures(self):
         """Return the measures by their names in patchfem."""
-        bench, amplitude = self.bench, self.bench.amplitude
+        bench = self.bench
+        amplitude = self.bench.amplitude
         free = self.shear @ self.limit
         slides = amplitude * (np.arange(161) / 160) ** 2
         lack = np.array(
@@ -319,16 +333,20 @@ class Reference:
 def solve_bench(seed: int) -> tuple:
     """Return a bench, its measures on the fine grid, and their differences from the coarse grid."""
     bench = Bench(seed)
-    fine, coarse = Reference(bench, 1.5), Reference(bench, 1.0)
+    fine = Reference(bench, 1.5)
+    coarse = Reference(bench, 1.0)
     bench.amplitude = float(bench.share * bench.static * bench.load / fine.stiffness)
-    found, other = fine.measures(), coarse.measures()
+    found = fine.measures()
+    other = coarse.measures()
     return bench, found, {name: abs(value - other[name]) for name, value in found.items()}
 
 
 def compare_bench(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare a bench with its reference; see `campaigns`."""
     if earlier and "true" in earlier:
-        bench, true, doubt = Bench(seed), earlier["true"], earlier["doubt"]
+        bench = Bench(seed)
+        true = earlier["true"]
+        doubt = earlier["doubt"]
         bench.amplitude = earlier["amplitude"]
     else:
         bench, true, doubt = solve_bench(seed)

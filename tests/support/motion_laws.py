@@ -24,15 +24,15 @@ class Law:
     """
 
     # `splits`: whether slip and the reversible part of the slide can be distinguished.
-    size, set_valued, split_by_mode, splits = (
-        1,
-        False,
-        False,
-        True,
-    )
+    size = 1
+    set_valued = False
+    split_by_mode = False
+    splits = True
 
     def __init__(self, limit: float, **keys):
-        self.limit, self.mode, self.keys = limit, 1, keys
+        self.limit = limit
+        self.mode = 1
+        self.keys = keys
         self.side = 1  # side of a second border, if a law has one
 
     def begin(self, v: float, accel: float) -> None:
@@ -141,7 +141,9 @@ class Stretch(Law):
         return self.limit * s[0] / self.keys["bond_length"]
 
     def rate(self, s, v, t):
-        first, k, speed = self.keys["bond_length"], self.keys, self.mode * v
+        first = self.keys["bond_length"]
+        k = self.keys
+        speed = self.mode * v
         if not self.grows:
             return np.array([v - speed * s[0] / first])
         last = first * k["kinetic"] / k["static"]
@@ -187,7 +189,8 @@ class Maturing(Stretch):
         return np.array([0.0, self.keys["initial"]])
 
     def rate(self, s, v, t):
-        length, speed = self.keys["bond_length"], self.mode * v
+        length = self.keys["bond_length"]
+        speed = self.mode * v
         return np.array([s[1] * v - speed * s[0] / length, speed * (1 - s[1]) / length])
 
 
@@ -198,11 +201,9 @@ class BoucWen(Law):
         return self.limit * s[0]
 
     def rate(self, s, v, t):
-        n, share, eps = (
-            self.keys["exponent"],
-            self.keys["shape"],
-            self.limit / self.keys["stiffness"],
-        )
+        n = self.keys["exponent"]
+        share = self.keys["shape"]
+        eps = self.limit / self.keys["stiffness"]
         way = self.mode * self.side
         return np.array([v / eps * (1 - abs(s[0]) ** n * (share * way + 1 - share))])
 
@@ -262,7 +263,9 @@ class Iwan(Law):
 
     def __init__(self, limit, **keys):
         super().__init__(limit, **keys)
-        chi, beta, k = keys["chi"], keys["beta"], keys["stiffness"]
+        chi = keys["chi"]
+        beta = keys["beta"]
+        k = keys["stiffness"]
         self.top = limit * (1 + beta) / (k * (beta + (chi + 1) / (chi + 2)))
         self.density = k * (chi + 1) / (1 + beta) / self.top ** (chi + 1)
         self.last = k * beta / (1 + beta)
@@ -271,7 +274,8 @@ class Iwan(Law):
 
     def loading(self, u: float) -> float:
         """Return the force of a first loading to u >= 0."""
-        chi, u = self.keys["chi"], min(u, self.top)
+        chi = self.keys["chi"]
+        u = min(u, self.top)
         inside = u ** (chi + 2) / (chi + 2) + u * (self.top ** (chi + 1) - u ** (chi + 1)) / (
             chi + 1
         )
@@ -279,7 +283,8 @@ class Iwan(Law):
 
     def stretch(self, u: float) -> float:
         """Return the mean stretch of the sliders at a first loading to u, weighted by their limits."""
-        chi, u = self.keys["chi"], min(u, self.top)
+        chi = self.keys["chi"]
+        u = min(u, self.top)
         inside = u ** (chi + 3) / (chi + 3) + u * (self.top ** (chi + 2) - u ** (chi + 2)) / (
             chi + 2
         )
@@ -287,7 +292,8 @@ class Iwan(Law):
 
     def held(self, u: float) -> float:
         """Return the derivative of this mean stretch by the slide."""
-        chi, u = self.keys["chi"], min(u, self.top)
+        chi = self.keys["chi"]
+        u = min(u, self.top)
         inside = (self.top ** (chi + 2) - u ** (chi + 2)) / (chi + 2)
         return (self.density * inside + self.last * self.top * (u < self.top)) / self.limit
 
@@ -296,7 +302,8 @@ class Iwan(Law):
 
         start: index of its own value in the reversal.
         """
-        turn, way = self.turns[-1], s[0] - self.turns[-1][0]
+        turn = self.turns[-1]
+        way = s[0] - self.turns[-1][0]
         if len(self.turns) == 1:
             return np.sign(s[0]) * of(abs(s[0]))
         return turn[start] + np.sign(way) * 2 * of(abs(way) / 2)
@@ -344,16 +351,22 @@ class Report(Law):
     (slide, path); reversals of both are kept as long as they count.
     """
 
-    size, splits = 2, False
+    size = 2
+    splits = False
 
     def __init__(self, limit, **keys):
         super().__init__(limit, **keys)
-        self.order, self.turns = keys.get("order", 1.0), [(0.0, 0.0)]
+        self.order = keys.get("order", 1.0)
+        self.turns = [(0.0, 0.0)]
 
     def force(self, s, v, t):
-        q, path, eps, p = s[0], s[1], self.keys["bond_length"], self.order
+        q = s[0]
+        path = s[1]
+        eps = self.keys["bond_length"]
+        p = self.order
         places = np.array([*self.turns, (path, q)])
-        rho, u = (path - places[:, 0]) / eps, q - places[:, 1]
+        rho = (path - places[:, 0]) / eps
+        u = q - places[:, 1]
         sums = gammainc(p + 1, np.maximum(rho, 0.0))
         # age at which a stroke was at the present position, if it was
         passed = rho[:-1] - np.abs(u[:-1]) / eps
@@ -371,7 +384,8 @@ class Report(Law):
         return 0.0
 
     def turned(self, k, s, v, accel):
-        turns, old = [*self.turns, (float(s[1]), float(s[0]))], s[1] - 60 * self.keys["bond_length"]
+        turns = [*self.turns, (float(s[1]), float(s[0]))]
+        old = s[1] - 60 * self.keys["bond_length"]
         self.turns, self.mode = (
             [a for a, b in pairwise(turns) if b[0] > old] + turns[-1:],
             -self.mode,
@@ -382,11 +396,14 @@ class Report(Law):
 class Coulomb(Law):
     """|F| <= static while it sticks; the kinetic force against the velocity while it slips."""
 
-    size, set_valued, split_by_mode = 0, True, True
+    size = 0
+    set_valued = True
+    split_by_mode = True
 
     def __init__(self, limit, **keys):
         super().__init__(limit, **keys)
-        self.kinetic, self.mode = limit * keys.get("kinetic", keys["static"]) / keys["static"], 0
+        self.kinetic = limit * keys.get("kinetic", keys["static"]) / keys["static"]
+        self.mode = 0
 
     def begin(self, v, accel):
         self.mode = int(np.sign(v))

@@ -15,10 +15,13 @@ class Window:
     """The last cycles of a motion: Gauss nodes and ends of every step, and values there."""
 
     def __init__(self, motion: Motion, stretches, begin: float, end: float, cycles: int):
-        self.motion, self.begin, self.end = motion, begin, end
+        self.motion = motion
+        self.begin = begin
+        self.end = end
         borders = np.linspace(begin, end, cycles + 1)
         columns = {name: [] for name in ("t", "w", "y", "f", "split", "back", "a", "kind")}
-        self.modes, self.parts = [], []
+        self.modes = []
+        self.parts = []
         for one in stretches:
             if one.times[-1] <= begin or one.times[-1] <= one.times[0]:
                 continue
@@ -34,7 +37,8 @@ class Window:
             np.concatenate(columns[name]) for name in ("f", "split", "back", "a")
         )
         self.stuck = np.concatenate(columns["kind"])
-        n, faces = motion.n, motion.plant.faces
+        n = motion.n
+        faces = motion.plant.faces
         self.q, self.v = self.y[:, :n] @ faces.T, self.y[:, n : 2 * n] @ faces.T
         self.out = self.y[:, :n] @ motion.plant.output
 
@@ -46,7 +50,8 @@ class Window:
                 law.turns = one.turns[k]
 
     def _take(self, columns, one, t, w) -> None:
-        m, Y = self.motion, one.solution(t).T
+        m = self.motion
+        Y = one.solution(t).T
         self.parts.append((one, t))
         rates = Y[:, m.n : 2 * m.n] @ m.plant.faces.T
         columns["t"].append(t)
@@ -85,7 +90,8 @@ class Window:
         where : array of bool, optional
             Nodes that count; by default all. A step lies completely inside or outside.
         """
-        values, each = values if where is None else np.where(where, values, -np.inf), NODES.size + 2
+        values = values if where is None else np.where(where, values, -np.inf)
+        each = NODES.size + 2
         best = float(values.max())
         beside = np.concatenate([[-np.inf], values, [-np.inf]])
         peaks = np.flatnonzero(
@@ -126,9 +132,12 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
         Cycles of the run.
     window : int
     """
-    s, p, end = motion.s, motion.plant, period * cycles
+    s = motion.s
+    p = motion.plant
+    end = period * cycles
     w = Window(motion, stretches, end - window * period, end, window)
-    n, out = motion.n, {}
+    n = motion.n
+    out = {}
     high = w.top(w.out, lambda t, y: p.output @ y[:n])
     low = w.top(-w.out, lambda t, y: -p.output @ y[:n])
     last = _last_cycle(w, motion, period) if s["drive"] == "free" else None
@@ -140,7 +149,9 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
         out[f"friction_force_peak{tail}"] = w.top(
             np.abs(w.f[:, k]), lambda t, y, k=k: abs(motion.forces(t, y)[k])
         )
-        slip, part, face = w.q[:, k] - w.back[:, k], motion.parts[k], p.faces[k]
+        slip = w.q[:, k] - w.back[:, k]
+        part = motion.parts[k]
+        face = p.faces[k]
         ends = [
             w.top(
                 sign * slip,
@@ -180,7 +191,10 @@ def _last_cycle(w: Window, motion: Motion, period: float) -> float | None:
     Seen from the end, a position is a reversal if the output has returned from it by more than a
     quarter of its range in the last period.
     """
-    n, row, each, places = motion.n, motion.plant.output, NODES.size + 2, []
+    n = motion.n
+    row = motion.plant.output
+    each = NODES.size + 2
+    places = []
     rate = w.y[:, n : 2 * n] @ row
     way = np.where(np.abs(rate) <= 1e-9 * np.abs(rate).max(), 0.0, np.sign(rate))
     for a, b in pairwise(np.flatnonzero(way)):
@@ -198,7 +212,8 @@ def _last_cycle(w: Window, motion: Motion, period: float) -> float | None:
             places.append(float(row @ one.solution(at)[:n]))
         else:  # an event at the reversal
             places.append(float(w.out[a : b + 1][np.argmin(np.abs(rate[a : b + 1]))]))
-    least, back = 0.25 * np.ptp(w.out[w.t >= w.end - period]), [float(w.out[-1]), *places[::-1]]
+    least = 0.25 * np.ptp(w.out[w.t >= w.end - period])
+    back = [float(w.out[-1]), *places[::-1]]
     if not least > 0:
         return least
     top = next((k for k, one in enumerate(back) if abs(one - back[0]) > least), len(back))
@@ -252,7 +267,9 @@ def _stuck(w: Window, law, k: int) -> tuple:
         return share, w.t[1:][stuck[:-1] & ~stuck[1:]]
     if law.size == 0:
         return 0.0, np.empty(0)
-    motion, part, face = w.motion, w.motion.parts[k], w.motion.plant.faces[k]
+    motion = w.motion
+    part = w.motion.parts[k]
+    face = w.motion.plant.faces[k]
 
     def above(t, y):
         v = face @ y[motion.n : 2 * motion.n]
@@ -260,7 +277,8 @@ def _stuck(w: Window, law, k: int) -> tuple:
 
     with np.errstate(divide="ignore", invalid="ignore"):
         values = np.where(w.v[:, k] == 0, -0.5, np.abs(w.split[:, k] / w.v[:, k]) - 0.5)
-    below, starts = 0.0, []
+    below = 0.0
+    starts = []
     for number, (one, t) in enumerate(w.parts):
         row = values[number * t.size : (number + 1) * t.size]
         w.restore(one)
@@ -297,7 +315,8 @@ def _secant(w: Window, motion: Motion, period: float, window: int) -> float | No
 
 def _turn(w: Window, motion: Motion, k: int) -> tuple | None:
     """Return (slide, force) at a reversal next to node k; None if there is none."""
-    each, face = NODES.size + 2, motion.plant.faces[0]
+    each = NODES.size + 2
+    face = motion.plant.faces[0]
     if w.v[k, 0] == 0:
         return w.q[k, 0], w.f[k, 0]
     for low in (k - 1, k):
@@ -319,7 +338,9 @@ def _turn(w: Window, motion: Motion, k: int) -> tuple | None:
 
 def _periodic(w: Window, motion: Motion, period: float, window: int) -> dict:
     """Stiffness and damping of the first interface, and the distortion of the acceleration."""
-    omega, q, f = 2 * np.pi / period, w.q[:, 0], w.f[:, 0]
+    omega = 2 * np.pi / period
+    q = w.q[:, 0]
+    f = w.f[:, 0]
 
     def part(values, order=1):
         return 2 * np.sum(w.w * values * np.exp(-1j * order * omega * w.t)) / (w.end - w.begin)
@@ -337,13 +358,15 @@ def _periodic(w: Window, motion: Motion, period: float, window: int) -> dict:
         secant = _secant(w, motion, period, window)
         out |= {} if secant is None else {"secant_stiffness": secant}
     if motion.plant.first > 0:
-        each, face = [], motion.plant.faces[0]
+        each = []
+        face = motion.plant.faces[0]
         for c in range(window):
             mine = (w.t >= w.begin + c * period) & (w.t <= w.begin + (c + 1) * period)
             each += [
                 w.top(sign * q, lambda t, y, sign=sign: sign * (face @ y[: motion.n]), mine)
                 for sign in (1, -1)
             ]
-        area, half = float(np.sum(w.w * f * w.v[:, 0])) / window, sum(each) / (2 * window)
+        area = float(np.sum(w.w * f * w.v[:, 0])) / window
+        half = sum(each) / (2 * window)
         out["equivalent_damping"] = area / (2 * np.pi * motion.plant.first * half**2)
     return out

@@ -38,21 +38,29 @@ def plant_of(s: dict) -> ModalSystem:
     """Return the modal system of a spec."""
     if s["several"]:
         m = s["masses"]
-        K, C = np.zeros((2, 2)), np.zeros((2, 2))
+        K = np.zeros((2, 2))
+        C = np.zeros((2, 2))
         for (i, j), k, c in zip(([1, 0], [2, 1], [2, 0]), m["stiffness"], m["damper"]):
             row = _row(i, j)
-            K, C = K + k * np.outer(row, row), C + c * np.outer(row, row)
-        M, output = np.diag(m["mass"]), np.array([1.0, 0.0])
+            K = K + k * np.outer(row, row)
+            C = C + c * np.outer(row, row)
+        M = np.diag(m["mass"])
+        output = np.array([1.0, 0.0])
         faces = np.array([_row(*pair) for pair in m["pairs"]])
         base = -s["mass"] * output if forced(s) else np.array(m["mass"])
         first = 0.0
     else:
         column = {key: np.array([mode[key] for mode in s["modes"]]) for key in s["modes"][0]}
-        omega, mass = 2 * np.pi * column["frequency"], s["mass"]
-        M, output, faces = mass * np.eye(omega.size), column["output"], column["slide"][None]
-        K, C = np.diag(mass * omega**2), np.diag(2 * mass * column["damping"] * omega)
+        omega = 2 * np.pi * column["frequency"]
+        mass = s["mass"]
+        M = mass * np.eye(omega.size)
+        output = column["output"]
+        faces = column["slide"][None]
+        K = np.diag(mass * omega**2)
+        C = np.diag(2 * mass * column["damping"] * omega)
         b = s.get("bonded", {"stiffness": 0.0, "damping": 0.0})
-        K, C = K + b["stiffness"] * faces.T @ faces, C + b["damping"] * faces.T @ faces
+        K = K + b["stiffness"] * faces.T @ faces
+        C = C + b["damping"] * faces.T @ faces
         base = -mass * output if forced(s) else mass * column["base"]
         first = mass * (omega[0] / column["slide"][0]) ** 2
     fastest = np.sqrt(np.linalg.eigvalsh(np.linalg.solve(M, K)).max()) / (2 * np.pi)
@@ -80,7 +88,9 @@ def drive_of(s: dict):
     tuple
         a(t) [m s-2], times at which it is not smooth [s], and whether the base moves.
     """
-    kind, size, omega = s["drive"], s["size"], 2 * np.pi * s["frequency"]
+    kind = s["drive"]
+    size = s["size"]
+    omega = 2 * np.pi * s["frequency"]
     if kind == "free":
         return (lambda t: 0.0), [], False
     if kind == "step":
@@ -146,11 +156,14 @@ def stretched(
     solver = DOP853(
         motion.slope, t, y, stop, rtol=rtol, atol=atol, first_step=min(first / 50, stop - t)
     )
-    times, parts, before = [t], [], np.array([guard[2](t, y) for guard in guards])
+    times = [t]
+    parts = []
+    before = np.array([guard[2](t, y) for guard in guards])
     while solver.status == "running":
         solver.max_step = motion.longest(solver.y, solver.f)
         assert solver.step() is None, "the integrator gave up"
-        part, begin = solver.dense_output(), solver.t_old
+        part = solver.dense_output()
+        begin = solver.t_old
         parts.append(part)
         for at in np.linspace(begin, solver.t, LOOKS + 1)[1:]:
             after = np.array([guard[2](at, part(at)) for guard in guards])
@@ -170,7 +183,8 @@ def stretched(
                 ]
                 hit = max(min(roots), np.nextafter(times[-1], np.inf))
                 return OdeSolution([*times, hit], parts), guards[fell[int(np.argmin(roots))]]
-            before, begin = after, at
+            before = after
+            begin = at
         times.append(solver.t)
         if len(times) > most:
             raise TooLong("steps without end")
@@ -193,7 +207,9 @@ class Motion:
     """
 
     def __init__(self, s: dict, share: float = 0.04):
-        self.s, self.plant, self.share = s, plant_of(s), share
+        self.s = s
+        self.plant = plant_of(s)
+        self.share = share
         self.drive, self.breaks, self.moving = drive_of(s)
         loads = s["masses"]["loads"] if s["several"] else [s["load"]]
         self.laws = [LAWS[s["law"]](s["keys"]["static"] * load, **s["keys"]) for load in loads]
@@ -214,7 +230,9 @@ class Motion:
         return y
 
     def pull(self, t, y):
-        p, x, v = self.plant, y[: self.n], y[self.n : 2 * self.n]
+        p = self.plant
+        x = y[: self.n]
+        v = y[self.n : 2 * self.n]
         out = -p.K @ x - p.C @ v - p.base * self.drive(t)
         return out - p.cubic * (p.output @ x) ** 3 * p.output if p.cubic else out
 
@@ -234,13 +252,13 @@ class Motion:
         return out
 
     def slope(self, t, y):
-        pull, v = self.pull(t, y), y[self.n : 2 * self.n]
-        force, rates = self.forces(t, y, pull), self.plant.faces @ v
+        pull = self.pull(t, y)
+        v = y[self.n : 2 * self.n]
+        force = self.forces(t, y, pull)
+        rates = self.plant.faces @ v
         out = np.empty_like(y)
-        out[: self.n], out[self.n : 2 * self.n] = (
-            v,
-            self.inverse @ (pull - self.plant.faces.T @ force),
-        )
+        out[: self.n] = v
+        out[self.n : 2 * self.n] = self.inverse @ (pull - self.plant.faces.T @ force)
         for law, part, rate in zip(self.laws, self.parts, rates):
             out[part] = law.rate(y[part], rate, t)
         out[-1] = force @ rates
@@ -256,7 +274,8 @@ class Motion:
         """
         out = []
         for k, law in enumerate(self.laws):
-            face, part = self.plant.faces[k], self.parts[k]
+            face = self.plant.faces[k]
+            part = self.parts[k]
             if law.set_valued and law.mode == 0:
                 for side in (1, -1):
                     out.append(
@@ -300,7 +319,8 @@ class Motion:
         ):
             for k, mode in zip(active, option):
                 self.laws[k].mode = mode
-            force, accel = self.forces(t, y), self.accelerations(t, y)
+            force = self.forces(t, y)
+            accel = self.accelerations(t, y)
             scale = max(law.limit for law in self.laws) * 1e-9
             if all(
                 abs(force[k]) <= self.laws[k].limit + scale
@@ -318,7 +338,8 @@ class Motion:
         limited to the scale over which a law relaxes, because beyond it dense output is not better
         than 1e-4.
         """
-        out, n = self.share / max(self.plant.fastest, self.s["frequency"]), self.n
+        out = self.share / max(self.plant.fastest, self.s["frequency"])
+        n = self.n
         speed = np.abs(self.plant.faces @ y[n : 2 * n]).max()
         gain = np.abs(self.plant.faces @ slope[n : 2 * n]).max() + 1e-300
         if self.s["law"] in ("stretch", "growing", "bouc-wen", "lugre", "report"):
@@ -344,7 +365,10 @@ class Motion:
         most : float
             Number of steps above which TooLong is raised.
         """
-        t, y, out, n = 0.0, self.start() if start is None else np.append(start, 0.0), [], self.n
+        t = 0.0
+        y = self.start() if start is None else np.append(start, 0.0)
+        out = []
+        n = self.n
         stops = [b for b in self.breaks if 0 < b < end * (1 - 1e-12)] + [end]
         reach = self.s["size"] / self.s["seeded"] ** 2
         atol = np.full(y.size, rtol * 1e-3 * reach)
@@ -387,7 +411,9 @@ class Motion:
 
     def turn(self, t, y, k: int, g: int) -> None:
         """What the event g of interface k changes."""
-        law, n, face = self.laws[k], self.n, self.plant.faces[k]
+        law = self.laws[k]
+        n = self.n
+        face = self.plant.faces[k]
         if law.set_valued and law.mode == 0:
             law.mode = g
             others = [j for j, one in enumerate(self.laws) if one.mode == 0 and j != k]

@@ -51,9 +51,12 @@ def draw_log_uniform(r, low: float, high: float) -> float:
 def spec(seed: int) -> dict:
     """Return the numbers of a random scene by name, in SI; a seed gives always the same scene."""
     r = np.random.default_rng(seed)
-    law, drive = str(r.choice(LAWS)), str(r.choice(DRIVES))
-    own, mass = draw_log_uniform(r, 20, 400), draw_log_uniform(r, 0.2, 2)
-    omega, size = 2 * np.pi * own, draw_log_uniform(r, 5, 80)
+    law = str(r.choice(LAWS))
+    drive = str(r.choice(DRIVES))
+    own = draw_log_uniform(r, 20, 400)
+    mass = draw_log_uniform(r, 0.2, 2)
+    omega = 2 * np.pi * own
+    size = draw_log_uniform(r, 5, 80)
     out = {
         "seed": seed,
         "law": law,
@@ -106,7 +109,8 @@ def held_out(count: int) -> list:
 
     A march and harmonic balance are named in the scene; otherwise the program chooses the method.
     """
-    seeds, out = from_(HELD_OUT), []
+    seeds = from_(HELD_OUT)
+    out = []
     for k in range(count):
         method = tuple(METHODS)[k % len(METHODS)]
         out.append(next(s for s in map(spec, seeds) if fits(s, method)))
@@ -135,7 +139,9 @@ def fits(s: dict, method: str) -> bool:
 
 def _modes(r, own: float) -> list:
     """Draw the modes of a rig whose first natural frequency is `own` [Hz]."""
-    count, out, left = int(r.choice([1, 1, 2, 3, 4])), [], 1.0
+    count = int(r.choice([1, 1, 2, 3, 4]))
+    out = []
+    left = 1.0
     for k in range(count):
         base = float(r.uniform(0.65, 0.9) if k == 0 else r.uniform(-0.25, 0.25))
         left -= base**2
@@ -158,7 +164,8 @@ def draw_law_keys(r, law: str, load: float, reach: float, speed: float) -> dict:
 
     The lengths are fractions of the motion that the drive alone would cause.
     """
-    length, out = reach * draw_log_uniform(r, 0.01, 0.6), {"static": 0.3}
+    length = reach * draw_log_uniform(r, 0.01, 0.6)
+    out = {"static": 0.3}
     if law == "weakening" or law in ("growing", "lugre"):
         out["kinetic"] = 0.3 * float(r.uniform(0.3, 0.95))
     if law in ("elastic-plastic", "stretch", "growing", "order", "report", "convolution"):
@@ -226,7 +233,8 @@ def _drive(r, out: dict, own: float, reach: float) -> None:
     if out["several"] and kind in ("levels",):
         kind = out["drive"] = "sine"
     if kind == "sweep":
-        low, high = own * r.uniform(0.6, 0.9), own * r.uniform(1.1, 1.5)
+        low = own * r.uniform(0.6, 0.9)
+        high = own * r.uniform(1.1, 1.5)
         ends = (low, high) if r.random() < 0.5 else (high, low)
         out["sweep"] = {
             "from": float(ends[0]),
@@ -401,7 +409,9 @@ def _masses(s: dict) -> str:
 
 def _driven(s: dict, signal: str) -> str:
     """Return the drive as text."""
-    kind, size, out = s["drive"], s["size"], ""
+    kind = s["drive"]
+    size = s["size"]
+    out = ""
     force = s["mass"] * size
     pushed = {"mass": 1} if s["several"] else {}
     cycles = {"cycles": s["cycles"]}

@@ -258,7 +258,8 @@ def faults_of_file(file: str, text: str) -> list[Fault]:
             words = ast.unparse(ast.fix_missing_locations(changed))
             if isinstance(changed, (ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare, ast.IfExp)):
                 words = f"({words})"
-            first, last = node.lineno - 1, node.end_lineno
+            first = node.lineno - 1
+            last = node.end_lineno
             before = b"\n".join(lines[first:last])
             tail = lines[last - 1][node.end_col_offset :]
             after = lines[first][: node.col_offset] + words.encode() + tail
@@ -276,7 +277,8 @@ def is_valid(fault: Fault, text: str) -> bool:
 
 def with_fault(fault: Fault, text: str) -> str | None:
     """Return a source with the fault, at its line or where the same lines stand now; None if they are gone."""
-    lines, before = text.split("\n"), fault.before.split("\n")
+    lines = text.split("\n")
+    before = fault.before.split("\n")
     places = [place for place in range(len(lines)) if lines[place : place + len(before)] == before]
     if not places:
         return None
@@ -902,7 +904,8 @@ def show(results: Path) -> None:
 
 def compare(before: Path, after: Path) -> None:
     """Print how often the outcome is the same, and each fault that only the first run caught."""
-    first, second = read_outcomes(before), read_outcomes(after)
+    first = read_outcomes(before)
+    second = read_outcomes(after)
     pairs = {fault: (first[fault], second[fault]) for fault in first if fault in second}
     for (old, new), number in sorted(Counter(pairs.values()).items()):
         print(f"{old} -> {new}: {number}")

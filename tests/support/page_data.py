@@ -28,7 +28,10 @@ class _Heard(HTMLParser):
 
     def __init__(self):
         super().__init__()
-        self.lacks, self.levels, self.label, self.named = [], [], None, set()
+        self.lacks = []
+        self.levels = []
+        self.label = None
+        self.named = set()
 
     def handle_starttag(self, tag, attrs):
         """Controls are named by a label around them, in which nothing stands that a label names first, or by theirs."""

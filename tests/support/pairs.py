@@ -52,15 +52,18 @@ def pair(
     random = np.random.default_rng([seed, 1985])
     z = surface(seed)
     x = np.arange(round(length / step) + 1) * step
-    asked, moved = random.uniform(0.15, 0.65), random.uniform(-25, 25) * UM
-    share, moved = asked if share is None else share, moved if shift is None else shift
+    asked = random.uniform(0.15, 0.65)
+    moved = random.uniform(-25, 25) * UM
+    share = asked if share is None else share
+    moved = moved if shift is None else shift
     start = -length / 2
     here = z(x + start - moved)
     level = np.quantile(here, 1 - share) + random.uniform(0, 1) * UM * np.sin(
         2 * np.pi * x / length + random.uniform(0, 2 * np.pi)
     )
     worn = np.maximum(here - level, 0.0) if share > 0 else np.zeros(x.size)
-    tilts, offsets = random.uniform(-0.01, 0.01, 2), random.uniform(-5, 5, 2) * UM
+    tilts = random.uniform(-0.01, 0.01, 2)
+    offsets = random.uniform(-5, 5, 2) * UM
     jitter = noise * random.standard_normal((2, x.size))
     before = z(x + start) + tilts[0] * x + offsets[0] + jitter[0]
     after = here - worn + tilts[1] * x + offsets[1] + jitter[1]
@@ -91,7 +94,8 @@ def track(kind: str, seed: int, count: int = 4001, noise: float = 0.02 * UM) -> 
         "valid",
     )
     rough *= 0.3 * UM / rough.std()
-    depth, moved = random.uniform(0.4, 2.0) * UM, int(random.integers(-80, 81))
+    depth = random.uniform(0.4, 2.0) * UM
+    moved = int(random.integers(-80, 81))
     width = random.uniform(30, 120) if kind == "groove" else random.uniform(0.1, 0.4) * count
     middle = random.uniform(0.15 * count + width / 2, 0.85 * count - width / 2)
     x = np.arange(float(count))
@@ -105,10 +109,8 @@ def track(kind: str, seed: int, count: int = 4001, noise: float = 0.02 * UM) -> 
     }[kind]
     worn = np.where(inside, depth * shape, 0.0)
     jitter = noise * random.standard_normal((2, count))
-    before, after = (
-        rough[spare : spare + count],
-        rough[spare - moved : spare - moved + count] - worn,
-    )
+    before = rough[spare : spare + count]
+    after = rough[spare - moved : spare - moved + count] - worn
     x = frozen_array(x * UM)
     return Pair(
         Profile(x, frozen_array(before + jitter[0]), "before"),

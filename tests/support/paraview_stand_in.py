@@ -60,8 +60,13 @@ class Simple(types.ModuleType):
 
     def __init__(self):
         super().__init__("paraview.simple")
-        self.shown, self.coloured, self.tables, self.saved = [], {}, {}, []
-        self.view, self.scene, self.bars = Proxy("RenderView"), Proxy("AnimationScene"), {}
+        self.shown = []
+        self.coloured = {}
+        self.tables = {}
+        self.saved = []
+        self.view = Proxy("RenderView")
+        self.scene = Proxy("AnimationScene")
+        self.bars = {}
         for kind in ("PVDReader", "WarpByVector", "ExtractBlock", "AnnotateTimeFilter"):
             setattr(self, kind, lambda registrationName, kind=kind, **given: Proxy(kind, **given))
 
@@ -105,7 +110,8 @@ def blocks_at(source: Proxy, file: Path) -> list:
     """The grids that a source gives where its reader reads `file`: (points (n, 3), point data, cell data)."""
     last = _filter(source, file)
     last.Update()
-    walk, out = last.GetOutputDataObject(0).NewIterator(), []
+    walk = last.GetOutputDataObject(0).NewIterator()
+    out = []
     walk.InitTraversal()
     while not walk.IsDoneWithTraversal():
         grid = walk.GetCurrentDataObject()

@@ -34,27 +34,31 @@ def chain(seed: int) -> dict:
     """
     r = np.random.default_rng(seed)
     nodes = int(r.integers(1, 4))
-    masses, links = r.uniform(0.5, 2, 2 * nodes), []
+    masses = r.uniform(0.5, 2, 2 * nodes)
+    links = []
     for k in range(nodes):
-        x, y, below = 2 * k + 1, 2 * k + 2, max(2 * k - 1, 0)
+        x = 2 * k + 1
+        y = 2 * k + 2
+        below = max(2 * k - 1, 0)
         links += [
             ((x, below), r.uniform(2e4, 8e4)),
             ((y, below and below + 1), r.uniform(2e4, 8e4)),
             ((x, y), r.uniform(0, 1e4)),
         ]
     springs = [(pair, float(k)) for pair, k in links]
-    K, C = matrix(springs, 2 * nodes), matrix(dampers_of(springs), 2 * nodes)
+    K = matrix(springs, 2 * nodes)
+    C = matrix(dampers_of(springs), 2 * nodes)
     omega = np.sqrt(np.linalg.eigvalsh(K / np.sqrt(np.outer(masses, masses))))
-    drive, frequency = (
-        str(r.choice(["base", "force"])),
-        float(r.choice(omega[:2]) * r.uniform(0.7, 1.3)),
-    )
-    push, out = float(10 ** r.uniform(0, 2)), []
+    drive = str(r.choice(["base", "force"]))
+    frequency = float(r.choice(omega[:2]) * r.uniform(0.7, 1.3))
+    push = float(10 ** r.uniform(0, 2))
+    out = []
     limit = push * 10 ** r.uniform(-1.2, 0.1)
     at = r.choice(nodes, int(r.integers(1, nodes + 1)), replace=False)
     for k in (int(one) for one in at):
         to = 2 * k - 1 if k and r.random() < 0.5 else 0
-        stiff, load = float(10 ** r.uniform(4, 5.3)), float(limit / 0.4 * r.uniform(0.5, 1.5))
+        stiff = float(10 ** r.uniform(4, 5.3))
+        load = float(limit / 0.4 * r.uniform(0.5, 1.5))
         out.append(
             (
                 [2 * k + 1, to],
@@ -125,8 +129,11 @@ class Motion:
     """
 
     def __init__(self, s: dict):
-        self.s, n = s, len(s["masses"])
-        self.n, self.m, self.omega = n, s["masses"], 2 * np.pi * s["frequency"]
+        self.s = s
+        n = len(s["masses"])
+        self.n = n
+        self.m = s["masses"]
+        self.omega = 2 * np.pi * s["frequency"]
         self.rows = [np.array([row(one, n) for one in pairs if one]) for *pairs, _, _ in s["faces"]]
         self.k, self.most = zip(*((stiff, 0.4 * load / stiff) for *_, stiff, load in s["faces"]))
         ends = 2 * n + np.cumsum([0, *map(len, self.rows)])
@@ -138,13 +145,15 @@ class Motion:
 
     def rate(self, t, y, slips):
         """Return dy/dt; slips: whether each interface slips."""
-        n, out = self.n, np.zeros_like(y)
+        n = self.n
+        out = np.zeros_like(y)
         out[:n] = y[n : 2 * n]
         force = (
             self.push * np.sin(self.omega * t) - self.s["K"] @ y[:n] - self.s["C"] @ y[n : 2 * n]
         )
         for i, (rows, at, k) in enumerate(zip(self.rows, self.at, self.k)):
-            stretch, speed = y[at], rows @ y[n : 2 * n]
+            stretch = y[at]
+            speed = rows @ y[n : 2 * n]
             held = speed - stretch * (stretch @ speed) / (stretch @ stretch) if slips[i] else speed
             force -= k * rows.T @ stretch
             out[at] = held
@@ -166,19 +175,18 @@ class Motion:
                 else stretch @ stretch - self.most[i] ** 2
             )
 
-        gap.terminal, gap.direction = True, -1 if slips else 1
+        gap.terminal = True
+        gap.direction = -1 if slips else 1
         return gap
 
     def run(self, end: float, first: float, rtol: float) -> tuple:
         """Return (times, y) at SAMPLES per cycle from `first` [s] to the end."""
         period = 2 * np.pi / self.omega
         times = np.linspace(first, end, round((end - first) / period * SAMPLES) + 1)
-        y, slips, t, out = (
-            np.zeros(self.size),
-            [False] * len(self.rows),
-            0.0,
-            np.zeros((times.size, self.size)),
-        )
+        y = np.zeros(self.size)
+        slips = [False] * len(self.rows)
+        t = 0.0
+        out = np.zeros((times.size, self.size))
         atol = rtol * np.concatenate(
             [
                 np.full(self.n, min(self.most)),
@@ -203,7 +211,8 @@ class Motion:
             assert found.success, found.message
             here = (times >= t) & (times <= found.t[-1])
             out[here] = found.sol(times[here]).T if here.any() else out[here]
-            t, y = found.t[-1], found.y[:, -1].copy()
+            t = found.t[-1]
+            y = found.y[:, -1].copy()
             for i, hit in enumerate(found.t_events):
                 if hit.size:
                     slips[i] = not slips[i]
@@ -229,14 +238,16 @@ def widest(places) -> float:
 
 def measures(motion: Motion, times, y, cycles: float) -> dict:
     """Return the measures of the last cycles by name, as MEASURES.md defines them."""
-    s, n, seen = motion.s, motion.n, motion.s["seen"] - 1
+    s = motion.s
+    n = motion.n
+    seen = motion.s["seen"] - 1
     base = s["push"] * np.sin(motion.omega * times) if s["drive"] == "base" else 0.0
     last = -2 * len(motion.rows)
-    books, force = (
-        y[:, last:],
+    books = y[:, last:]
+    force = (
         motion.push[:, None] * np.sin(motion.omega * times)
         - s["K"] @ y[:, :n].T
-        - s["C"] @ y[:, n : 2 * n].T,
+        - s["C"] @ y[:, n : 2 * n].T
     )
     out = {
         "relative_displacement_amplitude": np.ptp(y[:, seen]) / 2,
@@ -244,7 +255,8 @@ def measures(motion: Motion, times, y, cycles: float) -> dict:
         "energy_dissipated": books[-1, 1::2].sum(),
     }
     for i, (rows, at, k) in enumerate(zip(motion.rows, motion.at, motion.k)):
-        tail, stretch = f"_{i + 1}" if i else "", y[:, at]
+        tail = f"_{i + 1}" if i else ""
+        stretch = y[:, at]
         force -= k * rows.T @ stretch.T
         slip = y[:, :n] @ rows.T - stretch
         out |= {
@@ -258,7 +270,8 @@ def measures(motion: Motion, times, y, cycles: float) -> dict:
 
 def truth(s: dict, window: int, rtol: float = 1e-10) -> dict:
     """Return the measures of the last `window` cycles of a chain."""
-    motion, period = Motion(s), 1 / s["frequency"]
+    motion = Motion(s)
+    period = 1 / s["frequency"]
     return measures(
         motion, *motion.run(s["cycles"] * period, (s["cycles"] - window) * period, rtol), window
     )

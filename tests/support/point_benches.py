@@ -41,7 +41,8 @@ def draw_bench(seed: int) -> dict:
     """Draw the numbers of a bench in SI units; the laws take turns."""
     r = np.random.default_rng(seed)
     law = LAWS[seed % len(LAWS)]
-    load, frequency = draw_log_uniform(r, 20, 2000), draw_log_uniform(r, 1, 300)
+    load = draw_log_uniform(r, 20, 2000)
+    frequency = draw_log_uniform(r, 1, 300)
     amplitude = draw_log_uniform(r, 1e-6, 1e-4)
     omega = 2 * np.pi * frequency
     numbers = {
@@ -90,11 +91,13 @@ class PrescribedMotion(Motion):
         return y
 
     def forces(self, t, y, pull=None):
-        law, part = self.laws[0], self.parts[0]
+        law = self.laws[0]
+        part = self.parts[0]
         return np.array([law.mode * law.kinetic if law.set_valued else law.force(y[part], y[1], t)])
 
     def slope(self, t, y):
-        law, part = self.laws[0], self.parts[0]
+        law = self.laws[0]
+        part = self.parts[0]
         out = np.empty_like(y)
         out[0] = y[1]
         out[1] = -self.s["size"] * np.sin(self.s["seeded"] * t)
@@ -113,16 +116,20 @@ class PrescribedMotion(Motion):
 def integrate_bench(bench: dict, rtol: float) -> dict:
     """Integrate a bench and return its measures by name."""
     motion = PrescribedMotion(bench)
-    law, period = motion.laws[0], 1 / bench["frequency"]
+    law = motion.laws[0]
+    period = 1 / bench["frequency"]
     end = bench["cycles"] * period
-    times, forces, displacements = [], [], []
+    times = []
+    forces = []
+    displacements = []
     peak = 0.0
     works = {}
     for stretch in motion.run(end, rtol, start=None if law.set_valued else motion.start()[:-1]):
         law.mode, law.side = stretch.modes[0]
         if stretch.turns:
             law.turns = stretch.turns[0]
-        begin, stop = stretch.times[0], stretch.times[-1]
+        begin = stretch.times[0]
+        stop = stretch.times[-1]
         count = max(int(N_SAMPLES * (stop - begin) / period), 2)
         t = np.linspace(begin, stop, count)
         y = stretch.solution(t).T
@@ -137,7 +144,8 @@ def integrate_bench(bench: dict, rtol: float) -> dict:
         displacements.append(y[last, 0])
     t, f, q = map(np.concatenate, (times, forces, displacements))
     turn = np.exp(-1j * bench["seeded"] * t)
-    high, low = np.argmax(q), np.argmin(q)
+    high = np.argmax(q)
+    low = np.argmin(q)
     measures = {
         "loop_area": works[end] - works[end - period],
         "friction_work": works[end],

@@ -105,7 +105,8 @@ def scene_of(kind: str, seed: int):
         sets["contact.crown.radius"] = f"{10 ** draw.uniform(0.3, 2):.3g} m"
     if shape == "tilt":
         sets["contact.tilt.angle"] = f"{10 ** draw.uniform(-5.5, -4):.3g} rad"
-    frequency, stroke = draw.uniform(80, 200), length * 10 ** draw.uniform(-0.3, 0.9)
+    frequency = draw.uniform(80, 200)
+    stroke = length * 10 ** draw.uniform(-0.3, 0.9)
     push = 10 ** draw.uniform(0.3, 1.0)
     if kind == "bench":
         sets |= {"slide.frequency": f"{frequency:.1f} Hz", "slide.amplitude": f"{stroke:.4g} um"}
@@ -157,17 +158,19 @@ class Bonds:
     """
 
     def __init__(self, f, size: int, floor: float, steps: int = 400):
-        self.f, self.floor, self.mu, self.finest = f, floor, f.static, FINEST / steps
-        self.at, self.path, self.harm, self.eps = (
-            np.zeros(size),
-            np.zeros(size),
-            np.zeros(size),
-            np.full(size, f.bond_length),
-        )
+        self.f = f
+        self.floor = floor
+        self.mu = f.static
+        self.finest = FINEST / steps
+        self.at = np.zeros(size)
+        self.path = np.zeros(size)
+        self.harm = np.zeros(size)
+        self.eps = np.full(size, f.bond_length)
         self.low, self.high, self.when, self.hurt, self.born, self.lag, self.dense = (
             np.zeros((0, size)) for _ in range(7)
         )
-        self.first, self.forming = np.ones(size), lambda places, part: np.ones_like(places)
+        self.first = np.ones(size)
+        self.forming = lambda places, part: np.ones_like(places)
 
     def grown(self, moved, dt):
         """Return lengths of bonds by 2.10 for points that move by `moved` (m,) [m] in a step dt [s].
@@ -183,10 +186,8 @@ class Bonds:
             return self.eps, np.ones_like(moved), self.eps
         out = []
         for part in (1.0, 0.5):
-            rest, slide = (
-                f.rest_growth * part * dt / np.maximum(moved / dt, self.floor),
-                part * moved / f.slip_growth,
-            )
+            rest = f.rest_growth * part * dt / np.maximum(moved / dt, self.floor)
+            slide = part * moved / f.slip_growth
             target = (rest * f.bond_length + slide * f.bond_length * f.kinetic / f.static) / (
                 rest + slide
             )
@@ -199,10 +200,14 @@ class Bonds:
 
         keep: whether s becomes the new state.
         """
-        f, p, e0 = self.f, self.f.order, self.f.bond_length
-        moved, norm = np.abs(s - self.at), gamma(self.f.order + 1)
+        f = self.f
+        p = self.f.order
+        e0 = self.f.bond_length
+        moved = np.abs(s - self.at)
+        norm = gamma(self.f.order + 1)
         eps, left, middle = self.grown(moved, dt)
-        path, harm = self.path + moved, self.harm + moved / middle
+        path = self.path + moved
+        harm = self.harm + moved / middle
         parts = (
             int(np.ceil(moved.max() / (self.finest * e0 * (f.kinetic or f.static) / f.static))) or 1
         )
@@ -210,15 +215,14 @@ class Bonds:
         ends = self.at + np.arange(parts + 1)[:, None] / parts * (s - self.at)
         # fraction of the step from its end to the middle of a part
         back = 1 - (np.arange(parts)[:, None] + 0.5) / parts
-        low, high = np.vstack([self.low, ends[:-1]]), np.vstack([self.high, ends[1:]])
+        low = np.vstack([self.low, ends[:-1]])
+        high = np.vstack([self.high, ends[1:]])
         size = np.abs(high - low)
         share = np.divide(s - low, high - low, out=np.full(low.shape, 0.5), where=size > 0)
         # bonds formed behind the point minus bonds formed ahead of it
         side = np.where(high >= low, 1.0, -1.0) * (2 * np.clip(share, 0, 1) - 1)
-        when, hurt = (
-            np.vstack([self.when, path - back * moved]),
-            np.vstack([self.hurt, harm - back * moved / middle]),
-        )
+        when = np.vstack([self.when, path - back * moved])
+        hurt = np.vstack([self.hurt, harm - back * moved / middle])
         born = np.vstack([self.born, np.tile(middle, (parts, 1))])
         gone = np.zeros_like(moved) + left
         # difference of a bond's length from its mature length, by 2.10 from 0
@@ -253,12 +257,16 @@ class Bonds:
             self.low, self.high, self.when, self.hurt, self.born, self.lag, self.dense = (
                 one[on] for one in (low, high, when, hurt, born, lag, dense)
             )
-            self.at, self.path, self.harm, self.eps = s, path, harm, eps
+            self.at = s
+            self.path = path
+            self.harm = harm
+            self.eps = eps
         return (each * side).sum(axis=0) + first
 
     def lift(self, off):
         """Break the bonds of points without pressure, off (m,) bool."""
-        self.dense[:, off], self.first[off] = 0.0, 0.0
+        self.dense[:, off] = 0.0
+        self.first[off] = 0.0
 
 
 def settled(bonds: Bonds, limit, c, q: float, dt: float, guess):
@@ -283,7 +291,8 @@ def settled(bonds: Bonds, limit, c, q: float, dt: float, guess):
     tuple
         Slides (m,) [m] and forces (m,) [N].
     """
-    s, tiny = guess.copy(), 1e-7 * bonds.f.bond_length
+    s = guess.copy()
+    tiny = 1e-7 * bonds.f.bond_length
     force = limit * bonds.weight(s, dt)
     miss = s - q + c @ force
     for _ in range(25):
@@ -297,7 +306,9 @@ def settled(bonds: Bonds, limit, c, q: float, dt: float, guess):
             left = new - q + c @ there
             if np.linalg.norm(left) < (1 - 0.1 * part) * np.linalg.norm(miss):
                 break
-        s, force, miss = new, there, left
+        s = new
+        force = there
+        miss = left
     return s, force
 
 
@@ -306,9 +317,11 @@ class Pressed:
 
     def __init__(self, patch):
         self.force = patch.pieces.interface.weight * patch.pressure.sigma_n
-        self.c, self.x = patch.pieces.normal, patch.x
+        self.c = patch.pieces.normal
+        self.x = patch.x
         self.load, self.moment = self.force.sum(), self.force @ self.x
-        self.opening, self.inverses = patch.pressure.gap - self.c @ self.force, {}
+        self.opening = patch.pressure.gap - self.c @ self.force
+        self.inverses = {}
 
     def at(self, heave: float, turn: float):
         """Return nodal forces (m,) [N] and their derivatives by heave and rotation (m, 2).
@@ -316,15 +329,18 @@ class Pressed:
         The forces and gaps are >= 0. The active set starts from the last one: nodes that pull leave
         it, nodes that would overlap join it.
         """
-        on, open_ = self.force > 0, self.opening + heave + turn * self.x
+        on = self.force > 0
+        open_ = self.opening + heave + turn * self.x
         for _ in range(200):
-            force, slopes = np.zeros_like(self.x), np.zeros((self.x.size, 2))
+            force = np.zeros_like(self.x)
+            slopes = np.zeros((self.x.size, 2))
             if on.any():
                 if on.tobytes() not in self.inverses:
                     self.inverses[on.tobytes()] = np.linalg.inv(self.c[np.ix_(on, on)])
                 sides = np.stack([open_, np.ones_like(open_), self.x], axis=1)
                 found = self.inverses[on.tobytes()] @ sides[on]
-                force[on], slopes[on] = -found[:, 0], -found[:, 1:]
+                force[on] = -found[:, 0]
+                slopes[on] = -found[:, 1:]
             wanted = np.where(on, force >= 0, open_ + self.c @ force < -1e-16)
             if (wanted == on).all():
                 break
@@ -337,18 +353,20 @@ def by_hand(scene, steps: int = 500) -> dict:
     """Return the measures of a scene by the sum, at `steps` per cycle."""
     model = build(scene)
     patch = patches.solve_all(model.patch, 0.1 * model.accuracy.tolerance, False, False)[0]
-    f, rig = model.friction, model.rig
-    area, sigma, lower = (
-        patch.pieces.interface.weight,
-        patch.pressure.sigma_n,
-        model.side == "lower",
-    )
+    f = model.friction
+    rig = model.rig
+    area = patch.pieces.interface.weight
+    sigma = patch.pressure.sigma_n
+    lower = model.side == "lower"
     varies = rig is not None and rig.friction.load_varies
     on = np.flatnonzero(sigma > 0) if not (lower or varies) else np.arange(sigma.size)
     measure = patch.pressure.load / area[sigma > 0].sum()
     under = np.full(on.size, measure) if lower or varies else sigma[on]
-    limit, c, x = f.static * area[on] * under, patch.giving[np.ix_(on, on)], patch.x[on]
-    bonds, press = Bonds(f, on.size, model.bonds.rest_speed, steps), Pressed(patch)
+    limit = f.static * area[on] * under
+    c = patch.giving[np.ix_(on, on)]
+    x = patch.x[on]
+    bonds = Bonds(f, on.size, model.bonds.rest_speed, steps)
+    press = Pressed(patch)
     bonds.first = sigma[on] / under
     force_now = area * sigma
     if lower:
@@ -362,10 +380,14 @@ def by_hand(scene, steps: int = 500) -> dict:
     )
     dt = 2 * pi / omega / steps
     slide, force, slip = (np.zeros(cycles * steps + 1) for _ in range(3))
-    s, before, beta = np.zeros(on.size), np.zeros(on.size), 0.0
+    s = np.zeros(on.size)
+    before = np.zeros(on.size)
+    beta = 0.0
     if rig is not None:
         modes = rig.modes
-        own, zeta, mass = modes.omega, modes.zeta, modes.mass
+        own = modes.omega
+        zeta = modes.zeta
+        mass = modes.mass
         rows = np.stack(
             [
                 np.zeros(own.size) if one is None else np.asarray(one, float)
@@ -373,7 +395,8 @@ def by_hand(scene, steps: int = 500) -> dict:
             ]
         )
         stiff = own**2 + 4 / dt**2 + 4 * zeta * own / dt
-        beta, state = float((rows[0] ** 2 / stiff).sum() / mass), np.zeros((3, own.size))
+        beta = float((rows[0] ** 2 / stiff).sum() / mass)
+        state = np.zeros((3, own.size))
     for k in range(1, slide.size):
         t = k * dt
         if rig is None:
@@ -384,7 +407,8 @@ def by_hand(scene, steps: int = 500) -> dict:
             free_z = (
                 push + 4 * z / dt**2 + 4 * v / dt + a + 2 * zeta * own * (2 * z / dt + v)
             ) / stiff
-            old, pull = force_now, np.zeros(own.size)
+            old = force_now
+            pull = np.zeros(own.size)
             if varies:
                 force_now, pull = balanced(press, rows, free_z, stiff * mass, z)
                 bonds.forming = lambda places, part, a=old[on], b=force_now[on]: np.broadcast_to(
@@ -393,7 +417,8 @@ def by_hand(scene, steps: int = 500) -> dict:
             free_z = free_z + pull
             free = rows[0] @ free_z
         new, there = settled(bonds, limit, c + beta, free, dt, 2 * s - before)
-        before, s = s, new
+        before = s
+        s = new
         bonds.weight(s, dt, keep=True)
         here = (
             np.interp(x + s, patch.x, sigma, left=0.0, right=0.0) * area[on]
@@ -446,7 +471,8 @@ def balanced(press: Pressed, rows, free, stiff, guess) -> tuple:
         Nodal forces (m,) [N], and the coordinates (n,) by which they push the modes from `free`.
     """
     up = rows[1:] / stiff  # change of the coordinates by one newton and one newton metre
-    place, rest = rows[1:] @ guess, rows[1:] @ free
+    place = rows[1:] @ guess
+    rest = rows[1:] @ free
     for _ in range(60):
         force, slopes = press.at(*place)
         pull = np.array([force.sum() - press.load, force @ press.x - press.moment])
@@ -468,7 +494,8 @@ def compare_sum(kind: str, seed: int) -> dict:
         result = runs.run(pf.plan(scene))
     except pf.PatchfemError as error:
         return {"group": kind, "rows": [], "refused": str(error)}
-    rough, fine = by_hand(scene, 200), by_hand(scene, 400)
+    rough = by_hand(scene, 200)
+    fine = by_hand(scene, 400)
     doubts = {name: abs(fine[name] - rough[name]) for name in fine}
     return {"group": kind, "rows": measure_rows(result.measures, fine, doubts, COMPARED[kind])}
 

@@ -108,7 +108,8 @@ def remaining_decay(quarter: dict, half: dict, whole: dict) -> dict:
     If the decay over a quarter is r, the ratio of the two changes is r (1 + r), and r^2/(1 - r^2) of the last one is
     left.
     """
-    out, early = difference(whole, half), difference(half, quarter)
+    out = difference(whole, half)
+    early = difference(half, quarter)
     for name, last in out.items():
         rate = min((np.sqrt(1 + 4 * last / max(early.get(name, last), 1e-300)) - 1) / 2, 0.99)
         out[name] = last * max(1.0, 2 * rate**2 / (1 - rate**2))
@@ -180,9 +181,11 @@ def run_rig(path: Path) -> dict:
         result = pf.run(path)
     except pf.PatchfemError as error:
         return {"refused": str(error)}
-    seconds, rig = process_time() - begin, pf.build(path).rig
+    seconds = process_time() - begin
+    rig = pf.build(path).rig
     summary = json.loads((result.save(path.with_suffix("")) / "summary.json").read_text("utf-8"))
-    numerics, time = summary["numerics"], result.to_xarray().time
+    numerics = summary["numerics"]
+    time = result.to_xarray().time
     return {
         "outcome": summary["outcome"],
         "engine": numerics["engine"],

@@ -33,7 +33,8 @@ def shaken(frequency: float, damping: float, duration: float, seed: int) -> tupl
     """(window, drive): the steady motion of an oscillator under a record, whose lines are those of the drive."""
     low, high = band_of(frequency)
     drive = draw_random_record((low, high), (LEVEL, LEVEL), duration, seed, 1 / frequency)
-    f, omega = np.arange(drive.time.size // 2 + 1) / drive.duration, 2 * np.pi * frequency
+    f = np.arange(drive.time.size // 2 + 1) / drive.duration
+    omega = 2 * np.pi * frequency
     lines = (
         np.fft.rfft(drive.value[:-1])
         * np.sinc(f * drive.time[1]) ** 2

@@ -57,7 +57,8 @@ def drawn(seed: int) -> tuple:
 
 def _shape(kind: str, x, draw) -> tuple:
     """Gap (n,) [m] of a kind, and a load [N] that closes some of it."""
-    area, half = LENGTH * 12.7e-3, LENGTH / 2
+    area = LENGTH * 12.7e-3
+    half = LENGTH / 2
     place = draw.uniform(-0.4, 0.4) * half
     if kind == "corner":
         left, right = 10 ** draw.uniform(-4, -2.7, 2)
@@ -69,7 +70,8 @@ def _shape(kind: str, x, draw) -> tuple:
         heights = draw.uniform(0, 10 ** draw.uniform(-6.5, -5.5), at.size)
         return np.interp(x, at, heights), 10 ** draw.uniform(1.7, 3)
     if kind == "punch":
-        flat, radius = draw.uniform(0.05, 0.3) * half, 10 ** draw.uniform(-1.7, 0)
+        flat = draw.uniform(0.05, 0.3) * half
+        radius = 10 ** draw.uniform(-1.7, 0)
         return np.maximum(np.abs(x - place) - flat, 0) ** 2 / (2 * radius), 10 ** draw.uniform(
             2, 3.5
         )
@@ -125,7 +127,8 @@ def _beside(kind: str, asked, tolerance: float) -> dict:
     """Measures of a patch by name from cells alone: even ones of traces that are fine everywhere, else graded ones."""
     if kind in FINE:
         return measures(*solve_all(asked.with_mesh(element_size=LENGTH / CELLS), tolerance))
-    given, ladder._finer = ladder._finer, lambda asked: False
+    given = ladder._finer
+    ladder._finer = lambda asked: False
     try:
         return measures(
             *(one for one in solve_all(asked, tolerance) if one is not None), tolerance=tolerance

@@ -48,22 +48,26 @@ def chain(seed: int) -> dict:
     """Matrices and numbers of a random chain of 16 to 60 masses that rubs at one and is watched at another."""
     r = np.random.default_rng(seed)
     n = int(r.integers(16, 61))
-    k, m = 1e7 * 10 ** r.uniform(-0.3, 0.3, n), 0.02 * 10 ** r.uniform(-0.3, 0.3, n)
+    k = 1e7 * 10 ** r.uniform(-0.3, 0.3, n)
+    m = 0.02 * 10 ** r.uniform(-0.3, 0.3, n)
     K = np.diag(k + np.append(k[1:], 0)) - np.diag(k[1:], 1) - np.diag(k[1:], -1)
     M = np.diag(m)
     omega, shapes = np.linalg.eigh(K / np.sqrt(np.outer(m, m)))
-    omega, mode = np.sqrt(omega), int(r.integers(0, 2))
+    omega = np.sqrt(omega)
+    mode = int(r.integers(0, 2))
     rubs, seen = (int(one) for one in r.choice(np.arange(n // 4, n), 2, replace=False))
     alpha = 2 * r.uniform(0.003, 0.03) * omega[0]
     frequency = omega[mode] * r.uniform(0.85, 1.15)
-    force, stiff = 10 ** r.uniform(0, 2), 1 / np.linalg.inv(K)[rubs, rubs]
+    force = 10 ** r.uniform(0, 2)
+    stiff = 1 / np.linalg.inv(K)[rubs, rubs]
     # a modal force gives a slide of F shape^2/(2 zeta omega^2) at resonance
     shape = shapes[:, mode] / np.sqrt(m)
     reach = float(
         force * abs(shape[seen] * shape[rubs]) / (max(alpha / omega[mode], 0.05) * omega[mode] ** 2)
     )
     load = stiff * reach * 10 ** r.uniform(-1.5, 0.3) / 0.3
-    law, drive = str(r.choice(list(LAWS))), str(r.choice(["base", "force"]))
+    law = str(r.choice(list(LAWS)))
+    drive = str(r.choice(["base", "force"]))
     sizes = {"length": float(reach * 10 ** r.uniform(-2, -0.5))}
     sizes["speed"] = float(reach * frequency * 10 ** r.uniform(-2, -1))
     sizes["stiffness"] = float(0.3 * load / sizes["length"])
@@ -88,7 +92,8 @@ def chain(seed: int) -> dict:
 
 def texts(s: dict) -> tuple:
     """Scenes of the reduced chain and of all of it, in this order."""
-    out, exact = [], "" if s["law"] not in SMOOTH else '[accuracy]\nmethod = "harmonic"\n'
+    out = []
+    exact = "" if s["law"] not in SMOOTH else '[accuracy]\nmethod = "harmonic"\n'
     for whole in (False, True):
         rubs, seen = (s["rubs"] + 1, s["seen"] + 1) if whole else (1, 2)
         size = (

@@ -173,7 +173,8 @@ def _judged(before, after, remedy: Remedy, sets: dict) -> str:
     sentence = remedy.sentence
     if not (names := _named(before, sentence)):
         said = [*after.warnings, *after.extra.get("notes", [])]
-        old, new = sentence, next((one for one in said if _gist(one) == _gist(sentence)), None)
+        old = sentence
+        new = next((one for one in said if _gist(one) == _gist(sentence)), None)
         if new is None:
             return "gone"
         share = re.compile(r"^work_check is (\S+) ")

@@ -101,7 +101,8 @@ def coverage(kind: str, seeds) -> dict:
     """Name -> (share of the intervals that hold the mean, share of traces that have an interval)."""
     from patchfem.surface.roughness.report import make_report
 
-    truth, held = means(kind), defaultdict(list)
+    truth = means(kind)
+    held = defaultdict(list)
     for seed in seeds:
         for one in make_report(trace(kind, seed), CUTOFF).values:
             if one.name in truth and one.value is not None:

@@ -118,7 +118,8 @@ def _draw(model, half: float, height: float, coating: float, radius: float, flat
         )
         groups["coating"] = [layer]
     else:
-        low, seam = top, surface
+        low = top
+        seam = surface
     walls = [geo.addLine(a, b) for a, b in ((low[0], base[0]), (low[-1], base[1]))]
     groups["substrate"] = [
         geo.addPlaneSurface([geo.addCurveLoop([*seam, walls[1], -far, -walls[0]])])
@@ -157,7 +158,9 @@ def _mirrored(model) -> TaggedMesh:
     row = np.full(int(numbers.max()) + 1, -1)
     row[numbers.astype(int)] = np.arange(numbers.size)
     points = place.reshape(-1, 3)
-    cells, names, nodes = {2: [], 3: []}, {2: [], 3: []}, {}
+    cells = {2: [], 3: []}
+    names = {2: [], 3: []}
+    nodes = {}
     for dim, group in model.getPhysicalGroups():
         name = model.getPhysicalName(dim, group)
         for entity in model.getEntitiesForPhysicalGroup(dim, group):

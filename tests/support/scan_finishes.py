@@ -55,13 +55,12 @@ def draw_surface(random, shape: tuple, finish: Finish) -> np.ndarray:
 
 def _spectral(random, shape: tuple, finish: Finish, angle: float | None = None) -> np.ndarray:
     """Draw Gaussian heights with a self-affine spectrum, stretched along a lay at `angle` if there is one."""
-    ky, kx = fftfreq(shape[0])[:, None], rfftfreq(shape[1])[None, :]
+    ky = fftfreq(shape[0])[:, None]
+    kx = rfftfreq(shape[1])[None, :]
     k = np.hypot(kx, ky)
     if angle is not None:
-        along, across = (
-            np.cos(angle) * kx + np.sin(angle) * ky,
-            np.cos(angle) * ky - np.sin(angle) * kx,
-        )
+        along = np.cos(angle) * kx + np.sin(angle) * ky
+        across = np.cos(angle) * ky - np.sin(angle) * kx
         k = np.hypot(across, finish.elongation * along)
     amplitude = np.maximum(k, 1 / finish.rolloff) ** (-1 - finish.hurst)
     amplitude *= np.exp(-((finish.cutoff * np.hypot(kx, ky)) ** 2) / 4)
@@ -102,7 +101,8 @@ def _plateau(random, shape: tuple, finish: Finish) -> np.ndarray:
         for place in random.uniform(
             places[0], places[-1], int(places.size / (2 * finish.period)) + 1
         ):
-            depth, half = random.exponential(1.0) + 0.3, random.uniform(3, 8)
+            depth = random.exponential(1.0) + 0.3
+            half = random.uniform(3, 8)
             profile = np.maximum(profile, depth * np.maximum(1 - np.abs(places - place) / half, 0))
         grooves = np.maximum(grooves, np.interp(across, places, profile))
     return -grooves + random.uniform(0.08, 0.2) * _spectral(random, shape, finish)
@@ -114,7 +114,8 @@ def _peened(random, shape: tuple, finish: Finish) -> np.ndarray:
     count = int(3.0 * heights.size / (np.pi * finish.period**2))
     for _ in range(count):
         radius = finish.period * random.uniform(0.6, 1.2)
-        i, j = random.uniform(0, shape[0]), random.uniform(0, shape[1])
+        i = random.uniform(0, shape[0])
+        j = random.uniform(0, shape[1])
         rows = slice(max(int(i - radius), 0), int(i + radius) + 2)
         columns = slice(max(int(j - radius), 0), int(j + radius) + 2)
         block = heights[rows, columns]

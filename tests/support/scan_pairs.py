@@ -169,7 +169,8 @@ def make(seed: int, kind: str | None = None) -> Pair:
         first, second, new, worn = second, first, old, first
     points = scan_points(shape, spacing, Pose((0.0, 0.0), 0.0, pose.centre))
     moved = scan_points(shape, spacing, pose)
-    true_before, true_after = sample(first, grid, points), sample(second, grid, moved)
+    true_before = sample(first, grid, points)
+    true_after = sample(second, grid, moved)
     instrument = random.choice(["stylus", "camera"])
     noise = rms * random.uniform(0.01, 0.06)
     scans = [
@@ -194,7 +195,8 @@ def draw_pose(random, size) -> Pose:
 
 def make_field(size, spacing: float, pose: Pose) -> Field:
     """Return the grid of the surface over both scans, and the box within both of them."""
-    pitch, margin = spacing / OVERSAMPLING, MARGIN * size.max()
+    pitch = spacing / OVERSAMPLING
+    margin = MARGIN * size.max()
     x = np.arange(-margin, size[0] + margin, pitch)
     y = np.arange(-margin, size[1] + margin, pitch)
     skew = abs(np.tan(pose.rotation)) * size[::-1] / 2 + 4 * spacing
@@ -206,8 +208,10 @@ def make_field(size, spacing: float, pose: Pose) -> Field:
 def scan_points(shape, spacing: float, pose: Pose) -> np.ndarray:
     """Return the positions (2, ny, nx) [m] on the piece of the points of a scan."""
     y, x = np.indices(tuple(shape)) * spacing
-    x, y = x - pose.centre[0], y - pose.centre[1]
-    cos, sin = np.cos(pose.rotation), np.sin(pose.rotation)
+    x = x - pose.centre[0]
+    y = y - pose.centre[1]
+    cos = np.cos(pose.rotation)
+    sin = np.sin(pose.rotation)
     return np.array(
         [
             pose.centre[0] + pose.shift[0] + cos * x - sin * y,
@@ -228,7 +232,8 @@ def measure(
     """Return a scan: heights with noise, tilt, offset, digitisation, dust and missing points."""
     ny, nx = heights.shape
     z = heights + noise * draw_noise(random, heights.shape, instrument)
-    along, across = np.linspace(-0.5, 0.5, nx), np.linspace(-0.5, 0.5, ny)[:, None]
+    along = np.linspace(-0.5, 0.5, nx)
+    across = np.linspace(-0.5, 0.5, ny)[:, None]
     tilt = random.uniform(-8, 8, 2) * rms
     z += tilt[0] * along + tilt[1] * across + random.uniform(-5e-6, 5e-6)
     step = random.choice([0.0, 0.3, 1.0]) * noise
@@ -236,7 +241,8 @@ def measure(
         z = np.round(z / step) * step
     if random.random() < 0.5:
         for _ in range(random.integers(1, 6)):
-            i, j = random.integers(0, ny - 4), random.integers(0, nx - 4)
+            i = random.integers(0, ny - 4)
+            j = random.integers(0, nx - 4)
             height, width = random.integers(1, 4, 2)
             sign = -1 if instrument == "camera" and random.random() < 0.4 else 1
             z[i : i + height, j : j + width] += sign * random.uniform(6, 25) * rms
@@ -246,7 +252,9 @@ def measure(
         z[(slope > limit) & (random.random(z.shape) < random.uniform(0.4, 1.0))] = np.nan
     if random.random() < 0.3:
         for _ in range(random.integers(1, 4)):
-            i, j, radius = random.integers(0, ny), random.integers(0, nx), random.uniform(1, 5)
+            i = random.integers(0, ny)
+            j = random.integers(0, nx)
+            radius = random.uniform(1, 5)
             rows, columns = np.ogrid[:ny, :nx]
             z[(rows - i) ** 2 + (columns - j) ** 2 < radius**2] = np.nan
     return z
@@ -281,9 +289,11 @@ def apply_wear(kind: str, random, grid: Field, new, rms: float) -> tuple:
         return wear_track(kind, random, grid, new, rms)
     span = grid.high - grid.low
     middle = grid.low + random.uniform(0.4, 0.6, 2) * span
-    dx, dy = grid.x - middle[0], grid.y - middle[1]
+    dx = grid.x - middle[0]
+    dy = grid.y - middle[1]
     if kind == "crater":
-        radius, depth = random.uniform(0.15, 0.32) * span.min(), random.uniform(2, 12) * rms
+        radius = random.uniform(0.15, 0.32) * span.min()
+        depth = random.uniform(2, 12) * rms
         return cut(random, grid, new, depth * (1 - (dx**2 + dy**2) / radius**2)), None
     if kind == "shallow wear":
         half = random.uniform(0.27, 0.4, 2) * span
@@ -342,7 +352,8 @@ def wear_track(kind: str, random, grid: Field, new, rms: float) -> tuple:
     axis = np.array([np.cos(direction), np.sin(direction)])
     across = -(grid.x - middle[0]) * axis[1] + (grid.y - middle[1]) * axis[0]
     along = (grid.x - middle[0]) * axis[0] + (grid.y - middle[1]) * axis[1]
-    length, ends = None, None
+    length = None
+    ends = None
     distance = np.abs(across)
     if random.random() < 0.5:
         # half the length between the centres of the round ends
@@ -392,12 +403,12 @@ def draw_scratches(random, grid: Field, rms: float) -> np.ndarray:
     span = grid.high - grid.low
     depth = np.zeros(grid.x.shape)
     for _ in range(random.integers(3, 9)):
-        middle, angle = grid.low + random.uniform(0.1, 0.9, 2) * span, random.uniform(0, np.pi)
-        dx, dy = grid.x - middle[0], grid.y - middle[1]
-        along, across = (
-            np.cos(angle) * dx + np.sin(angle) * dy,
-            np.cos(angle) * dy - np.sin(angle) * dx,
-        )
+        middle = grid.low + random.uniform(0.1, 0.9, 2) * span
+        angle = random.uniform(0, np.pi)
+        dx = grid.x - middle[0]
+        dy = grid.y - middle[1]
+        along = np.cos(angle) * dx + np.sin(angle) * dy
+        across = np.cos(angle) * dy - np.sin(angle) * dx
         half = random.uniform(2, 6) * OVERSAMPLING * grid.pitch
         beyond = np.maximum(np.abs(along) - random.uniform(0.1, 0.6) * span.max(), 0)
         shape = np.maximum(1 - np.hypot(across, beyond) / half, 0)
@@ -410,10 +421,8 @@ def draw_lumps(random, grid: Field, rms: float) -> np.ndarray:
     span = grid.high - grid.low
     height = np.zeros(grid.x.shape)
     for _ in range(random.integers(1, 7)):
-        middle, half = (
-            grid.low + random.uniform(0.15, 0.85, 2) * span,
-            random.uniform(0.04, 0.13, 2) * span.min(),
-        )
+        middle = grid.low + random.uniform(0.15, 0.85, 2) * span
+        half = random.uniform(0.04, 0.13, 2) * span.min()
         r = ((grid.x - middle[0]) / half[0]) ** 2 + ((grid.y - middle[1]) / half[1]) ** 2
         height = np.maximum(
             height, random.uniform(1.5, 7) * rms * np.maximum(1 - r, 0) ** random.choice([0.5, 1.0])
@@ -426,11 +435,13 @@ def find_truth(
 ) -> Truth:
     """Integrate the noise-free depth (ny, nx) [m] over the region that both scans show."""
     beyond = np.stack([points[0], points[1], size[0] - points[0], size[1] - points[1]]).min(axis=0)
-    common, inner = beyond >= 0, beyond >= spacing
+    common = beyond >= 0
+    inner = beyond >= spacing
     inner[[0, -1], :] = inner[:, [0, -1]] = False
     if kind == "elsewhere":
         depth = np.zeros(depth.shape)
-    lost, gained = np.maximum(depth, 0), np.maximum(-depth, 0)
+    lost = np.maximum(depth, 0)
+    gained = np.maximum(-depth, 0)
     sums = [spacing**2 * part[mask].sum() for mask in (common, inner) for part in (lost, gained)]
     volumes = Volumes(*sums, common.sum() * spacing**2, inner.sum() * spacing**2)
     medians = median_filter(depth, 3)
@@ -458,8 +469,10 @@ def find_section(track: Track, depth, points, common, spacing: float) -> Section
     The average is over nine tenths of the straight part.
     """
     axis = np.array([np.cos(track.direction), np.sin(track.direction)])
-    dx, dy = points[0] - track.middle[0], points[1] - track.middle[1]
-    across, along = axis[0] * dy - axis[1] * dx, axis[0] * dx + axis[1] * dy
+    dx = points[0] - track.middle[0]
+    dy = points[1] - track.middle[1]
+    across = axis[0] * dy - axis[1] * dx
+    along = axis[0] * dx + axis[1] * dy
     reach = np.inf if track.length is None else 0.45 * (track.length - track.width)
     used = common & (np.abs(along) <= reach) & (np.abs(across) < track.width / 2)
     n_bins = max(round(track.width / spacing), 5)

@@ -36,7 +36,9 @@ def compare(pair, folder: Path) -> dict:
             comments="",
         )
         names.append(str(path))
-    out, err, code = io.StringIO(), io.StringIO(), 0
+    out = io.StringIO()
+    err = io.StringIO()
+    code = 0
     start = time.process_time()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
@@ -66,7 +68,8 @@ def find_faults(pair, unworn: bool, answer: dict) -> list:
         faults.append("depth of wear shown where none can be shown")
     if unworn and any(word in headline for word in ("reduced", "increased", "flatter")):
         faults.append("waves changed, but they did not")
-    true_mean, true_max = pair.worn.mean(), pair.worn.max()
+    true_mean = pair.worn.mean()
+    true_max = pair.worn.max()
     limit = re.search(r"would have been found from a mean depth of ([\d.e+-]+) (nm|um|mm)", text)
     if (
         limit
@@ -94,10 +97,8 @@ def check_intervals(pair, answer: dict) -> dict:
     y = x + pair.shift
     common = (y >= 0) & (y <= pair.before[0][-1])
     # pile-up is not counted as negative wear
-    worn, spacing = (
-        np.maximum(pair.worn[common], 0.0),
-        x[1] - x[0],
-    )
+    worn = np.maximum(pair.worn[common], 0.0)
+    spacing = x[1] - x[0]
     hides = pair.kind in ("even", "wedge", "elsewhere")
     if not hides:
         truth["shift"] = None
@@ -119,7 +120,8 @@ def check_intervals(pair, answer: dict) -> dict:
             continue
         if quantity.get("low") is None or quantity.get("high") is None:
             continue
-        low, high = quantity["low"], quantity["high"]
+        low = quantity["low"]
+        high = quantity["high"]
         outside = max(low - true, true - high, 0.0)
         half = (high - low) / 2
         found[name] = (

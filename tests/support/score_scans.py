@@ -88,10 +88,13 @@ def find_false_ratios(pair, answer: dict) -> list:
 
 def list_truths(pair) -> dict:
     """Return name -> true values; an interval holds if it contains any of them (definitions may differ)."""
-    truth, track, section = pair.truth, pair.truth.track, pair.truth.section
+    truth = pair.truth
+    track = pair.truth.track
+    section = pair.truth.section
     if not truth.is_knowable:
         return {}
-    volumes, depths = truth.volumes, truth.depths
+    volumes = truth.volumes
+    depths = truth.depths
     nearly_nothing = 1e-4 * (volumes.worn + volumes.grown)  # ripples of the interpolation
     truths = {
         "worn_volume": (volumes.worn,),
@@ -137,7 +140,8 @@ def check_intervals(pair, answer: dict) -> dict:
             or quantity.get("high") is None
         ):
             continue
-        low, high = quantity["low"], quantity["high"]
+        low = quantity["low"]
+        high = quantity["high"]
         half = (high - low) / 2
         misses = [max(low - true, true - high, 0.0) for true in truths]
         if name == "track_direction":  # an axis: directions that differ by half a turn are the same

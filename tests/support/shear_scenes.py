@@ -142,7 +142,8 @@ def chain(seed: int) -> tuple:
     draw = np.random.default_rng(seed)
     one, two = 10 ** draw.uniform(5, 7, 2)
     pieces, rest = RIG.split("[friction]")
-    text, sets = CHAIN.format(one=one, two=two), {}
+    text = CHAIN.format(one=one, two=two)
+    sets = {}
     for k, pair in enumerate(("1, 0", "2, 1")):
         text += FACE.format(pair=pair, static=draw.uniform(0.1, 0.6)) + pieces.replace(
             "[contact", "[structure.interface.contact"

@@ -7,7 +7,8 @@ import numpy as np
 
 def elements(group, path):
     """Resultant [N] at every reversal of parallel elements, each a spring in series with a slider."""
-    settled, out = np.zeros(group.stiffness.size), []
+    settled = np.zeros(group.stiffness.size)
+    out = []
     for q in path:
         stretch = np.clip(q - settled, -group.yield_displacement, group.yield_displacement)
         settled = q - stretch

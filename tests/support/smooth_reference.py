@@ -68,19 +68,25 @@ def integrate(modes, drive, form, end, times, start=None, kink=None, rtol=1e-12)
     """(coordinates (n, k), forces (k,)) at times (k,) [s], pieces: between reversals of the slide, kinks kink(y) of the
     law's states and borders of the drive's segments every piece is integrated by itself."""
     begin, rates, force = form
-    n, period = modes.omega.size, drive.period
+    n = modes.omega.size
+    period = drive.period
     borders = (
         [s.start for s in drive.segments[1:]]
         if drive.segments
         else list(getattr(drive, "time", []))
     )
     y = np.concatenate([np.zeros(2 * n) if start is None else [*start.z, *start.v], begin])
-    damping, t, way = modes.damping_matrix, 0.0, 0.0
-    out, forces = np.zeros((n, len(times))), np.zeros(len(times))
+    damping = modes.damping_matrix
+    t = 0.0
+    way = 0.0
+    out = np.zeros((n, len(times)))
+    forces = np.zeros(len(times))
 
     def slope(t, y, way, edge):
-        z, v = y[:n], y[n : 2 * n]
-        speed, push = modes.slide @ v, float(drive.values(min(t, np.nextafter(edge, -np.inf))))
+        z = y[:n]
+        v = y[n : 2 * n]
+        speed = modes.slide @ v
+        push = float(drive.values(min(t, np.nextafter(edge, -np.inf))))
         pull = force(y[2 * n :], speed, way)
         return [
             *v,
@@ -107,7 +113,9 @@ def integrate(modes, drive, form, end, times, start=None, kink=None, rtol=1e-12)
         def bends(t, y, way, edge):
             return kink(y[2 * n :], modes.slide @ y[n : 2 * n]) if kink is not None else 1.0
 
-        stops.terminal, stops.direction, bends.terminal = True, -way, True
+        stops.terminal = True
+        stops.direction = -way
+        bends.terminal = True
         first = min(1e-6 * period, edge - t)
         done = solve_ivp(
             slope,
@@ -127,12 +135,14 @@ def integrate(modes, drive, form, end, times, start=None, kink=None, rtol=1e-12)
         out[:, here] = states[:n]
         forces[here] = [force(s[2 * n :], modes.slide @ s[n : 2 * n], way) for s in states.T]
         turned = done.t_events[0].size > 0
-        t, y = done.t[-1], done.y[:, -1].copy()
+        t = done.t[-1]
+        y = done.y[:, -1].copy()
         if turned:
             way = -way
             if n == 1:
                 y[1] = 0.0
         elif done.t_events[1].size:  # beyond the kink, which would end the next piece at once
             step = 1e-9 * period
-            y, t = y + step * np.array(slope(t, y, way, edge)), t + step
+            y = y + step * np.array(slope(t, y, way, edge))
+            t = t + step
     return out, forces

@@ -63,7 +63,8 @@ def spread(points, sizes, begin: float, end: float, growth: float, most: float) 
 
     The cells grow by `growth` per distance, up to `most`.
     """
-    points, sizes = np.asarray(points, float), np.asarray(sizes, float)
+    points = np.asarray(points, float)
+    sizes = np.asarray(sizes, float)
     stops = np.unique(np.concatenate([[begin, end], points[(points > begin) & (points < end)]]))
     stops = stops[np.concatenate([[True], np.diff(stops)[:-1] > sizes.min() / 4, [True]])]
     out = [begin]
@@ -85,7 +86,8 @@ def face(body: PieceInterface, plane: str, inner, growth: float, corner: float) 
 
     They are per unit width, at the nodes of the cells of `inner`; nt is the normal motion by shear.
     """
-    x, extra = inner, 0
+    x = inner
+    extra = 0
     if body.length > inner[-1] - inner[0] + 1e-12:
         beyond = spread(
             [inner[-1]],
@@ -95,17 +97,25 @@ def face(body: PieceInterface, plane: str, inner, growth: float, corner: float) 
             growth,
             body.length / 8,
         )
-        x, extra = np.concatenate([-beyond[:0:-1], inner, beyond[1:]]), (beyond.size - 1) * ORDER
-    top, thick = float(np.diff(inner).min()), body.thickness
-    points, sizes = [0.0, body.height], [top, corner]
+        x = np.concatenate([-beyond[:0:-1], inner, beyond[1:]])
+        extra = (beyond.size - 1) * ORDER
+    top = float(np.diff(inner).min())
+    thick = body.thickness
+    points = [0.0, body.height]
+    sizes = [top, corner]
     if thick:
-        points, sizes = [*points, thick], [*sizes, max(top, min(thick / 4, corner))]
+        points = [*points, thick]
+        sizes = [*sizes, max(top, min(thick / 4, corner))]
     deep = spread(points, sizes, 0.0, body.height, growth, min(body.height, body.length) / 4)
     place, count = cells_of.numbering(x.size - 1, deep.size - 1, ORDER)
-    m, rows, columns, entries = (x.size - 1) * ORDER + 1, [], [], []
+    m = (x.size - 1) * ORDER + 1
+    rows = []
+    columns = []
+    entries = []
     for number, (young, nu) in enumerate(body.layers):
         if plane == "stress":
-            young, nu = young * (1 + 2 * nu) / (1 + nu) ** 2, nu / (1 + nu)
+            young = young * (1 + 2 * nu) / (1 + nu) ** 2
+            nu = nu / (1 + nu)
         layer = np.flatnonzero(((deep[1:] + deep[:-1]) / 2 > thick) == bool(number))
         if not layer.size:
             continue
@@ -129,7 +139,9 @@ def face(body: PieceInterface, plane: str, inner, growth: float, corner: float) 
         rows.append(np.broadcast_to(dof[:, :, None], cells.shape).ravel())
         columns.append(np.broadcast_to(dof[:, None, :], cells.shape).ravel())
         entries.append(cells.ravel())
-    row, column, entry = np.concatenate(rows), np.concatenate(columns), np.concatenate(entries)
+    row = np.concatenate(rows)
+    column = np.concatenate(columns)
+    entry = np.concatenate(entries)
     free = (row >= 0) & (column >= 0)
     matrix = sparse.csc_array(
         (entry[free], (row[free], column[free])), shape=(2 * count, 2 * count)
@@ -159,7 +171,8 @@ def contact(c, g, load: float, theta_x) -> tuple:
         f = np.zeros(g.size)
         f[index] = d * rows[:, 0] - rows[:, 1]
         left = c @ f + gap - d
-        wrong_in, wrong_out = active & (f < 0), ~active & (left < -1e-13 * np.abs(c @ f).max())
+        wrong_in = active & (f < 0)
+        wrong_out = ~active & (left < -1e-13 * np.abs(c @ f).max())
         if not wrong_in.any() and not wrong_out.any():
             return f, d
         active = (active & ~wrong_in) | (wrong_out if not wrong_in.any() else False)
@@ -188,22 +201,25 @@ def solve(scene: Scene, edges, fine: float, lap: tuple = FIRST) -> tuple:
     fine *= share
     wide = min((b - a for a, b, _ in edges), default=scene.length)
     corner *= min(scene.lower.height, scene.length)
-    points, sizes = [-half, half], [min(corner, wide / 30)] * 2
+    points = [-half, half]
+    sizes = [min(corner, wide / 30)] * 2
     if scene.lower.length != scene.upper.length:
         sizes = [wide * fine] * 2
     for a, b, _ in edges:
-        points, sizes = (
-            [*points, a, b, (a + b) / 2],
-            [*sizes, wide * fine, wide * fine, (b - a) / inside],
-        )
+        points = [*points, a, b, (a + b) / 2]
+        sizes = [*sizes, wide * fine, wide * fine, (b - a) / inside]
     if scene.step:
-        points, sizes = [*points, scene.step[1]], [*sizes, wide * fine]
+        points = [*points, scene.step[1]]
+        sizes = [*sizes, wide * fine]
     x = spread(points, sizes, -half, half, growth, scene.length / 10)
     place, weight = cells_of.face_nodes(x, ORDER)
     bodies = [scene.lower] + [scene.upper] * (scene.upper != scene.lower)
     parts = [face(one, scene.plane, x, growth, corner) for one in bodies]
-    low, high = parts[0], parts[-1]
-    nn, tt, nt = low[0] + high[0], low[1] + high[1], low[2] - high[2]
+    low = parts[0]
+    high = parts[-1]
+    nn = low[0] + high[0]
+    tt = low[1] + high[1]
+    nt = low[2] - high[2]
     if scene.skin:
         nn = nn + np.diag(1 / (scene.skin * weight))
     gap = place**2 / 2 * scene.curvature
@@ -286,7 +302,8 @@ def answer(scene: Scene, fine: float = 5e-4, start=()) -> tuple:
 
     The uncertainty is the largest of the last change and a third of the change before.
     """
-    edges, found = list(start), []
+    edges = list(start)
+    found = []
     for size in (0.03, 0.01):
         edges = solve(scene, edges, size)[1]
     for lap in LAPS:

@@ -34,12 +34,14 @@ JUDGED = (
 
 def drawn(seed: int) -> Scene:
     """The scene of a seed; its kind is KINDS[seed % 6]."""
-    r, kind = np.random.default_rng([seed, 28]), KINDS[seed % len(KINDS)]
+    r = np.random.default_rng([seed, 28])
+    kind = KINDS[seed % len(KINDS)]
 
     def wide(low, high):
         return float(f"{10 ** r.uniform(np.log10(low), np.log10(high)):.5g}")
 
-    length, load = wide(5e-3, 5e-2), wide(10, 5e3)
+    length = wide(5e-3, 5e-2)
+    load = wide(10, 5e3)
     height = float(f"{length * r.uniform(0.3, 1.2):.5g}")
     kinds = r.choice(len(MATERIALS), 3)
     thick = float(f"{height * r.uniform(0.01, 0.2):.5g}") if r.random() < 0.5 else 0.0

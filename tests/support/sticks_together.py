@@ -45,22 +45,25 @@ def spec(seed: int) -> dict:
     `links` are (pair, stiffness [N/m], damping [N s/m]); bodies are numbered from 1, and 0 is the
     base.
     """
-    r, kind = np.random.default_rng(seed), KINDS[seed % len(KINDS)]
-    faces, ratio = int(r.integers(2, 4)), RATIOS[int(r.integers(len(RATIOS)))]
+    r = np.random.default_rng(seed)
+    kind = KINDS[seed % len(KINDS)]
+    faces = int(r.integers(2, 4))
+    ratio = RATIOS[int(r.integers(len(RATIOS)))]
     n = int(r.integers(2 if kind == "twins" or (ratio == 1 and kind != "mirror") else faces, 5))
-    alike, omega = kind == "mirror", 2 * np.pi * r.uniform(50, 200)
+    alike = kind == "mirror"
+    omega = 2 * np.pi * r.uniform(50, 200)
     mass = np.full(n, r.uniform(0.3, 2)) if alike else r.uniform(0.3, 2, n)
-    ground, between = (
-        mass * omega**2 * r.uniform(0.5, 1.5, n),
-        r.uniform(0.1, 0.8, (n, n)) * mass[0] * omega**2,
-    )
+    ground = mass * omega**2 * r.uniform(0.5, 1.5, n)
+    between = r.uniform(0.1, 0.8, (n, n)) * mass[0] * omega**2
     if alike:
-        ground[:], between[:] = ground[0], between[0, 0]
+        ground[:] = ground[0]
+        between[:] = between[0, 0]
     links = [((k + 1, 0), ground[k]) for k in range(n)]
     links += [
         ((k + 1, j + 1), between[k, j]) for k in range(n) for j in range(k) if alike or j == k - 1
     ]
-    zeta, size = r.uniform(0.002, 0.05), r.uniform(10, 80)
+    zeta = r.uniform(0.002, 0.05)
+    size = r.uniform(10, 80)
     pairs = [[1, 0]] * faces if kind == "twins" else [[k + 1, 0] for k in range(min(faces, n))]
     if len(pairs) < faces:
         pairs.append([2, 1])
@@ -142,7 +145,8 @@ def marched(s: dict, time, slide) -> float:
         damping_matrix=shapes.T @ damp @ shapes,
         base=shapes.T @ mass @ np.ones(len(mass)),
     )
-    size, omega = s["size"] if s["kind"] != "release" else 0.0, 2 * np.pi * s["frequency"]
+    size = s["size"] if s["kind"] != "release" else 0.0
+    omega = 2 * np.pi * s["frequency"]
     drive = SimpleNamespace(
         values=lambda t: np.full_like(t, size) if s["kind"] == "step" else size * np.sin(omega * t)
     )
@@ -167,7 +171,8 @@ def truth(s: dict, end: float, order: str) -> tuple:
     equal faces are one that carries the load of all, and equal bodies are one.
     """
     (mass, stiff, damp, faces), n = matrices(s), len(s["mass"])
-    same, bodies = np.arange(len(faces)), np.eye(n)
+    same = np.arange(len(faces))
+    bodies = np.eye(n)
     if order == "together":
         same[:] = 0
     if order == "together" and s["kind"] == "mirror":
@@ -182,7 +187,8 @@ def truth(s: dict, end: float, order: str) -> tuple:
         damping_matrix=shapes.T @ damp @ shapes,
         base=shapes.T @ mass @ np.ones(n),
     )
-    size, omega = s["size"] if s["kind"] != "release" else 0.0, 2 * np.pi * s["frequency"]
+    size = s["size"] if s["kind"] != "release" else 0.0
+    omega = 2 * np.pi * s["frequency"]
     constant, amplitude = (size, 0.0) if s["kind"] == "step" else (0.0, size)
     drive = SimpleNamespace(
         start=0.0,
@@ -191,7 +197,8 @@ def truth(s: dict, end: float, order: str) -> tuple:
         phase=0.0,
         omega=0.0 if s["kind"] == "step" else omega,
     )
-    static, start = 0.3 * np.bincount(same, s["load"]), shapes.T @ mass @ np.array(s["start"])
+    static = 0.3 * np.bincount(same, s["load"])
+    start = shapes.T @ mass @ np.array(s["start"])
     found = run_reference(
         modes,
         [drive],
@@ -223,7 +230,8 @@ def compare_rig(seed: int, folder: Path | None = None, earlier: dict | None = No
     )
     last = np.append(np.diff(time) > 0, True)
     curve = CubicHermiteSpline(time[last], slide[:, last], speed[:, last], axis=1)
-    gaps, failed = {}, {}
+    gaps = {}
+    failed = {}
     for order in ORDERS[s["kind"]]:
         signal.setitimer(signal.ITIMER_PROF, LONGEST)
         try:
@@ -237,9 +245,11 @@ def compare_rig(seed: int, folder: Path | None = None, earlier: dict | None = No
         gaps[order] = float(np.abs(curve(when).T - where).max() / scale)
         if gaps[order] <= SAME:
             break
-    gap, allowed = min(gaps.values(), default=np.inf), SAME
+    gap = min(gaps.values(), default=np.inf)
+    allowed = SAME
     if gap > SAME and len(s["pairs"]) > len(s["mass"]):
-        gap, allowed = marched(s, time, slide), NEAR
+        gap = marched(s, time, slide)
+        allowed = NEAR
     balance = result.measures["energy_balance"].value
     rows = [
         Row("slides", gap, allowed, 0.0, 0.0, 0.0),

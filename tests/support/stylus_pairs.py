@@ -83,7 +83,8 @@ def draw_surface(random, length: float) -> np.ndarray:
 
 def draw_wear(kind: str, random, x, surface) -> tuple:
     """Draw the worn depth [m] over x [m] and the span of the worn part (None where there is not a single one)."""
-    length, roughness = x[-1] - x[0], surface.std()
+    length = x[-1] - x[0]
+    roughness = surface.std()
     wear = np.zeros(x.size)
     middle = x[0] + random.uniform(0.38, 0.62) * length
     half = random.uniform(0.06, 0.16) * length
@@ -161,7 +162,8 @@ def measure(random, x, heights, start: float, length: float, spacing: float) -> 
 def draw_pair(kind: str, seed: int) -> StylusPair:
     """Draw the pair of traces of `kind` that belongs to `seed`."""
     random = np.random.default_rng([seed, 7 + KINDS.index(kind)])
-    length, spacing = random.uniform(2e-3, 8e-3), random.choice([0.5e-6, 1e-6, 2e-6])
+    length = random.uniform(2e-3, 8e-3)
+    spacing = random.choice([0.5e-6, 1e-6, 2e-6])
     margin = 0.06 * length
     total = (2.6 if kind == "elsewhere" else 1.0) * length + 2 * margin
     new = draw_surface(random, total)

@@ -73,14 +73,17 @@ def _shape_noise(random, count: int, amplitude) -> np.ndarray:
 
 def _lapped(random, count: int) -> np.ndarray:
     """Draw a surface with a single hump in its spectrum: one dominant wavelength of wide band."""
-    peak, width = 1 / random.uniform(15e-6, 70e-6), random.uniform(0.3, 0.7)
+    peak = 1 / random.uniform(15e-6, 70e-6)
+    width = random.uniform(0.3, 0.7)
     return _shape_noise(random, count, lambda k: np.exp(-(np.log(k / peak) ** 2) / (2 * width**2)))
 
 
 def _two_scale(random, count: int) -> np.ndarray:
     """Draw a surface whose self-affine spectrum has a kink: steep at long waves, shallow at short ones."""
-    kink, rolloff = 1 / random.uniform(10e-6, 40e-6), 1 / random.uniform(100e-6, 500e-6)
-    steep, shallow = random.uniform(0.8, 1.0) + 0.5, random.uniform(0.1, 0.4) + 0.5
+    kink = 1 / random.uniform(10e-6, 40e-6)
+    rolloff = 1 / random.uniform(100e-6, 500e-6)
+    steep = random.uniform(0.8, 1.0) + 0.5
+    shallow = random.uniform(0.1, 0.4) + 0.5
     return _shape_noise(
         random,
         count,
@@ -96,7 +99,8 @@ def _eroded(random, count: int) -> np.ndarray:
     for _ in range(int(count * STEP / random.uniform(8e-6, 20e-6))):
         half = int(random.gamma(4.0, 3e-6) / STEP) + 4
         middle = random.integers(0, count)
-        low, high = max(middle - half, 0), min(middle + half, count)
+        low = max(middle - half, 0)
+        high = min(middle + half, count)
         t = (np.arange(low, high) - middle) / half
         heights[low:high] = np.minimum(
             heights[low:high], random.uniform(0.5, 1.0) * half * STEP * (t**2 - 1)
@@ -132,7 +136,8 @@ def _porous(random, count: int) -> np.ndarray:
 
 def draw_wear(kind: str, random, x, surface) -> tuple:
     """Draw the worn depth [m] over x [m] and the span of the worn part (None where there is not a single one)."""
-    length, scale = x[-1] - x[0], max(surface.std(), 0.2e-6)
+    length = x[-1] - x[0]
+    scale = max(surface.std(), 0.2e-6)
     wear = np.zeros(x.size)
     if kind in UNWORN or kind == "elsewhere":
         return wear, None
@@ -171,7 +176,8 @@ def draw_wear(kind: str, random, x, surface) -> tuple:
 def _draw_scar(kind: str, random, x, depth: float) -> tuple:
     """Draw a single scar: depth [m] over x [m] and its span."""
     length = x[-1] - x[0]
-    middle, half = x[0] + random.uniform(0.36, 0.64) * length, random.uniform(0.05, 0.18) * length
+    middle = x[0] + random.uniform(0.36, 0.64) * length
+    half = random.uniform(0.05, 0.18) * length
     t = (x - middle) / half
     r = np.minimum(np.abs(t), 1.0)
     if kind == "cosine scar":
@@ -208,8 +214,10 @@ def _draw_scar(kind: str, random, x, depth: float) -> tuple:
 def _draw_comb(random, x, scale: float) -> np.ndarray:
     """Draw a comb of scratches at nearly equal distances."""
     length = x[-1] - x[0]
-    n_teeth, wear = random.integers(4, 16), np.zeros(x.size)
-    first, pitch = x[0] + random.uniform(0.1, 0.4) * length, random.uniform(0.015, 0.035) * length
+    n_teeth = random.integers(4, 16)
+    wear = np.zeros(x.size)
+    first = x[0] + random.uniform(0.1, 0.4) * length
+    pitch = random.uniform(0.015, 0.035) * length
     for k in range(n_teeth):
         t = (x - first - (k + 0.15 * random.normal()) * pitch) / random.uniform(5e-6, 20e-6)
         wear = np.maximum(wear, random.uniform(2, 9) * scale * np.maximum(1 - t**2, 0))
@@ -234,7 +242,8 @@ def measure(random, x, heights, start: float, length: float, spacing: float) -> 
 
 def add_spikes(random, trace: tuple, scale: float) -> tuple:
     """Return the trace with one to six spikes, up or down, of one to four points."""
-    x, z = trace[0], trace[1].copy()
+    x = trace[0]
+    z = trace[1].copy()
     for place in random.integers(4, z.size - 8, random.integers(1, 7)):
         width = random.integers(1, 5)
         z[place : place + width] += random.choice([-1, 1]) * random.uniform(8, 30) * scale
@@ -243,7 +252,8 @@ def add_spikes(random, trace: tuple, scale: float) -> tuple:
 
 def cut_gaps(random, trace: tuple, places=()) -> tuple:
     """Return the trace with missing heights (NaN) in gaps that begin at the given positions [m] and at random ones."""
-    x, z = trace[0], trace[1].copy()
+    x = trace[0]
+    z = trace[1].copy()
     starts = [*places, *(x[-1] * random.uniform(0.02, 0.95, random.integers(0, 4)))]
     for start in starts:
         z[(x > start) & (x < start + random.uniform(2e-6, 40e-6))] = np.nan

@@ -81,18 +81,22 @@ def discretize(patch: reference.Scene, span: tuple, cells: int) -> Model:
     half = patch.length / 2
     size = (span[1] - span[0]) / cells
     corner = min(patch.lower.height, patch.length) / 60
-    points, sizes = [-half, half], [min(corner, size)] * 2
+    points = [-half, half]
+    sizes = [min(corner, size)] * 2
     if patch.lower.length != patch.upper.length:
         sizes = [size / 8] * 2
     for place in np.linspace(*span, cells + 1):
-        points, sizes = [*points, float(place)], [*sizes, size]
+        points = [*points, float(place)]
+        sizes = [*sizes, size]
     if patch.step:
-        points, sizes = [*points, patch.step[1]], [*sizes, size / 4]
+        points = [*points, patch.step[1]]
+        sizes = [*sizes, size / 4]
     x = reference.spread(points, sizes, -half, half, 0.5, patch.length / 10)
     place, weight = reference.cells_of.face_nodes(x, reference.ORDER)
     bodies = [patch.lower] + [patch.upper] * (patch.upper != patch.lower)
     parts = [reference.face(body, patch.plane, x, 0.5, corner) for body in bodies]
-    low, high = parts[0], parts[-1]
+    low = parts[0]
+    high = parts[-1]
     normal = low[0] + high[0]
     if patch.skin:
         normal = normal + np.diag(1 / (patch.skin * weight))
@@ -138,7 +142,8 @@ def wear(model: Model, scene: WearScene, steps: int) -> dict:
         depth = depth + rate * force
     pressure = force / model.weight
     index = np.flatnonzero(active)
-    patch, place = scene.patch, model.place
+    patch = scene.patch
+    place = model.place
     ends = [
         reference.edge_of(place, pressure, int(index[0]), -1, patch),
         reference.edge_of(place, pressure, int(index[-1]), 1, patch),
@@ -175,7 +180,8 @@ def contact_span(model: Model, scene: WearScene) -> tuple:
 
 def answer(scene: WearScene) -> dict:
     """Compute the measures after wear: name -> (value, uncertainty)."""
-    patch, half = scene.patch, scene.patch.length / 2
+    patch = scene.patch
+    half = scene.patch.length / 2
     span = (-half, half)
     for _ in range(3):
         low, high = contact_span(discretize(patch, span, CELLS[0]), scene)

@@ -13,7 +13,8 @@ def turning(angle: float, power: float) -> float:
     face t = angle, no shear and unit pressure on t = 0. The motion across that face is the last coefficient (Williams
     1952).
     """
-    p, m = power + 1, power - 1
+    p = power + 1
+    m = power - 1
 
     def value(t):
         return [np.cos(p * t), np.sin(p * t), np.cos(m * t), np.sin(m * t)]

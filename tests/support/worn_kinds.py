@@ -73,7 +73,8 @@ def surface(random, rms: float, longest: float, shortest: float):
 
 def _lost(kind: str, random, x, z, rms: float) -> np.ndarray:
     """Worn depth [m] at the samples."""
-    t, depth = x / x[-1], random.uniform(1.0, 6.0) * max(rms, 0.3 * UM)
+    t = x / x[-1]
+    depth = random.uniform(1.0, 6.0) * max(rms, 0.3 * UM)
     if kind in ("even", "wedge"):
         depth = random.uniform(0.3, 7.0) * UM
         return (
@@ -101,13 +102,15 @@ def _lost(kind: str, random, x, z, rms: float) -> np.ndarray:
         "exchanged",
         "worn elsewhere",
     ):
-        half, at = random.uniform(0.05, 0.18), random.uniform(0.3, 0.7)
+        half = random.uniform(0.05, 0.18)
+        at = random.uniform(0.3, 0.7)
         u = np.abs(t - at) / half
         if kind == "trough":
             return depth * np.clip((1 - u) / random.uniform(0.1, 0.5), 0, 1)
         return depth * np.maximum(1 - u**2, 0.0)
     if kind == "edge":
-        start, ramp = random.uniform(0.25, 0.6), random.uniform(0.02, 0.2)
+        start = random.uniform(0.25, 0.6)
+        ramp = random.uniform(0.02, 0.2)
         out = depth * np.clip((t - start) / ramp, 0, 1)
         return out if random.random() < 0.5 else out[::-1].copy()
     if kind in ("run-in", "coarse", "scale"):
@@ -122,12 +125,14 @@ def made(kind: str, seed: int) -> Kind:
     step = random.choice([0.5, 1.0, 2.0]) * UM if kind != "coarse" else 4 * UM
     length = random.uniform(1.0, 2.5) * 1e-3
     x = np.arange(round(length / step) + 1) * step
-    rms, noise = np.exp(random.uniform(np.log(0.3), np.log(6.0))) * UM, random.uniform(5, 40) * 1e-9
+    rms = np.exp(random.uniform(np.log(0.3), np.log(6.0))) * UM
+    noise = random.uniform(5, 40) * 1e-9
     height = surface(random, rms, random.uniform(80, 250) * UM, 12 * UM)
     shift = random.uniform(-40, 40) * UM
     factor = 1 + (random.choice([-1, 1]) * random.uniform(0.002, 0.02) if kind == "scale" else 0.0)
     here = height(x / factor - shift) if "elsewhere" not in kind else height(x + 20e-3)
-    worn, piled = _lost(kind, random, x, here, rms), np.zeros(x.size)
+    worn = _lost(kind, random, x, here, rms)
+    piled = np.zeros(x.size)
     if kind == "deposits":
         for at in random.uniform(0.1, 0.9, random.integers(1, 4)) * length:
             piled += (
@@ -147,11 +152,9 @@ def made(kind: str, seed: int) -> Kind:
     ]
     if "dust" in kind or kind == "dropouts":
         for _ in range(random.integers(1, 5)):
-            z, at, wide = (
-                sides[random.integers(2)],
-                random.integers(5, x.size - 8),
-                random.integers(1, 4),
-            )
+            z = sides[random.integers(2)]
+            at = random.integers(5, x.size - 8)
+            wide = random.integers(1, 4)
             z[at : at + wide] += (
                 (1 if "dust" in kind else -1) * random.uniform(5, 30) * max(UM, rms)
             )

@@ -47,7 +47,8 @@ def test_exact_the_plane_of_a_dense_least_squares_solve():
 
 def test_exact_rows_and_columns_are_traces():
     one = scan(bumps((4, 6), 0.2))
-    row, column = one.row(2), one.column(-1)
+    row = one.row(2)
+    column = one.column(-1)
     assert np.array_equal(row.x, one.x) and np.array_equal(row.z, one.z[2], equal_nan=True)
     assert np.array_equal(column.x, one.y) and np.array_equal(column.z, one.z[:, 5], equal_nan=True)
     assert (row.source, column.source) == ("scan.txt, row 2", "scan.txt, column -1")
@@ -64,7 +65,8 @@ def test_refuses_rows_that_are_not_there_and_heights_in_one_line():
             take(which)
     line = np.full((4, 6), np.nan)
     line[range(4), range(4)] = 1e-6
-    line[0, 0], line[1, 1] = 2e-6, 1e-6
+    line[0, 0] = 2e-6
+    line[1, 1] = 1e-6
     for heights in (line, np.full((4, 6), np.nan)):
         with pytest.raises(
             PatchfemError, match="all lie on one straight line; a plane needs three points"

@@ -69,7 +69,8 @@ def test_exact_the_step_of_the_stylus_is_length_over_points(data):
 
 def test_exact_the_instrument_s_own_results_between_its_cursors(data, truth):
     """Four of the printed results to their last digit; the step height is off by one digit of 0.01 nm."""
-    profile, known = dektak(data), truth["dektak-1.csv"]["instrument_printed_results"]
+    profile = dektak(data)
+    known = truth["dektak-1.csv"]["instrument_printed_results"]
     # of the cursors
     low, high = (int(np.floor(place / 0.15625e-6 + 1e-9)) for place in (468e-6, 733e-6))
     part = slice(low, high + 1)  # samples 2995 to 4691, both ends included
@@ -86,7 +87,8 @@ def test_exact_the_instrument_s_own_results_between_its_cursors(data, truth):
 
 @pytest.mark.parametrize("name", ["nanovea-test1.txt.gz", "nanovea-test2.txt.gz"])
 def test_exact_areal_parameters_of_three_codes(data, truth, name):
-    known, scan = truth[name], read_surface(data / name, ("mm", "um"))
+    known = truth[name]
+    scan = read_surface(data / name, ("mm", "um"))
     assert scan.z.shape == tuple(known["shape"]) and np.diff(scan.x) == pytest.approx(
         np.full(100, 5e-6), rel=1e-9
     )
@@ -111,10 +113,8 @@ def test_exact_areal_parameters_of_three_codes(data, truth, name):
 
 def test_exact_the_measured_interface_of_a_bolted_beam(data, truth):
     """A gap map in metres: 246 x 54 places, each at the height that SciPy reads there."""
-    known, scan = (
-        truth["brb_surface_data.mat"],
-        read_surface(data / "brb_surface_data.mat", ("m", "m")),
-    )
+    known = truth["brb_surface_data.mat"]
+    scan = read_surface(data / "brb_surface_data.mat", ("m", "m"))
     assert (
         scan.z.shape == tuple(reversed(known["grid"]))
         and np.isfinite(scan.z).sum() == known["finite"]
@@ -130,10 +130,8 @@ def test_exact_the_measured_interface_of_a_bolted_beam(data, truth):
         known["flatness_PV_um"] * 1e-6, rel=1e-6
     )
     points = loadmat(data / "brb_surface_data.mat")["mesoscale_xygap"]
-    column, row = (
-        np.searchsorted(scan.x, points[:, 0] - 1e-9),
-        np.searchsorted(scan.y, points[:, 1] - 1e-9),
-    )
+    column = np.searchsorted(scan.x, points[:, 0] - 1e-9)
+    row = np.searchsorted(scan.y, points[:, 1] - 1e-9)
     assert np.array_equal(scan.z[row, column], points[:, 2], equal_nan=True)
 
 
@@ -192,10 +190,8 @@ def test_refuses_files_that_name_no_units_or_are_no_surface(data, name):
 
 
 def test_exact_a_digitised_uneven_trace_without_a_header(data):
-    profile, known = (
-        read_surface(data / "xy-1.txt", ("um", "um")),
-        np.loadtxt(data / "xy-1.txt") * 1e-6,
-    )
+    profile = read_surface(data / "xy-1.txt", ("um", "um"))
+    known = np.loadtxt(data / "xy-1.txt") * 1e-6
     assert profile.x == pytest.approx(known[:, 0], rel=1e-14) and profile.z == pytest.approx(
         known[:, 1], rel=1e-14
     )

@@ -55,7 +55,8 @@ def test_exact_means_against_fine_quadrature(grid, seed):
         mean.append(
             (np.diff(knots) * np.interp((knots[1:] + knots[:-1]) / 2, x, z)).sum() / (b - a)
         )
-    mean, middle = np.array(mean), (edges[1:] + edges[:-1]) / 2
+    mean = np.array(mean)
+    middle = (edges[1:] + edges[:-1]) / 2
     wanted = mean + (nodes - middle) * np.array(
         [
             (mean[min(i + 1, nodes.size - 1)] - mean[max(i - 1, 0)])

@@ -41,8 +41,10 @@ def test_exact_a_good_trace_is_not_touched():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_exact_planted_spikes_are_found_all_and_only(seed):
-    trace, rng = rough(seed=seed), np.random.default_rng(seed)
-    z, at = trace.z.copy(), np.sort(rng.choice(np.arange(10, 3900, 20), 40, replace=False))
+    trace = rough(seed=seed)
+    rng = np.random.default_rng(seed)
+    z = trace.z.copy()
+    at = np.sort(rng.choice(np.arange(10, 3900, 20), 40, replace=False))
     for k, place in enumerate(at):
         z[place : place + 1 + k % 3] += rng.choice([-1, 1]) * 20e-6
     hit = np.flatnonzero(z != trace.z)
@@ -64,7 +66,8 @@ def test_exact_planted_spikes_are_found_all_and_only(seed):
 @pytest.mark.parametrize("seed", range(20))
 def test_always_real_surfaces_hold_no_spikes(seed):
     """Noise, self-affine heights, smooth waves, ramps, steps, coarse digits."""
-    rng, x = np.random.default_rng(seed), np.linspace(0, 1e-2, 2000)
+    rng = np.random.default_rng(seed)
+    x = np.linspace(0, 1e-2, 2000)
     coarse = np.round(rng.normal(0, 0.4, x.size))
     for z in (
         rng.normal(size=x.size),

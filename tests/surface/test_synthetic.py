@@ -63,7 +63,9 @@ def test_exact_waves_add_up(wave, phase, height):
 
 def test_exact_area_of_peaks():
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 20001)
-    at, heights, widths = [-3e-3, 0.0, LENGTH / 2], [-4e-6, 2e-6, 1e-6], [20e-6, 300e-6, 100e-6]
+    at = [-3e-3, 0.0, LENGTH / 2]
+    heights = [-4e-6, 2e-6, 1e-6]
+    widths = [20e-6, 300e-6, 100e-6]
     area = np.sqrt(np.pi / 2) * sum(
         h * w * (erf((LENGTH / 2 - a) / w / np.sqrt(2)) - erf((-LENGTH / 2 - a) / w / np.sqrt(2)))
         for a, h, w in zip(at, heights, widths)
@@ -119,7 +121,8 @@ def test_always_80_um_dominate():
 
 def test_exact_the_factors_of_the_amplitude_kinds():
     """Heights from a peak to the next valley of traces less their waves below 40 um: 2.5 sigma at the quartile."""
-    f, swings = np.fft.rfftfreq(POINTS, STEP), []
+    f = np.fft.rfftfreq(POINTS, STEP)
+    swings = []
     for row in np.concatenate([z[::8] for z in areas(10)]):
         z = np.fft.irfft(np.where(f <= 1 / 40e-6, np.fft.rfft(row), 0), POINTS)
         up = np.diff(z) > 0

@@ -37,7 +37,8 @@ def held(names, share, seed):
 def warm_once(tmp_path_factory):
     """What the driver does before its first campaign, once for all of them."""
     driver.warm(run_command, tmp_path_factory.mktemp("warm"))
-    kept, driver.warm = driver.warm, lambda command, place: None
+    kept = driver.warm
+    driver.warm = lambda command, place: None
     yield
     driver.warm = kept
 

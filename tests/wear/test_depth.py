@@ -52,7 +52,8 @@ def pressing(compliance, x, gap, load=LOAD):
 def flat():
     """Flat bare blocks: (press, compliance, area, rate of even slip, critical jump)."""
     pair = bare_pair(32)
-    area, c = pair.interface.weight, np.array(pair.normal)
+    area = pair.interface.weight
+    c = np.array(pair.normal)
     rate = wear_rates(KAPPA, np.full(area.size, PATH), area)
     return (
         pressing(c, pair.interface.x, np.zeros(area.size)),
@@ -65,9 +66,11 @@ def flat():
 
 def evolved(asked, tolerance=1e-3, count=None):
     """(last state, number of jumps) of a whole wear run."""
-    state, jumps = start_wear(asked), 0
+    state = start_wear(asked)
+    jumps = 0
     while state.cycle < asked.cycles:
-        state, jumps = take_jump(asked, state, tolerance, count), jumps + 1
+        state = take_jump(asked, state, tolerance, count)
+        jumps = jumps + 1
     return state, jumps
 
 
@@ -100,7 +103,9 @@ def punch_transient(force, compliance, rate, cycles):
 
 def test_order_two_against_the_exact_transient_of_a_punch():
     press, c, area, rate, critical = flat()
-    cycles, zero, errors = 6 * critical, np.zeros(area.size), []
+    cycles = 6 * critical
+    zero = np.zeros(area.size)
+    errors = []
     _, exact = punch_transient(press(zero, zero), c, rate, cycles)
     for count in (8, 16, 32):
         depth = zero
@@ -130,13 +135,13 @@ def test_order_a_jump_grows_as_its_true_error_allows():
 def test_exact_pressure_times_path_is_even_under_uneven_slip():
     """A yawing pad: p s = constant, the classical p ~ 1/s."""
     pair = bare_pair(32)
-    x, area, width = pair.interface.x, pair.interface.weight, pair.interface.width
+    x = pair.interface.x
+    area = pair.interface.weight
+    width = pair.interface.width
     path = PATH * (1.5 + x / x[-1])
-    press, rate, depth = (
-        pressing(np.array(pair.normal), x, 0 * x),
-        wear_rates(KAPPA, path, area),
-        0 * x,
-    )
+    press = pressing(np.array(pair.normal), x, 0 * x)
+    rate = wear_rates(KAPPA, path, area)
+    depth = 0 * x
     for _ in range(60):
         depth, force = solve_jump(press, depth, rate, 1e7)
     assert force / area == pytest.approx(
@@ -146,11 +151,17 @@ def test_exact_pressure_times_path_is_even_under_uneven_slip():
 
 def test_exact_tilted_pad_on_springs():
     """Contact grows as sqrt(1/k + kappa s) until it is full; the error is at most a cell."""
-    length, width, angle, stiffness, count = 10e-3, 10e-3, 1e-4, 1e13, 1000
+    length = 10e-3
+    width = 10e-3
+    angle = 1e-4
+    stiffness = 1e13
+    count = 1000
     x = (np.arange(count) + 0.5) / count * length - length / 2
     area = np.full(count, length / count * width)
     press = pressing(np.diag(1 / (stiffness * area)), x, angle * x)
-    rate, depth, cycles = wear_rates(KAPPA, np.full(count, PATH), area), np.zeros(count), 0.0
+    rate = wear_rates(KAPPA, np.full(count, PATH), area)
+    depth = np.zeros(count)
+    cycles = 0.0
     for step in (2e5, 4e5, 8e5, 1e6):
         depth, force = solve_jump(press, depth, rate, step)
         cycles += step
@@ -162,7 +173,8 @@ def test_exact_tilted_pad_on_springs():
 def crowned(cells=100, radius=0.05):
     """Coated pieces, one of them crowned, under gross slip for 135 723 cycles."""
     pair = coated_pair(cells)
-    x, area = pair.interface.x, pair.interface.weight
+    x = pair.interface.x
+    area = pair.interface.weight
     even = np.full(x.size, PATH)
     return WearProblem(
         pressing(np.array(pair.normal), x, x**2 / 2 / radius),
@@ -175,7 +187,8 @@ def crowned(cells=100, radius=0.05):
 
 @pytest.mark.slow
 def test_always_automatic_jumps_meet_the_tolerance():
-    asked, counts = crowned(), []
+    asked = crowned()
+    counts = []
     fine, _ = evolved(asked, 1e-6)
     for tolerance in (1e-2, 1e-3, 1e-4):
         state, count = evolved(asked, tolerance)
@@ -191,14 +204,19 @@ def test_always_automatic_jumps_meet_the_tolerance():
 def test_exact_worn_hertz_contact_at_two_paths():
     """Half-planes under gross slip. Where the worn parabola alone would be 2.207 and 3.891 wide (over Hertz' a0), an
     independent half-space program found 2.315 and 3.959, and 1.060 and 1.023 of the mean pressure."""
-    width, radius, line, young = 10e-3, 0.05, 1e5, 121e9
+    width = 10e-3
+    radius = 0.05
+    line = 1e5
+    young = 121e9
     half = hertz_half_width(line, radius, young / (1 - 0.32**2) / 2)
     grid = refined_middle(5 * half, half / 10, 40 * half, 20 * half, 1.2)
     nn, _, _ = interface_compliance(
         make_piece(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32)))
     )
-    x, area = grid.x, grid.tributary_lengths() * width
-    press, even = pressing(2 * nn / width, x, x**2 / 2 / radius, line * width), np.ones(x.size)
+    x = grid.x
+    area = grid.tributary_lengths() * width
+    press = pressing(2 * nn / width, x, x**2 / 2 / radius, line * width)
+    even = np.ones(x.size)
     for alone, wide, peak in ((2.207, 2.315, 1.060), (3.891, 3.959, 1.023)):
         path = (alone * half) ** 3 / (1.5 * radius * line)
         assert worn_crown_half_width(1.0, line, path, radius) == pytest.approx(alone * half)

@@ -285,7 +285,8 @@ def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:
 
     It begins at the amplitude above which the motion does not stop within a cycle.
     """
-    model, modes = joint.model, joint.modes
+    model = joint.model
+    modes = joint.modes
     if model.rig.springs.is_nonlinear or not modes.omega.all():
         raise PatchfemError(
             "with rigid friction the free motion cannot be computed if the rig has a nonlinear "

@@ -192,7 +192,8 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
     uses the stiffness that a run of the patch prints, extrapolated over its meshes, if the pieces
     alone are elastic.
     """
-    model, modes = joint.model, joint.modes
+    model = joint.model
+    modes = joint.modes
     spring = model.rig.springs.interlock
     free = float(modes.omega[joint.mode])
     if spring is not None:
@@ -226,7 +227,8 @@ def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
     theory = _theoretical_exponent(joint)
     if curve is None or curve.amplitude.size < 2 or not joint.friction_limit:
         return LossExponents(micro_theory=theory)
-    amplitude, loss = curve.amplitude, curve.loss
+    amplitude = curve.amplitude
+    loss = curve.loss
     speed = 2 * np.pi * curve.frequency * amplitude / joint.reach
     energy = joint.modes.mass * speed**2
     relative_error = notes.MIN_LOSS_RATIO * 2 * np.pi * curve.damping_error
@@ -239,7 +241,8 @@ def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
         """Return the slope from the first to the last of some points; None for fewer than two."""
         if points.size < 2:
             return None
-        i, j = points[0], points[-1]
+        i = points[0]
+        j = points[-1]
         return float(np.log(loss[j] / loss[i]) / np.log(amplitude[j] / amplitude[i]))
 
     return LossExponents(slope(micro), slope(gross), theory)

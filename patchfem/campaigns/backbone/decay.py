@@ -247,7 +247,8 @@ def _measure_other_modes(joint: Joint, found, amplitudes) -> np.ndarray:
     at which the balance finds no slip. It is NaN if the motion or the balance is not known.
     """
     out = np.full(amplitudes.size, np.nan)
-    motion, shape = found.response, joint.shape
+    motion = found.response
+    shape = joint.shape
     asked = np.flatnonzero(np.isfinite(amplitudes))
     if shape.size == 1 or joint.is_rigid:
         return out
@@ -302,7 +303,8 @@ def _distance_to_free_motion(free, shape, place, rate) -> float:
 
 def _is_stuck(group: LawGroup, free) -> np.ndarray:
     """Return whether each interface (i,) of a free motion has its stiffness without slip."""
-    force, slide = free.forces[:, 1], free.slides[:, 1]
+    force = free.forces[:, 1]
+    slide = free.slides[:, 1]
     stiffness = STUCK_FRACTION * group.stiffness()
     return np.real(force * np.conj(slide)) >= stiffness * np.abs(slide) ** 2
 
@@ -336,7 +338,8 @@ def _release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> t
 
 def _is_growing(joint: Joint, found) -> bool:
     """Return whether the swings of a Solution grow along the shape of the sticking mode."""
-    motion, shape = found.response, joint.shape
+    motion = found.response
+    shape = joint.shape
     _, places = find_turning_points(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
     swings = np.abs(np.diff(places))
     return find_decay_rate(joint.modes) < 0 and swings.size > 2 and swings[-1] > swings[0]
@@ -379,7 +382,8 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
             # The cycles are those of the sticking mode; a swing in slip can last hundreds of them.
             cycles = min(8 * cycles, max_cycles)
             continue
-        high, low = read.amplitude[0], read.amplitude[-1]
+        high = read.amplitude[0]
+        low = read.amplitude[-1]
         rests = read.time[-1] < end - 3 / read.frequency[-1]
         lowest = END_FACTOR * amplitudes[0]
         if high < amplitudes[-1] and begin < travel and n_raised < MAX_RAISED:
@@ -486,7 +490,8 @@ def _read_decay(joint: Joint, found, turns=find_turning_points) -> DecayCurve:
     turns : callable
         Of `response.decay_curve`: finds the reversals between samples.
     """
-    motion, shape = found.response, joint.shape
+    motion = found.response
+    shape = joint.shape
     if shape.size == 1:
         return compute_swing_curve(
             half_swings_between(*turns(motion.time, motion.output, motion.output_rate))

@@ -190,7 +190,8 @@ class Joint(NamedTuple):
 
     def _max_amplitude(self) -> float:
         """Return the largest default amplitude [m] by the stop and by a cubic spring."""
-        rig, modes = self.model.rig, self.modes
+        rig = self.model.rig
+        modes = self.modes
         travel = rig.springs.travel / RELEASE_FACTOR
         if not rig.springs.cubic:
             return travel
@@ -271,7 +272,8 @@ def build_joint(model: Model, name: str) -> Joint:
             "a backbone needs the scene of a rig; add the tables [structure] and [drive]",
             "structure",
         )
-    modes, number = model.rig.modes, _find_mode(model.rig, name)
+    modes = model.rig.modes
+    number = _find_mode(model.rig, name)
     if modes.lateral_faces is not None:
         key = next(one.key for one in model.rig.friction.interfaces if one.lateral)
         refusal = describe_unsupported("a backbone with interfaces that slide in a plane", "out")
@@ -294,7 +296,8 @@ def build_joint(model: Model, name: str) -> Joint:
 
 def _refuse_mode(joint: Joint) -> None:
     """Raise PatchfemError for a mode that has no backbone."""
-    model, modes = joint.model, joint.modes
+    model = joint.model
+    modes = joint.modes
     rig = model.rig
     has_friction = model.friction is not None or bool(rig.friction.interfaces)
     if not joint.friction_limit and rig.springs.is_nonlinear and has_friction:
@@ -322,7 +325,8 @@ def _refuse_mode(joint: Joint) -> None:
 
 def _find_mode(rig, name: str) -> int:
     """Return the index of the coordinate of a mode; "" is the first mode of the scene."""
-    modes, names = rig.modes, list(rig.modes.names)
+    modes = rig.modes
+    names = list(rig.modes.names)
     count = modes.omega.size
     if not rig.structure.lists_modes:
         if not name:
@@ -349,7 +353,8 @@ def _stuck_stiffness(joint: Joint) -> np.ndarray:
     It is that of the loops of the laws if they have a closed form, that of a small loop on a bench
     if there is one interface, else the one of the plan (`joint.stiffness`).
     """
-    model, planned = joint.model, joint.stiffness
+    model = joint.model
+    planned = joint.stiffness
     load_changes = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart
     if joint.is_rigid or model.friction is None or model.grooves is not None or load_changes:
         return planned

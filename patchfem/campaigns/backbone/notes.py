@@ -123,9 +123,11 @@ def note_differences(curves: dict) -> list:
         _, here, there = np.intersect1d(
             curves[method].amplitude, balance.amplitude, return_indices=True
         )
-        curve, other = curves[method].at(here), balance.at(there)
+        curve = curves[method].at(here)
+        other = balance.at(there)
         for name in ("frequency", "damping"):
-            value, beside = getattr(curve, name), getattr(other, name)
+            value = getattr(curve, name)
+            beside = getattr(other, name)
             errors = getattr(curve, f"{name}_error") + getattr(other, f"{name}_error")
             difference = np.abs(value - beside)
             share = np.where(difference > errors, difference / np.abs(beside), 0.0)

@@ -83,7 +83,8 @@ def _rising_part(best, error) -> Curve:
 
 def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
     """Return the curve of one interface whose law has its loop in closed form, else None."""
-    model, modes = joint.model, joint.modes
+    model = joint.model
+    modes = joint.modes
     is_soft = (
         model.partial_slip or model.rig.friction.has_partial_slip or model.rig.springs.is_nonlinear
     )

@@ -291,7 +291,8 @@ def fit_curve(
         return ((curve - measured.value) / measured.error).ravel()
 
     problem = Problem(scene, wanted, lambda values: misfit(curves.quick(values)))
-    start, box = problem.own_values(), problem.box
+    start = problem.own_values()
+    box = problem.box
     trials = [start, *map(box.values, make_space_filling_points(MAX_TRIALS, len(start)))]
     curves.choose_methods(trials)
     if say:

@@ -90,7 +90,8 @@ class BenchModel:
 
     def _is_exact(self) -> bool:
         """Return whether the force at the rows is independent of the time steps."""
-        law, contact = self.scene.friction, self.scene.contact
+        law = self.scene.friction
+        contact = self.scene.contact
         bonds = law_has_trait(law.law, "bonds")
         is_closed_form = law.rest_growth is None and (law.reading == "report" or law.order == 1)
         if bonds and not is_closed_form:
@@ -190,7 +191,8 @@ class BenchModel:
         They are measured, or computed from the speed of the slide, or equally spaced if time has no
         effect.
         """
-        loop, scene = self.loop, self.scene
+        loop = self.loop
+        scene = self.scene
         if loop.time is not None:
             return loop.time
         law = scene.friction

@@ -357,7 +357,8 @@ def _patch_elements(model: Model, patch) -> Elements:
 
 def _check_model(model: Model) -> None:
     """Raise PatchfemError if a patch cannot be described by elastic-plastic elements."""
-    friction, rig = model.friction, model.rig
+    friction = model.friction
+    rig = model.rig
     if model.patch is None or friction is None:
         raise PatchfemError(
             "fit --from-patch needs a patch that slides: the scene must have [contact], [friction] "

@@ -84,7 +84,8 @@ class WearCurve(NamedTuple):
     def inverse(self) -> Callable:
         """Return the fraction of the cycles as a function of the depth."""
         keep = np.concatenate([[True], np.diff(self.depth) > 0])
-        depth, fraction = self.depth[keep], self.fraction[keep]
+        depth = self.depth[keep]
+        fraction = self.fraction[keep]
         if depth.size > 2:
             return PchipInterpolator(depth, fraction, extrapolate=False)
         return lambda value: np.interp(value, depth, fraction)

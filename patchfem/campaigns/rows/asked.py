@@ -19,7 +19,9 @@ class FitRequest:
     """Problem of a fit: the scene of a rig, the ranges of its free keys, and a file of rows."""
 
     def __init__(self, scene: Scene, wanted, measured):
-        self.scene, self.wanted, self.measured = scene, wanted, measured
+        self.scene = scene
+        self.wanted = wanted
+        self.measured = measured
 
     def condition_models(self, conditions, *sets: str) -> ConditionModels:
         """Return the models of the scene at conditions (c, 2), with additional --set strings."""
@@ -54,20 +56,25 @@ class ConditionModels:
     """
 
     def __init__(self, scene: Scene, conditions, wanted, measured):
-        self.scene, self.wanted, self.notes, self.sets = scene, wanted, [], []
+        self.scene = scene
+        self.wanted = wanted
+        self.notes = []
+        self.sets = []
         self._refuse(measured)
         if scene.measured is None and any(one.key.startswith("measured.") for one in wanted):
             self.sets.append(f"measured.file={measured.resolve().as_posix()}")
         if scene.accuracy.method in (None, "auto"):
             self._settle()
         start = loads(scene.text, scene.path, [*scene.sets, *self.sets])
-        self.base, self.read = BaseScene(start), start.measured
+        self.base = BaseScene(start)
+        self.read = start.measured
         self.inner = [k for k, one in enumerate(wanted) if one.key not in READINGS]
         self.rigs = [build(self.base.override(condition_sets(*one))).rig for one in conditions]
 
     def _refuse(self, measured) -> None:
         """Raise PatchfemError for a scene or a key that cannot be fitted to rows."""
-        scene, drive = self.scene, self.scene.drive
+        scene = self.scene
+        drive = self.scene.drive
         where = f"{scene.path}: fit --to {measured.name}: "
         if scene.kind not in ("rig", "linear"):
             raise PatchfemError(

@@ -83,7 +83,8 @@ class Readings:
             raise PatchfemError(
                 f"--hold {one}: write column=value,value, for example frequency=135 Hz,150 Hz"
             )
-        here, out = self.column(name), np.zeros(self.row.size, bool)
+        here = self.column(name)
+        out = np.zeros(self.row.size, bool)
         for text in (part.strip() for part in values.split(",")):
             named = np.array([self._is(name, value, text) for value in here])
             if not named.any():
@@ -149,7 +150,9 @@ def read_readings(path: Path) -> Readings:
     file.
     """
     rows = tuple(read_table(path))
-    row, felt, measured = [], [], []
+    row = []
+    felt = []
+    measured = []
     for k, one in enumerate(rows):
         if not (one.frequency > 0 and one.input > 0):
             raise PatchfemError(f"{path}: row {k + 1}: frequency and input must be above zero")
@@ -217,7 +220,8 @@ def scores(cells: Readings, logs, among) -> dict | None:
     """
     if not np.any(among):
         return None
-    logs, out = np.asarray(logs), {}
+    logs = np.asarray(logs)
+    out = {}
     for name, which in (
         ("acceleration", cells.felt),
         ("displacement", ~cells.felt),

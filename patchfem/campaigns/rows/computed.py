@@ -20,8 +20,12 @@ class ModelReadings:
     """
 
     def __init__(self, asked: ConditionModels, say=None):
-        self.asked, self.say = asked, say
-        self.patch, self.near, self.last, self.watcher = None, {}, (None, {}), None
+        self.asked = asked
+        self.say = say
+        self.patch = None
+        self.near = {}
+        self.last = (None, {})
+        self.watcher = None
         self.runs = 0
         read_as = asked.read
         self.reading = (
@@ -38,7 +42,8 @@ class ModelReadings:
 
     def forget(self) -> None:
         """Let the next motions start from rest."""
-        self.near, self.last = {}, (None, {})
+        self.near = {}
+        self.last = (None, {})
 
     def __call__(self, values, conditions) -> tuple:
         count = len(self.asked.rigs)
@@ -56,7 +61,8 @@ class ModelReadings:
 
     def _run(self, values, conditions) -> dict:
         """Return, by condition, the acceleration reading without its gain and the displacement."""
-        model, found = self.asked.model(values), {}
+        model = self.asked.model(values)
+        found = {}
         with locate_errors(model.source):
             patch = self._get_patch(model)
             whole = self.reading[0] not in ("peak", "fundamental")

@@ -33,7 +33,8 @@ def fit_null_model(cells: Readings, name: str, training) -> tuple:
         ln(computed/measured) (n,), NaN for a kind without training readings; and by kind the fitted
         "factor", exponent of "input" and exponent of "frequency".
     """
-    out, found = np.full(cells.row.size, np.nan), {}
+    out = np.full(cells.row.size, np.nan)
+    found = {}
     at = np.log(cells.conditions[cells.condition])
     for kind, which in (("acceleration", cells.felt), ("displacement", ~cells.felt)):
         here = which & training

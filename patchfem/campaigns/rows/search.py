@@ -128,7 +128,8 @@ def fit_readings(
     """
     wanted = computed.asked.wanted
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
-    residual, n = make_residual(cells, computed, training, how.unstable), len(wanted)
+    residual = make_residual(cells, computed, training, how.unstable)
+    n = len(wanted)
     quick = CubeResidual(residual, box, is_quick=True)
     begins = np.random.default_rng(how.seed).random((how.starts, n))
 

@@ -101,7 +101,8 @@ class SweepScene:
         cases : (n,) array
             Numbers of the cases.
         """
-        keys, known = tuple(keys), _model_cache(self)
+        keys = tuple(keys)
+        known = _model_cache(self)
         if keys not in known:
             base = _parse_base_scene(self)
             scene = base and self.scene(sets(int(cases[0])))
@@ -141,7 +142,8 @@ class SweepScene:
 
     def numbered_key(self, key: str) -> str:
         """Return a key in which the name of a mode is replaced by its number."""
-        pieces, modes = key.split("."), tomllib.loads(self.text).get("structure", {})
+        pieces = key.split(".")
+        modes = tomllib.loads(self.text).get("structure", {})
         modes = modes.get("mode") if isinstance(modes, dict) else None
         if pieces[:2] == ["structure", "mode"] and len(pieces) > 2 and isinstance(modes, list):
             names = [one.get("name") if isinstance(one, dict) else None for one in modes]

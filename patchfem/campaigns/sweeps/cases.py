@@ -205,7 +205,9 @@ def combine_cases(parts: Sequence[Cases]) -> Cases:
         return parts[0]
     if not any(part.rows for part in parts):
         return Cases(tuple(axis for part in parts for axis in part.axes))
-    count, axes, inner = prod(map(len, parts)), [], prod(map(len, parts))
+    count = prod(map(len, parts))
+    axes = []
+    inner = prod(map(len, parts))
     for part in parts:
         inner //= len(part)
         picked = [part.places(number // inner % len(part)) for number in range(count)]

@@ -51,7 +51,9 @@ def estimate_sweep(asked: SweepScene, cases: Cases) -> dict:
     PatchfemError
         If none of the planned cases can run.
     """
-    plans, numbers, wrong = [], [], None
+    plans = []
+    numbers = []
+    wrong = None
     for number in cases.representative_cases(MAX_PLANNED_CASES):
         try:
             plans.append(plan(asked.model(cases.sets(number))))
@@ -112,7 +114,8 @@ def _split_shared_seconds(plans: list) -> tuple[float, list]:
     A case of a sweep needs no start and no fields. Pieces that are the same in all cases are
     condensed once.
     """
-    costs, shared = [each.cost for each in plans], 0.0
+    costs = [each.cost for each in plans]
+    shared = 0.0
     left_out = {"start", "code", "fields"}
     patches = [each.model.patch for each in plans]
     if None not in patches:

@@ -106,7 +106,8 @@ def read_cases(asked: SweepScene, request: Request) -> Cases:
     SceneError
         With the mistakes of scene and request, and if none of the cases that are checked is valid.
     """
-    parts, wrong = [], []
+    parts = []
+    wrong = []
     if min(request.count, request.seed) < 0 or (request.sobol and not request.count):
         raise SceneError(
             [
@@ -215,7 +216,8 @@ def _find_equal_keys(asked: SweepScene, keys: Sequence[str]) -> list[str]:
 
     Two keys do so if they name a mode by its name and by its number.
     """
-    first, wrong = {}, []
+    first = {}
+    wrong = []
     for key in keys:
         place = asked.numbered_key(key)
         if first.setdefault(place, key) != key:
@@ -253,7 +255,8 @@ def contradictions(asked: SweepScene, cases: Cases) -> str:
     found = [one for one in map(asked.mistakes, map(cases.sets, numbers)) if one]
     if not found:
         return ""
-    first, swept = found[0][0], {asked.numbered_key(axis.key) for axis in cases.axes}
+    first = found[0][0]
+    swept = {asked.numbered_key(axis.key) for axis in cases.axes}
     key = re.search(r"(?:^|: )([a-z_]+(?:\.[\w-]+)+): ", first)
     helps = (
         f"sweep {key[1]}, too, remove this key from the scene, or give other values in --over"

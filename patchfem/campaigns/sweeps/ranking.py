@@ -119,7 +119,8 @@ def _rank_fraction(values: np.ndarray) -> np.ndarray:
 
 def _grid_indices(values: np.ndarray) -> tuple:
     """Return first-order and total Sobol indices and the interval of the total, (keys,) each, on a full grid."""
-    axes, whole = range(values.ndim), values.var()
+    axes = range(values.ndim)
+    whole = values.var()
     first = (
         np.array(
             [values.mean(axis=tuple(other for other in axes if other != one)).var() for one in axes]
@@ -144,7 +145,8 @@ def _random_indices(levels: np.ndarray, values: np.ndarray) -> list:
     rng = np.random.default_rng(0)
     if len(levels) > MAX_SURFACE_CASES:
         some = np.sort(rng.choice(len(levels), MAX_SURFACE_CASES, replace=False))
-        levels, values = levels[some], values[some]
+        levels = levels[some]
+        values = values[some]
     scaled = (values - values.mean(axis=0)) / values.std(axis=0)
     halves = [rng.permutation(len(levels)) for _ in range(N_HALF_SURFACES)]
     half = len(levels) // 2
@@ -165,10 +167,8 @@ def _random_indices(levels: np.ndarray, values: np.ndarray) -> list:
             ),
         ]
     )
-    low, high = (
-        others.min(axis=0) - left[:, None] - INDEX_ERROR,
-        others.max(axis=0) + left[:, None] + INDEX_ERROR,
-    )
+    low = others.min(axis=0) - left[:, None] - INDEX_ERROR
+    high = others.max(axis=0) + left[:, None] + INDEX_ERROR
     parts = [np.clip(one, 0.0, 1.0) for one in (first, total, low, high)]
     return [
         tuple(part[k] for part in parts) if left[k] < 1 - MIN_EXPLAINED_FRACTION else None
@@ -189,7 +189,8 @@ def _unexplained_variance(levels, values, order, half: int, smooth: float) -> np
     The surface goes through the first half of the cases in an order (n,), and is compared with the
     others.
     """
-    seen, rest = order[:half], order[half:]
+    seen = order[:half]
+    rest = order[half:]
     off = _fit_surface(levels[seen], values[seen], smooth)(levels[rest]) - values[rest]
     return np.mean(off**2, axis=0) / np.maximum(values[rest].var(axis=0), 1e-30)
 

@@ -128,7 +128,8 @@ def compute_timed(work: Work, numbers: Sequence[int], say: Callable | None = Non
 
     The seconds do not include compilation, which no later case needs.
     """
-    begin, made = perf_counter(), compiled.COMPILE_SECONDS[0]
+    begin = perf_counter()
+    made = compiled.COMPILE_SECONDS[0]
     found = compute_chunk(work, numbers, say)
     return perf_counter() - begin - (compiled.COMPILE_SECONDS[0] - made), found
 
@@ -147,7 +148,8 @@ def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels |
 
     None as well for pressed patches in motion, and if `work.keep` needs every single run.
     """
-    cases, values = np.asarray(numbers), work.cases.columns(numbers)
+    cases = np.asarray(numbers)
+    values = work.cases.columns(numbers)
     if work.keep is not None or values is None:
         return None
     try:
@@ -180,7 +182,8 @@ def choose_meshes(work: Work) -> Work:
     """Return the work with the meshes that all cases share, including cases already computed."""
     if work.meshes is not None:
         return work
-    numbers, models = work.cases.spread_cases(MAX_MESH_CASES), []
+    numbers = work.cases.spread_cases(MAX_MESH_CASES)
+    models = []
     for number in numbers:
         models.append(_build_case_model(work, number))
         if isinstance(models[-1], Model) and models[-1].patch is None:
@@ -215,7 +218,9 @@ class Chunks:
 
     def __init__(self, numbers: Sequence[int], workers: int, least: int = 1):
         self.least = least
-        self.left, self.suspect, self.workers = deque(numbers), deque(), max(workers, 1)
+        self.left = deque(numbers)
+        self.suspect = deque()
+        self.workers = max(workers, 1)
         self.deaths: dict[int, int] = {}
         self.each = CHUNK_SECONDS  # seconds per case, from the last chunk
 
@@ -324,13 +329,11 @@ class RemainingTime:
     """
 
     def __init__(self, total: int, workers: int):
-        self.left, self.workers, self.chunks, self.work, self.cases = (
-            total,
-            max(workers, 1),
-            0,
-            0.0,
-            0.0,
-        )
+        self.left = total
+        self.workers = max(workers, 1)
+        self.chunks = 0
+        self.work = 0.0
+        self.cases = 0.0
 
     def __call__(self, count: int, seconds: float) -> float | None:
         """Return the remaining seconds after a chunk; None if they are not known yet.

@@ -81,7 +81,8 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
 
 def _parse_column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[tuple]]:
     """Return the axis of a column of (line, cell), and its mistakes as (line or 0, message)."""
-    known, wrong = {}, []
+    known = {}
+    wrong = []
     for number, cell in cells:
         if cell in known:
             continue

@@ -64,7 +64,8 @@ def make_dots(x, y, colour: str, name: str = "", **style) -> dict:
 
 def make_line(x, y, colour: str, name: str = "", most: int = MAX_LINE_POINTS, **style) -> dict:
     """Return a line of at most `most` points; a longer line is reduced by `sample_indices`."""
-    x, y = np.asarray(x, float), np.asarray(y, float)
+    x = np.asarray(x, float)
+    y = np.asarray(y, float)
     keep = sample_indices(x, y, most)
     return make_mark("line", colour, name, x=x[keep], y=y[keep], **style)
 
@@ -143,7 +144,8 @@ def interface_charts(x, fields: dict, name: str = "") -> list:
     name : str
         Name of the interface, if there are several.
     """
-    sigma, tau = fields["normal_stress"][0], fields.get("shear_stress")
+    sigma = fields["normal_stress"][0]
+    tau = fields.get("shear_stress")
     part = contact_range(x, sigma) or (x[0], x[-1])
     along, size = choose_axis_unit(part, "m")
     place = make_axis("x", along) | {"range": [part[0] * size, part[1] * size]}
@@ -204,7 +206,9 @@ def contact_window(x, depth, sigma, ratio: float) -> tuple:
         Width / height of the picture.
     """
     used = np.flatnonzero(sigma > 0)
-    first, last, length = x[used[0]], x[used[-1]], x[-1] - x[0]
+    first = x[used[0]]
+    last = x[used[-1]]
+    length = x[-1] - x[0]
     width = min(1.6 * (last - first) + 2 * (x[1] - x[0]), 0.4 * length)
     middle = (first + last) / 2
     if last - first > width:
@@ -392,7 +396,8 @@ def cycle_envelope(time, value, period: float) -> tuple:
     many = int(np.ceil(max(1.0, (time[-1] - time[0]) / period / MAX_ENVELOPE_CYCLES)))
     number = np.floor(time / (many * period) + 1e-9).astype(int)
     count = number[-1] + 1
-    low, high = np.full(count, np.inf), np.full(count, -np.inf)
+    low = np.full(count, np.inf)
+    high = np.full(count, -np.inf)
     np.minimum.at(low, number, value)
     np.maximum.at(high, number, value)
     empty = low > high
@@ -453,7 +458,8 @@ def history_charts(
         if period
         else time[0]
     )
-    late, marks = time >= begin, []
+    late = time >= begin
+    marks = []
     if joined and not late.all():
         early = slice(0, int(np.argmax(late)) + 1)
         marks.append(make_line(time[early] * per, value[early] * scale, "accent", width=1.0))
@@ -531,12 +537,14 @@ def measured_charts(rows: list, frequency: float, level: float, acceleration, di
     acceleration, displacement : tuple or None
         Computed value and error in SI.
     """
-    near, out = [r for r in rows if abs(r.frequency - frequency) < 0.5], []
+    near = [r for r in rows if abs(r.frequency - frequency) < 0.5]
+    out = []
     for name, unit, scale, found in (
         ("acceleration", "g", G_N, acceleration),
         ("displacement", "mil", MIL, displacement),
     ):
-        read, marks = [r for r in near if getattr(r, name) is not None], []
+        read = [r for r in near if getattr(r, name) is not None]
+        marks = []
         marks += [
             make_mark("rule", "warm", "unstable in the test", x=place)
             for place in sorted({r.input / G_N for r in near if "U" in r.flag})
@@ -603,8 +611,10 @@ def regime_sentence(steady: dict | None) -> str:
 
 def curve_caption(found: dict) -> str:
     """Return the caption of a curve of steady motions: content, regimes, folds and gaps."""
-    what, parts = curve_axis(found)[1], [regime for regime, _, _ in regime_stretches(found)]
-    count, folds = np.asarray(found["amplitude"]).size, len(found.get("folds", ()))
+    what = curve_axis(found)[1]
+    parts = [regime for regime, _, _ in regime_stretches(found)]
+    count = np.asarray(found["amplitude"]).size
+    folds = len(found.get("folds", ()))
     text = f"Half the peak-to-peak steady motion at the output against the {what}, {count} points; "
     text += "colour and line style show the regime: " + ", ".join(dict.fromkeys(parts)) + "."
     if folds:
@@ -622,7 +632,8 @@ def curve_charts(found: dict) -> list:
     """
     along, what, unit = curve_axis(found)
     name, scale = choose_axis_unit(found["amplitude"], "m")
-    value, parts = np.asarray(found["amplitude"]) * scale, regime_stretches(found)
+    value = np.asarray(found["amplitude"]) * scale
+    parts = regime_stretches(found)
     colours = dict(zip(dict.fromkeys(part[0] for part in parts), COLOURS * 9))
     lost = np.concatenate([[False], ~np.isfinite(value), [False]]).astype(int)
     marks = [
@@ -685,7 +696,8 @@ def spectra_charts(found, frequency: float | None) -> list:
         Frequency [Hz] of the mode that was fitted to the peak of H1.
     """
     # outside the band of the drive the spectrum is only leakage
-    driven, out = np.isfinite(found.coherence), []
+    driven = np.isfinite(found.coherence)
+    out = []
     found = type(found)(*(column[driven] for column in found))
     hertz = found.frequency
     unit, scale = choose_axis_unit([float(np.sqrt(found.place.max(initial=0.0)))], "m")
@@ -709,7 +721,8 @@ def spectra_charts(found, frequency: float | None) -> list:
             ],
         )
     )
-    gain, told = np.abs(found.gain) * G_N, found.coherence >= MIN_COHERENCE
+    gain = np.abs(found.gain) * G_N
+    told = found.coherence >= MIN_COHERENCE
     unit, scale = choose_axis_unit([gain.max(initial=0.0)], "m")
     marks = [
         _positive_line(hertz, gain * scale, "soft"),
@@ -745,7 +758,8 @@ def decay_charts(found) -> list:
     unit, scale = choose_axis_unit(found.amplitude, "m")
     out = []
     for name, label, of in (("frequency", "frequency", "Hz"), ("damping", "damping ratio", "")):
-        error, y = getattr(found, f"{name}_error"), getattr(found, name)
+        error = getattr(found, f"{name}_error")
+        y = getattr(found, name)
         known = np.isfinite(error)
         x = found.amplitude[known] * scale
         out.append(
@@ -783,17 +797,13 @@ def levels_chart(rows: list) -> list:
         np.array([row["errors"].get("relative_displacement_amplitude") or 0.0 for row in rows])
         * scale
     )
-    held, y, log = (
-        np.array([row["stuck"] for row in rows]),
-        amplitude * scale,
-        needs_log_scale(amplitude),
-    )
+    held = np.array([row["stuck"] for row in rows])
+    y = amplitude * scale
+    log = needs_log_scale(amplitude)
     drawn = y > 0 if log else np.isfinite(y)
     # Lower end of error bars that would extend below 0.
-    marks, style = (
-        [],
-        {"floor": 0.1 * float(y[drawn].min())} if log else {},
-    )
+    marks = []
+    style = {"floor": 0.1 * float(y[drawn].min())} if log else {}
     for k, (a, b) in enumerate(pairwise(drive)):
         up = b >= a
         if drawn[k] and drawn[k + 1]:

@@ -109,7 +109,10 @@ def make_film(series: Series, magnify: float | None = None) -> Film:
             f"{series.path}: contains only one frame, so there is no motion to show; write a picture "
             "with -o FILE.png"
         )
-    seen, windows, slides, reach = [], [], [], {"normal_stress": [], "shear_stress": []}
+    seen = []
+    windows = []
+    slides = []
+    reach = {"normal_stress": [], "shear_stress": []}
     for number in numbers:
         one = series.frame(number)
         seen.append(make_panels(one, magnify))
@@ -149,7 +152,8 @@ def make_film(series: Series, magnify: float | None = None) -> Film:
 
 def _enclosing_window(windows: list) -> tuple:
     """Return the smallest window that contains several windows."""
-    low, high = np.min(windows, axis=0), np.max(windows, axis=0)
+    low = np.min(windows, axis=0)
+    high = np.max(windows, axis=0)
     return (float(low[0]), float(high[1]), float(low[2]), float(high[3]))
 
 
@@ -178,12 +182,14 @@ def write_film(series: Series, head: str, magnify: float | None, out: Path) -> s
     Missing
         ffmpeg is not installed or cannot write the file.
     """
-    film, picture = make_film(series, magnify), None
+    film = make_film(series, magnify)
+    picture = None
     with matplotlib.rc_context(STYLE | {"savefig.bbox": None, "savefig.dpi": "figure"}):
         writer = _movie_writer(out, film.seconds)
         for number in film.numbers:
             frame = series.frame(number)
-            text, shown = f"{head}, {frame.time:.6g} s", film.panels(frame)
+            text = f"{head}, {frame.time:.6g} s"
+            shown = film.panels(frame)
             if picture is None:
                 picture = Picture(frame, text, shown, FRAME_SIZE, film.reach)
                 picture.freeze_layout(DPI)

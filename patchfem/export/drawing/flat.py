@@ -76,7 +76,8 @@ class Picture:
             low, high = np.array(reach) * choose_axis_unit(reach, "Pa")[1]
             axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
         axes.legend(loc="best" if reach is None else "upper right")
-        drawn, unit = self.bodies[0].cells[0][2], choose_axis_unit([shown[0].top], "Pa")[0]
+        drawn = self.bodies[0].cells[0][2]
+        unit = choose_axis_unit([shown[0].top], "Pa")[0]
         self.figure.colorbar(
             drawn, ax=self.bodies[0].axes, label=f"von Mises stress [{unit}]", shrink=0.7
         )
@@ -110,7 +111,8 @@ class _Bodies:
         from matplotlib.collections import LineCollection, PolyCollection
 
         self.scale = choose_axis_unit([panel.top], "Pa")[1]
-        self.axes, self.edges = axes, outer_edges(frame, panel.cells)
+        self.axes = axes
+        self.edges = outer_edges(frame, panel.cells)
         self.cells = []  # (selection, corners, collection) of triangles and of quadrilaterals
         size = np.diff(frame.offsets)
         for count in np.unique(size[panel.cells]):

@@ -107,7 +107,8 @@ def make_panels(
     factors = magnify if isinstance(magnify, tuple) else (magnify, magnify)
     windows = (whole, find_contact_window(frame) if close is None else close)
     inside = [_stressed_cells(frame, window) for window in windows]
-    mises, area = frame.cell_data["von_mises"], cell_areas(frame)
+    mises = frame.cell_data["von_mises"]
+    area = cell_areas(frame)
     # Panels side by side have the same scale.
     top = max(_colour_limit(mises[cells], area[cells]) for cells in inside)
     return tuple(_make_panel(frame, motion, *each, top) for each in zip(windows, inside, factors))
@@ -131,10 +132,8 @@ def _colour_limit(mises, area) -> float:
 
     It is the largest stress, unless this is a peak in a corner.
     """
-    largest, most = (
-        float(mises.max(initial=0.0)),
-        float(_weighted_quantile(mises, area, COLOURED_AREA)),
-    )
+    largest = float(mises.max(initial=0.0))
+    most = float(_weighted_quantile(mises, area, COLOURED_AREA))
     return most if most < MIN_PEAK_RATIO * largest else largest
 
 
@@ -243,7 +242,8 @@ def drawn_displacement(frame: Frame) -> np.ndarray:
     that the drawn gap is the computed one.
     """
     move = frame.points[:, :2] * 0 + frame.point_data["displacement"][:, :2]
-    line, upper = frame.interface(), upper_points(frame)
+    line = frame.interface()
+    upper = upper_points(frame)
     surface = move[line, 1] + frame.point_data["gap"][line]
     move[upper, 1] += surface_shape_motion(
         frame.points[upper], move[None, upper, 1], frame.points[line, 0], surface[None]
@@ -286,15 +286,20 @@ def round_down_factor(factor: float, least: float = 1.0) -> float:
 def find_contact_window(frame: Frame) -> tuple:
     """Return a window [mm] around the contact; for a long contact, around its largest pressure."""
     line = frame.interface()
-    x, sigma = frame.points[line, 0] * 1e3, frame.point_data["normal_stress"][line]
-    length, touching = np.ptp(x), x[sigma > 0]
+    x = frame.points[line, 0] * 1e3
+    sigma = frame.point_data["normal_stress"][line]
+    length = np.ptp(x)
+    touching = x[sigma > 0]
     cell = np.diff(x).max()
     if not touching.size:
-        middle, half = x.mean(), length / 8
+        middle = x.mean()
+        half = length / 8
     elif np.ptp(touching) > length / 4:
-        middle, half = x[np.argmax(sigma)], length / 8
+        middle = x[np.argmax(sigma)]
+        half = length / 8
     else:
-        middle, half = (touching[0] + touching[-1]) / 2, max(np.ptp(touching), 4 * cell)
+        middle = (touching[0] + touching[-1]) / 2
+        half = max(np.ptp(touching), 4 * cell)
     left = max(x[0], min(middle - half, x[-1] - 2 * half))
     right = min(x[-1], left + 2 * half)
     return (left, right, -0.3 * (right - left), 0.3 * (right - left))
@@ -357,17 +362,22 @@ def outer_edges(frame: Frame, cells) -> tuple:
 
     cells: (cells,) bool.
     """
-    outer, inner = [], []
-    size, material = np.diff(frame.offsets), frame.cell_data["material"]
+    outer = []
+    inner = []
+    size = np.diff(frame.offsets)
+    material = frame.cell_data["material"]
     for part in (0, 1):
-        ends, coat, shown = [], [], []
+        ends = []
+        coat = []
+        shown = []
         for count in (3, 4):
             mine = (frame.cell_data["part"] == part) & (size == count)
             block = frame.connectivity[frame.offsets[:-1][mine][:, None] + np.arange(count)]
             ends.append(np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2))
             coat.append(np.repeat(material[mine], count))
             shown.append(np.repeat(cells[mine], count))
-        ends, coat = np.sort(np.concatenate(ends), axis=1), np.concatenate(coat)
+        ends = np.sort(np.concatenate(ends), axis=1)
+        coat = np.concatenate(coat)
         pairs, number = np.unique(ends, axis=0, return_inverse=True)
         times = np.bincount(number.ravel())
         coats = np.bincount(number.ravel(), coat > 0)

@@ -159,7 +159,8 @@ def write_script(folder: Path, out: Path, of: str = "von_mises") -> str:
     PatchfemError
         If the fields have only one frame, or the stress is unknown.
     """
-    status, of = of == STATUS, "von_mises" if of == STATUS else of
+    status = of == STATUS
+    of = "von_mises" if of == STATUS else of
     if of not in STRESSES:
         raise PatchfemError(
             f"--of {of}: no stress of this name; the stresses are {', '.join(STRESSES)}; {STATUS} "
@@ -235,7 +236,8 @@ def add_motion(frame: Frame, of: str = "von_mises") -> Frame:
     slide = np.zeros((len(frame.points), 3))
     slide[upper_points(frame), 0] = upper_piece_slide(frame)
     motion = np.column_stack([drawn_displacement(frame), np.zeros(len(slide))]) - slide
-    blocks, first = {}, 0
+    blocks = {}
+    first = 0
     for name, block in frame.blocks.items():
         mine = slice(first, first + len(block.points))
         more = {"motion": motion[mine].astype(np.float32), "slide": slide[mine].astype(np.float32)}

@@ -47,11 +47,14 @@ def sweep_chart(dataset, measure: str) -> dict:
         for part, name in names.items()
     }
     hollow = is_over_tolerance(table, dataset.attrs.get("tolerance", np.nan))
-    values, errors = table["values"], np.nan_to_num(table["errors"])
+    values = table["values"]
+    errors = np.nan_to_num(table["errors"])
     unit, scale = _choose_axis_unit(values, dataset[measure].attrs.get("units", "1"))
     below = np.fmin(errors, np.fmax(values - minimum_value(measure), 0.0))
     x, x_axis = _make_key_axis(key, along)
-    lines, rings, filled = [], [], []
+    lines = []
+    rings = []
+    filled = []
     for k, place in enumerate(np.ndindex(*(dataset[name].size for name in others))):
         text = ", ".join(
             f"{measure_label(name)} {_format_key(dataset[name], at)}"
@@ -97,7 +100,8 @@ def _choose_axis_unit(values, unit: str) -> tuple:
 
 def _format_key(key, place: int) -> str:
     """Format a value of a key."""
-    value, unit = key.values[place], key.attrs.get("units", "1")
+    value = key.values[place]
+    unit = key.attrs.get("units", "1")
     if key.dtype.kind != "f":
         return str(value)
     if unit in UNIT_LADDERS:

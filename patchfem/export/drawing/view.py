@@ -227,7 +227,9 @@ def _draw_stresses(plotter, one: Frame) -> None:
     for (label, values), colour in zip(shown, ("#1f5f99", "#c8551b")):
         chart.line(x, values, color=colour, width=3, label=label)
     for axis in (chart.x_axis, chart.y_axis):
-        axis.label_size, axis.tick_label_size, axis.label_font_size = FONT, FONT - 3, FONT
+        axis.label_size = FONT
+        axis.tick_label_size = FONT - 3
+        axis.label_font_size = FONT
     chart.legend_visible = True
     chart.background_color = "white"
     plotter.add_chart(chart)

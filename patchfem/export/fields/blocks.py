@@ -139,7 +139,8 @@ def _strips_block(x, width: float, areal: dict) -> Block:
 
 def _piece_block(body: dict) -> Block:
     """Return the block of a piece."""
-    frames, cells = len(body["displacement"]), len(body["material"])
+    frames = len(body["displacement"])
+    cells = len(body["material"])
     move = np.zeros((frames, len(body["points"]), 3), np.float32)
     move[..., :2] = body["displacement"]
     stress = np.zeros((frames, cells, 6), np.float32)

@@ -59,7 +59,8 @@ def write_fields(result, path: Path) -> dict:
     Returns the pressed state for the picture of the report, after all wear; only tensor grids have
     it. A stress beyond the yield strength of a named material is added to the notes of the result.
     """
-    patch, fields = result.patch, result.fields
+    patch = result.patch
+    fields = result.fields
     times = fields["time"]
     interface = {k: v for k, v in fields.items() if k != "time" and not k.startswith("holder_")}
     loads = [_nodal_loads(patch, fields, side) for side in ("lower", "upper")]
@@ -92,7 +93,8 @@ def write_fields(result, path: Path) -> dict:
     )
     if not isinstance(patch.pair.piece, Piece):
         return {}
-    shape, shown = (patch.x.size - 1, -1), result.extra.get("wear_shown", {"states": 0})["states"]
+    shape = (patch.x.size - 1, -1)
+    shown = result.extra.get("wear_shown", {"states": 0})["states"]
     return {
         "x": patch.x,
         "pressure": patch.pressure.sigma_n,
@@ -170,13 +172,13 @@ def _mesh_and_stress(piece, grid) -> _PieceFields:
     """Return mesh, stress and recovery of a piece."""
     cells = get_cells(piece)
     if isinstance(piece, Piece):
-        points, blocks, interface = (
-            cells.points,
-            [piece.cells],
-            np.arange(0, len(cells.points), grid.depth.size),
-        )
+        points = cells.points
+        blocks = [piece.cells]
+        interface = np.arange(0, len(cells.points), grid.depth.size)
     else:
-        points, blocks, interface = grid.points, list(cells.blocks), grid.interface
+        points = grid.points
+        blocks = list(cells.blocks)
+        interface = grid.interface
     return _PieceFields(
         points,
         blocks,
@@ -204,7 +206,9 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, inside: _PieceField
     u : (1 + f, n, 2) array
         From `_piece_displacements`; its first row is the pressed state.
     """
-    lower, cells, frames = side == "lower", inside.cells, len(u) - 1
+    lower = side == "lower"
+    cells = inside.cells
+    frames = len(u) - 1
     sign = -1.0 if lower else 1.0
     out = {
         name: np.empty((frames, *shape), np.float32)
@@ -214,7 +218,8 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, inside: _PieceField
             "mises": cells.is_coating.shape,
         }.items()
     }
-    errors, largest = [], 0.0
+    errors = []
+    largest = 0.0
     for first in range(0, frames, FRAMES_PER_PASS):
         some = slice(first, first + FRAMES_PER_PASS)
         motion = u[:1] + u[1:][some]

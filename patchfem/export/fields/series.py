@@ -63,7 +63,8 @@ class Frame(Block):
 
         part: 0 lower piece, 1 upper piece, 2 interface.
         """
-        mine, size = self.cell_data["part"] == part, np.diff(self.offsets)
+        mine = self.cell_data["part"] == part
+        size = np.diff(self.offsets)
         return [
             self.connectivity[self.offsets[:-1][mine & (size == n)][:, None] + np.arange(n)]
             for n in np.unique(size[mine])
@@ -236,10 +237,8 @@ class Series:
             Numbers of the frames.
         """
         group = self.root[block]
-        rows, size = (
-            group[f"{kind}/{name}"],
-            len(group["Points" if kind == "PointData" else "Types"]),
-        )
+        rows = group[f"{kind}/{name}"]
+        size = len(group["Points" if kind == "PointData" else "Types"])
         first = group[f"Steps/{kind}Offsets/{name}"][:][numbers]
         if np.all(np.diff(first) == size):  # consecutive frames need a single read
             whole = rows[int(first[0]) : int(first[-1]) + size]

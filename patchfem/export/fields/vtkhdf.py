@@ -69,7 +69,8 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
         for data in (one.point_data, one.cell_data)
         for values in data.values()
     )
-    large, later = size > MIN_FRAMEWISE_BYTES, []
+    large = size > MIN_FRAMEWISE_BYTES
+    later = []
     packed = large or size > MIN_COMPRESSED_BYTES
     with (
         write_atomically(path, None if large else size) as partial,
@@ -168,8 +169,10 @@ def round_to_bits(values, bits: int) -> np.ndarray:
     bits : int
         0 < bits < 23; the relative error is at most 2^-(bits + 1). Infinities and NaN are kept.
     """
-    raw, drop = np.ascontiguousarray(values, np.float32).view(np.uint32), np.uint32(23 - bits)
-    half, one = np.uint32(1) << (drop - np.uint32(1)), np.uint32(1)
+    raw = np.ascontiguousarray(values, np.float32).view(np.uint32)
+    drop = np.uint32(23 - bits)
+    half = np.uint32(1) << (drop - np.uint32(1))
+    one = np.uint32(1)
     near = (raw + (half - one) + ((raw >> drop) & one)) >> drop << drop
     return np.where(np.isfinite(values), near.view(np.float32), values)
 
@@ -236,10 +239,8 @@ def _create_steps(group, times):
 def _write_field_data(group, steps, text: dict, count: int) -> None:
     """Write field arrays of text, which are the same in all frames."""
     field = group["FieldData"]
-    offsets, sizes = (
-        _create_group(steps, "FieldDataOffsets"),
-        _create_group(steps, "FieldDataSizes"),
-    )
+    offsets = _create_group(steps, "FieldDataOffsets")
+    sizes = _create_group(steps, "FieldDataSizes")
     for name, lines in text.items():
         if lines:
             field.create_dataset(name, data=lines, dtype=h5py.string_dtype("ascii"))
@@ -254,8 +255,10 @@ def _write_mesh(group, one: Block) -> None:
     group["NumberOfPoints"] = np.array([len(one.points)], np.int64)
     group["NumberOfCells"] = np.array([len(one.types)], np.int64)
     group["NumberOfConnectivityIds"] = np.array([one.connectivity.size], np.int64)
-    group["Points"], group["Connectivity"] = one.points, one.connectivity
-    group["Offsets"], group["Types"] = one.offsets, one.types
+    group["Points"] = one.points
+    group["Connectivity"] = one.connectivity
+    group["Offsets"] = one.offsets
+    group["Types"] = one.types
     for kind in ("PointData", "CellData", "FieldData"):
         _create_group(group, kind)
 
@@ -269,7 +272,8 @@ def _write_block(group, one: Block, times, about: tuple) -> None:
     """
     units, text, later, rounding = about
     _write_mesh(group, one)
-    steps, count = _create_steps(group, times), len(times)
+    steps = _create_steps(group, times)
+    count = len(times)
     for name in ("PartOffsets", "PointOffsets"):
         steps[name] = np.zeros(count, np.int64)
     steps["NumberOfParts"] = np.ones(count, np.int64)

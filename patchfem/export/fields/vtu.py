@@ -142,7 +142,8 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise explain_write_error(error, folder, folder) from None
-    lines, written = [], set()
+    lines = []
+    written = set()
     numbers = range(len(series)) if numbers is None else numbers
     for number in numbers:
         one = series.frame(number)
@@ -204,7 +205,8 @@ def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> Non
     units : dict
         Unit by name.
     """
-    count, cells = len(frame.points), len(frame.types)
+    count = len(frame.points)
+    cells = len(frame.types)
     text = [
         '<?xml version="1.0"?>',
         '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64" '
@@ -288,7 +290,8 @@ def write_csv(path: Path, frame: Frame) -> None:
     """
     line = frame.blocks["interface"]
     nodes = np.argsort(line.points[:, 0], kind="stable")
-    head, columns = ["x [m]"], [[repr(float(x)) for x in line.points[nodes, 0]]]
+    head = ["x [m]"]
+    columns = [[repr(float(x)) for x in line.points[nodes, 0]]]
     for name, values in line.point_data.items():
         mine = values[nodes]
         parts = (

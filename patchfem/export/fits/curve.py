@@ -58,7 +58,8 @@ def describe_curve_fit(fitted: FittedCurve, folder: Path) -> FitFiles:
 
 def _fit_json(fitted: FittedCurve) -> dict:
     """Return the object of fit.json."""
-    keys, measured = fitted.keys, fitted.measured
+    keys = fitted.keys
+    measured = fitted.measured
     deviation = (fitted.model - measured.value) / np.abs(measured.value)
     frequency_rms, damping_rms = np.sqrt(np.mean(deviation**2, axis=1)).tolist()
     name = fitted.path.name

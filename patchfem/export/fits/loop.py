@@ -54,7 +54,8 @@ def describe_loop_fit(fitted: FittedLoop, folder: Path) -> FitFiles:
 
 def _fit_json(fitted: FittedLoop) -> dict:
     """Return the object of fit.json."""
-    keys, loop = fitted.keys, fitted.loop
+    keys = fitted.keys
+    loop = fitted.loop
     found = keys.fit
     first = len(keys.ranges)
     offsets = {
@@ -108,7 +109,8 @@ def _draw_charts(fitted: FittedLoop) -> list:
     along, size = choose_axis_unit(loop.displacement, "m")
     up, scale = choose_axis_unit(loop.reading, "N") if unit == "N" else ("1", 1.0)
     number = np.arange(loop.reading.size)
-    slide, reading = loop.displacement * size, loop.reading * scale
+    slide = loop.displacement * size
+    reading = loop.reading * scale
     residual = (fitted.model - loop.reading) * scale
     over_slide = []
     over_rows = [charts.make_line(number[[0, -1]], [0.0, 0.0], "soft", width=0.8)]

@@ -106,7 +106,8 @@ def _relative_loss(one: FittedLaw, fitted: FittedPatch) -> dict:
 
     If the patch dissipates nothing, the difference is that of `one.deviations`.
     """
-    own, loss = fitted.patch.curves.loss, one.curves.loss
+    own = fitted.patch.curves.loss
+    loss = one.curves.loss
     share = np.where(own > 0, loss / np.where(own > 0, own, 1.0) - 1, one.deviations[1])
     k = np.abs(share).argmax()
     return {"relative": float(share[k]), "relative_at": float(fitted.patch.slides[k])}
@@ -206,7 +207,8 @@ def _format_answer(answer: dict) -> list:
 
 def _format_stiffness(answer: dict) -> str:
     """Format the stiffness while nothing slips, with its error if it is known."""
-    value, error = answer["stiffness"], answer["stiffness_error"]
+    value = answer["stiffness"]
+    error = answer["stiffness_error"]
     if error is None:
         return _format_in_unit(value, "N/m")
     return format_value(value, error, unit=SENTENCE_UNITS["N/m"])

@@ -171,7 +171,8 @@ def _check_options(kind: str, options: Options, format_option: Callable) -> None
         )
         these = "this option" if len(others) == 1 else "these options"
         raise PatchfemError(f"{belong}; this scene is {KINDS[kind]}; leave {these} out")
-    starts, seed = options.starts, options.seed
+    starts = options.starts
+    seed = options.seed
     if starts is not None and (not isinstance(starts, int) or starts < 1):
         raise PatchfemError(f"{format_option('starts')} {starts}: at least one is needed")
     if not isinstance(seed, int) or seed < 0:

@@ -88,7 +88,8 @@ def describe_rows_fit(fitted: FittedRows, folder: Path) -> FitFiles:
 
 def describe_answer(fitted: FittedRows) -> dict:
     """Return the object of fit.json; scores are root mean squares of ln(computed/measured)."""
-    keys, cells = fitted.keys, fitted.cells
+    keys = fitted.keys
+    cells = fitted.cells
     found = keys.fit
     nulls = {}
     nulls_stable = {}

@@ -10,7 +10,8 @@ from .files import FITTED_SCENE, FitFiles, describe_measurement
 
 def describe_wear_fit(fitted: FittedCoefficient, scene: Scene) -> FitFiles:
     """Return the files of a fitted wear coefficient; scene: before the fit."""
-    measured, bounds = fitted.measured, fitted.bounds
+    measured = fitted.measured
+    bounds = fitted.bounds
     whole = loads(scene.text, scene.path, [*scene.sets, bounds.format_assignment(fitted.value)])
     value = {
         "value": fitted.value,

@@ -77,7 +77,8 @@ def export_structure(model: Model, out: Path) -> str:
                 "structure",
             )
         _refuse_unsupported(model)
-        arrays, found = rig_matrices(model), friction_elements(model)
+        arrays = rig_matrices(model)
+        found = friction_elements(model)
     with write_atomically(out) as partial, open(partial, "wb") as file:
         if out.suffix.lower() == ".npz":
             np.savez(file, **arrays, **found._asdict())
@@ -125,13 +126,12 @@ def rig_matrices(model: Model) -> dict:
         M, C, K (n, n) [kg, N s/m, N/m]; output (n,); Fex1 (n,) [N]; force or base (n,); slide (i,
         n); Omega [rad/s] for a sine and for levels.
     """
-    rig, modes = model.rig, model.rig.modes
-    turn, mass = (
-        _coordinate_basis(
-            modes.interfaces if rig.friction.interfaces else np.zeros((0, modes.omega.size))
-        ),
-        modes.mass,
+    rig = model.rig
+    modes = model.rig.modes
+    turn = _coordinate_basis(
+        modes.interfaces if rig.friction.interfaces else np.zeros((0, modes.omega.size))
     )
+    mass = modes.mass
     sine = isinstance(rig.drive.signal, SineDrive)
     size = rig.drive.signal.acceleration if sine else float(rig.drive.kind != "free")
     found = (
@@ -201,14 +201,13 @@ def _refuse_unsupported(model: Model) -> None:
 
 def friction_elements(model: Model) -> Elements:
     """Return the friction elements of a rig; none if it has no friction."""
-    rig, n = model.rig, model.rig.modes.omega.size
+    rig = model.rig
+    n = model.rig.modes.omega.size
     none = np.zeros(0)
     if not rig.friction.interfaces:
         return Elements("elements", np.zeros((0, n)), none, none, none)
-    rows, laws = (
-        rig.modes.interfaces @ _coordinate_basis(rig.modes.interfaces),
-        [one.numbers for one in rig.friction.interfaces],
-    )
+    rows = rig.modes.interfaces @ _coordinate_basis(rig.modes.interfaces)
+    laws = [one.numbers for one in rig.friction.interfaces]
     if _is_speed_only(rig):
         limit = np.array(
             [

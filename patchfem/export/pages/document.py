@@ -116,7 +116,8 @@ def table_html(heads: Sequence, rows: Iterable, frame: str = "across", kind: str
         f"<th scope=col{number}>{head.removeprefix('>')}</th>"
         for number, head in zip(numbers, heads)
     )
-    body, headed = "", any(heads)
+    body = ""
+    headed = any(heads)
     for row in rows:
         attributes, cells = row if isinstance(row, tuple) else ("", row)
         if not headed:

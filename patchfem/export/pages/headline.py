@@ -149,7 +149,8 @@ class SweepHeadline(NamedTuple):
 
 def summarise_sweep(table: dict) -> SweepHeadline:
     """Summarise a sweep; table: as for `sweep.page_html`."""
-    measures, tolerance = table["measures"], table.get("tolerance", np.nan)
+    measures = table["measures"]
+    tolerance = table.get("tolerance", np.nan)
     values = measure_columns(table)
     outcome = np.asarray(table["outcome"], str)
     settled = np.isin(outcome, SETTLED_OUTCOMES)
@@ -247,7 +248,8 @@ def _unsettled_sentence(measures: dict, outcome: np.ndarray) -> str:
     name = MAIN_MEASURES[0]
     if name not in measures:
         return ""
-    values, unit = np.asarray(measures[name][0], float), measures[name][2]
+    values = np.asarray(measures[name][0], float)
+    unit = measures[name][2]
     known = np.isfinite(values)
     late = values[known & np.isin(outcome, CHANGING_OUTCOMES)]
     settled = values[known & np.isin(outcome, SETTLED_OUTCOMES)]
@@ -264,7 +266,8 @@ def _unsettled_sentence(measures: dict, outcome: np.ndarray) -> str:
 
 def _end_peaks_sentence(table: dict) -> str:
     """State in how many cases the peak frequency is an end of the frequency range, or ""."""
-    measures, name = measure_columns(table), "peak_frequency"
+    measures = measure_columns(table)
+    name = "peak_frequency"
     if name not in measures:
         return ""
     values = np.asarray(measures[name][0], float)
@@ -273,7 +276,8 @@ def _end_peaks_sentence(table: dict) -> str:
         [np.isclose(values, end, rtol=EQUAL_FREQUENCY_TOL, atol=0) for end in ends], axis=0
     )
     at_end &= np.asarray(measures[MAIN_MEASURES[0]][0], float) > format_zero(MAIN_MEASURES[0])
-    count, total = int(at_end.sum()), int(np.isfinite(values).sum())
+    count = int(at_end.sum())
+    total = int(np.isfinite(values).sum())
     where = f"In {count} of {total} cases" if total > 1 else "In this case"
     return (
         f"{where} the largest response lies at an end of the swept frequencies, so that it may be no resonance."
@@ -296,11 +300,9 @@ def _qualification_sentence(table: dict, outcome: np.ndarray, known: bool) -> st
     known : bool
         Whether another sentence already says that no case has settled.
     """
-    count, ran, said = (
-        int(np.sum(outcome == "")),
-        outcome[(outcome != "") & (outcome != FAILED_OUTCOME)],
-        [],
-    )
+    count = int(np.sum(outcome == ""))
+    ran = outcome[(outcome != "") & (outcome != FAILED_OUTCOME)]
+    said = []
     if count:
         said.append(
             f"{count} of {outcome.size} cases {'has' if count == 1 else 'have'} no result yet and "
@@ -371,7 +373,8 @@ def span_sentence(
         if name in least and least[name][0][there].any():
             bands.append(f"{least[name][1]}, the floor of this measure")
         band = f", with errors of at most {' or '.join(bands)}" if bands else ""
-        counts, ended = there.sum(), (every & settled).sum()
+        counts = there.sum()
+        ended = (every & settled).sum()
         whose = (
             ""
             if counts == every.sum()

@@ -156,7 +156,8 @@ def find_limits(
     if key["name"].startswith(KEYS_WITHOUT_LIMIT):
         return Limits()
     lines = group_cases_along_key(key, [other for other in keys if other is not key])
-    found, lost = [], []
+    found = []
+    lost = []
     for name in CHANGE_AT_LIMIT:
         values, errors = (
             np.asarray(part, float) for part in measures.get(name, ([np.nan], [np.nan]))[:2]
@@ -423,7 +424,8 @@ def _format_position(limits: Limits, limit: KeyLimit, *notes: str) -> str:
 def _format_cases(limits: Limits, limit: KeyLimit) -> str:
     """Write the values of the key in the two cases around a limit: `0.1 and 0.32 mrad`."""
     shown = key_formatter(limits.key)
-    inside, beyond = shown(limit.inside), shown(limit.beyond)
+    inside = shown(limit.inside)
+    beyond = shown(limit.beyond)
     return f"{drop_repeated_unit(inside, beyond)} and {beyond}"
 
 
@@ -442,7 +444,8 @@ def _choose_unit(limits: Limits) -> tuple:
         default=None,
     )
     value, case = (float(limits.sizes().max()), 0) if first is None else (first.value, first.inside)
-    written, size = NUMBER.match(str(key["texts"][case])), float(limits.sizes()[case])
+    written = NUMBER.match(str(key["texts"][case]))
+    size = float(limits.sizes()[case])
     unit, scale = (
         (written[2] or "", float(written[1]) / size) if written and size else (key["unit"], 1.0)
     )
@@ -480,7 +483,8 @@ def limits_table(limits: Limits, measures: dict) -> str:
     """
     if not limits.found:
         return ""
-    shown, sizes = key_formatter(limits.key), limits.sizes()
+    shown = key_formatter(limits.key)
+    sizes = limits.sizes()
     rows = []
     for limit in limits.found:
         if limit.beyond is not None:

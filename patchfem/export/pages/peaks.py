@@ -116,7 +116,8 @@ def _peak_heights(name: str, measures: dict, trusted: dict) -> tuple:
     MAX_STEADY_ERROR; else NaN.
     """
     (value, error, _), steady = measures[name], measures.get(f"{name}_steady")
-    value, error = np.asarray(value, float), np.nan_to_num(np.asarray(error, float))
+    value = np.asarray(value, float)
+    error = np.nan_to_num(np.asarray(error, float))
     if steady is None:
         return np.where(trusted[name], value, np.nan), error
     known = np.asarray(steady[1], float) <= MAX_STEADY_ERROR * np.abs(steady[0])
@@ -143,7 +144,8 @@ def _find_swept_peak(
         In SI; NaN if a case does not count.
     """
     known = np.isfinite(height) & (height > 0)
-    x, y = frequency[known], height[known]
+    x = frequency[known]
+    y = height[known]
     top = int(np.argmax(y)) if y.size >= MIN_FREQUENCIES else 0
     if not 0 < top < y.size - 1:
         return None
@@ -211,7 +213,9 @@ def _find_minimum(square: np.ndarray, g: np.ndarray, top: int, low: int, high: i
         neighbours of `top`.
     """
     line = np.polynomial.Polynomial.fit(square[low:high], g[low:high], high - low - 1)
-    slope, bend, at = line.deriv(), line.deriv(2), 0.0
+    slope = line.deriv()
+    bend = line.deriv(2)
+    at = 0.0
     for _ in range(N_NEWTON_STEPS):
         at = (
             float(np.clip(at - slope(at) / bend(at), square[top - 1], square[top + 1]))
@@ -242,11 +246,14 @@ def _find_crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) 
     above = np.flatnonzero(g >= 2 * least)
     if not above.size or above[0] == 0:
         return UNKNOWN
-    k, level, found = above[0], 2 * least, []
+    k = above[0]
+    level = 2 * least
+    found = []
     line = square[k - 1] + (level - g[k - 1]) / (g[k] - g[k - 1]) * (square[k] - square[k - 1])
     for part in (slice(max(k - 2, 0), k + 1), slice(k - 1, k + 2)):
         if square[part].size == 3:
-            curve, at = np.polynomial.Polynomial.fit(square[part], g[part], 2) - level, line
+            curve = np.polynomial.Polynomial.fit(square[part], g[part], 2) - level
+            at = line
             for _ in range(N_NEWTON_STEPS):
                 at -= curve(at) / curve.deriv()(at)
             found += [at] if (at - square[k - 1]) * (at - square[k]) <= 0 else []
@@ -289,7 +296,8 @@ def _known_peaks_sentence(peaks: list) -> str:
     """State where the first and the last known peaks are."""
     if not peaks:
         return ""
-    first, last = peaks[0], peaks[-1]
+    first = peaks[0]
+    last = peaks[-1]
     head = f"{measure_label(first.name).capitalize()} peaks at {_format_frequency(first)}"
     if len(peaks) == 1:
         return f"{head}, {_format_height(first)}{_format_width(first)}."

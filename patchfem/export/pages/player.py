@@ -203,7 +203,8 @@ def _read_piece(series: Series, side: str, numbers: list, most: int, near: tuple
 
 def _separate_slide(upper: dict, x, line: dict) -> np.ndarray:
     """Separate the slide (f,) [m] of the upper piece from its moves, and add the gap to them."""
-    points, moves = upper["points"], upper["moves"]
+    points = upper["points"]
+    moves = upper["moves"]
     slide = upper_piece_slides(points, moves)
     moves[:, :, 0] -= slide[:, None]
     moves[:, :, 1] += surface_shape_motion(

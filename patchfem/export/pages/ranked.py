@@ -79,8 +79,10 @@ def rank_keys(table: dict, trusted: dict, settled: np.ndarray) -> RankedKeys:
         {measure: (n,) whether a case settled and meets its tolerance}.
     settled : (n,) ndarray of bool
     """
-    shares, found = sobol_indices(table), measure_quantiles(table, trusted)
-    count, asked = len(table["outcome"]), table.get("first", "")
+    shares = sobol_indices(table)
+    found = measure_quantiles(table, trusted)
+    count = len(table["outcome"])
+    asked = table.get("first", "")
     ends_unsettled = not settled.any() or Outcome.TRANSIENT.value in list(table["outcome"])
     rank = ""
     if not asked or asked in shares or asked not in table["measures"]:
@@ -106,7 +108,8 @@ def too_few(table: dict, settled: np.ndarray) -> str:
 
     The consequence is that no ranking is possible, or that the scatter is not known.
     """
-    outcome, count = [str(one) for one in table["outcome"]], int(settled.sum())
+    outcome = [str(one) for one in table["outcome"]]
+    count = int(settled.sum())
     if (
         not table.get("drawn")
         or len(outcome) < MIN_RANDOM_CASES
@@ -157,7 +160,8 @@ def describe_trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
         From `sobol_indices`.
     settled : (n,) ndarray of bool
     """
-    moving, first = [one for one in table["keys"] if is_varied(one)], table.get("first", "")
+    moving = [one for one in table["keys"] if is_varied(one)]
+    first = table.get("first", "")
     name = first if first in table["measures"] else next(iter(ranks), SCATTER_MEASURES[0])
     strongest = ranks[name][0].key if name in ranks else ""
     key = next((one for one in moving if len(moving) == 1 or one["name"] == strongest), None)
@@ -231,7 +235,8 @@ def _trend_sentence(
     unit : str
         SI unit.
     """
-    shown, what = key_formatter(key), measure_name(name).capitalize()
+    shown = key_formatter(key)
+    what = measure_name(name).capitalize()
     for word, sign in (("largest", 1), ("least", -1)):
         top = int(np.argmax(sign * middle))
         ends = [sign * (middle[top] - middle[end]) > off[top] + off[end] for end in (0, -1)]
@@ -320,7 +325,8 @@ def ranking_sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0
             "where each share includes interactions between keys, so that the shares can sum to more than "
             "100 %"
         )
-    what, said = measure_name(name), ", ".join(said)
+    what = measure_name(name)
+    said = ", ".join(said)
     has, is_, its = ("has", "is", "its") if left == 1 else ("have", "are", "their")
     last = f"last value{'s' * (left != 1)}"
     ended = f"{has} not settled" if moves else f"miss{'es' * (left == 1)} the tolerance"
@@ -393,7 +399,8 @@ def _upper_percent(one) -> int:
 
 def _format_interval(one) -> str:
     """Write the interval of an index in brackets; "" if it has none."""
-    low, high = round(100 * one.low), round(100 * one.high)
+    low = round(100 * one.low)
+    high = round(100 * one.high)
     return f" ({low} to {high} %)" if low != high and not _may_be_zero(one) else ""
 
 
@@ -416,7 +423,8 @@ def measure_quantiles(table: dict, trusted: dict) -> dict:
         By measure: unit, quantiles of QUANTILE_LEVELS [SI], number of cases, and how many of these miss the
         tolerance.
     """
-    out, settled = {}, np.isin(np.asarray(table["outcome"], str), FINAL_OUTCOMES)
+    out = {}
+    settled = np.isin(np.asarray(table["outcome"], str), FINAL_OUTCOMES)
     for name in (
         asked_first(RANKED_MEASURES, table)
         if table.get("drawn") and len(table["outcome"]) >= MIN_RANDOM_CASES
@@ -429,7 +437,8 @@ def measure_quantiles(table: dict, trusted: dict) -> dict:
         there = np.isfinite(values) & (
             settled | trusted[name] | ~np.isfinite(values)[settled].any()
         )
-        misses, values = int(np.sum(there & ~trusted[name])), values[there]
+        misses = int(np.sum(there & ~trusted[name]))
+        values = values[there]
         if values.size >= MIN_RANDOM_CASES and np.ptp(values) > 1e-9 * np.abs(values).max():
             out[name] = one["unit"], np.quantile(values, QUANTILE_LEVELS), values.size, misses
     return out
@@ -456,7 +465,8 @@ def describe_scatter(
     str
         "" if there are no such measures.
     """
-    said, most = [], max((found[name][2] for name in names if name in found), default=0)
+    said = []
+    most = max((found[name][2] for name in names if name in found), default=0)
     if most and most < MIN_SETTLED_FRACTION * of:
         why = "not settled within the tolerance" if settled else "no value"
         missed = f"{'has' if of - most == 1 else 'have'} {why}"
@@ -542,7 +552,8 @@ def quantile_table(found: dict, of: int) -> str:
     -------
     str
     """
-    rows, most = [], max((one[2] for one in found.values()), default=0)
+    rows = []
+    most = max((one[2] for one in found.values()), default=0)
     for name, (unit, values, count, misses) in found.items():
         in_unit, scale = (
             ("%", 100.0)

@@ -23,7 +23,8 @@ def describe_release(result: Result) -> str:
 
     The text has no full stop at the end.
     """
-    rig, r = result.plan.model.rig, result.response
+    rig = result.plan.model.rig
+    r = result.response
     if rig is None or rig.drive.kind != "free" or r is None or r.time.size < 2:
         return ""
     amplitude = result.measures.get("relative_displacement_amplitude")
@@ -69,7 +70,8 @@ def describe_swing(time, output, error: float = 0.0, amplitude: float | None = N
     -------
     str
     """
-    end, begin = float(output[-1]), float(output[0])
+    end = float(output[-1])
+    begin = float(output[0])
     end = 0.0 if abs(end) < ZERO_FRACTION * np.abs(output).max() else end
     far = np.abs(output - end)
     if not np.isfinite(far).all() or not far.max() > 0:

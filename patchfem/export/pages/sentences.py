@@ -121,7 +121,9 @@ def format_value_and_error(name: str, measure: dict, scale: float | None = None)
 
     They are in the first unit of the measure, or in SI times `scale`.
     """
-    value, error, unit = measure["value"], measure["error"], measure["unit"]
+    value = measure["value"]
+    error = measure["error"]
+    unit = measure["unit"]
     if value is None:
         return "-", ""
     scale = display_units(name, value, unit, error)[0][1] if scale is None else scale
@@ -202,7 +204,8 @@ def format_with_error(name: str, measure: dict) -> str:
 
 def format_below_minimum(name: str, measure: dict) -> bool:
     """Return whether value minus error is below the smallest possible value, 0."""
-    value, error = measure["value"], measure["error"]
+    value = measure["value"]
+    error = measure["error"]
     return minimum_value(name) == 0 and value is not None and bool(error) and error >= value > 0
 
 
@@ -212,7 +215,8 @@ def format_zero(name: str, measure: dict = NONE) -> float:
     It is the floor of its definition, or the floor in the run if this is smaller: a floor that the
     run has raised to the tolerance times larger terms is what is required of it, not what is known.
     """
-    row, own = find_definition(name), measure.get("floor") or inf
+    row = find_definition(name)
+    own = measure.get("floor") or inf
     return 0.0 if row is None else min(row.floor, own)
 
 
@@ -221,7 +225,8 @@ def format_imperial(name: str, measure: dict) -> str:
 
     A value within its error counts as 0.
     """
-    value, error = measure["value"], measure["error"]
+    value = measure["value"]
+    error = measure["error"]
     if (
         value is None
         or not isfinite(value)
@@ -253,7 +258,8 @@ def verdict_sentence(summary: dict) -> str:
     error, part of it slips, and the sentence says how much. For a bench the sentence also says
     whether it slipped.
     """
-    outcome, measures = Outcome(summary["outcome"]), summary["measures"]
+    outcome = Outcome(summary["outcome"])
+    measures = summary["measures"]
     if outcome is Outcome.NOT_CONVERGED and (unknown := _unknown_measures(measures)):
         known = "use the other measures with their stated errors"
         return f"The numerical error of {unknown} is as large as the value, so it is not known; {known}."
@@ -339,7 +345,8 @@ def _bench_slip_sentence(slip: dict | None, done: str, patch: bool) -> str:
 
 def _bench_loop_sentence(loop: dict, stiffness: dict) -> str:
     """Return the sentence about stiffness and damping of a bench; loop: from `summary.loop_entry`."""
-    factor, error = loop["loss_factor"], loop["error"]
+    factor = loop["loss_factor"]
+    error = loop["error"]
 
     def number(scale: float) -> str:
         """Write the loss factor times `scale` with its error."""
@@ -518,8 +525,11 @@ def describe_contact(contact: dict | None, fraction: float | None = None) -> str
     """
     if not contact or not contact["stretches"]:
         return ""
-    first, last, stretches = contact["from"], contact["to"], contact["stretches"]
-    left, right = stretches[0][0] <= first, stretches[-1][1] >= last
+    first = contact["from"]
+    last = contact["to"]
+    stretches = contact["stretches"]
+    left = stretches[0][0] <= first
+    right = stretches[-1][1] >= last
     if left and right and len(stretches) == 1:
         return ""
     unit, scale = formatting.choose_unit(formatting.UNIT_LADDERS["m"], max(abs(first), abs(last)))
@@ -688,10 +698,12 @@ def record_interval(name: str, measures: dict) -> tuple:
 
     They have the digits that the scatter of records allows; ("", "") for any other measure.
     """
-    one, spread = measures.get(name, NONE), measures.get(f"{name}{SCATTER}", NONE)
+    one = measures.get(name, NONE)
+    spread = measures.get(f"{name}{SCATTER}", NONE)
     if one.get("value") is None or spread.get("value") is None:
         return "", ""
-    value, half = one["value"], spread["value"]
+    value = one["value"]
+    half = spread["value"]
     unit, scale = display_units(name, value, one["unit"])[0]
     digits = max(2, 2 + ceil(log10(abs(value) / half))) if half > 0 and value else 6
     own, low, high = (
@@ -717,9 +729,11 @@ def format_measures(measures: dict, engine: str = "") -> list[str]:
     -------
     list of str
     """
-    every, measures = measures, order_measures(measures)
+    every = measures
+    measures = order_measures(measures)
     width = max(map(len, measures), default=0)
-    out, pressed = [], "contact_fraction" in measures
+    out = []
+    pressed = "contact_fraction" in measures
     over = (
         OVER_MOTION_CYCLES if "worn_volume" in measures else PERIOD_BY_ENGINE.get(engine, WHOLE_RUN)
     )
@@ -750,7 +764,8 @@ def notebook_html(summary: dict, sentence: str, cycles: float | None, released: 
     -------
     str
     """
-    rows, measures = [], summary["measures"]
+    rows = []
+    measures = summary["measures"]
     for line in format_measures(measures, summary.get("numerics", {}).get("engine", "")):
         name, _, value = line.strip().partition(" ")
         cells = f"<td>{escape(name)}</td><td style='text-align:right'>{escape(value.strip())}</td>"

@@ -86,7 +86,8 @@ def _read_arrays(path: Path) -> dict:
     """Read the variables of CHARTS that have finite values."""
     if not path.is_file():
         return {}
-    shown, out = {name for _, *axes in CHARTS for name, _ in axes}, {}
+    shown = {name for _, *axes in CHARTS for name, _ in axes}
+    out = {}
     for name, one in read_variables(path, shown)[1].items():
         with reading_errors(path, "results of a run"):
             require_valid(
@@ -185,7 +186,8 @@ def _lines_by_units(x: str, y: str, runs: list, names: list) -> dict:
             continue
         if "time" in run.arrays and run.arrays["time"][0].shape == a.shape:
             late = _select_last_cycles(run)
-            a, b = a[late], b[late]
+            a = a[late]
+            b = b[late]
             a = a - a[-1] if x == "time" else a
         step = -(-a.size // POINTS)
         lines.setdefault((unit_a, unit_b), []).append(Line(name, a[::step], b[::step]))
@@ -251,7 +253,8 @@ def _select_last_cycles(run: FinishedRun) -> np.ndarray:
 
     Without a sine it is the last tenth of the run; on a bench all samples.
     """
-    time, period = run.arrays["time"][0], drive_period(run)
+    time = run.arrays["time"][0]
+    period = drive_period(run)
     span = N_SHOWN_CYCLES * period if period else np.ptp(time) / 10
     if run.summary["kind"] == "bench":
         span = np.ptp(time)

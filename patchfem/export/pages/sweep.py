@@ -67,10 +67,8 @@ def page_html(table: dict, told: SweepHeadline | None = None) -> str:
         ),
         None,
     )
-    told, part = (
-        told or summarise_sweep(table),
-        select_cases(table, lambda cases, whole: _script_data(table, first, cases, whole)),
-    )
+    told = told or summarise_sweep(table)
+    part = select_cases(table, lambda cases, whole: _script_data(table, first, cases, whole))
     data = _script_data(table, first, part.cases, not part.said)
     sections = [
         Section(
@@ -142,9 +140,11 @@ def _key_data(one: dict, cases) -> dict:
     written = [NUMBER.match(text) for text in texts]
     units = {(match[2] or "").strip() if match else None for match in written}
     if len(units) == 1 and None not in units:
-        unit, values = units.pop(), [float(match[1]) for match in written]
+        unit = units.pop()
+        values = [float(match[1]) for match in written]
     else:
-        unit, values = one["unit"], np.asarray(one["values"], float)[cases]
+        unit = one["unit"]
+        values = np.asarray(one["values"], float)[cases]
     words = None if any(written) else list(dict(zip(values, map(shorten_number, texts))).items())
     return {
         "name": one["name"],
@@ -248,11 +248,13 @@ def _change_section(table: dict, found: limits.Limits) -> list:
 
 def _lead_html(table: dict, said: SweepHeadline) -> str:
     """Return the verdict as HTML: the answer, number of cases, keys, outcomes, other sentences."""
-    number, over = len(table["outcome"]), " × ".join(one["name"] for one in table["keys"])
+    number = len(table["outcome"])
+    over = " × ".join(one["name"] for one in table["keys"])
     ended = ", ".join(
         f"{count} {measure_label(name)}" for name, count in Counter(table["outcome"]).most_common()
     )
-    first, others = said.sentences()[:1], said.sentences()[1:]
+    first = said.sentences()[:1]
+    others = said.sentences()[1:]
     lines = [
         *map(sentence_html, first),
         f"<b>{number} case{'s' * (number != 1)}</b> over {escape(over)}: {escape(ended)}.",

@@ -64,7 +64,8 @@ def reduce_mesh(points, cells, material, most: int, near: tuple | None = None) -
     -------
     ReducedMesh
     """
-    count, size = len(cells), quadrilateral_areas(points, cells)
+    count = len(cells)
+    size = quadrilateral_areas(points, cells)
     if count <= most:
         every = np.arange(count)
         return ReducedMesh(np.arange(len(points)), cells, every, every, every, size)
@@ -93,7 +94,8 @@ def _line_bins(points, cells, material, most: int, near: tuple | None) -> tuple:
 
     The indices count columns along x and rows in depth.
     """
-    x, depth = points[:, 0], np.abs(points[:, 1])
+    x = points[:, 0]
+    depth = np.abs(points[:, 1])
     columns, rows = (np.unique(one) for one in (x, depth))
     # not a grid: a box between lines needs two triangles
     if columns.size * rows.size > len(points):

@@ -445,7 +445,8 @@ def _aligned_pictures(part: Comparison) -> list:
 
 def _scan_pictures(change: Change) -> list:
     """Draw two aligned scans, their heights and the mean section of a track."""
-    x, y = change.before.x, change.before.y
+    x = change.before.x
+    y = change.before.y
     first = level_plane(change.before).z
     depth = change.volumes.filled
     second = first - depth

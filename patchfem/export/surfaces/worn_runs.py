@@ -112,7 +112,8 @@ class PatchRun(NamedTuple):
 
     def describe_position(self, number: int) -> str:
         """Describe the position of a node by its index in the flattened depth."""
-        x, y = self.surface.x, self.surface.y
+        x = self.surface.x
+        y = self.surface.y
         strip, node = divmod(int(number), x.size)
         return f"x = {format_length(float(x[node]), 3)}" + (
             "" if y is None else f", y = {format_length(float(y[strip]), 3)}"
@@ -444,7 +445,8 @@ def _measure_track(x, depth, error: float, area: float) -> dict:
     first = max(int(deep[0]) - 1, 0)
     last = min(int(deep[-1]) + 1, x.size - 1)
     cells = [float(x[min(k + 1, x.size - 1)] - x[max(k - 1, 0)]) / 2 for k in (first, last)]
-    start, end = float(x[first]), float(x[last])
+    start = float(x[first])
+    end = float(x[last])
     width = end - start
     places = np.linspace(start, end, FLOOR_PARTS * FLOOR_POINTS)
     part = np.full(FLOOR_POINTS, 1 / FLOOR_POINTS)

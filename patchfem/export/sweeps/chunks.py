@@ -101,7 +101,8 @@ def read_chunk(path: Path) -> tuple[np.ndarray, CaseResults]:
     OSError, ValueError, KeyError or TypeError if it is damaged.
     """
     with _open_results(path) as file:
-        about, names = json.loads(bytes(file.attrs["about"])), _read_column(file["case"], np.uint64)
+        about = json.loads(bytes(file.attrs["about"]))
+        names = _read_column(file["case"], np.uint64)
         count = names.size
         found = CaseResults.blank(count)
         found.outcome[:] = np.array(about["outcomes"], object)[
@@ -192,7 +193,8 @@ class Chunks:
             wanted = known[at] == names if known.size else np.zeros(names.size, bool)
             held[at[wanted]] = place
             others.append(names[~wanted])
-        self.held, self.others = held[same], np.unique(np.concatenate(others)).size
+        self.held = held[same]
+        self.others = np.unique(np.concatenate(others)).size
 
     def parts(self, numbers: np.ndarray) -> Iterator[tuple[np.ndarray, CaseResults]]:
         """Yield (numbers, CaseResults) of the requested cases that exist, file by file.

@@ -207,7 +207,9 @@ class Folder:
     """
 
     def __init__(self, target: Path, names: np.ndarray, shared: bool = False):
-        self.target, self.shown, self.shared = Path(os.path.abspath(target)), target, shared
+        self.target = Path(os.path.abspath(target))
+        self.shown = target
+        self.shared = shared
         self.claim = FolderLock(self.target / LOCK, target, "sweep")
         self.token = f".{secrets.token_hex(8)}"
         self.chunks = chunks.Chunks(self.target / CHUNKS, np.asarray(names, np.uint64))
@@ -239,7 +241,8 @@ class Folder:
         if not (self.target / CASES).is_dir():
             return
         named = {one.name for one in os.scandir(self.target / CASES)}
-        numbers, found = [], []
+        numbers = []
+        found = []
         for number in np.flatnonzero(self.chunks.held < 0).tolist():
             if (key := case_folder_name(self.chunks.names[number])) in named:
                 with suppress(OSError, ValueError):

@@ -280,7 +280,8 @@ def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
         for name in file.variables
         if f"{name}_error" in file.variables
     }
-    text, sets = str(file.attrs["scene"]), json.loads(str(file.attrs["sets"]))
+    text = str(file.attrs["scene"])
+    sets = json.loads(str(file.attrs["sets"]))
     words = json.loads(str(file.attrs.get("words", "[]"))) or REPEAT_WORDS
     overs = (
         words
@@ -359,7 +360,8 @@ def join_tables(tables: list, names: list) -> dict:
                 else np.concatenate([one["values"] for one in own]),
             }
         )
-    measures, shift = {}, np.cumsum([0, *counts])
+    measures = {}
+    shift = np.cumsum([0, *counts])
     for name in dict.fromkeys(name for table in tables for name in table["measures"]):
         own = [table["measures"].get(name) for table in tables]
         first = next(one for one in own if one is not None)

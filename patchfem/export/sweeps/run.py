@@ -88,7 +88,8 @@ def sweep_into(
     -------
     CaseResults
     """
-    shared, keep = place.shard is not None, place.kept_files(len(cases))
+    shared = place.shard is not None
+    keep = place.kept_files(len(cases))
     with Folder(place.target, cases.names(asked), shared) as folder:
         if place.resume:
             folder.refuse_another(sweep_identity(asked, cases))
@@ -184,7 +185,10 @@ def _compute_cases(
     told : callable or None
         told(done, seconds left or None) is called as cases are done.
     """
-    keep, folder, names, died = jobs.keep, jobs.folder, jobs.folder.chunks.names, []
+    keep = jobs.keep
+    folder = jobs.folder
+    names = jobs.folder.chunks.names
+    died = []
     clock = RemainingTime(numbers.size, executor.workers)
     writer = Writer(folder.target, folder.shown, names, keep, folder.token)
     whole = (
@@ -303,7 +307,8 @@ def write_tables(
     sign : str
         From `hash_tables` if every case has a result that is stored; else "".
     """
-    keys, tabled = folder.keys(), every or len(cases) <= MAX_CASES_WITH_TABLES
+    keys = folder.keys()
+    tabled = every or len(cases) <= MAX_CASES_WITH_TABLES
     table = sweep_table(asked, cases, found, keys, folder.target) | {"tabled": tabled}
     lead = summarise_sweep(table)
     for name in () if tabled else ("sweep.csv", "sweep.nc"):

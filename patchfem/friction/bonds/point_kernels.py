@@ -282,7 +282,11 @@ def grow(eps, v0, v1, path, dt, growth):
     eps, exponent : float
         Bond length after [m]; the distance to its target has decayed by exp(-exponent).
     """
-    a_s, l_k, min_speed, eps_0, eps_k = growth[0], growth[1], growth[2], growth[3], growth[4]
+    a_s = growth[0]
+    l_k = growth[1]
+    min_speed = growth[2]
+    eps_0 = growth[3]
+    eps_k = growth[4]
     if a_s < 0:
         return eps, 0.0
     if max(abs(v0), abs(v1)) < min_speed:

@@ -186,7 +186,9 @@ class Quadrature:
         The dissipation holds for reading="stretch", where damage takes the fraction dR/eps of the stored energy.
         """
         if self.law.reading == "report":
-            elastic, damage, panel_ends = 0.0, 1.0, np.array([0.0, 1.0])
+            elastic = 0.0
+            damage = 1.0
+            panel_ends = np.array([0.0, 1.0])
         else:
             middle = self._middle_length(state, dq, dt)
             path = length_and_direction(dq)[0]
@@ -302,7 +304,8 @@ class Quadrature:
         -------
         Strips
         """
-        law, now = self.law, state.now
+        law = self.law
+        now = state.now
         dq = np.atleast_1d(np.asarray(dq, float))
         path = length_and_direction(dq)[0]
         speed = path / dt if dt > 0 else 0.0
@@ -347,9 +350,11 @@ class Quadrature:
         if self.tail <= 0:
             return state
         if self.law.reading == "stretch":
-            age, now = state.strips.end.damage, state.now.damage
+            age = state.strips.end.damage
+            now = state.now.damage
         else:
-            age, now = state.strips.end.path / self.law.length, state.now.path / self.law.length
+            age = state.strips.end.path / self.law.length
+            now = state.now.path / self.law.length
         first = int(np.searchsorted(age, now - cutoff_age(self.law.order, self.tail)))
         if first < max(MIN_DROPPED, len(age) // 2):
             return state

@@ -292,7 +292,8 @@ def _gauss_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
     pieces = _divide_strips(strips, now, law)
     n_strips = len(strips.length)
     rule = _rules_of_pieces(pieces.steep_end, law.order)
-    start, length = pieces.start[:, None], pieces.length[:, None]
+    start = pieces.start[:, None]
+    length = pieces.length[:, None]
     distance = start + length * rule.points
     sums = _sum_points(strips.select(pieces.strip), now, distance, length * rule.weights, law)
     weights = [np.bincount(pieces.strip, column, n_strips) for column in sums.T]
@@ -390,7 +391,9 @@ def _split_at_zero_stretch(strips: Strip, stretch: _StretchComponents) -> _Strip
     start = np.concatenate([np.zeros_like(cut), cut])
     length = np.concatenate([cut, strips.length - cut])
     has_length = length > 0
-    strip, start, length = strip[has_length], start[has_length], length[has_length]
+    strip = strip[has_length]
+    start = start[has_length]
+    length = length[has_length]
     # u = 0 lies at this cut, which may also be an end of the strip
     has_zero = is_straight & (np.abs(cut + stretch.along) <= REVERSAL_TOL * strips.length)
     return _StripParts(
@@ -419,7 +422,8 @@ def _singularity_distances(
     The point u = 0 at an end of a part does not count.
     """
     is_fractional = law.order != int(law.order)
-    along, across = stretch.along[parts.strip], stretch.across[parts.strip]
+    along = stretch.along[parts.strip]
+    across = stretch.across[parts.strip]
     gap = np.maximum(np.maximum(-along - parts.start - parts.length, parts.start + along), 0.0)
     is_smooth = (across == 0) & (law.reading == "report" or not is_fractional)
     is_smooth |= parts.is_zero_at_start | parts.is_zero_at_end
@@ -447,7 +451,8 @@ def _jacobi_rule(order: float) -> _GaussRule:
 
 def _rules_of_pieces(steep_end, order: float) -> _GaussRule:
     """Return Gauss rules (n, N_GAUSS_POINTS) of pieces; from a steep end the integrand grows as t^order."""
-    legendre, jacobi = _legendre_rule(), _jacobi_rule(order)
+    legendre = _legendre_rule()
+    jacobi = _jacobi_rule(order)
     steep_end = steep_end[:, None]
     points = np.where(steep_end == -1, 1 - jacobi.points, legendre.points)
     points = np.where(steep_end == 1, jacobi.points, points)

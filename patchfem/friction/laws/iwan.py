@@ -137,7 +137,8 @@ def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
     -------
     SteadyLoop
     """
-    chi, beta = friction.chi, friction.beta
+    chi = friction.chi
+    beta = friction.beta
     limit = friction.static * load
     phi_max = max_yield_displacement(limit, friction.stiffness, chi, beta)
     scale = limit / (beta + (chi + 1) / (chi + 2))

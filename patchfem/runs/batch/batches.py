@@ -175,8 +175,11 @@ def solve_models(
         if isinstance(models, SimilarModels)
         else [_model_without_joint(one) for one in models]
     )
-    found, groups, failures = CaseResults.blank(len(models)), {}, Counter()
-    left, study = np.arange(len(models)), study or len(models)
+    found = CaseResults.blank(len(models))
+    groups = {}
+    failures = Counter()
+    left = np.arange(len(models))
+    study = study or len(models)
     if keep is None:
         left, groups = _by_columns(models, study)
     for case in left.tolist():
@@ -223,7 +226,8 @@ def _by_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
     Return the indices of models that no batch reads as columns, and those of all others in a dict
     by batch and group.
     """
-    out, left = {}, np.arange(len(models))
+    out = {}
+    left = np.arange(len(models))
     for batch in BATCHES:
         if batch.parts is None or study < batch.least or not left.size:
             continue

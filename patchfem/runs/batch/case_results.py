@@ -32,11 +32,9 @@ class OnDisk:
 
     def __init__(self, file, shape: tuple, whole: OnDisk | None = None):
         # the file is closed together with the array for which it was opened
-        self.file, self.shape, self.whole = (
-            file,
-            shape,
-            whole,
-        )
+        self.file = file
+        self.shape = shape
+        self.whole = whole
         self.file.truncate(8 * self.size)
         if whole is None:
             finalize(self, file.close)
@@ -127,7 +125,8 @@ class CaseResults:
 
     def fail(self, case: int, message: str) -> None:
         """Mark a case as failed."""
-        self.outcome[case], self.messages[case] = FAILED_OUTCOME, message
+        self.outcome[case] = FAILED_OUTCOME
+        self.messages[case] = message
 
     def put(self, case: int, outcome: str, measures: dict, seconds: float) -> None:
         """Set the results of one case.
@@ -141,7 +140,8 @@ class CaseResults:
         seconds : float
             CPU seconds.
         """
-        self.outcome[case], self.seconds[case] = str(outcome), seconds
+        self.outcome[case] = str(outcome)
+        self.seconds[case] = seconds
         self.fill(case, measures)
 
     def fill(self, case: int, measures: dict) -> None:
@@ -157,7 +157,8 @@ class CaseResults:
     def place(self, cases: Sequence[int], part: CaseResults) -> None:
         """Insert the results `part` of these cases, in their order."""
         at = np.asarray(cases, int)
-        self.outcome[at], self.seconds[at] = part.outcome, part.seconds
+        self.outcome[at] = part.outcome
+        self.seconds[at] = part.seconds
         for name, unit in part.units.items():
             self.measure(name, unit)
             for columns, given in (
@@ -180,10 +181,8 @@ class CaseResults:
 
     def some(self, cases: np.ndarray) -> CaseResults:
         """Return the results of some cases, in their order, as `place` takes them."""
-        out, at = (
-            CaseResults(self.outcome[cases], units=self.units, seconds=self.seconds[cases]),
-            {case: place for place, case in enumerate(np.asarray(cases).tolist())},
-        )
+        out = CaseResults(self.outcome[cases], units=self.units, seconds=self.seconds[cases])
+        at = {case: place for place, case in enumerate(np.asarray(cases).tolist())}
         for mine, columns in (
             (out.values, self.values),
             (out.errors, self.errors),

@@ -119,7 +119,8 @@ def group(model: Model) -> Hashable:
 
 def no_lanes(model: Model) -> str:
     """Return why a model that is not refused does not march in a lane; "" if it may."""
-    rig, law = model.rig, model.bonds
+    rig = model.rig
+    law = model.bonds
     if (
         not rig.drive.waveform.is_sine
         or rig.drive.kind != "base"
@@ -168,7 +169,9 @@ def solve(models: Sequence[Model], say=None) -> CaseResults:
 
 def _solve_cases(models: list, say) -> CaseResults:
     """Return the case results of models whose patches are pressed."""
-    begin, out, alone = perf_counter(), CaseResults.blank(len(models)), set(range(len(models)))
+    begin = perf_counter()
+    out = CaseResults.blank(len(models))
+    alone = set(range(len(models)))
     held = (
         {}
         if no_lanes(models[0])
@@ -199,11 +202,9 @@ def _side_by_side(models: list, held: list, steps: int) -> tuple:
     They march with `steps` per cycle, or with twice as many if the displacement needs them and the
     scene does not fix them. Cases with similar slides are neighbours.
     """
-    found, lost, many = (
-        CaseResults.blank(len(models)),
-        np.zeros(len(models), bool),
-        load(lanes.LANES_KERNELS).LANES,
-    )
+    found = CaseResults.blank(len(models))
+    lost = np.zeros(len(models), bool)
+    many = load(lanes.LANES_KERNELS).LANES
     order = np.argsort([one.fine.amplitude / one.fine.limit.sum() for one in held], kind="stable")
     size = max(1, SAMPLES // (steps * held[0].numerics.window * many)) * many
     for first in range(0, len(models), size):
@@ -234,7 +235,8 @@ def _press_case(model: Model) -> _PressedCase | None:
                 or choose_quadrature(model, numerics).engine != "recursion"
             ):
                 return None
-            kernels, tolerance = load(lanes.LANES_KERNELS), SHARE * model.accuracy.tolerance
+            kernels = load(lanes.LANES_KERNELS)
+            tolerance = SHARE * model.accuracy.tolerance
             found = [
                 few_points(one, model.bonds, tolerance, kernels.N_POINTS, kernels.N_PIECE_MODES)
                 for one in (patch, coarse[0])
@@ -274,7 +276,9 @@ def _march_cases(models: list, held: list, steps: int) -> tuple:
 
     Returns their results, which (n,) must be run by themselves, and which need twice the steps.
     """
-    rig, window, cycles = models[0].rig, held[0].numerics.window, int(models[0].rig.drive.cycles)
+    rig = models[0].rig
+    window = held[0].numerics.window
+    cycles = int(models[0].rig.drive.cycles)
 
     def read(share: int, coarse: bool = False, asked=None) -> _Read:
         """Return the evaluation of a march with a fraction of the steps, or on the coarser mesh."""
@@ -284,7 +288,9 @@ def _march_cases(models: list, held: list, steps: int) -> tuple:
 
     fine = read(1)
     rings = ~np.isnan(fine.values[RINGS[0]])
-    half, quarter, coarse = read(2, False, rings), read(4, False, rings), read(4, True, rings)
+    half = read(2, False, rings)
+    quarter = read(4, False, rings)
+    coarse = read(4, True, rings)
     runs, parts = _with_errors(models, held, (fine, half, quarter, coarse), (steps, window, cycles))
     found, alone, _ = batch_answers(
         models, runs, {"engine": MARCH.name, "steps_per_cycle": steps, "window_cycles": window}
@@ -331,11 +337,9 @@ def _read(models: list, held: list, done: lanes.MarchedCases, steps: int, asked=
 
     asked: which cases (n,) are searched for ringing; None: all.
     """
-    modes, omega, window = (
-        models[0].rig.modes,
-        models[0].rig.drive.signal.omega,
-        held[0].numerics.window,
-    )
+    modes = models[0].rig.modes
+    omega = models[0].rig.drive.signal.omega
+    window = held[0].numerics.window
     seen = Samples(
         done,
         modes,
@@ -406,7 +410,8 @@ def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple
         whole.append(
             one.values | {MAIN_MEASURE: amplitude, "energy_balance": energy_balance(one.book)}
         )
-    errors, parts = {name: np.zeros(n) for name in whole[0]}, []
+    errors = {name: np.zeros(n) for name in whole[0]}
+    parts = []
     for case in range(n):
         a, b, c, d = (
             {name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])}
@@ -478,7 +483,8 @@ def _tell(
     steps: int,
 ) -> None:
     """Add measures of the patch, outcome, settings, warnings and notes, as in a single run."""
-    reach, known = reads[0].reach[case : case + 1], known_measures(found, case)
+    reach = reads[0].reach[case : case + 1]
+    known = known_measures(found, case)
     outcome = outcome_on_piece(Outcome(found.outcome[case]), model.patch, one.patch, reach)
     found.outcome[case] = str(outcome)
     found.fill(case, one.measures)
@@ -488,7 +494,8 @@ def _tell(
         "interface_nodes": int(one.patch.x.size),
     }
     measures = one.measures | {name: m for name, m in known.items() if name != "normal_load"}
-    tolerance, warned = model.accuracy.tolerance, []
+    tolerance = model.accuracy.tolerance
+    warned = []
     if any(m.error_ratio(tolerance) > 1 for m in measures.values()):
         runs = [
             {name: float(column[case]) for name, column in read.values.items()} for read in reads

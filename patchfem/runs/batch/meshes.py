@@ -21,7 +21,8 @@ class Shared:
     """
 
     def __init__(self, models: Iterable[Model | PatchfemError], all_: bool = True):
-        self.meshes, groups = {}, {}
+        self.meshes = {}
+        groups = {}
         for model in models:
             if _wants(model):
                 groups.setdefault(_key(model), []).append(model.patch)

@@ -64,7 +64,8 @@ def solved_together(models: Sequence[Model]) -> list[Model]:
     Of patches that are equal, e.g. for several drive levels or friction laws, one is pressed for
     all, so that they share its shear modes.
     """
-    out, groups = list(models), {}
+    out = list(models)
+    groups = {}
     for case, model in enumerate(models):
         if not static.not_together(model.patch):
             asked = store.content_key(model.patch) if store.may_be_shared(model.patch) else case
@@ -109,17 +110,19 @@ def solve(models: Sequence[Model], say: Callable | None = None) -> CaseResults:
 
 def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
     """Return the case results of at most AT_ONCE models."""
-    begin, first, alike = perf_counter(), models[0], isinstance(models, SimilarModels)
+    begin = perf_counter()
+    first = models[0]
+    alike = isinstance(models, SimilarModels)
     asked = (
         static.asked_by_columns(models.columns().patch, len(models))
         if alike
         else static.collect_loads([model.patch for model in models])
     )
-    found, out = (
-        static.pressed_together(asked, first.accuracy.tolerance),
-        CaseResults.blank(len(models)),
-    )
-    good, wide, tolerance = found.good, ~found.good, first.accuracy.tolerance
+    found = static.pressed_together(asked, first.accuracy.tolerance)
+    out = CaseResults.blank(len(models))
+    good = found.good
+    wide = ~found.good
+    tolerance = first.accuracy.tolerance
     unknown = np.any([found.errors[name] >= found.values[name] for name in POSITIVE], axis=0)
     floors = {
         name: np.broadcast_to(least, good.shape)
@@ -145,9 +148,11 @@ def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
     pieces = first.patch.pieces
     mean = found.values["normal_load"] / (pieces.length * pieces.width * pieces.pairs)
     least_peak = found.values["pressure_peak"] - found.errors["pressure_peak"]
-    always, told = bool(first.source.remarks) or not alike, file_name_shortener(first.source.path)
+    always = bool(first.source.remarks) or not alike
+    told = file_name_shortener(first.source.path)
     for case in np.flatnonzero(good & (wide | strained | always)).tolist():
-        model, measures = models[case], found.measures(case, floors)
+        model = models[case]
+        measures = found.measures(case, floors)
         warned = [
             *model.source.remarks,
             *of_patch.strain_warnings(

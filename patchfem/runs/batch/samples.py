@@ -42,9 +42,15 @@ class Samples:
     """
 
     def __init__(self, found, modes, omega: float, amplitude, steps: int, window: int):
-        self.found, self.modes, self.omega, self.amplitude = found, modes, omega, amplitude
-        self.steps, self.window, self.period = steps, window, 2 * np.pi / omega
-        self.dt, self.angle = self.period / steps, 2 * np.pi * np.arange(steps * window + 1) / steps
+        self.found = found
+        self.modes = modes
+        self.omega = omega
+        self.amplitude = amplitude
+        self.steps = steps
+        self.window = window
+        self.period = 2 * np.pi / omega
+        self.dt = self.period / steps
+        self.angle = 2 * np.pi * np.arange(steps * window + 1) / steps
         self.slide, self.speed = (
             _project_motion(modes.slide, one) for one in (found.z, found.rate)
         )
@@ -52,7 +58,8 @@ class Samples:
 
     def acceleration(self) -> np.ndarray:
         """Return the absolute acceleration of the output (s, n) [m s-2]."""
-        modes, found = self.modes, self.found
+        modes = self.modes
+        found = self.found
         out = np.multiply.outer(
             (1 - modes.base @ modes.output) * np.sin(self.angle), self.amplitude
         )
@@ -107,18 +114,19 @@ class Samples:
 
         They are those of cubics, as in `spectrum.motion_harmonic`.
         """
-        h, n, s, found = self.dt, number, GAUSS_POINTS, self.found
-        wave, part = (
-            np.exp(-1j * n * self.angle[:-1]),
-            GAUSS_WEIGHTS * h * np.exp(-1j * n * self.omega * h * s),
-        )
-        left, right = part @ (1 - 3 * s**2 + 2 * s**3), part @ (3 * s**2 - 2 * s**3)
-        leaves, comes = h * (part @ (s - 2 * s**2 + s**3)), h * (part @ (s**3 - s**2))
+        h = self.dt
+        n = number
+        s = GAUSS_POINTS
+        found = self.found
+        wave = np.exp(-1j * n * self.angle[:-1])
+        part = GAUSS_WEIGHTS * h * np.exp(-1j * n * self.omega * h * s)
+        left = part @ (1 - 3 * s**2 + 2 * s**3)
+        right = part @ (3 * s**2 - 2 * s**3)
+        leaves = h * (part @ (s - 2 * s**2 + s**3))
+        comes = h * (part @ (s**3 - s**2))
         at = np.append(left * wave, 0.0) + np.append(0.0, right * wave)
-        of_rate, shape = (
-            np.append(leaves * wave, 0.0) + np.append(0.0, comes * wave),
-            found.z.shape[1:],
-        )
+        of_rate = np.append(leaves * wave, 0.0) + np.append(0.0, comes * wave)
+        shape = found.z.shape[1:]
         flat = [one.reshape(len(at), -1) for one in (found.z, found.rate)]
         return (
             2
@@ -168,7 +176,8 @@ class Samples:
         )
         rest -= (2 * modes.zeta * modes.omega)[:, None] * rates + (modes.omega**2)[:, None] * first
         pull = modes.mass * (modes.slide @ rest) / (modes.slide @ modes.slide)
-        turns, moves = self.turns(), np.ptp(self.slide, axis=0) > MIN_SLIDE_RANGE
+        turns = self.turns()
+        moves = np.ptp(self.slide, axis=0) > MIN_SLIDE_RANGE
         half = np.array([mean_half_range(one) for one in turns]) * moves
         secants = [secant_stiffness(one) for one in turns]
         secant = np.where(moves, [np.nan if one is None else one for one in secants], np.nan)
@@ -178,11 +187,15 @@ class Samples:
 
     def turns(self) -> list:
         """Return the result of `loops.find_reversals` for each run."""
-        steps, size = self.steps, self.slide.shape[1]
-        rows, out = np.arange(size), np.empty((2, 2, self.window, size))
+        steps = self.steps
+        size = self.slide.shape[1]
+        rows = np.arange(size)
+        out = np.empty((2, 2, self.window, size))
         for number in range(self.window):
             part = slice(number * steps, (number + 1) * steps + 1)
-            slide, speed, force = self.slide[part], self.speed[part], self.found.force[part]
+            slide = self.slide[part]
+            speed = self.speed[part]
+            force = self.found.force[part]
             for k, way in enumerate((-1, 1)):
                 out[k, :, number] = _largest_slides(
                     way * slide, way * speed, force, rows, self.dt
@@ -213,7 +226,8 @@ class Samples:
 
     def drift(self) -> np.ndarray:
         """Return the motion per cycle (n,) [m] as `loops.drift` does, for two cycles or more."""
-        means, h = [], self.dt
+        means = []
+        h = self.dt
         for first in (0, (self.window - 1) * self.steps):
             y, v = (one[first : first + self.steps + 1] for one in (self.slide, self.speed))
             inside = (y[1:-1] - y[0]).sum(axis=0) + (y[-1] - y[0]) / 2
@@ -222,27 +236,25 @@ class Samples:
 
     def slips(self) -> dict:
         """Return the measures of the slip as `measures.compute_slip_measures` does for runs that slide."""
-        slip, steps = self.found.slip, np.abs(np.diff(self.slide, axis=0))
+        slip = self.found.slip
+        steps = np.abs(np.diff(self.slide, axis=0))
         still = steps <= COORDINATE_ROUND_OFF * np.abs(self.slide).max(axis=0)
         above = (
             np.where(still, 0.0, np.abs(np.diff(slip, axis=0)) / np.where(still, 1.0, steps))
             - SLIP_FRACTION
         )
-        before, after = above[:-1], above[1:]
-        rise, low, high = (
-            np.abs(after - before),
-            np.minimum(before, after),
-            np.maximum(before, after),
-        )
+        before = above[:-1]
+        after = above[1:]
+        rise = np.abs(after - before)
+        low = np.minimum(before, after)
+        high = np.maximum(before, after)
         below = np.where(
             high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0))
         )
         at, run = np.nonzero((before < 0) & (after >= 0))
         phase = self.angle[at] + 2 * np.pi / self.steps * (0.5 - before[at, run] / rise[at, run])
-        count, sums = (
-            np.bincount(run, minlength=slip.shape[1]),
-            [np.bincount(run, wave(2 * phase), slip.shape[1]) for wave in (np.cos, np.sin)],
-        )
+        count = np.bincount(run, minlength=slip.shape[1])
+        sums = [np.bincount(run, wave(2 * phase), slip.shape[1]) for wave in (np.cos, np.sin)]
         return {
             "slip_amplitude": np.ptp(slip, axis=0) / 2,
             "stick_fraction": below.mean(axis=0),
@@ -254,7 +266,8 @@ class Samples:
 
         acceleration: (s,) [m s-2].
         """
-        z, rate = self.found.z[:, :, run], self.found.rate[:, :, run]
+        z = self.found.z[:, :, run]
+        rate = self.found.rate[:, :, run]
         return Response(
             self.angle / self.omega,
             z,
@@ -298,21 +311,24 @@ def _largest_slides(slide, speed, force, rows, h: float) -> np.ndarray:
     cycle.
     """
     top = slide.argmax(axis=0)
-    best, at, share = slide[top, rows], top.copy(), np.zeros(len(rows))
+    best = slide[top, rows]
+    at = top.copy()
+    share = np.zeros(len(rows))
     for k in (top - 1, top):
         here = np.clip(k, 0, len(slide) - 2)
-        a, p, q = slide[here, rows], speed[here, rows] * h, speed[here + 1, rows] * h
+        a = slide[here, rows]
+        p = speed[here, rows] * h
+        q = speed[here + 1, rows] * h
         rise = slide[here + 1, rows] - a
-        mid, big = 3 * rise - 2 * p - q, p + q - 2 * rise
+        mid = 3 * rise - 2 * p - q
+        big = p + q - 2 * rise
         root = np.sqrt(np.maximum(mid**2 - 3 * big * p, 0.0))
         s = np.divide(p, root - mid, out=np.zeros(len(rows)), where=root > mid)
         value = a + s * (p + s * (mid + s * big))
         good = (k == here) & (p > 0) & (q < 0) & (s >= 0) & (s <= 1) & (value > best)
-        best, at, share = (
-            np.where(good, value, best),
-            np.where(good, here, at),
-            np.where(good, s, share),
-        )
+        best = np.where(good, value, best)
+        at = np.where(good, here, at)
+        share = np.where(good, s, share)
     up = np.minimum(at + 1, len(slide) - 1)
     last = at + ((share > 0) & (slide[up, rows] > slide[at, rows]))
     before = np.maximum(at - 1, 0)
@@ -329,7 +345,8 @@ def peaks(size) -> tuple:
 
     As in `measures.compute_acceleration_peak` and `measures.peak_sampling_errors`.
     """
-    rows, top = np.arange(size.shape[1]), size.argmax(axis=0)
+    rows = np.arange(size.shape[1])
+    top = size.argmax(axis=0)
     inside = (top > 0) & (top < len(size) - 1)
     near = np.clip(top + np.arange(-2, 3)[:, None], 0, len(size) - 1)
     five = size[near, rows]

@@ -75,12 +75,16 @@ class MotionObserver:
     def __init__(
         self, model, patch, say=None, windowed: bool = True, before: MotionObserver | None = None
     ):
-        self.model, self.patch, self.say, self.windowed = model, patch, say, windowed
+        self.model = model
+        self.patch = patch
+        self.say = say
+        self.windowed = windowed
         self.numerics = choose(model)
         steady = ENGINES[self.numerics.engine].finds_periodic_motion
         line = model.kind == "linear" and not model.rig.springs.is_nonlinear
         self.by = "" if not steady else "line" if line else choose_steady_method(model).name
-        self.made, self.before = {}, before.made if before is not None else {}
+        self.made = {}
+        self.before = before.made if before is not None else {}
 
     def __call__(self, drive, near=None) -> ObservedMotion | None:
         """Return the motion under a drive, found from `near` or from rest; None if not found."""
@@ -118,7 +122,8 @@ class MotionObserver:
 
     def _line(self, drive, near) -> ObservedMotion | None:
         """Return the motion without friction: z = (Omega^2 - omega^2 + i omega D)^-1 (i a base)."""
-        modes, omega = self.model.rig.modes, drive.omega
+        modes = self.model.rig.modes
+        omega = drive.omega
         found = harmonic.make_linear_part(modes, omega, 1)
         if any(k == 1 for k, *_ in found.free):
             return None
@@ -126,7 +131,8 @@ class MotionObserver:
         time = np.linspace(0.0, drive.period, SAMPLES + 1)
         turn = np.exp(1j * omega * time)
         modal, rate = (np.outer(turn, z * factor).real for factor in (1.0, 1j * omega))
-        push, none = drive.values(time), np.zeros(time.size)
+        push = drive.values(time)
+        none = np.zeros(time.size)
         base, shift = (push, -1j * drive.acceleration) if drive.moving else (none, 0.0)
         gain = np.outer(turn, -(omega**2) * z).real
         window = Response(
@@ -163,10 +169,8 @@ class MotionObserver:
 
     def _orbits(self):
         """Return the event map, in the workspace of an earlier MotionObserver if it fits."""
-        modes, groups = (
-            self.model.rig.modes,
-            pieces.YieldingElements(self.model, self.numerics, self.patch).groups,
-        )
+        modes = self.model.rig.modes
+        groups = pieces.YieldingElements(self.model, self.numerics, self.patch).groups
         found = self.before.pop("yields", None)
         return (
             found

@@ -19,7 +19,8 @@ def _law():
 
 def law_on(model, patch):
     """Return the law of a bench; patch: None for [normal]."""
-    f, law = model.friction, _law()
+    f = model.friction
+    law = _law()
     if patch is None:
         return law.Convolution(f.static, f.bond_length, f.order)
 
@@ -38,7 +39,8 @@ def limit_share(model, patch) -> float:
     f = model.friction
     if patch is None or not law_has_trait(f.law, "averaged"):
         return 1.0
-    weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
+    weight = patch.pieces.interface.weight
+    sigma = patch.pressure.sigma_n
     forward, back = _law().sliding_limits(patch.x, sigma, weight, f.bond_length, f.order)
     if abs(forward - back) > EQUAL_LIMITS_TOL * max(forward, back):
         raise PatchfemError(
@@ -57,8 +59,10 @@ def limit_tractions(model, patch, force) -> np.ndarray:
 
     They are proportional to the averaged pressure in the direction of the force.
     """
-    f, x = model.friction, patch.x
-    sigma, weight = patch.pressure.sigma_n, patch.pieces.interface.weight
+    f = model.friction
+    x = patch.x
+    sigma = patch.pressure.sigma_n
+    weight = patch.pieces.interface.weight
     one = []
     for way in (1.0, -1.0):
         average = _law().average_pressure(x, x, sigma, way, f.bond_length, f.order)

@@ -146,7 +146,9 @@ def _values(model, time, slide, out, first, omega) -> dict:
         **compute_ledger_measures(out.ledger),
     }
     if omega:
-        t, q, f = time[first:], slide[first:], out.force[first:]
+        t = time[first:]
+        q = slide[first:]
+        f = out.force[first:]
         weight = np.zeros(t.size)
         weight[1:] += np.diff(t) / 2
         weight[:-1] += np.diff(t) / 2

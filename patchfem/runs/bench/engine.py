@@ -86,7 +86,8 @@ def bench_engine(
     Missing
         If the sum over bonds would take too long.
     """
-    f, soft = model.friction, bool(model.partial_slip)
+    f = model.friction
+    soft = bool(model.partial_slip)
     if model.slide.across is not None:
         return BenchEngine(PLANE, _stepped_seconds(model, slide, 1))
     if soft and (law_has_trait(f.law, "bonds") or model.grooves is not None):
@@ -116,7 +117,8 @@ def bench_engine(
 
 def steps_per_cycle(model) -> int:
     """Return the steps per cycle of a bench: from the scene, else from tolerance and grooves."""
-    slide, accuracy = model.slide, model.accuracy
+    slide = model.slide
+    accuracy = model.accuracy
     steps = slide.steps(accuracy.tolerance, accuracy.steps_per_cycle, model.friction.bond_length)
     if model.grooves is None or accuracy.steps_per_cycle is not None:
         return steps
@@ -142,7 +144,8 @@ def choose_bond_sum(model, slide) -> "bond_engines.EngineChoice":
     It is chosen as in a rig, except that its error is relative to the force that is reached, which
     is small if the stroke is short compared with the bond length. slide: samples (k,) [m].
     """
-    law, accuracy = model.bonds, model.accuracy
+    law = model.bonds
+    accuracy = model.accuracy
     stroke, steps = mean_stroke(slide)
     stroke = max(stroke / law.length, 1e-9)
     goal = accuracy.tolerance * min(1.0, stroke)
@@ -157,7 +160,8 @@ def requested_engine(model) -> str:
     "merged" replaces it if every point has its own list and bonds keep the pressure at which they
     formed while it changes, because each step then leaves a strip.
     """
-    named, f = model.accuracy.quadrature, model.friction
+    named = model.accuracy.quadrature
+    f = model.friction
     rig = model.rig is not None
     apart = (model.side == "lower" and (model.partial_slip or (rig and is_bond_list(f)))) or (
         rig and model.load_varies and is_bond_list(f)
@@ -273,7 +277,8 @@ def cost(model, points: int) -> Cost:
     samples = MemoryPart(
         SAMPLE_BYTES * steps / 2, f"{steps // 2} samples of the slide", _samples_key(model)
     )
-    sizes, lists = {}, ()
+    sizes = {}
+    lists = ()
     if engine.choice is not None and engine.choice.strips:
         strips = int(engine.choice.strips)
         sizes = {"bond_list_about": strips}

@@ -73,11 +73,13 @@ def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> tu
         watch = PassOptions(variant.choice, say, springs=variant.springs, modes=variant.modes)
         return bench.run(model, on, variant.steps, watch=watch)
 
-    ladder, made = list_coarse_passes(model, patches, fine, steps), {}
+    ladder = list_coarse_passes(model, patches, fine, steps)
+    made = {}
     errors, seconds = estimate_errors(solve, fine.values, ladder, made)
     kinds = [one.of for one in ladder]
     if sum_error(model, fine.engine):
-        errors, kinds = [*errors, _sum_errors(model, fine)], [*kinds, "bonds"]
+        errors = [*errors, _sum_errors(model, fine)]
+        kinds = [*kinds, "bonds"]
     runs = [fine.values, *(made[one].values for one in ladder[0].runs)]
     return errors, seconds, find_open_kinds(kinds, errors, runs)
 
@@ -99,10 +101,13 @@ def list_coarse_passes(model, patches: list, fine, steps: int) -> list:
         Steps per cycle of the fine pass.
     """
     choice = fine.engine.choice
-    half, few = Pass(max(4, steps // 8 * 4), 0, choice), Pass(max(4, steps // 16 * 4), 0, choice)
+    half = Pass(max(4, steps // 8 * 4), 0, choice)
+    few = Pass(max(4, steps // 16 * 4), 0, choice)
     # elements follow any path exactly, so that the sampling affects the harmonics only
     rule = convergence_errors if slips_by_elements(model) else partial(step_errors, steps=steps)
-    out, meshed, patch = [CoarserRuns((half, few), rule, of="steps")], len(patches) > 1, patches[0]
+    out = [CoarserRuns((half, few), rule, of="steps")]
+    meshed = len(patches) > 1
+    patch = patches[0]
     if meshed and slips_by_elements(model):
         length = model.friction.bond_length
         same = model.slide.steps(MESH_TOL, model.accuracy.steps_per_cycle, length)

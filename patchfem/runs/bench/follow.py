@@ -79,8 +79,11 @@ def follow_path(
     turns = _new_pace(time) if paced else np.zeros(0, int)
     last = slide.size - 1
     edges = np.unique(np.concatenate([np.arange(0, last, BLOCK), at, turns, [last]]))
-    forces, energies = np.zeros((slide.size, 3)), np.zeros((slide.size, 2))
-    states, missed, told = [], 0, 0
+    forces = np.zeros((slide.size, 3))
+    energies = np.zeros((slide.size, 2))
+    states = []
+    missed = 0
+    told = 0
     for a, b in pairwise(edges):
         kept = copy_state(contact)
 

@@ -76,7 +76,8 @@ def elastic_slip(model, slide, force, load) -> np.ndarray:
     slide, force, load : (k,)
         [m], [N], [N].
     """
-    length, static = _length(model), model.friction.static
+    length = _length(model)
+    static = model.friction.static
     stretch = length * np.divide(
         force, static * load, out=np.zeros_like(force), where=static * load > 0
     )

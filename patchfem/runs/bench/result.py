@@ -45,7 +45,8 @@ MOST_TRIED = 2e6  # most evaluations (points times samples) of this search
 
 def run_prescribed(what, patch, coarse, seconds, warnings, say, progress, estimate) -> Result:
     """Run a plan of kind bench; the parameters are those of `run.run`."""
-    model, f = what.model, what.model.friction
+    model = what.model
+    f = what.model.friction
     if law_has_trait(f.law, "bonds"):
         warnings = [
             *warnings,
@@ -63,16 +64,15 @@ def run_prescribed(what, patch, coarse, seconds, warnings, say, progress, estima
     frames = FRAMES if patch is not None else 0
     fine = bench.run(model, patch, steps, frames, watch=PassOptions(None, say, progress))
     seconds["bench"] = fine.seconds
-    others, left = [], None
+    others = []
+    left = None
     if estimate:
         patches = [patch, *(one for one in coarse if one is not None)]
         others, seconds["error"], left = estimate_pass_errors(model, patches, fine, steps, say)
     found = add_errors(fine.values, *others, min_relative_error=1e-10)
-    fields, created, power = (
-        {},
-        fine.values["energy_created"],
-        np.abs(np.diff(fine.ledger[0])).sum(),
-    )
+    fields = {}
+    created = fine.values["energy_created"]
+    power = np.abs(np.diff(fine.ledger[0])).sum()
     if f.reading == "report" and created > 1e-6 * power:
         warnings = [
             *warnings,
@@ -91,10 +91,8 @@ def run_prescribed(what, patch, coarse, seconds, warnings, say, progress, estima
         fields = interface_frames(
             patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames]
         )
-    outcome, notes = (
-        outcome_on_piece(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral),
-        [],
-    )
+    outcome = outcome_on_piece(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral)
+    notes = []
     if law_has_trait(f.law, "bonds"):
         peak = (
             fine.values["friction_ratio_peak"] / f.static
@@ -142,7 +140,9 @@ def _warn_if_open(model, patch, fine, steps: int) -> list:
     It names the number of cycles after which the loop is steady, if MAX_EXTRA_CYCLES cycles with at most
     MOST_TRIED evaluations show it.
     """
-    period, tolerance, cycles = model.slide.period, model.accuracy.tolerance, model.slide.cycles
+    period = model.slide.period
+    tolerance = model.accuracy.tolerance
+    cycles = model.slide.cycles
     if period is None or cycles < 1 or not fine.values.get("loop_area"):
         return []
     if (miss := _miss(fine)) <= tolerance:

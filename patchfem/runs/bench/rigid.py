@@ -59,12 +59,11 @@ def rigid(
     tau = np.outer(done.force[done.at] / load if load > 0 else np.zeros(done.at.size), sigma)
     loads = model.point.evaluate(time) if model.load_varies else np.full(time.size, load)
     if engine.kind == ELEMENTS or model.grooves is not None:
-        slip, local = done.slip, np.where(sigma > 0, done.slip[done.at, None], slide[done.at, None])
+        slip = done.slip
+        local = np.where(sigma > 0, done.slip[done.at, None], slide[done.at, None])
     else:
-        slip, local = (
-            elastic_slip(model, slide, done.force, loads),
-            local_slip(model, slide[done.at], tau, sigma),
-        )
+        slip = elastic_slip(model, slide, done.force, loads)
+        local = local_slip(model, slide[done.at], tau, sigma)
     return SlideHistories(done.force, loads, slip, done.ledger, done.at, tau, local)
 
 
@@ -119,7 +118,8 @@ def one_point(model, load: float, engine: BenchEngine, springs=None) -> ContactM
         return element_model(
             one if springs is None else parallel_element(*springs(*np.split(one.numbers[2:], 2)))
         )
-    law, found = model.bonds, engine.choice
+    law = model.bonds
+    found = engine.choice
     if found.engine == "recursion":
         return points_model(law, [1.0], [load])
     return bond_list_model(law, f.static * load, found.reach(law.order), found.merge)

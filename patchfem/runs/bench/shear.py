@@ -113,8 +113,10 @@ def climbed_fields(patch, contact, states) -> tuple:
     states : sequence
         f states (slide [m], `ClimbingModel.shown`).
     """
-    index, m = contact.shear.points, patch.x.size
-    tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))
+    index = contact.shear.points
+    m = patch.x.size
+    tau = np.zeros((len(states), m))
+    local = np.zeros((len(states), m))
     for i, (slide, (along, elastic, vertical)) in enumerate(states):
         t = float(contact.grooves.slope(slide))
         tau[i, index] = (vertical * t + along * np.hypot(1.0, t)) / patch.pieces.interface.weight[
@@ -127,11 +129,14 @@ def climbed_fields(patch, contact, states) -> tuple:
 
 def _points(model, patch, time, slide, frames, watch, engine) -> SlideHistories:
     """Slide bond points, or lists of bonds, with shear modes."""
-    law, shear, found = model.bonds, shear_modes_of_points(model, patch, watch.modes), engine.choice
+    law = model.bonds
+    shear = shear_modes_of_points(model, patch, watch.modes)
+    found = engine.choice
     if model.side == "lower":
         contact = lists_on_lower_piece(model, patch, found, shear)
     else:
-        weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
+        weight = patch.pieces.interface.weight
+        sigma = patch.pressure.sigma_n
         contact = (
             points_model(law, weight, sigma, shear)
             if found is None
@@ -164,7 +169,9 @@ def shear_modes_of_points(model, patch, count: int | None = None):
     count : int, optional
         Number of modes; None: by scene and tolerance.
     """
-    law, sigma, tolerance = model.bonds, patch.pressure.sigma_n, 0.1 * model.accuracy.tolerance
+    law = model.bonds
+    sigma = patch.pressure.sigma_n
+    tolerance = 0.1 * model.accuracy.tolerance
     count = count or model.accuracy.shear_modes
     if model.side != "lower":
         return bond_shear_modes(patch, law, count, tolerance)
@@ -200,7 +207,9 @@ def lists_on_lower_piece(model, patch, found, shear):
     shear : ShearModes or None
         Modes on every node; None for pieces that are rigid in shear.
     """
-    law, sigma, mean = model.bonds, patch.pressure.sigma_n, mean_pressure(patch)
+    law = model.bonds
+    sigma = patch.pressure.sigma_n
+    mean = mean_pressure(patch)
     return point_lists_model(
         law,
         law.static * mean * patch.pieces.interface.weight,

@@ -55,7 +55,8 @@ def slide_step_by_step(
     """
     law, (weight, pressure) = law_for(model, patch), _pressures(model, patch, time, slide)
     refuse_long_sum(model, law, time.size, weight.size, slide)
-    peaks, at = ends_of_rest(model, slide), frame_numbers(time.size, frames)
+    peaks = ends_of_rest(model, slide)
+    at = frame_numbers(time.size, frames)
     found = _evaluate_law(
         (law, _step_under_changing_load if model.load_varies else _step_law),
         (time, slide[:, None]),
@@ -64,7 +65,8 @@ def slide_step_by_step(
         peaks,
         watch,
     )
-    force, tau = found.force[:, 0], found.tau[:, 0]
+    force = found.force[:, 0]
+    tau = found.tau[:, 0]
     return SlideHistories(
         force,
         found.load,
@@ -102,7 +104,8 @@ def run_plane(model, patch, time, slide, frames: int, watch: PassOptions) -> tup
     """
     law = law_for(model)
     refuse_long_sum(model, law, time.size, 1, slide)
-    across, one = np.interp(time, model.slide.corners[0], model.slide.across), np.ones(1)
+    across = np.interp(time, model.slide.corners[0], model.slide.across)
+    one = np.ones(1)
     at = frame_numbers(time.size, frames)
     found = _evaluate_law(
         (law, _step_law),
@@ -114,7 +117,8 @@ def run_plane(model, patch, time, slide, frames: int, watch: PassOptions) -> tup
     )
     load, moment, roll = _moments(model, patch)
     sigma = patch.pressure.sigma_n if patch is not None else np.array([load])
-    unit, give = found.force, law.law.length / law.law.static if law.law.static > 0 else 0.0
+    unit = found.force
+    give = law.law.length / law.law.static if law.law.static > 0 else 0.0
     slip = slide - give * unit[:, 0]
     local = np.where(sigma > 0, slip[at, None], slide[at, None])
     more = {
@@ -170,22 +174,24 @@ def _evaluate_law(
     """
     (law, move), (time, slide), (weight, pressure) = laws, path, points
     size, width = slide.shape
-    s0, pick = pressure(0), set(at.tolist())
+    s0 = pressure(0)
+    pick = set(at.tolist())
     state = law.start(s0) if width == 1 else law.start(s0, width)
-    force, load, work, stored = (
-        np.zeros((size, width)),
-        np.zeros(size),
-        np.zeros(size),
-        np.zeros(size),
-    )
-    losses, tau = np.zeros((size, 2)), []
+    force = np.zeros((size, width))
+    load = np.zeros(size)
+    work = np.zeros(size)
+    stored = np.zeros(size)
+    losses = np.zeros((size, 2))
+    tau = []
     for k in range(size):
         if k:
-            dq, s1 = slide[k] - slide[k - 1], pressure(k)
+            dq = slide[k] - slide[k - 1]
+            s1 = pressure(k)
             mean, lost, state = move(
                 law, state, dq if width > 1 else dq[0], s0, s1, time[k] - time[k - 1]
             )
-            s0, losses[k] = s1, gains_and_losses(weight * lost)
+            s0 = s1
+            losses[k] = gains_and_losses(weight * lost)
             work[k] = work[k - 1] + dq @ np.atleast_2d(mean) @ weight
         here = np.atleast_2d(
             law.breakaway_traction(s0, peaks[k]) if k in peaks else law.traction(state)

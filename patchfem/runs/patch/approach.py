@@ -52,7 +52,8 @@ def press_to_approach_with_rotation(
     from scipy.optimize import brentq
 
     refuse_opening(asked, stiff)
-    distance, tried = asked.loading.approach, []
+    distance = asked.loading.approach
+    tried = []
     least = _least_load(asked, np.ptp(pieces.interface.x))
 
     def short(log_load: float) -> float:
@@ -68,7 +69,8 @@ def press_to_approach_with_rotation(
     for _ in range(60):
         if short(top) >= 0:
             break
-        low, top = top, top + 2
+        low = top
+        top = top + 2
     while low == top or short(low) >= 0:
         if low == bottom:
             apart = asked.with_loading(
@@ -82,10 +84,8 @@ def press_to_approach_with_rotation(
     best = min(tried, key=lambda one: abs(one[1].approach - distance))
     if abs(best[1].approach - distance) > APPROACH_TOL * distance + GAP_ROUND * np.ptp(gap):
         reached = [one[1].approach for one in tried]
-        below, above = (
-            max(a for a in reached if a < distance),
-            min(a for a in reached if a > distance),
-        )
+        below = max(a for a in reached if a < distance)
+        above = min(a for a in reached if a > distance)
         raise NotConverged(
             f"an approach of {distance:.6g} m cannot be reached: the approach jumps from {below:.6g} m "
             f"to {above:.6g} m when the line of the load passes one of the few nodes in contact; "

@@ -129,12 +129,16 @@ def condense(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
         upper = finite_elements(upper_grid, make_elastic_layers(asked, asked.pieces.upper))
     low = load_compliance(grid, piece, fresh)
     high = low if upper is piece else load_compliance(upper_grid, upper, fresh)
-    joint, x, share = None, grid.x, grid.tributary_lengths()
+    joint = None
+    x = grid.x
+    share = grid.tributary_lengths()
     if upper_grid is not None and not _match(x, upper_grid.x):
         joint = mortar.join_pieces(
             mortar.PieceInterface(x, low), mortar.PieceInterface(upper_grid.x, high)
         )
-        x, share, parts = joint.x, joint.tributary_lengths, joint.compliance
+        x = joint.x
+        share = joint.tributary_lengths
+        parts = joint.compliance
     # Shear of the upper piece lifts the interface where that of a like lower piece lowers it: nt
     # cancels.
     else:

@@ -124,7 +124,8 @@ def make_elements(one, tolerance: float, coarser: bool = False) -> tuple:
     tuple
         Stiffness (t,) [N/m], yield slide (t,) [m], and the JenkinsSet (None for strips).
     """
-    patch, static = press_on_meshes(one, tolerance)[int(coarser)], one.numbers.static
+    patch = press_on_meshes(one, tolerance)[int(coarser)]
+    static = one.numbers.static
     if not patch.pressure.load > 0:
         return np.array([1 / patch.giving.mean()]), np.zeros(1), None
     length = record.make_law(one.numbers, one.load).element(one.load).length
@@ -159,7 +160,8 @@ def faces_with_frames(model, shots) -> tuple:
     """
     out = []
     for face in press_faces(model):
-        one, fields = model.rig.friction.interfaces[face.number], at_rest(face.patch)
+        one = model.rig.friction.interfaces[face.number]
+        fields = at_rest(face.patch)
         found = make_elements(one, model.accuracy.tolerance)[2] if face.partial_slip else None
         if found is not None and shots:
             states = [shot["faces"][face.number] for shot in shots]

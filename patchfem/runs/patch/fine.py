@@ -113,7 +113,9 @@ def solve_on_points(asked, enough) -> PointSolution:
     enough : callable
         Function of the measures that ends the refinement; MAX_POINTS and MAX_WORK end it as well.
     """
-    count, series, found = _first_level_points(asked), [], {}
+    count = _first_level_points(asked)
+    series = []
+    found = {}
     with one_thread():
         try:
             cells = [_ends(asked, level) for level in range(MIN_LEVELS)]
@@ -166,7 +168,8 @@ def _ends(asked, level: int) -> list:
 
     Returns positions (k,) [m] and changes (2, k, k) [m2/N] for pressure and for shear.
     """
-    length, sides = asked.pieces.length, (-0.5, 0.5)
+    length = asked.pieces.length
+    sides = (-0.5, 0.5)
     layout = Layout(
         -length / 2,
         length / 2,
@@ -176,7 +179,8 @@ def _ends(asked, level: int) -> list:
         MIDDLE_CELL * length,
         GROWTH,
     ).scale_cells(0.5**level)
-    places, changes = divide_into_columns(layout), 0.0
+    places = divide_into_columns(layout)
+    changes = 0.0
     for piece, share in _bodies(asked):
         depth, coated = _rows(piece, layout)
         changes = changes + share * np.array(
@@ -202,7 +206,8 @@ def operators(asked, ends: tuple, count: int) -> tuple:
     count : int
         Number of points.
     """
-    length, width = asked.pieces.length, asked.pieces.width * asked.pieces.pairs
+    length = asked.pieces.length
+    width = asked.pieces.width * asked.pieces.pairs
     x = ((np.arange(count) + 0.5) / count - 0.5) * length
     k = np.arange(count) * np.pi / length
     waves = sum(
@@ -221,7 +226,9 @@ def operators(asked, ends: tuple, count: int) -> tuple:
 
 def _rows(piece, layout: Layout) -> tuple:
     """Return the depths [m] of the rows of a piece, and the number of rows in its coating."""
-    height, thick, least = piece.height, piece.thickness, layout.bands[0][2]
+    height = piece.height
+    thick = piece.thickness
+    least = layout.bands[0][2]
     bands = [
         (0.0, 0.0, least),
         (height, height, height * layout.max_length / (layout.stop - layout.start) / 2),
@@ -239,14 +246,13 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
     start: forces (n,) [N] of the level with half as many points, or None.
     """
     normal, shear = operators(asked, ends, count)
-    x, between = (
-        normal.x,
-        np.linspace(-asked.pieces.length / 2, asked.pieces.length / 2, 2 * count + 1),
-    )
+    x = normal.x
+    between = np.linspace(-asked.pieces.length / 2, asked.pieces.length / 2, 2 * count + 1)
     gap = asked.gap.evaluate(between).heights[1::2]
     force, closing, theta, work = _solve_forces(asked, normal, gap, start)
     moved = normal.product(force)
-    opening, touches = gap + theta * x - closing + moved, force > 0
+    opening = gap + theta * x - closing + moved
+    touches = force > 0
     if not opening.min() >= -MAX_OVERLAP * np.abs(moved).max():
         raise NotConverged(
             f"contact: at {count} points the pieces still overlap by up to {-opening.min():.1e} m"
@@ -278,7 +284,8 @@ def _solve_forces(asked, normal: PointCompliance, gap, start) -> tuple:
     Returns forces (n,) [N], approach [m], rotation [rad] in addition to that in the gap, and
     iterations.
     """
-    x, begin = normal.x, None if start is None else np.repeat(start, 2) / 2
+    x = normal.x
+    begin = None if start is None else np.repeat(start, 2) / 2
     low = gap.min() if asked.loading.approach is None else asked.loading.approach
     moment = None if asked.loading.approach is not None else asked.loading.moment
     load = asked.loading.load if asked.loading.approach is None else None
@@ -307,7 +314,8 @@ def _values(asked, both: tuple, force, gap) -> tuple:
     The parts are (k, 2) [m].
     """
     (normal, shear), x, load = both, both[0].x, float(force.sum())
-    touches, sigma = force > 0, force / normal.area
+    touches = force > 0
+    sigma = force / normal.area
     if not touches.any():
         raise NotConverged("contact: the pieces touch on coarser cells only")
     one = np.ones(x.size)
@@ -320,7 +328,8 @@ def _values(asked, both: tuple, force, gap) -> tuple:
     ]
     stretches = np.array(places).reshape(-1, 2)
     long = np.maximum(np.diff(stretches).ravel(), 0.0)
-    peak, top = float(sigma.max()), int(np.argmax(sigma))
+    peak = float(sigma.max())
+    top = int(np.argmax(sigma))
     if 0 < top < x.size - 1:
         peak = max(peak, float(vertex(x, sigma[None], np.array([top]))[0]))
     moment = float(force @ x)

@@ -171,7 +171,8 @@ def _shows_slip(zones: tuple, x, layout: Layout) -> bool:
 
     Their cells are at most MAX_SEARCH_CELL times those of a layout.
     """
-    middle, long = (x[1:] + x[:-1]) / 2, np.diff(x)
+    middle = (x[1:] + x[:-1]) / 2
+    long = np.diff(x)
     for low, high in zones:
         inside = (x[1:] > low) & (x[:-1] < high)
         if (long[inside] > MAX_SEARCH_CELL * layout.cell_lengths(middle[inside])).any():
@@ -199,7 +200,8 @@ def _longest(asked) -> float:
 
 def search_layout(asked) -> Layout:
     """Return equal columns on which a contact is searched for."""
-    half, cell = asked.pieces.length / 2, min(asked.pieces.length / SEARCH_CELLS, _longest(asked))
+    half = asked.pieces.length / 2
+    cell = min(asked.pieces.length / SEARCH_CELLS, _longest(asked))
     return Layout(-half, half, (), (-half, half), cell, cell, 0.0)
 
 
@@ -211,7 +213,8 @@ def find_layout(asked, seen: list) -> Layout:
     length = asked.pieces.length
     half = length / 2
     span = (min(one.span[0] for one in seen), max(one.span[1] for one in seen))
-    wide, thick = min(one.wide for one in seen), _coating(asked)
+    wide = min(one.wide for one in seen)
+    thick = _coating(asked)
     # the third mesh, whose cells are a quarter as long, has to resolve the waves
     most = min(length / 12, 4 * _longest(asked))
     if max(len(one.places) for one in seen) > MAX_PLACES:
@@ -288,20 +291,24 @@ def contact_extent(patch: Patch, slip=None) -> ContactExtent:
     slip : PrescribedSlip, optional
         Slide of the holders; None if nothing slips in part.
     """
-    x, sigma = patch.x, patch.pressure.sigma_n
+    x = patch.x
+    sigma = patch.pressure.sigma_n
     if not (sigma > 0).any():
         least = int(np.argmin(patch.pressure.gap))
-        low, high = float(x[max(least - 1, 0)]), float(x[min(least + 1, x.size - 1)])
+        low = float(x[max(least - 1, 0)])
+        high = float(x[min(least + 1, x.size - 1)])
         return ContactExtent((low, high), (float(x[least]),), (), np.inf)
     strips = patch.strips.pressure if patch.strips is not None else sigma[None]
     bears = strips > (1e-3 * strips.max() if patch.skin is not None else 0.0)
     index = np.flatnonzero(bears.any(axis=0))
-    low, high = x[max(index[0] - 1, 0)], x[min(index[-1] + 1, x.size - 1)]
+    low = x[max(index[0] - 1, 0)]
+    high = x[min(index[-1] + 1, x.size - 1)]
     # a contact of few nodes: the next search has shorter cells around it
     if index.size < 4 and index.size < x.size:
         return ContactExtent((float(low), float(high)), tuple(x[index].tolist()), (), np.inf)
     changes = np.flatnonzero((bears[:, 1:] != bears[:, :-1]).any(axis=0))
-    places, cells = (x[changes] + x[changes + 1]) / 2, np.diff(x)[changes]
+    places = (x[changes] + x[changes + 1]) / 2
+    cells = np.diff(x)[changes]
     found = contact_ends(patch)
     if len(found) == changes.size:
         places = np.array([end.position for end in found])
@@ -361,7 +368,8 @@ def grid_on(asked, x, piece) -> TensorGrid:
     Its rows are as fine as the columns at the interface, at the inner face of the coating and at
     the holder.
     """
-    thick, height = piece.thickness, piece.height
+    thick = piece.thickness
+    height = piece.height
     top = float(np.diff(x).min())
     # a row is at most a tenth of the length; in a piece taller than this it may be 1/24 of the
     # height, and never more than 1/6 of it

@@ -122,7 +122,8 @@ def comparison_meshes(low, high) -> list:
         return [tuple(None if body is None else body.refine() for body in (low, high))]
     out = []
     while len(out) < 2 and low.x.size > 8:
-        low, high = low.coarsen(), high.coarsen() if high is not None else None
+        low = low.coarsen()
+        high = high.coarsen() if high is not None else None
         out.append((low, high))
     return out
 
@@ -149,7 +150,9 @@ def solve_on_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool 
     tuple
         Patches on all meshes, fine to coarse.
     """
-    grids, out, on_points = base_grids(asked).bodies, [], None
+    grids = base_grids(asked).bodies
+    out = []
+    on_points = None
     while True:
         try:
             wanted = estimate or len(out) == MIN_LEVELS - 1
@@ -176,7 +179,8 @@ def solve_on_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool 
                 fine=on_points.fine,
                 stretches=on_points.stretches,
             )
-        found, shows_slip = measures(*out, tolerance=tolerance), _shows_slip(asked, out, tolerance)
+        found = measures(*out, tolerance=tolerance)
+        shows_slip = _shows_slip(asked, out, tolerance)
         if (
             dear > MAX_SECONDS[False]
             and not is_within_tolerance(found, tolerance)
@@ -240,7 +244,8 @@ def _finer(asked) -> bool:
 
 def _on_points(asked, patches: list, tolerance: float):
     """Return the finest patch with measures computed on points as fine as its profile."""
-    found, first = fine.solve_on_points(asked, partial(_enough, patches, tolerance)), patches[0]
+    found = fine.solve_on_points(asked, partial(_enough, patches, tolerance))
+    first = patches[0]
     return replace(
         first,
         sharper=found.measures,

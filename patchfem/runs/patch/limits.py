@@ -49,7 +49,8 @@ def extrapolate(values, nested: bool = True) -> Limit:
         Whether each mesh halves the cells of the previous one.
     """
     values = np.asarray(values, float)
-    last, size = values[-1] - values[-2], np.abs(values[-1] - values[-2])
+    last = values[-1] - values[-2]
+    size = np.abs(values[-1] - values[-2])
     if len(values) < 3:
         return Limit(values[-1], UNSTEADY_FACTOR * size, values[-1], UNSTEADY_FACTOR * size)
     before = values[-2] - values[-3]

@@ -48,10 +48,8 @@ def plane_band(asked, patch: Patch) -> list:
     if other is None:
         return []
     try:
-        mine, theirs = (
-            values(patch),
-            values(press_patch(other, pair_on_same_meshes(other, patch.pair))),
-        )
+        mine = values(patch)
+        theirs = values(press_patch(other, pair_on_same_meshes(other, patch.pair)))
     except PatchfemError as error:
         return [
             f"{_plane_state_clause(asked)}; the true state lies between plane strain and plane stress; how much the two "
@@ -122,7 +120,8 @@ def strip_error(asked, patch: Patch, found: dict) -> dict:
     other, ratio = other_strips(asked)
     if other is asked:
         return found
-    beside, here = values(press_patch(other, patch.pair)), values(patch)
+    beside = values(press_patch(other, patch.pair))
+    here = values(patch)
     added = {
         name: errors.error_of_change(here[name] - beside[name], ratio, errors.MAX_ORDER)
         for name in here
@@ -142,11 +141,13 @@ def other_strips(asked) -> tuple:
     strips = asked.interface.strips
     if strips is None or strips.count < 2:
         return asked, 2.0
-    count, ratio = strips.count // 2, 2.0
+    count = strips.count // 2
+    ratio = 2.0
     if strips.offset is not None and abs(strips.offset) >= compute_outermost_strip_distance(
         asked.pieces.width, count
     ):
-        count, ratio = 2 * strips.count, 0.5
+        count = 2 * strips.count
+        ratio = 0.5
     interface = replace(asked.interface, strips=strips._replace(count=count))
     return replace(asked, interface=interface), ratio
 
@@ -165,7 +166,8 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     tolerance : float or None
         Tolerance of a patch whose mesh it chose; a value whose error exceeds it is extrapolated.
     """
-    series, mine = [one for one in coarse if one is not None], values(fine)
+    series = [one for one in coarse if one is not None]
+    mine = values(fine)
     if not series:
         return _remove_unbounded(_why_unbounded(fine), measures_from_series([mine], {}))
     missed_peak = unresolved_rounding(fine)
@@ -269,7 +271,8 @@ def converge(
     known = np.array([[values[name] for name in names] for values in series])
     hidden, floors = np.zeros((2, *known.shape[1:]))
     for row, name in enumerate(names):
-        hidden[row], floors[row] = least.get(name, 0.0), TABLE[name].floor
+        hidden[row] = least.get(name, 0.0)
+        floors[row] = TABLE[name].floor
     enough = np.inf if wanted is None else compute_allowed_error(wanted, known[-1], floors)
     with np.errstate(invalid="ignore", divide="ignore"):  # patches that were not solved have NaN
         seen = extrapolate(known, nested)
@@ -283,7 +286,8 @@ def converge(
         best = np.where(left < plain, seen.extrapolated, seen.value)
         error = np.maximum(np.minimum(left, plain), alike * np.abs(known[-1]))
         found = Converged(dict(zip(names, best)), dict(zip(names, error)))
-        fraction, peak = found.values["loaded_fraction"], found.values["pressure_peak"]
+        fraction = found.values["loaded_fraction"]
+        peak = found.values["pressure_peak"]
         relative = np.where(peak > 0, found.errors["pressure_peak"] / peak, 0.0)
         found.errors["loaded_fraction"] = contain_peak_error(
             fraction, found.errors["loaded_fraction"], relative
@@ -367,7 +371,8 @@ def _why_unbounded(patch: Patch) -> str:
     """
     if patch.skinned:
         return ""
-    x, cells = patch.x, np.diff(patch.x)
+    x = patch.x
+    cells = np.diff(patch.x)
     bears = patch.strips.pressure.any(axis=0) if patch.strips is not None else patch.active
     if patch.sharp and bears[[0, -1]].any():
         return (
@@ -455,7 +460,8 @@ def hidden_by_meshes(pair, pieces, force, gap_range, turns: bool) -> Hidden:
     turns : bool
         Whether the rotation is free.
     """
-    interface, active = pieces.interface, force > 0
+    interface = pieces.interface
+    active = force > 0
     cells = np.where(active[:, 1:] != active[:, :-1], np.diff(interface.x), 0.0)
     longest = cells.max(axis=1)
     spread = gap_range + np.abs(force @ pieces.normal).max(axis=1)
@@ -516,12 +522,10 @@ def shared_errors(hidden: Hidden, mine: dict) -> dict:
     mine : dict
         Values by name on the finest mesh.
     """
-    length, load, count, total = (
-        hidden.length,
-        mine["normal_load"],
-        hidden.count,
-        mine["pressure_peak"],
-    )
+    length = hidden.length
+    load = mine["normal_load"]
+    count = hidden.count
+    total = mine["pressure_peak"]
     # half the sum exceeds the longest cell only if the contact has many ends
     cell = np.maximum(hidden.cell, hidden.cells / 2)
     few = count <= UNRESOLVED_NODES
@@ -602,7 +606,8 @@ def _wedge(patch: Patch) -> float:
 
     It is E* times the slope of the gap there.
     """
-    x, active = patch.x, patch.active
+    x = patch.x
+    active = patch.active
     ends = np.flatnonzero(active[1:] != active[:-1])
     slope = (np.abs(np.diff(patch.gap)) / np.diff(x))[..., ends].max()
     bending = [

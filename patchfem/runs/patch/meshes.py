@@ -95,11 +95,13 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
     )
     # the first state of a contact that moves later, or slips in part, says nothing about its
     # measures
-    shares, own = CELL_FACTORS[-1:] if asked.mesh.edge_motion or slips else CELL_FACTORS, None
+    shares = CELL_FACTORS[-1:] if asked.mesh.edge_motion or slips else CELL_FACTORS
+    own = None
     if layout is None:
         return None
     while True:
-        share, shares = shares[0], shares[1:]
+        share = shares[0]
+        shares = shares[1:]
         bodies = grids.make_grids(asked, layout.scale_cells(share))
         if shares:
             own = own or grids.make_grids(asked, layout)
@@ -224,7 +226,8 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
         `_halvings` beyond those of all cases; the cells of a case are shorter by these from the
         first level.
     """
-    first, along = cases[0], grids.EDGE_CELLS[cases[0].mesh.is_static]
+    first = cases[0]
+    along = grids.EDGE_CELLS[cases[0].mesh.is_static]
     layout = None
     for _ in range(MAX_SEARCHES):
         pair = (
@@ -270,7 +273,8 @@ def _merge_layouts(layouts: list, between: bool) -> Layout:
     bands = {band for one in layouts for band in (*one.bands, (*one.span, one.max_loaded_length))}
     if between:
         bands |= set(_bands_between(layouts))
-    first, bands = layouts[0], sorted(bands, key=lambda band: (band[2], band))
+    first = layouts[0]
+    bands = sorted(bands, key=lambda band: (band[2], band))
     out = Layout(
         first.start,
         first.stop,
@@ -293,7 +297,8 @@ def _merge_layouts(layouts: list, between: bool) -> Layout:
 
 def _bands_between(layouts: list) -> list:
     """Return bands from each edge of a contact to that of the next case, with cells in between."""
-    out, half = [], max(one.stop for one in layouts)
+    out = []
+    half = max(one.stop for one in layouts)
     for side in (-1, 1):
         ends = sorted(
             {
@@ -307,7 +312,8 @@ def _bands_between(layouts: list) -> list:
             count = (
                 1 if high == low else int(np.ceil(abs(np.log(a / b)) / np.log(MAX_CELL_RATIO))) or 1
             )
-            places, sizes = np.linspace(low, high, count + 1), np.geomspace(a, b, count + 1)
+            places = np.linspace(low, high, count + 1)
+            sizes = np.geomspace(a, b, count + 1)
             out += [
                 (*map(float, stretch), float(max(pair)))
                 for stretch, pair in zip(pairwise(places), pairwise(sizes), strict=True)
@@ -335,7 +341,8 @@ def _refine_until_met(cases: list, bodies, tolerance: float, once: bool, least: 
         Pairs, fine to coarse, and the largest error over the tolerance: that of the cases that are
         solved together; if all of them meet it, that of the first other one that does not.
     """
-    pairs, tolerance = [], cases[0].mesh.tolerance or tolerance
+    pairs = []
+    tolerance = cases[0].mesh.tolerance or tolerance
     while True:
         pairs.insert(0, condense(cases[0], *bodies))
         bodies = [body.refine() for body in bodies]

@@ -195,7 +195,8 @@ def groups(model: Model) -> dict:
     tilt_over_first_opening is the tilt over the tilt at which the edge of flat pieces opens, with
     the pieces as bars.
     """
-    out, asked = {}, model.patch
+    out = {}
+    asked = model.patch
     load = asked.nominal_load
     if model.friction is not None:
         out["slip_length"] = model.friction.static * load / asked.pieces.shear_stiffness
@@ -254,7 +255,8 @@ def verdict(found: dict, asked) -> list:
 
 def _tilt_sentence(found: dict, asked) -> list:
     """Return the sentence on the tilt, as a list."""
-    tilt, gap = found.get("tilt_over_first_opening"), asked.gap
+    tilt = found.get("tilt_over_first_opening")
+    gap = asked.gap
     if tilt is None:
         return []
     if gap.profile is not None or asked.interface.strips is not None or len(gap.shapes) > 1:

@@ -157,7 +157,8 @@ def press_patch(asked, pair: Pair, worn=None) -> Patch:
     x = pair.compliance.interface.x
     gap, notes, seconds = asked.gap.evaluate(x)
     gap = gap + pair.rise if worn is None else gap + pair.rise + worn
-    rim, out = asked.gap.half_step_heights(x), _on(asked, pair, gap, notes, seconds)
+    rim = asked.gap.half_step_heights(x)
+    out = _on(asked, pair, gap, notes, seconds)
     if (
         pair.joint is not None
         and pair.joint.ripple > RIPPLE
@@ -192,7 +193,8 @@ def _shifts_at_step(node: int, gap, rim, worn) -> tuple:
     """
     if worn is None:
         return -rim, rim
-    higher, lower = node + 1, node - 1
+    higher = node + 1
+    lower = node - 1
     if np.mean(gap[..., lower]) < np.mean(gap[..., higher]):
         higher, lower = lower, higher
     shifts = []
@@ -287,7 +289,8 @@ def make_force_function(asked, pair: Pair):
         If a profile does not fit the mesh.
     """
     gap = asked.gap.evaluate(pair.compliance.interface.x).heights
-    gap, bare = gap + pair.rise, pair.compliance
+    gap = gap + pair.rise
+    bare = pair.compliance
     how = _choose_solver(asked)
     if asked.interface.strips is not None:
         return PressedStrips(asked, bare, gap)
@@ -363,11 +366,9 @@ def _solve_under_load(asked, pieces: Compliance, gap, added=None, warm_start=Non
     `StripCompliance`.
     """
     strips = skin = None
-    angle, moment, spring = (
-        asked.gap.angle,
-        asked.loading.moment,
-        asked.loading.rotational_stiffness,
-    )
+    angle = asked.gap.angle
+    moment = asked.loading.moment
+    spring = asked.loading.rotational_stiffness
     if asked.interface.strips is not None:
         pieces, pressure, skin, strips = strip_press.press_strips_of_patch(
             asked, pieces, gap, (angle, moment, spring), added, warm_start

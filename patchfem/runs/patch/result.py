@@ -123,10 +123,8 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
 
     The parameters are those of `run.run`.
     """
-    p, extra = (
-        patch.pressure,
-        {"residuals": dict(patch.pressure.residuals), "iterations": patch.pressure.iterations},
-    )
+    p = patch.pressure
+    extra = {"residuals": dict(patch.pressure.residuals), "iterations": patch.pressure.iterations}
     if p.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
     found = static_measures(what.model, patch, coarse)
@@ -166,7 +164,8 @@ def strain_warnings(asked, top: float, approach: float, beyond=()) -> list:
     beyond : sequence of str
         Warnings that are inserted before the one on locking.
     """
-    out, stuff = [], _materials(asked)
+    out = []
+    stuff = _materials(asked)
     words = (
         "the peak pressure is {:.3g} of the lowest Young's modulus",
         "the approach is {:.3g} of the total height of the two pieces",
@@ -297,11 +296,14 @@ def frictionless(asked, patch) -> list:
     Faces of unlike pieces slide on each other under pressure. Stick prevents this by shear
     stresses, which stiffen the contact.
     """
-    pair, held = patch.pair, np.flatnonzero(patch.active)
+    pair = patch.pair
+    held = np.flatnonzero(patch.active)
     if not pair.closing.any() or not held.size:
         return []
-    here, one = np.ix_(held, held), np.ones(held.size)
-    normal, cross = patch.pieces.normal[here], pair.closing[here]
+    here = np.ix_(held, held)
+    one = np.ones(held.size)
+    normal = patch.pieces.normal[here]
+    cross = pair.closing[here]
     stuck = normal - cross @ np.linalg.solve(patch.pieces.tangential[here], cross.T)
     more = one @ np.linalg.solve(stuck, one) / (one @ np.linalg.solve(normal, one)) - 1
     beta = abs(_dundurs(asked))
@@ -314,7 +316,8 @@ def frictionless(asked, patch) -> list:
 
 def _dundurs(asked) -> float:
     """Return Dundurs' beta of the two faces."""
-    shear, kappa = [], []
+    shear = []
+    kappa = []
     for piece in (asked.pieces.lower, asked.pieces.upper):
         face = piece.coating.material if piece.coating else piece.substrate
         shear.append(face.young / (2 + 2 * face.poisson))
@@ -360,7 +363,8 @@ def notes_on_tall_pieces(asked, mean: float) -> list:
     out = []
     for side in ("lower", "upper"):
         piece = getattr(asked.pieces, side)
-        young, nu = piece.substrate.young, piece.substrate.poisson
+        young = piece.substrate.young
+        nu = piece.substrate.poisson
         stiff = young / (1 - nu**2) if asked.pieces.plane == "strain" else young
         share = mean / (np.pi**2 * stiff * asked.pieces.length**2 / (48 * piece.height**2))
         if piece.height > asked.pieces.length and share > MIN_BUCKLING_RATIO:

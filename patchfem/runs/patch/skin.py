@@ -57,7 +57,8 @@ def note_on_peak_stiffness(asked, pressure: float) -> list:
     if part is None or part.law != "hertz" or part.rms_height is None or not pressure > 0:
         return []
     soft, stiff = peaks.persson_stiffness(pressure, part.rms_height)
-    half, told = "", []
+    half = ""
+    told = []
     waves = f" of the waves below {format_quantity(part.cutoff, 'm', 3)}" if part.cutoff else ""
     if part.from_ is not None:
         found = traces.read_spectral_moments(Path(part.from_), part.cutoff)

@@ -35,13 +35,17 @@ def slip_zones(patch, slip, ends: list) -> tuple:
     beyond = {(end.node, end.side): end.position for end in ends}
     out = []
     for stretch in np.split(found.points, 1 + np.flatnonzero(np.diff(found.points) > 1)):
-        places, slides = patch.x[stretch].tolist(), [yields[node] for node in stretch.tolist()]
+        places = patch.x[stretch].tolist()
+        slides = [yields[node] for node in stretch.tolist()]
         if slip.bond_length == 0:
-            first, last = beyond.get((int(stretch[0]), -1)), beyond.get((int(stretch[-1]), 1))
+            first = beyond.get((int(stretch[0]), -1))
+            last = beyond.get((int(stretch[-1]), 1))
             if first is not None and first < places[0]:
-                places, slides = [first, *places], [0.0, *slides]
+                places = [first, *places]
+                slides = [0.0, *slides]
             if last is not None and last > places[-1]:
-                places, slides = [*places, last], [*slides, 0.0]
+                places = [*places, last]
+                slides = [*slides, 0.0]
         out += _intervals_below(np.array(places), np.array(slides), slip.amplitude)
     return tuple(out)
 
@@ -53,7 +57,8 @@ def _intervals_below(x, slides, amplitude: float) -> list:
     stops = np.flatnonzero(yields & ~np.append(yields[1:], False))
     out = []
     for first, last in zip(starts.tolist(), stops.tolist()):
-        low, high = float(x[first]), float(x[last])
+        low = float(x[first])
+        high = float(x[last])
         if first > 0:
             low = _crossing(x[first - 1 : first + 1], slides[first - 1 : first + 1], amplitude)
         if last < x.size - 1:

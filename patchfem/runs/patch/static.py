@@ -217,7 +217,8 @@ def patches_on(patches, pair: Pair) -> list:
 
     Returns a list of Patch; None for each that this module cannot solve.
     """
-    out, groups = [None] * len(patches), {}
+    out = [None] * len(patches)
+    groups = {}
     grids = (
         isinstance(pair.grid, TensorGrid)
         and isinstance(pair.upper_grid, TensorGrid)
@@ -243,7 +244,8 @@ def solved_patches(patches, tolerance: float) -> list:
 
     They are alike in their pieces and in `pressing_kind`. tolerance: see `pressed_together`.
     """
-    pairs, found = shared_pairs(patches[0]), pressed_together(collect_loads(patches), tolerance)
+    pairs = shared_pairs(patches[0])
+    found = pressed_together(collect_loads(patches), tolerance)
     return [
         SolvedPatch(
             found.measures(k),
@@ -267,7 +269,8 @@ def max_error_ratios(patches, pairs: list, tolerance: float) -> list:
         Condensed pieces, fine to coarse.
     tolerance : float
     """
-    out, groups = [None] * len(patches), {}
+    out = [None] * len(patches)
+    groups = {}
     grids = all(
         isinstance(body, TensorGrid) for pair in pairs for body in (pair.grid, pair.upper_grid)
     )
@@ -295,13 +298,17 @@ def pressed_together(
         Pieces, fine to coarse, that replace the shared ones; the other plane state is then not
         solved.
     """
-    pairs, first, level, levels = pieces or shared_pairs(asked.first), asked.first, None, []
+    pairs = pieces or shared_pairs(asked.first)
+    first = asked.first
+    level = None
+    levels = []
     with one_thread():
         for pair in reversed(pairs):
             level = solve_on_pair(asked, pair, level)
             levels.insert(0, level)
         theirs = () if pieces else _in_other_plane(asked, levels[1])
-    fine, pair = levels[0], pairs[0]
+    fine = levels[0]
+    pair = pairs[0]
     good = np.logical_and.reduce([level.is_solved for level in (*levels, *theirs)])
     good &= (fine.contacts.n_nodes > one_by_one.UNRESOLVED_NODES) & (
         not any(one.closing.any() for one in pairs)
@@ -382,15 +389,18 @@ def solve_on_pair(asked: PatchLoads, pair: Pair, coarse: Level | None = None) ->
     coarse : Level, optional
         The same patches on coarser cells, near whose ends of contact the search starts.
     """
-    bare, pieces = pair.compliance, _with_asperities(asked.first, pair)
-    x, held = bare.interface.x, asked.moment is None
+    bare = pair.compliance
+    pieces = _with_asperities(asked.first, pair)
+    x = bare.interface.x
+    held = asked.moment is None
     gap = asked.gaps(x) + pair.rise
     gap_range = np.ptp(gap, axis=1)
     turned = np.zeros(asked.load.size) if held else asked.angle
     # the rotation of a free piece is measured from zero, so that it keeps its digits
     gap = gap - turned[:, None] * x
     low = gap.min(axis=1)
-    normal, tangential = Intervals(pieces.normal, x), Intervals(pieces.tangential, x)
+    normal = Intervals(pieces.normal, x)
+    tangential = Intervals(pieces.tangential, x)
     contacts = normal.press(
         gap - low[:, None],
         asked.load,
@@ -434,11 +444,10 @@ def _about(x, coarse: Level) -> tuple:
 
     They are the first node (q,) and the node (q,) after the last one.
     """
-    known, solved = coarse.contacts, coarse.is_solved
-    before, after = (
-        coarse.x[np.maximum(known.first - 1, 0)],
-        coarse.x[np.minimum(known.stop, coarse.x.size - 1)],
-    )
+    known = coarse.contacts
+    solved = coarse.is_solved
+    before = coarse.x[np.maximum(known.first - 1, 0)]
+    after = coarse.x[np.minimum(known.stop, coarse.x.size - 1)]
     first = np.searchsorted(x, before) - np.where(known.first > 0, 0, 1)
     stop = np.searchsorted(x, after) + 1 + MAX_END_CELLS
     return np.where(solved, np.maximum(first, 0), 0), np.where(

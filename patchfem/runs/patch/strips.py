@@ -137,9 +137,12 @@ def strip_values(patch) -> dict:
 
 def _behind_skin(patch, weight) -> dict:
     """Return extent of contact and stiffnesses, by name, of strips with a smooth asperity layer."""
-    state, pieces, count = patch.strips, patch.pair.compliance, len(patch.strips.offsets)
+    state = patch.strips
+    pieces = patch.pair.compliance
+    count = len(patch.strips.offsets)
     ratio = patch.tangential_ratio if patch.tangential_ratio is not None else np.inf
-    x, bears = patch.x, state.pressure > MIN_RELATIVE_PRESSURE * state.pressure.max()
+    x = patch.x
+    bears = state.pressure > MIN_RELATIVE_PRESSURE * state.pressure.max()
     stretches = [
         edges.contact_intervals(
             x,
@@ -168,26 +171,31 @@ def _between_nodes(patch, weight) -> dict:
 
     The contact ends between nodes (`contact.edges`).
     """
-    state, pieces, x, count = (
-        patch.strips,
-        patch.pair.compliance,
-        patch.x,
-        len(patch.strips.offsets),
-    )
-    normal, tangential, softness = pieces.normal * count, pieces.tangential * count, None
+    state = patch.strips
+    pieces = patch.pair.compliance
+    x = patch.x
+    count = len(patch.strips.offsets)
+    normal = pieces.normal * count
+    tangential = pieces.tangential * count
+    softness = None
     if state.stiffness is not None:
         softness = 1 / (state.stiffness.max() * weight)
         normal = normal + np.diag(softness)
         if patch.tangential_ratio is not None:
             tangential = tangential + np.diag(softness / patch.tangential_ratio)
-    sums, length, low, high = np.zeros(3), 0.0, x[-1], x[0]
+    sums = np.zeros(3)
+    length = 0.0
+    low = x[-1]
+    high = x[0]
     for force, gap in zip(state.force, state.gap, strict=True):
         if not force.any():
             continue
         found = edges.find_edges(normal, x, force, gap, softness, patch.pair.row)
-        stretches, one = edges.contact_intervals(x, force, found), np.ones(x.size)
+        stretches = edges.contact_intervals(x, force, found)
+        one = np.ones(x.size)
         length += np.diff(stretches).sum()
-        low, high = min(low, stretches[0, 0]), max(high, stretches[-1, 1])
+        low = min(low, stretches[0, 0])
+        high = max(high, stretches[-1, 1])
         sums += [
             edges.set_stiffness(c, force > 0, motion, found)
             for c, motion in ((normal, one), (tangential, one), (normal, x))

@@ -67,16 +67,13 @@ def vertex(x, sigma, top) -> np.ndarray:
         Inner nodes with the largest pressure.
     """
     # at an end of the interface, the parabola itself replaces its missing neighbour
-    rows, at = (
-        np.arange(top.size),
-        np.clip(top[:, None] + [-1, 0, 1], 1, x.size - 2),
-    )
-    left, right = x[at] - x[at - 1], x[at + 1] - x[at]
+    rows = np.arange(top.size)
+    at = np.clip(top[:, None] + [-1, 0, 1], 1, x.size - 2)
+    left = x[at] - x[at - 1]
+    right = x[at + 1] - x[at]
     here = sigma[rows[:, None], at]
-    before, after = (
-        (here - sigma[rows[:, None], at - 1]) / left,
-        (sigma[rows[:, None], at + 1] - here) / right,
-    )
+    before = (here - sigma[rows[:, None], at - 1]) / left
+    after = (sigma[rows[:, None], at + 1] - here) / right
     bend = (after - before) / (left + right)
     slope = (before * right + after * left)[:, 1] / (left + right)[:, 1]
     loaded = (sigma[rows, top - 1] > 0) & (sigma[rows, top + 1] > 0) & (bend[:, 1] < 0)
@@ -133,7 +130,8 @@ def static_values(interface, pressed: ContactState, peak, edge_values: EdgeValue
     edge_values : EdgeValues
     """
     is_loaded = np.greater(pressed.load, 0)
-    out, force = np.zeros(np.shape(peak)), interface.weight.sum() * peak
+    out = np.zeros(np.shape(peak))
+    force = interface.weight.sum() * peak
     return {
         "normal_load": pressed.load,
         "contact_fraction": edge_values.length / np.ptp(interface.x),
@@ -166,7 +164,8 @@ def values(patch: Patch) -> dict:
 
 def _values(patch: Patch) -> dict:
     """Return the values of a patch without a node at a step."""
-    pressure, interface = patch.pressure, patch.pieces.interface
+    pressure = patch.pressure
+    interface = patch.pieces.interface
     if patch.strips is not None:
         peak = peak_pressures(patch.x, patch.strips.pressure, patch.skin_share).max()
         found = static_values(interface, pressure, peak, EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0))
@@ -180,7 +179,9 @@ def _values(patch: Patch) -> dict:
 
 def _edge_values(patch: Patch) -> EdgeValues:
     """Return the quantities of a patch that depend on where its contact ends."""
-    x, normal, active = patch.x, patch.pieces.normal, patch.active
+    x = patch.x
+    normal = patch.pieces.normal
+    active = patch.active
     found = contact_ends(patch)
     stretches = contact_intervals(patch, found)
     return EdgeValues(
@@ -219,7 +220,8 @@ def _ends_without_steps(patch: Patch) -> list:
         return edges.find_pressure_edges(
             patch.x, patch.skin.pressure[0], edges.MIN_RELATIVE_PRESSURE
         )
-    own, bare = patch.pieces.normal, patch.pair.compliance.normal
+    own = patch.pieces.normal
+    bare = patch.pair.compliance.normal
     softness = None if own is bare else np.diag(own) - np.diag(bare)
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     return edges.find_edges(own, patch.x, force, patch.pressure.gap, softness, patch.pair.row)
@@ -242,8 +244,10 @@ def shear_stiffness(patch: Patch, found: list) -> float:
 
     whole = out = of(patch.active)
     for end in found if patch.active.sum() > 2 else ():
-        more, less = patch.active.copy(), patch.active.copy()
-        more[end.node + end.side], less[end.node] = True, False
+        more = patch.active.copy()
+        less = patch.active.copy()
+        more[end.node + end.side] = True
+        less[end.node] = False
         out += edges.parabola_change(end.fraction - 0.5, of(more) - whole, whole - of(less))
     return float(out)
 
@@ -259,16 +263,16 @@ def unresolved_rounding(patch: Patch) -> float:
     The cells where the contact ends carry the pressure of a sharp end, K = sigma_n sqrt(cell); a
     rounding smaller than these cells has the peak of `rounded_corner_contact`.
     """
-    pair, x, sigma = patch.pair, patch.x, patch.pressure.sigma_n
+    pair = patch.pair
+    x = patch.x
+    sigma = patch.pressure.sigma_n
     rounded = _rounded_bodies(pair)
     loaded = np.flatnonzero(patch.active)
     # a compliant layer of asperities (skin) bounds the pressure
     if not rounded or not loaded.size or patch.pieces is not pair.compliance:
         return 0.0
-    flat, radius = (
-        min(body.half_flat_length for body in rounded),
-        1 / sum(1 / body.end.size for body in rounded),
-    )
+    flat = min(body.half_flat_length for body in rounded)
+    radius = 1 / sum(1 / body.end.size for body in rounded)
     modulus = 1 / sum(
         (1 - nu**2) / young
         for young, nu in (piece.layers.coating for piece in (pair.piece, pair.upper))

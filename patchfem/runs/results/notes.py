@@ -222,7 +222,8 @@ def heating_sentences(model, patch, work: float, duration: float) -> list:
     if not (area > 0 and duration > 0 and np.isfinite(work)):
         return []
     period = _cycle(model)
-    flux, stuff = work / duration / area, (known.conductivity, known.heat_capacity * kind.density)
+    flux = work / duration / area
+    stuff = (known.conductivity, known.heat_capacity * kind.density)
     rises = [
         f"{temperature.surface_temperature_rise(flux, duration, *stuff):.2g} K after {duration:.3g} s"
     ]

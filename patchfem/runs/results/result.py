@@ -177,7 +177,9 @@ def choices(result) -> dict:
     the length [m] over which its profile is averaged. map: "events" or "yields", the map that found
     a steady motion.
     """
-    extra, patch, out = result.extra, result.patch, {}
+    extra = result.extra
+    patch = result.patch
+    out = {}
     if (engine := extra.get("engine")) is not None:
         out["engine"] = engine
     if (found := extra.get("map")) is not None:

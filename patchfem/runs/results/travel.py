@@ -32,7 +32,8 @@ def contact_length(patch) -> float:
 
 def warn_of_large_slide(patch, slide) -> list:
     """Return a warning, as a list, if the slide (k,) [m] exceeds MAX_SLIDE_FRACTION of the contact length."""
-    largest, contact = largest_slide(slide), contact_length(patch)
+    largest = largest_slide(slide)
+    contact = contact_length(patch)
     if not contact > 0 or largest < MAX_SLIDE_FRACTION * contact:
         return []
     return [

@@ -110,7 +110,8 @@ MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
 
 def steps_wanted(model: Model) -> int:
     """Return the steps per cycle that a march needs for the tolerance, without upper bound."""
-    accuracy, rig = model.accuracy, model.rig
+    accuracy = model.accuracy
+    rig = model.rig
     quickest = max(
         find_max_frequency_ratio(rig.drive.signal),
         float(rig.structure.frequencies.max()) * rig.drive.signal.period,
@@ -151,11 +152,13 @@ def expected_elements(model: Model) -> tuple:
 
     A rigid element has no spring, and counts as stiffness 0.
     """
-    count, stiff = 0, 0.0
+    count = 0
+    stiff = 0.0
     for one in model.rig.friction.interfaces:
         load = model.nominal_load if one.load is None else one.load
         if law_has_trait(one.numbers.law, "set-valued"):
-            most, mine = inf, 1
+            most = inf
+            mine = 1
         else:
             element = record.make_law(one.numbers, load).element(load)
             mine = int(element.numbers[1]) >> count_merges(model)
@@ -166,7 +169,8 @@ def expected_elements(model: Model) -> tuple:
             mine = patch_model.TYPICAL_N_NODES
             if not patch.mesh.is_automatic:
                 mine = round(patch.pieces.length / patch.uniform_element_size) + 1
-        count, stiff = count + mine, max(stiff, most if most < inf else 0.0)
+        count = count + mine
+        stiff = max(stiff, most if most < inf else 0.0)
     return count, stiff
 
 
@@ -180,17 +184,17 @@ def ringing_and_events(model: Model) -> tuple:
 
     Those of events include the rows of a recorded drive.
     """
-    modes, drive = model.rig.modes, model.rig.drive.signal
+    modes = model.rig.modes
+    drive = model.rig.drive.signal
     (count, stiff), made = expected_elements(model), modal_system.make_modal_system(modes)
-    faces, damping = len(made.interfaces), made.damping_norm
+    faces = len(made.interfaces)
+    damping = made.damping_norm
     rate = damping / 2 + sqrt(
         damping**2 / 4 + made.max_omega_squared + stiff * max(made.inverse_mass, default=0.0)
     )
     rows = 0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
-    ringing, quick = (
-        max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / REACH,
-        find_max_frequency_ratio(drive),
-    )
+    ringing = max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / REACH
+    quick = find_max_frequency_ratio(drive)
     events = 2 * max(count, faces) * quick + 2 + rows
     if 2 * pi * quick <= made.slow_rate * drive.period:
         dying = DYING / min(find_min_decay_rate(modes), float(modes.omega.min()) ** 2 / damping)
@@ -222,7 +226,8 @@ def seconds_of_pieces(model: Model) -> float:
 
     The elements are assumed to stick all the time.
     """
-    cycles, each = model.rig.drive.cycles, cost_model.MAX_PIECE_SECONDS + _size_seconds(model)
+    cycles = model.rig.drive.cycles
+    each = cost_model.MAX_PIECE_SECONDS + _size_seconds(model)
     return (each * cycles + cost_model.READ_PIECE_SECONDS * min(cycles, 10.0)) * pieces_per_cycle(
         model
     )
@@ -258,7 +263,8 @@ def expected_seconds(model: Model) -> float:
 
 def seconds_of_steps(model: Model) -> float:
     """Return the expected CPU seconds of a march with the coarse runs of its error estimate."""
-    count, many = expected_elements(model)[0], len(model.rig.friction.interfaces)
+    count = expected_elements(model)[0]
+    many = len(model.rig.friction.interfaces)
     step = cost_model.STEP_SECONDS + cost_model.STEP_ELEMENT_SECONDS * count
     return (
         1.75
@@ -371,7 +377,8 @@ def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[Memory
     numerics : Numerics
     history : HistoryBytes
     """
-    rig, samples = model.rig, kept_samples(numerics)
+    rig = model.rig
+    samples = kept_samples(numerics)
     width = 2.0 * len(rig.structure.frequencies) + 12 + 6 * len(rig.friction.interfaces)
     length_key = "drive.duration" if rig.drive.waveform.is_random else "drive.cycles"
     key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else length_key
@@ -387,11 +394,9 @@ def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[Memory
 
 def exact_words(model: Model, engine: str) -> list:
     """Return the sentence of a plan on the engine of the elements and on its cost, as a list."""
-    count, exact, march = (
-        expected_elements(model)[0],
-        expected_seconds(model),
-        seconds_of_steps(model),
-    )
+    count = expected_elements(model)[0]
+    exact = expected_seconds(model)
+    march = seconds_of_steps(model)
     return [
         f"{count} element{'s' * (count > 1)} by engine {engine}; computing time: about {exact:.2g} s with the "
         f"exact solution between yield events, about {march:.2g} s with time steps at this tolerance"
@@ -400,7 +405,8 @@ def exact_words(model: Model, engine: str) -> list:
 
 def reason_to_march_smooth_law(model: Model) -> str:
     """Return the reason to march a rig instead of integrating it at high order, or ""."""
-    rig, accuracy = model.rig, model.accuracy
+    rig = model.rig
+    accuracy = model.accuracy
     pinned = next(
         (f"accuracy.{key}" for key in MARCH_SETTINGS if getattr(accuracy, key) is not None), ""
     )
@@ -442,8 +448,10 @@ def smooth_steps(model: Model, element: "Element") -> float:
     They are proportional to the phase of the fastest motion, plus some at every reversal, plus
     those that keep a state of the law with a short relaxation stable.
     """
-    rig, modes = model.rig, model.rig.modes
-    omega, period = find_drive_omega(rig.drive.signal), rig.drive.signal.period
+    rig = model.rig
+    modes = model.rig.modes
+    omega = find_drive_omega(rig.drive.signal)
+    period = rig.drive.signal.period
     damper = modes.damping if modes.damping is not None else np.diag(2 * modes.zeta * modes.omega)
     pace = max(
         float(modes.omega.max()),
@@ -470,7 +478,8 @@ def stiff_fraction(model: Model, element: "Element") -> float:
     With a single mode it is 1 for a ratio r of the force to the limit up to 1, and less for larger
     r.
     """
-    rig, modes = model.rig, model.rig.modes
+    rig = model.rig
+    modes = model.rig.modes
     if modes.omega.size > 1 or not modes.slide[0]:
         return 1.0
     if not element.limit:
@@ -494,7 +503,8 @@ def smooth_cost(model: Model, numerics, points: int) -> Cost:
     points : int
         Nodes of the interface; not used.
     """
-    rig, cycles = model.rig, model.rig.drive.cycles
+    rig = model.rig
+    cycles = model.rig.drive.cycles
     # after this many cycles the motion repeats, and the other cycles are not computed
     if (
         is_sinusoidal(rig.drive.signal)

@@ -59,10 +59,8 @@ def compute_decay(raw: Solution) -> DecayCurve | None:
 def _add_coarse_changes(found: DecayCurve, raw: Solution) -> DecayCurve:
     """Return the curve of a run with its differences from coarse runs added to the errors."""
     for run, beside in raw.coarser:
-        one, other = (
-            _read(run).over(found.amplitude),
-            found if beside is None else _read(beside).over(found.amplitude),
-        )
+        one = _read(run).over(found.amplitude)
+        other = found if beside is None else _read(beside).over(found.amplitude)
         found = found.add_difference(one, other)
     return found
 
@@ -74,7 +72,8 @@ def _read(run: Solution) -> DecayCurve:
     swings: other modes ring at the same time, so that the turning points of their sum belong to
     none of them.
     """
-    motion, held = run.response, run.extra.get("tail")
+    motion = run.response
+    held = run.extra.get("tail")
     found = compute_swing_curve(
         half_swings_between(*find_turning_points(motion.time, motion.output, motion.output_rate))
     )
@@ -82,7 +81,8 @@ def _read(run: Solution) -> DecayCurve:
         return found
     time = np.arange(held.begin, held.end, 0.5 / held.frequency)
     rate = 2 * np.pi * held.frequency * held.damping / np.sqrt(1 - held.damping**2)
-    size, still = held.displacement * np.exp(-rate * (time - held.begin)), np.zeros(time.size)
+    size = held.displacement * np.exp(-rate * (time - held.begin))
+    still = np.zeros(time.size)
     kept = size > MIN_HALF_SWING * np.abs(motion.output).max()
     rings = DecayCurve(time, size, still + held.frequency, still, still + held.damping, still).at(
         kept
@@ -221,7 +221,8 @@ def mesh_errors_of_decay(model, patch, coarse, amplitudes, mode) -> tuple:
         Errors (2, k), and the reason why they are not known, else "". They are 0 without a patch
         that slips in part, and if they are not known.
     """
-    rig, none = model.rig, np.zeros((2, len(amplitudes)))
+    rig = model.rig
+    none = np.zeros((2, len(amplitudes)))
     if not (model.partial_slip or rig.friction.has_partial_slip):
         return none, ""
     moves = (model.grooves is not None, rig.friction.load_varies, rig.friction.strips_slide_apart)

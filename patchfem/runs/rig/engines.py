@@ -311,7 +311,9 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
     They have a coarser mesh, another number of shear modes, or another sum over bonds.
     """
-    few, varies, out = _divide_steps(numerics, 4), model.rig.friction.load_varies, []
+    few = _divide_steps(numerics, 4)
+    varies = model.rig.friction.load_varies
+    out = []
     quarter = Variant(few, patch)
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     if coarse is not None and (varies or model.partial_slip):
@@ -321,10 +323,8 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     out += [
         make_coarser_space(Variant(one, patch), quarter) for one in _numerics_of_meshes(model, few)
     ]
-    climbs, gathers = (
-        model.grooves is not None,
-        model.patch is not None and model.patch.mesh.can_gather_points,
-    )
+    climbs = model.grooves is not None
+    gathers = model.patch is not None and model.patch.mesh.can_gather_points
     # a reduction to few points states the error of its modes itself
     pointed = coarse is not None and not gathers
     if shape is not None and (
@@ -358,7 +358,8 @@ def _coarse_sums(model: Model, few, patch, solution) -> list:
 
 def _sum_errors(model: Model, patch, fraction: float, values: dict, solution) -> dict:
     """Return the errors of the measures due to the error `fraction` of a sum over bonds."""
-    friction, load = model.friction, patch.pressure.load if patch is not None else model.point.load
+    friction = model.friction
+    load = patch.pressure.load if patch is not None else model.point.load
     passed = np.abs(np.diff(solution.window.extra["ledger"][0])).sum()
     span = solution.window.time[-1] - solution.window.time[0]
     cycle_work = passed * model.rig.drive.signal.period / max(span, 1e-300)

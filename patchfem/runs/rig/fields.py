@@ -25,7 +25,8 @@ def collect_frames(model, numerics, patch, raw) -> dict:
     patch : Patch
     raw : Solution
     """
-    sigma, f = patch.pressure.sigma_n, model.friction
+    sigma = patch.pressure.sigma_n
+    f = model.friction
     # strips have no common shear stress
     if model.patch.mesh.can_gather_points or (model.partial_slip and patch.strips is not None):
         return at_rest(patch)
@@ -80,7 +81,9 @@ def _frames_under_changing_load(patch, raw) -> dict:
 
     Its status is 0 for open, 1 for stick and 2 for slip.
     """
-    law, sets, weight = raw.contact.law, raw.contact.sets, patch.pieces.interface.weight
+    law = raw.contact.law
+    sets = raw.contact.sets
+    weight = patch.pieces.interface.weight
     shots = raw.snapshots
     time, slide = (np.array([0.0] + [shot[key] for shot in shots]) for key in ("time", "slide"))
     nodal = np.stack([patch.pressure.sigma_n * weight] + [shot["nodal"] for shot in shots])
@@ -89,7 +92,8 @@ def _frames_under_changing_load(patch, raw) -> dict:
     gap = np.maximum(sets.opening + lift + turn * sets.x + nodal @ sets.c, 0.0)
     gap[nodal > 0] = 0.0
     gap[0] = patch.pressure.gap
-    tau, local = np.zeros_like(nodal), np.zeros_like(nodal)
+    tau = np.zeros_like(nodal)
+    local = np.zeros_like(nodal)
     for k, shot in enumerate(shots, 1):
         tau[k], stretch = _shear(law, shot, nodal[k])
         local[k] = slide[k] - stretch - shot["bend"]

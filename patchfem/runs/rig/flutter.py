@@ -44,7 +44,9 @@ def find_limit_cycles(run) -> tuple:
     The measure is the amplitude of the largest unstable limit cycle with its error, or the reason
     why it is not known.
     """
-    model, unit, floor = run.model, TABLE[NAME].unit, TABLE[NAME].floor
+    model = run.model
+    unit = TABLE[NAME].unit
+    floor = TABLE[NAME].floor
     found, reason, looked = _cycles(model, run.numerics, run.patch)
     far = (
         [
@@ -91,10 +93,12 @@ def _cycles(model, numerics, patch) -> tuple:
 
     The amplitude [m] is that of the output, and 0 if all amplitudes were searched.
     """
-    rig, f = model.rig, model.friction
+    rig = model.rig
+    f = model.friction
     if len(rig.friction.interfaces) != 1 or f is None:
         return [], "limit cycles can be computed for one interface only", 0.0
-    modes, row = rig.modes, rig.modes.interfaces[0]
+    modes = rig.modes
+    row = rig.modes.interfaces[0]
     if not row[limit_cycles.find_unstable_modes(modes)].any():
         return [], NO_INTERFACE_NOTE, 0.0
     load = patch.pressure.load if patch is not None else model.point.load

@@ -48,7 +48,8 @@ def make_contact(model: Model, numerics: Numerics, patch):
     PatchfemError
         For a law that cannot be combined with other joints.
     """
-    rig, second = model.rig, model.rig.modes.lateral_faces
+    rig = model.rig
+    second = model.rig.modes.lateral_faces
     many = len(rig.modes.interfaces) > 1 or second is not None
     if model.grooves is not None:
         return _climbing(model, patch, numerics.shear_modes)
@@ -56,7 +57,8 @@ def make_contact(model: Model, numerics: Numerics, patch):
     if not many and not rig.springs.is_nonlinear:
         return alone
 
-    rows, found = [*rig.modes.interfaces], []
+    rows = [*rig.modes.interfaces]
+    found = []
     if many:
         found += [
             joints.Joint(k, one) for k, one in enumerate(_side_by_side(model, numerics, patch))
@@ -108,7 +110,8 @@ def own_elements(model: Model, meshed: tuple) -> list:
 
 def _climbing(model: Model, patch, count: int | None = None):
     """Return the model of a rig whose load climbs grooves."""
-    f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
+    f = model.friction
+    load = patch.pressure.load if patch is not None else model.point.load
     if model.partial_slip or not law_has_trait(f.law, "memoryless"):
         return rigid.climbing(model, load, patch, count)
 
@@ -144,7 +147,8 @@ def contact_model(model: Model, numerics: Numerics, patch):
     patch : Patch or None
         None under [normal].
     """
-    f, soft = model.friction, model.partial_slip
+    f = model.friction
+    soft = model.partial_slip
     if f is None:
         return models.frictionless_model()
     if model.rig.friction.load_varies:
@@ -176,11 +180,9 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
 
     It is a list of bonds, points with shear modes, points of a field, or a single point.
     """
-    law, found, limit = (
-        model.bonds,
-        choose_quadrature(model, numerics),
-        model.friction.static * load,
-    )
+    law = model.bonds
+    found = choose_quadrature(model, numerics)
+    limit = model.friction.static * load
     if model.side == "lower" and (model.partial_slip or found.engine != "recursion"):
         return shear.lists_on_lower_piece(
             model,
@@ -203,7 +205,9 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
         )
         return models.points_model(law, *pressed, reduced)
     if numerics.per_point:
-        x, weight, sigma = patch.x, patch.pieces.interface.weight, patch.pressure.sigma_n
+        x = patch.x
+        weight = patch.pieces.interface.weight
+        sigma = patch.pressure.sigma_n
         return models.points_model(
             law, weight, sigma, None, (x, sigma) if model.side == "lower" else None
         )
@@ -215,11 +219,9 @@ def _shear_modes(patch, law, count: int | None, model) -> tuple:
 
     The forces are None for all points. They are computed once for all marches of a pressed patch.
     """
-    made, tolerance, few = (
-        _SHEAR_MODES.setdefault(patch, {}),
-        model.accuracy.tolerance,
-        model.patch.mesh.can_gather_points,
-    )
+    made = _SHEAR_MODES.setdefault(patch, {})
+    tolerance = model.accuracy.tolerance
+    few = model.patch.mesh.can_gather_points
     if (law, count, tolerance, few) not in made:
         mode_tolerance = (FEWER if few else 0.1) * tolerance
         found = fields.bond_shear_modes(patch, law, count, mode_tolerance, fewest=few)
@@ -252,12 +254,11 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
         ShearModes of the points, their limits [N], and the error of the backbone as a fraction of
         the friction limit; None if more modes are needed.
     """
-    made, key = (
-        _SHEAR_MODES.setdefault(patch, {}),
-        (law.static, law.length, law.ratio, tolerance, points, modes),
-    )
+    made = _SHEAR_MODES.setdefault(patch, {})
+    key = (law.static, law.length, law.ratio, tolerance, points, modes)
     if key not in made:
-        found, made[key] = fields.bond_shear_modes(patch, law, None, tolerance, fewest=True), None
+        found = fields.bond_shear_modes(patch, law, None, tolerance, fewest=True)
+        made[key] = None
         if found.stiffness.size <= modes:
             few, limit, error = shear_modes.modes_on_gauss(found, patch.x[found.points], points)
             whole = found.spectrum.backbone(max(shear_modes.N_REFERENCE_MODES, 4 * modes))

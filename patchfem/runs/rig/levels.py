@@ -97,7 +97,8 @@ def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
         return None
     before, first = found
     first = levels[first]
-    low, high = levels[before].drive if before >= 0 else 0.0, first.drive
+    low = levels[before].drive if before >= 0 else 0.0
+    high = first.drive
     for _ in range(MAX_BISECTIONS):
         if high - low <= tolerance * (high if low else first.drive):
             break
@@ -134,7 +135,9 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
     coarser : sequence
         See `Solution`; the distance between the onsets of each pair is added to the error.
     """
-    unit, size, out = _unit(rig), _size(rig), {}
+    unit = _unit(rig)
+    size = _size(rig)
+    out = {}
     past = make_onset_test(*rig.drive.levels.onset)
     lowest = onset(levels, probe, tolerance, past) if rubs else None
     if lowest is not None:
@@ -207,7 +210,10 @@ def run_levels(reader, go, state, end, progress=None) -> tuple:
     tuple
         The joined run, and the fields `levels` and `probe` of its Solution.
     """
-    rig, states, parts, found = reader.model.rig, [state], [], []
+    rig = reader.model.rig
+    states = [state]
+    parts = []
+    found = []
 
     def at(level, state, watch=None, last=False) -> tuple:
         """Run one level from a state, and return the run and its Level."""
@@ -246,10 +252,8 @@ def joined_runs(parts, each: float):
     """
     shift = [k * each for k in range(len(parts))]
     # the last sample of a run is the first one of the next
-    last, rows = (
-        parts[-1],
-        [slice(None, -1)] * (len(parts) - 1) + [slice(None)],
-    )
+    last = parts[-1]
+    rows = [slice(None, -1)] * (len(parts) - 1) + [slice(None)]
 
     def column(of):
         """Return the concatenation of a history over all runs."""

@@ -83,7 +83,8 @@ def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine:
 
     stretch: bond lengths by which a block moves on its bonds.
     """
-    law, accuracy = model.bonds, model.accuracy
+    law = model.bonds
+    accuracy = model.accuracy
     once = model.rig.drive.kind == "free" or model.rig.drive.waveform.is_step
     left = STICKING_STROKE_RATIO if chatters(model) else DECAYED_FRACTION if once else 1.0
     stroke = max(
@@ -104,10 +105,12 @@ def _stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
     their limit is below `least` times the required force, or if the printed law gives them no
     stiffness.
     """
-    f, rig = model.friction, model.rig
+    f = model.friction
+    rig = model.rig
     if f.reading == "report" or rig.drive.kind == "free":
         return inf
-    needed, limit = force_that_holds(rig), f.static * model.nominal_load
+    needed = force_that_holds(rig)
+    limit = f.static * model.nominal_load
     return needed / limit if limit >= least * needed else inf
 
 
@@ -119,7 +122,8 @@ def halvings(model: Model) -> int:
     slip, half the square of the stretch, is below MOVES bond lengths, the motion is elastic and no
     halving is needed.
     """
-    rig, f = model.rig, model.friction
+    rig = model.rig
+    f = model.friction
     if f is None or not law_has_trait(f.law, "bonds") or model.accuracy.steps_per_cycle is not None:
         return 0
     stretch = _stretch(model)
@@ -134,7 +138,8 @@ def halvings(model: Model) -> int:
 
 def _bond_swing(model: Model) -> float:
     """Return the angular frequency [rad/s] of the block on its bonds, sqrt(k_t/m)."""
-    f, modes = model.friction, model.rig.modes
+    f = model.friction
+    modes = model.rig.modes
     return sqrt(
         f.static * model.nominal_load / f.bond_length * float((modes.slide**2).sum()) / modes.mass
     )
@@ -151,10 +156,12 @@ def held_by_bonds(model: Model, push: float | None = None) -> float:
 
     push: acceleration of the drive [m s-2]; None: the largest one.
     """
-    f, rig = model.friction, model.rig
+    f = model.friction
+    rig = model.rig
     if f is None or not law_has_trait(f.law, "bonds"):
         return 0.0
-    released, printed = rig.drive.kind == "free", f.reading == "report"
+    released = rig.drive.kind == "free"
+    printed = f.reading == "report"
     if (
         released
         and (not printed or rig.start is None or sum_form(model.bonds) != FORM_REPORT_GROWING)
@@ -258,7 +265,8 @@ def _held_with(rig, omega: float, push, slides) -> float:
     float
         inf if no forces can do it.
     """
-    modes, n = rig.modes, rig.modes.omega.size
+    modes = rig.modes
+    n = rig.modes.omega.size
     faces = modes.interfaces
     moves = np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.damping_matrix
     whole = np.block([[moves, faces.T / modes.mass], [faces, np.zeros((len(faces), len(faces)))]])
@@ -353,7 +361,8 @@ class ListGuard:
         now = thread_time()
         if self.start is None:
             self.start = now, fraction
-        spent, done = now - self.start[0], fraction - self.start[1]
+        spent = now - self.start[0]
+        done = fraction - self.start[1]
         if done > 0 and spent > MAX_LIST_SECONDS / 60 and spent > MAX_LIST_SECONDS * done:
             raise Missing(_too_long(spent / done), "")
         if self.progress is not None:
@@ -377,7 +386,8 @@ def refuse_unresolved(model: Model, numerics: Numerics) -> None:
     and every step would leave permanent bonds: the list would grow, and the run time with its
     square.
     """
-    drive, pace = model.rig.drive.signal, _bond_swing(model)
+    drive = model.rig.drive.signal
+    pace = _bond_swing(model)
     swing = pace * drive.period / numerics.steps
     if swing > MOST_SWING:
         wanted = ceil(pace * drive.period)

@@ -55,7 +55,8 @@ def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None
 
     The seconds of the preparation are a dict by name. The parameters are those of `run_march`.
     """
-    rig, begin = model.rig, perf_counter()
+    rig = model.rig
+    begin = perf_counter()
     contact = make_contact(model, numerics, patch)
     reduced = perf_counter() - begin
     engine.warm_up(rig.modes, rig.drive.signal, contact, say)
@@ -128,7 +129,8 @@ class MarchReader(Reader):
 
     def stated_errors(self, run, drive, values: dict) -> dict:
         """Return the errors due to peaks between samples and due to the end of the run, by name."""
-        late, between = self.late(run.window), self.peak_excesses(run.window)
+        late = self.late(run.window)
+        between = self.peak_excesses(run.window)
         return {name: late.get(name, 0.0) + between.get(name, 0.0) for name in late | between}
 
     def peak_excesses(self, window) -> dict:
@@ -162,7 +164,8 @@ class MarchReader(Reader):
         """Return the loop and, if an interface with a set-valued law sticks, its known measures."""
         if not self.rubs:
             return {}
-        rig, jumps = self.model.rig, self.contact.set_valued
+        rig = self.model.rig
+        jumps = self.contact.set_valued
         out = {
             "loop": self._loop(run, drive),
             "still": self.held if jumps else 0.0,
@@ -190,7 +193,8 @@ class MarchReader(Reader):
         number : int
             Index of the interface.
         """
-        model, one = self.model, self.model.rig.friction.interfaces[number]
+        model = self.model
+        one = self.model.rig.friction.interfaces[number]
         if (
             not law_has_trait(one.numbers.law, "overshoots")
             or model.grooves is not None
@@ -206,7 +210,8 @@ class MarchReader(Reader):
         If no other forces act besides drive and friction, the harmonics of the force come from the
         motion (`friction_harmonic`).
         """
-        w, rig = part.window, self.model.rig
+        w = part.window
+        rig = self.model.rig
         work = getattr(part, "window_work", None)
         work = part.work if work is None else work
         # the yaw of strips contributes work as well
@@ -239,7 +244,8 @@ class MarchReader(Reader):
 
     def _levels(self, done) -> tuple:
         """Return the levels of the drive, and the probe of `levels.onset`."""
-        rig, numerics = self.model.rig, self.numerics
+        rig = self.model.rig
+        numerics = self.numerics
 
         def probe(number, level):
             """Run another level after the level of this index, and return its Level."""

@@ -39,8 +39,12 @@ AS_ONE_POINT = (
 
 def collect_warnings(run) -> list:
     """Return the warnings of a `rig.Coupled`."""
-    model, patch, raw, found = run.model, run.patch, run.raw, run.measures
-    book, harmonics = raw.book, raw.extra.get("harmonics")
+    model = run.model
+    patch = run.patch
+    raw = run.raw
+    found = run.measures
+    book = raw.book
+    harmonics = raw.extra.get("harmonics")
     steps = (
         run.numerics.steps
         if "steps_per_cycle" in ENGINES[run.numerics.engine].summary_numbers
@@ -104,7 +108,8 @@ def peak_at_an_end(run, modes) -> list:
     modes : callable
         Returns the modes, as `plan.mode_frequencies` does.
     """
-    found, drive = run.measures.get("peak_frequency"), run.model.rig.drive.signal
+    found = run.measures.get("peak_frequency")
+    drive = run.model.rig.drive.signal
     at = (
         None
         if found is None or found.value is None
@@ -112,7 +117,8 @@ def peak_at_an_end(run, modes) -> list:
     )
     if at is None or not run.measures["relative_displacement_amplitude"].value > 0:
         return []
-    upper, key = at == max(drive.low, drive.high), "drive.from" if at == drive.low else "drive.to"
+    upper = at == max(drive.low, drive.high)
+    key = "drive.from" if at == drive.low else "drive.to"
     side, move = ("above", "raise") if upper else ("below", "lower")
     known = _nearest_resonance(modes(), at, upper)
     beyond = (
@@ -145,8 +151,10 @@ def _nearest_resonance(modes: list, at: float, upper: bool) -> list:
     """
     near = []
     for mode in modes:
-        free, stuck = mode["free_frequency"], mode["stuck_frequency"]
-        low, high = free, free if stuck is None else max(free, stuck)
+        free = mode["free_frequency"]
+        stuck = mode["stuck_frequency"]
+        low = free
+        high = free if stuck is None else max(free, stuck)
         if high > at * (1 + AT) if upper else 0 < low < at * (1 - AT):
             held = (
                 f" with a free interface and {format_number(high, 4)} Hz with one that sticks"
@@ -160,7 +168,9 @@ def _nearest_resonance(modes: list, at: float, upper: bool) -> list:
 
 def collect_notes(run) -> list:
     """Return the notes of a `rig.Coupled` on its law, engine, fields and the end of its motion."""
-    model, raw, rig = run.model, run.raw, run.model.rig
+    model = run.model
+    raw = run.raw
+    rig = run.model.rig
     ended = [
         *_lateral_motion_sentence(run),
         *([raw.message] if raw.message and raw.outcome is Outcome.LEAVES_GROOVES else []),
@@ -170,10 +180,8 @@ def collect_notes(run) -> list:
             "strips that slip part by part have no common shear stress, so the fields contain only the pressure",
             *ended,
         ]
-    out, f = (
-        [*_bond_notes(model, run.patch, raw), *climbing_as_one(model, run.patch)],
-        model.friction,
-    )
+    out = [*_bond_notes(model, run.patch, raw), *climbing_as_one(model, run.patch)]
+    f = model.friction
     if len(rig.friction.interfaces):
         out += ENGINES[run.numerics.engine].call("notes", model, run.numerics, run.patch, raw) or []
     if raw.levels and rig.drive.levels.onset[0] == "slip" and raw.held > 0:
@@ -192,11 +200,9 @@ def collect_notes(run) -> list:
 
 def _release_sentence(run) -> list:
     """Return the sentence on the time span of the measures of a release that still decays."""
-    rig, window, main = (
-        run.model.rig,
-        run.raw.window,
-        run.measures["relative_displacement_amplitude"],
-    )
+    rig = run.model.rig
+    window = run.raw.window
+    main = run.measures["relative_displacement_amplitude"]
     if (
         rig.drive.kind != "free"
         or main.value is None
@@ -247,10 +253,8 @@ def creeping_note(friction) -> list:
 
 def _as_one_point(model, patch, numerics) -> list:
     """Return the sentence, in a list, on a patch that moves exactly as one point."""
-    f, moves = (
-        model.friction,
-        model.rig.friction.load_varies or model.rig.friction.strips_slide_apart,
-    )
+    f = model.friction
+    moves = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart
     if (
         patch is None
         or f is None
@@ -303,7 +307,8 @@ def unmoved_elements(model, numerics, patch, raw) -> list:
 
     slides = raw.window.extra.get("slides", raw.window.slide[:, None])
     for group, slide in zip(pieces.YieldingElements(model, numerics, patch).groups, slides.T):
-        most, half = float(group.yield_displacement.max(initial=0.0)), float(np.ptp(slide)) / 2
+        most = float(group.yield_displacement.max(initial=0.0))
+        half = float(np.ptp(slide)) / 2
         if most > half:
             return [
                 f"a part of the joint slips only at a slide above {format_length(most)}, but the slide in this motion is "
@@ -342,7 +347,8 @@ def created_warning(model, book: dict, cycles: float) -> list:
     """
     if model.friction is None or model.friction.reading != "report":
         return []
-    made, work = book.get("created", 0.0), book.get("dissipated", 0.0)
+    made = book.get("created", 0.0)
+    work = book.get("dissipated", 0.0)
     if made <= 1e-9 * work or made <= 0:
         return []
     return [

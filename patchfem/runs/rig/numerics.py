@@ -83,7 +83,8 @@ def choose(model: Model) -> Numerics:
     PatchfemError
         For a method that cannot do it.
     """
-    accuracy, rig = model.accuracy, model.rig
+    accuracy = model.accuracy
+    rig = model.rig
     engine = choose_engine(model)
     window = int(max(1, min(10, (rig.drive.cycles + WHOLE_CYCLE_TOL) // 10)))
     # the window is the whole record except the transient at its start
@@ -165,7 +166,8 @@ def unique_steps(model: Model) -> int:
     It is 0 except for bonds that weaken: dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, with k_t = mu_s
     N/eps_0 and the mass M that the interface moves.
     """
-    f, modes = model.friction, model.rig.modes
+    f = model.friction
+    modes = model.rig.modes
     if (
         f is None
         or not law_has_trait(f.law, "bonds")

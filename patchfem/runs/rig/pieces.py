@@ -100,7 +100,10 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
 
 def _run(reader, frames: int, say, progress) -> Solution:
     """Run the drive of a rig, level by level if it has levels, and return the Solution."""
-    rig, numerics, begin, more = reader.model.rig, reader.numerics, perf_counter(), {}
+    rig = reader.model.rig
+    numerics = reader.numerics
+    begin = perf_counter()
+    more = {}
     histories.load_event_kernels(say)
     prepare = {"reduce": reader.reduced, "compiled_code": perf_counter() - begin}
     begin = perf_counter()
@@ -138,14 +141,17 @@ class PieceReader(Reader):
         super().__init__(
             model, numerics, patch, found.contact, found.held, histories.SAMPLES_PER_CYCLE
         )
-        self.groups, self.rigid, self.reduced = found.groups, found.rigid, found.seconds
+        self.groups = found.groups
+        self.rigid = found.rigid
+        self.reduced = found.seconds
         self.apart = found.rigid and model.rig.friction.strips_slide_apart
 
     def over_strips(self, run):
         """Return the run with histories of the whole patch, if its strips slide independently."""
         if not self.apart:
             return run
-        loads, offsets = strips.strip_loads(self.patch), self.patch.strips.offsets
+        loads = strips.strip_loads(self.patch)
+        offsets = self.patch.strips.offsets
         response, window = (
             strips.average_strips(one, loads, offsets) for one in (run.response, run.window)
         )
@@ -254,7 +260,8 @@ class PieceReader(Reader):
         have nearly the same error. The vibration that jumps excite in a mode r times as fast as the
         drive falls with 1/r^2, and its fourth derivative grows with r^2.
         """
-        window, modes = run.window, self.model.rig.modes
+        window = run.window
+        modes = self.model.rig.modes
         left = {} if self.apart else self.sampling_errors(run, drive, values)
         if not self.rigid or window.time[-1] - window.time[0] < 1.5 * drive.period:
             return left
@@ -265,7 +272,8 @@ class PieceReader(Reader):
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """Return the Solution of a PieceRun, with its steady motion if its windows still change."""
-        drive, numerics = drive or self.model.rig.drive.signal, self.numerics
+        drive = drive or self.model.rig.drive.signal
+        numerics = self.numerics
         more |= {"extra": more.get("extra", {}) | tail} if (tail := self.tail(run, drive)) else {}
         unsettled = still_changes(
             run.amplitudes,
@@ -291,7 +299,8 @@ def _strips_loop(run, drive) -> InterfaceLoop:
     The samples are those on both sides of every event; the yaw does work in addition to the mean
     slide.
     """
-    window, omega = run.window, find_drive_omega(drive)
+    window = run.window
+    omega = find_drive_omega(drive)
     gaps = np.diff(window.time)
     weight = np.concatenate([[0.0], gaps / 2]) + np.concatenate([gaps / 2, [0.0]])
     held = ~window.extra["slide_rates"].any(axis=1)
@@ -403,7 +412,9 @@ class YieldingElements:
     rigid = False
 
     def __init__(self, model, numerics, patch):
-        rig, self.contact, begin = model.rig, None, perf_counter()
+        rig = model.rig
+        self.contact = None
+        begin = perf_counter()
         if len(rig.modes.interfaces) > 1:
             parts = interface.own_elements(model, numerics.meshed)
         else:
@@ -426,7 +437,10 @@ class YieldingElements:
 class RigidElements:
     """Rigid elements `groups` of every Coulomb interface of a model; any slip counts as slip."""
 
-    rigid, contact, held, seconds = True, None, 0.0, 0.0
+    rigid = True
+    contact = None
+    held = 0.0
+    seconds = 0.0
 
     def __init__(self, model, numerics, patch):
         self.groups = tuple(
@@ -436,7 +450,8 @@ class RigidElements:
 
 def coulomb_limits(model, patch) -> list:
     """Return the static and kinetic friction limits [N] of every interface; 0 without friction."""
-    rig, share = model.rig, 1.0
+    rig = model.rig
+    share = 1.0
     if rig.friction.strips_slide_apart:
         return [
             tuple(map(float, model.friction_limits(load))) for load in strips.strip_loads(patch)

@@ -127,9 +127,12 @@ def mode_frequencies(rig, chain: dict) -> list:
     The stuck frequency is that with the contact held by the links of a chain; None if no link is
     compliant, and without friction.
     """
-    modes, rows, stiffness = rig.modes, rig.modes.interfaces, stuck_stiffness(rig, chain)
+    modes = rig.modes
+    rows = rig.modes.interfaces
+    stiffness = stuck_stiffness(rig, chain)
     if modes.lateral_faces is not None:
-        rows, stiffness = np.concatenate([rows, modes.lateral_faces]), np.tile(stiffness, 2)
+        rows = np.concatenate([rows, modes.lateral_faces])
+        stiffness = np.tile(stiffness, 2)
     named = rig.structure.lists_modes and modes.shapes is None
     out = []
     for k, omega in enumerate(modes.omega):
@@ -153,7 +156,8 @@ def cost(model: Model, points: int) -> Cost:
     points : int
         Nodes of the interface; 1 without a patch.
     """
-    rig, numerics = model.rig, choose(model)
+    rig = model.rig
+    numerics = choose(model)
     engine = ENGINES[numerics.engine]
     count = len(rig.structure.frequencies)
     rows = len(getattr(rig.drive.signal, "breaks", ())) if not rig.drive.signal.segments else 0
@@ -177,13 +181,18 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
     points : int
         Nodes of the interface.
     """
-    rig, f, soft = model.rig, model.friction, bool(model.partial_slip)
+    rig = model.rig
+    f = model.friction
+    soft = bool(model.partial_slip)
     steps = int(numerics.cycles * numerics.steps)
     is_bonds = model.grooves is None and f is not None and law_has_trait(f.law, "bonds")
-    sizes, parts, modes = {}, [], 0
+    sizes = {}
+    parts = []
+    modes = 0
     if is_bonds and lists.has_list(model, numerics):
         entries, seconds = lists.list_cost(model, numerics)
-        each, sizes["bond_list_about"] = seconds / steps, int(entries)
+        each = seconds / steps
+        sizes["bond_list_about"] = int(entries)
         parts.append(
             MemoryPart(capacity.list_bytes(int(entries)), "the list of bonds", "accuracy.tail")
         )
@@ -215,7 +224,8 @@ def march_code(model: Model) -> EngineCode:
 
 def _step_without_modes(model: Model, numerics, points: int, is_bonds: bool) -> float:
     """Return the CPU seconds of a step of a march without shear modes and list of bonds."""
-    rig, step = model.rig, _step(model.rig, model.friction)
+    rig = model.rig
+    step = _step(model.rig, model.friction)
     if model.grooves is not None:
         return cost_model.GROOVE_STEP_SECONDS
     if is_bonds:
@@ -254,7 +264,9 @@ def groups(model: Model) -> dict:
     - knee [m s-2], or knee_force [N] of a drive by force: drive above which friction alone does not
       bound a motion at resonance, for a block that slides.
     """
-    out, f, rig = {}, model.friction, model.rig
+    out = {}
+    f = model.friction
+    rig = model.rig
     limits = [
         one.friction_limits(model.nominal_load if one.load is None else one.load)
         for one in rig.friction.interfaces
@@ -305,7 +317,8 @@ def _lever(rig) -> float:
     does not excite this mode.
     """
     first = int(np.flatnonzero(rig.modes.omega > 0)[0]) if rig.first_mode.frequency else 0
-    slide, base = abs(float(rig.modes.slide[first])), abs(float(rig.modes.base[first]))
+    slide = abs(float(rig.modes.slide[first]))
+    base = abs(float(rig.modes.base[first]))
     return slide / base if rig.structure.lists_modes and base > 0 else 1.0
 
 
@@ -416,7 +429,8 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
     points : int
         Nodes of the interface; not used.
     """
-    rig, finder = model.rig, choose_steady_method(model)
+    rig = model.rig
+    finder = choose_steady_method(model)
     places = max(1, len(rig.drive.levels.amplitudes))
     if rig.drive.waveform.is_swept:
         places = CURVE[finder.name == "balance"]

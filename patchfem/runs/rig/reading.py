@@ -43,8 +43,12 @@ class Reader:
     def __init__(
         self, model, numerics, patch, contact=None, held: float = 0.0, steps: int | None = None
     ):
-        self.model, self.numerics, self.patch, self.contact = model, numerics, patch, contact
-        self.steps, self.rubs = steps or numerics.steps, model.friction is not None
+        self.model = model
+        self.numerics = numerics
+        self.patch = patch
+        self.contact = contact
+        self.steps = steps or numerics.steps
+        self.rubs = model.friction is not None
         self.creeps = self.rubs and law_has_trait(
             model.friction.law, "creeps"
         )  # such a law never sticks
@@ -79,7 +83,8 @@ class Reader:
         } | self.further_fields(run, drive, stuck)
         if self.rubs:
             given = {"by": reversal_evaluation(self.model), "ledger": ledger} | given
-        window, book = given.pop("window", run.window), given.pop("book", run.ledger)
+        window = given.pop("window", run.window)
+        book = given.pop("book", run.ledger)
         last = run.amplitudes[-min(self.numerics.window, len(run.amplitudes)) :]
         found = compute_measures(
             last_cycles(self.model, self.patch, window, last, book, drive=drive, **given)
@@ -189,7 +194,8 @@ class Reader:
         more
             Other fields of the Solution.
         """
-        drive, window = drive or self.model.rig.drive.signal, self.numerics.window
+        drive = drive or self.model.rig.drive.signal
+        window = self.numerics.window
         stuck, (rings, ring_errors) = self.sticks(run), self.rings(run, drive)
         values = self.values(run, drive, stuck, run.response.extra.get("ledger")) | rings
         kept = {"message": "", "log": None, "snapshots": []}

@@ -71,7 +71,8 @@ def run_coupled(what, patch, coarse, seconds, warnings, say, progress, estimate)
 
     The parameters are those of `run.run`; patch and coarse belong to its [contact].
     """
-    model, rig = what.model, what.model.rig
+    model = what.model
+    rig = what.model.rig
     if rig.start is None and rig.drive.kind != "free" and not np.any(rig.modes.base):
         raise PatchfemError(
             "the drive excites no mode, so nothing moves; give a mode the key `base` or `output`",
@@ -104,7 +105,8 @@ def run_coupled(what, patch, coarse, seconds, warnings, say, progress, estimate)
     notes = [*motion_warnings.collect_notes(run), *left_out]
     if find_decay_rate(rig.modes) < 0 and run.rubs:
         fluttering, more = flutter.find_limit_cycles(run)
-        run, notes = replace(run, measures=run.measures | fluttering), [*notes, *more]
+        run = replace(run, measures=run.measures | fluttering)
+        notes = [*notes, *more]
     run = _set_floors(run)
     outcome = outcome_on_piece(run.outcome, model.patch, patch, raw.response.slide)
     for face in faces.press_faces(model) if model.has_interface_patches else ():
@@ -126,7 +128,8 @@ def run_coupled(what, patch, coarse, seconds, warnings, say, progress, estimate)
 
 def _add_level_measures(run: Coupled) -> Coupled:
     """Return the run with the measures over all levels of its drive."""
-    raw, model = run.raw, run.model
+    raw = run.raw
+    model = run.model
     if not raw.levels:
         return run
     return replace(
@@ -155,13 +158,16 @@ def _add_outcome(run: Coupled) -> Coupled:
     if (
         outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL
     ):  # the limit is not a stop of the scene: nothing bounds the motion
-        outcome, found = Outcome.GROWS, remove_errors(found)
+        outcome = Outcome.GROWS
+        found = remove_errors(found)
     return replace(run, outcome=outcome, measures=found)
 
 
 def _add_reasons(run: Coupled) -> Coupled:
     """Return the run with a reason for each measure that lacks a value."""
-    found, window, rig = run.measures, run.raw.window, run.model.rig
+    found = run.measures
+    window = run.raw.window
+    rig = run.model.rig
     rigid = (
         run.rubs
         and law_has_trait(run.model.friction.law, "set-valued")
@@ -188,19 +194,21 @@ def _add_decay(run: Coupled, coarse) -> tuple:
     without a release. coarse: Patch on a coarser mesh or None. The notes say for which errors the
     mesh is not included.
     """
-    found, raw = (
+    found = (
         decays.compute_decay(run.raw)
         if run.model.rig.drive.kind == "free" and run.estimated
-        else None,
-        run.raw,
+        else None
     )
+    raw = run.raw
     if (
         run.model.rig.drive.kind != "free"
         or not run.estimated
         or not (run.model.partial_slip or run.model.rig.friction.has_partial_slip)
     ):
         return run, found, []
-    ring, own, whys = run.measures.get("ring_frequency"), (run.model, run.patch, coarse), {}
+    ring = run.measures.get("ring_frequency")
+    own = (run.model, run.patch, coarse)
+    whys = {}
     sticks = run_events.find_stick_intervals(raw.window, run.drive, raw.log, raw.held)
     if ring is not None and ring.value and ring.error is not None and sticks:
         swing = np.ptp(raw.window.output[raw.window.time >= sticks[-1][0]]) / 2
@@ -243,7 +251,9 @@ def _set_floors(run: Coupled) -> Coupled:
 
 def _extra(run: Coupled, notes: list) -> dict:
     """Return the other data of a Result: settings, levels, events, energies, notes."""
-    raw, numerics, rig = run.raw, run.numerics, run.model.rig
+    raw = run.raw
+    numerics = run.numerics
+    rig = run.model.rig
     tells = ENGINES[numerics.engine].summary_numbers
     numbers = {"steps_per_cycle": numerics.steps, "iterations": raw.book.get("iterations")}
     out = (
@@ -280,7 +290,8 @@ def _solve(model, numerics, patch, coarse, seconds, say, progress, estimated) ->
     within the tolerance.
     """
     run = _RefinedRun(model, numerics, patch, coarse, say, progress, estimated)
-    engine, size = run.engine, model.rig.displacement_scale
+    engine = run.engine
+    size = model.rig.displacement_scale
     found = run.solve_fine(numerics)
     seconds |= {"march": found.seconds} | (found.prepare or {})
     n_cycles = _whole_period(model, numerics, found)
@@ -362,7 +373,9 @@ class _RefinedRun:
     """
 
     def __init__(self, model, numerics, patch, coarse, say, progress, estimated):
-        self.model, self.patch, self.say = model, patch, say
+        self.model = model
+        self.patch = patch
+        self.say = say
         self.engine = ENGINES[numerics.engine]
         self.solutions = {}
         n_steps = _expected_steps(self.engine, model, numerics, patch, coarse, estimated)
@@ -480,12 +493,10 @@ class Passes:
     """
 
     def __init__(self, progress, expected_steps: float):
-        self.progress, self.expected_steps, self.done, self.shown = (
-            progress,
-            expected_steps,
-            0.0,
-            0.0,
-        )
+        self.progress = progress
+        self.expected_steps = expected_steps
+        self.done = 0.0
+        self.shown = 0.0
 
     def run_pass(self, steps: float, solve):
         """Return the result of solve(progress) for a pass with this number of steps per cycle.
@@ -555,7 +566,8 @@ def _whole_period(model, numerics, found) -> int:
 
 def _enough(model, numerics, found, measures, bars) -> bool:
     """Return whether the displacement is accurate enough, or steps cannot be doubled again."""
-    main, again = measures["relative_displacement_amplitude"], numerics.steps * 2
+    main = measures["relative_displacement_amplitude"]
+    again = numerics.steps * 2
     met = main.error_ratio(model.accuracy.tolerance) <= 1
     if numerics.local:
         return met or numerics.local < MIN_STEP_ERROR

@@ -44,7 +44,8 @@ def smooth_run(model, numerics, patch, frames: int = 0, say=None, progress=None)
 
     The parameters are those of `run_smooth`.
     """
-    rig, begin = model.rig, perf_counter()
+    rig = model.rig
+    begin = perf_counter()
     contact = make_contact(model, numerics, patch)
     engine.load_loop(contact.element.kernels, say)
     loaded = perf_counter() - begin
@@ -85,7 +86,8 @@ class SmoothReader(Reader):
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
         """Return the measures from the polynomials of the steps."""
-        book, fine = run.ledger, run.integrated
+        book = run.ledger
+        fine = run.integrated
         if not _clear(run):
             fine = replace(
                 fine, loops=(fine.loops[0]._replace(stuck_time=None),), slip_start_phases=None

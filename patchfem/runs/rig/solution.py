@@ -82,7 +82,8 @@ def seen_by_gauge(model, raw: Solution) -> Solution:
     gauge = model.rig.modes.gauge
     if gauge is None:
         return raw
-    name, moved = "relative_displacement_amplitude", []
+    name = "relative_displacement_amplitude"
+    moved = []
     for one in (raw.response, raw.window):
         felt = {"sensor": one.output, "sensor_rate": one.output_rate}
         moved.append(
@@ -183,7 +184,8 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
     """
     if not has_full_cycle(window.time[-1] - window.time[0], drive):
         return None
-    weight, omega = np.full(window.time.size, 1.0), find_drive_omega(drive)
+    weight = np.full(window.time.size, 1.0)
+    omega = find_drive_omega(drive)
     weight[[0, -1]] = 0.5
     slide = compute_harmonic(window.time, weight, window.slide - window.slide.mean(), omega)
     pull = compute_harmonic(window.time, weight, window.force, omega) if force is None else force

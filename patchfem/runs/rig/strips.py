@@ -16,7 +16,8 @@ def strip_loads(patch) -> np.ndarray:
 
 def run_of_strips(done, patch):
     """Return a MarchResult of strips as that of the patch, averaged by `average_strips`."""
-    loads, offsets = strip_loads(patch), patch.strips.offsets
+    loads = strip_loads(patch)
+    offsets = patch.strips.offsets
     window = average_strips(done.window, loads, offsets)
     return replace(
         done,
@@ -48,7 +49,8 @@ def average_strips(response, loads, offsets):
     offsets : (s,)
         Lateral positions y of the strips [m].
     """
-    extra, share = response.extra, np.asarray(loads) / np.sum(loads)
+    extra = response.extra
+    share = np.asarray(loads) / np.sum(loads)
     slides, rates, forces = (extra[name] for name in ("slides", "slide_rates", "forces"))
     slips = extra.get("slips", slides)
     return replace(
@@ -74,9 +76,14 @@ def lateral_motion(patch, window, period: float) -> tuple:
         cycle longer (mean over the patch, weighted by the pressure).
     """
     last = window.time >= window.time[-1] - period * (1 + 1e-9)
-    slides, y, x = window.extra["slides"][last], patch.strips.offsets, np.abs(patch.x)
+    slides = window.extra["slides"][last]
+    y = patch.strips.offsets
+    x = np.abs(patch.x)
     turned = (slides[:, -1] - slides[:, 0]) / (y[-1] - y[0])
-    steps, turns, along, whole = np.abs(np.diff(slides, axis=0)), np.abs(np.diff(turned)), 0.0, 0.0
+    steps = np.abs(np.diff(slides, axis=0))
+    turns = np.abs(np.diff(turned))
+    along = 0.0
+    whole = 0.0
     for step, force in zip(steps.T, patch.strips.force):
         bears = force > 0
         along += float(step.sum() * force.sum())

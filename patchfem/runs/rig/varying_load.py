@@ -41,7 +41,8 @@ def varying_load_model(model: Model, numerics: Numerics, patch):
         if patch is None
         else (None, march.make_contact_sets(patch, model.patch.loading.rotational_stiffness))
     )
-    law, shear = make_rubbing(model, numerics), None
+    law = make_rubbing(model, numerics)
+    shear = None
     if model.partial_slip:
         weight = patch.pieces.interface.weight
         shear = march.choose_shear_modes(

@@ -62,7 +62,8 @@ class Evidence:
     @cached_property
     def has_plain_friction(self) -> bool:
         """Whether a single interface slides under a constant load with constant coefficients."""
-        friction, model = self.scene.get("friction"), self.model
+        friction = self.scene.get("friction")
+        model = self.model
         if (
             friction is None
             or self.load is None
@@ -114,7 +115,8 @@ class Evidence:
 
         None also for too few samples.
         """
-        window, frequency = self.result.window, self.frequency
+        window = self.result.window
+        frequency = self.frequency
         if window is None or frequency is None or window.time.size < 3:
             return None
         if self.model.rig is None:
@@ -130,7 +132,8 @@ class Evidence:
     @cached_property
     def frequency(self) -> float | None:
         """Frequency [Hz] of a drive or a slide that is a sine to the end; None for any other."""
-        drive, slide = self.scene.get("drive"), self.scene.get("slide", {})
+        drive = self.scene.get("drive")
+        slide = self.scene.get("slide", {})
         if drive is None:
             return self.number("slide", "frequency") if slide.get("kind") == "sine" else None
         is_sine = drive.get("kind") in ("base", "force") and drive.get("waveform") == "sine"
@@ -139,7 +142,9 @@ class Evidence:
     @cached_property
     def balance(self) -> "ForceBalance | None":
         """Friction by the equation of motion and by its samples; None if other forces act as well."""
-        rig, modes, window = self.model.rig, self.modes, self.window
+        rig = self.model.rig
+        modes = self.modes
+        window = self.window
         if (
             rig is None
             or modes is None
@@ -254,16 +259,16 @@ def energy_balance(modes: SceneModes, window, acceleration: float, omega: float)
     omega : float
         Angular frequency of the drive [rad/s].
     """
-    time, span = window.time, window.time[-1] - window.time[0]
+    time = window.time
+    span = window.time[-1] - window.time[0]
     wave = np.exp(-1j * omega * time)
-    first, rest, size = (
-        np.zeros(modes.omega.size, complex),
-        np.zeros(modes.omega.size, complex),
-        0.0,
-    )
+    first = np.zeros(modes.omega.size, complex)
+    rest = np.zeros(modes.omega.size, complex)
+    size = 0.0
     drive = -1j * acceleration
     for i in range(modes.omega.size):
-        z, v = window.modal[:, i], window.modal_rate[:, i]
+        z = window.modal[:, i]
+        v = window.modal_rate[:, i]
         first[i] = cubic_harmonic(time, z, v, omega)
         ends = 2 / span * (z[-1] * wave[-1] - z[0] * wave[0])
         speed = ends + 1j * omega * first[i]
@@ -277,7 +282,8 @@ def energy_balance(modes: SceneModes, window, acceleration: float, omega: float)
         rest[i] = -sum(terms)
         size += abs(modes.slide[i]) * sum(abs(term) for term in terms)
     scale = modes.mass / (modes.slide @ modes.slide)
-    step, product = np.diff(time), window.force * wave
+    step = np.diff(time)
+    product = window.force * wave
     samples = 2 / span * np.sum(step * (product[1:] + product[:-1]) / 2)
     sampling = 2 / span * np.sum(step * np.abs(np.diff(window.force)))
     return ForceBalance(

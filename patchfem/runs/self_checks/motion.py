@@ -83,7 +83,8 @@ def check_friction_limit(run: Evidence) -> Iterator[Finding]:
     yield Finding("friction_force_peak", peak, min(peak, limit), slack, "N", AT_MOST)
     if run.result.patch is not None and (run.model.partial_slip or run.model.side == "lower"):
         return
-    slip, length = run.value("slip_amplitude"), quantity(friction.get("bond_length", "none"))
+    slip = run.value("slip_amplitude")
+    length = quantity(friction.get("bond_length", "none"))
     least = None
     if (
         friction["law"] == "coulomb"
@@ -112,7 +113,8 @@ def check_loop_area(run: Evidence) -> Iterator[Finding]:
     at most |change of F| |change of q|/2; twice as much is allowed. `equivalent_damping` is
     loop_area/(2 pi K A^2) with K and A of the first mode of the scene.
     """
-    window, area = run.window, run.value("loop_area")
+    window = run.window
+    area = run.value("loop_area")
     if window is None or area is None or not run.has_plain_friction:
         return
     if (
@@ -121,7 +123,8 @@ def check_loop_area(run: Evidence) -> Iterator[Finding]:
     ):
         return
     cycles = round((window.time[-1] - window.time[0]) * run.frequency)
-    move, force = np.diff(window.slide), window.force
+    move = np.diff(window.slide)
+    force = window.force
     expected = float(np.sum(move * (force[1:] + force[:-1]) / 2)) / cycles
     missed = float(np.sum(np.abs(move) * np.abs(np.diff(force)))) / cycles
     largest = float(np.sum(np.abs(move) * np.abs(force[1:]))) / cycles
@@ -132,7 +135,8 @@ def check_loop_area(run: Evidence) -> Iterator[Finding]:
         missed + CUBIC_QUADRATURE * largest + STATED_ERRORS * run.error("loop_area"),
         "J",
     )
-    damping, modes = run.value("equivalent_damping"), run.modes
+    damping = run.value("equivalent_damping")
+    modes = run.modes
     if (
         damping is None
         or modes is None
@@ -162,7 +166,9 @@ def check_motion_measures(run: Evidence) -> Iterator[Finding]:
     follows from the equation of motion, output . z'' + a(t); since friction that jumps at a sample
     may be on either side of the jump, the median over the samples is used.
     """
-    modes, window, rig = run.modes, run.window, run.model.rig
+    modes = run.modes
+    window = run.window
+    rig = run.model.rig
     if (
         rig is None
         or modes is None
@@ -173,10 +179,8 @@ def check_motion_measures(run: Evidence) -> Iterator[Finding]:
         return
     if run.result.outcome in (Outcome.EXCEEDS_TRAVEL, Outcome.GROWS, Outcome.NOT_CONVERGED):
         return
-    amplitude, peak = (
-        run.value("relative_displacement_amplitude"),
-        run.value("absolute_acceleration_peak"),
-    )
+    amplitude = run.value("relative_displacement_amplitude")
+    peak = run.value("absolute_acceleration_peak")
     expected = float(np.ptp(window.modal @ modes.output)) / 2
     if amplitude is not None:
         yield Finding(

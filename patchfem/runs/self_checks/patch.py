@@ -59,7 +59,8 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
     strain and are stiffer than the continuum, so that they lie between the same bounds. The stated
     errors of the measures are added.
     """
-    patch, found = run.result.patch, run.model.patch
+    patch = run.result.patch
+    found = run.model.patch
     if (
         patch is None
         or found.mesh.file is not None
@@ -81,18 +82,22 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
         ):
             if not thickness:
                 continue
-            young, nu = material.young, material.poisson
+            young = material.young
+            nu = material.poisson
             if found.pieces.plane == "strain":
-                column, stress = young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)), young / (1 - nu**2)
+                column = young * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+                stress = young / (1 - nu**2)
             else:
-                column, stress = young / (1 - nu**2), young
+                column = young / (1 - nu**2)
+                stress = young
             for name, modulus in (
                 ("column", column),
                 ("stress", stress),
                 ("shear", young / (2 * (1 + nu))),
             ):
                 flexibility[name] += thickness / (modulus * run.area)
-    normal, shear = run.value("normal_stiffness"), run.value("tangential_stiffness")
+    normal = run.value("normal_stiffness")
+    shear = run.value("tangential_stiffness")
     slack = {
         name: READING * run.value(name) + STATED_ERRORS * run.error(name)
         for name in ("normal_stiffness", "tangential_stiffness")
@@ -134,7 +139,8 @@ def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
     if patch.pressure.outcome is Outcome.NO_CONTACT or "wear" in run.scene:
         return
     fraction, peak, moment, share, load = (run.value(name) for name in names)
-    mean, weight = load / run.area, patch.pieces.interface.weight
+    mean = load / run.area
+    weight = patch.pieces.interface.weight
     relative_errors = run.error("loaded_fraction") / fraction + run.error("pressure_peak") / peak
     relative = STATED_ERRORS * relative_errors
     yield Finding(

@@ -21,7 +21,8 @@ def check_modes(run: Evidence) -> Iterator[Finding]:
     rig = run.model.rig
     if rig is None:
         return
-    modes, structure = run.modes, run.scene["structure"]
+    modes = run.modes
+    structure = run.scene["structure"]
     if modes is not None and modes.omega.size == rig.modes.omega.size:
         pairs = (
             ("natural frequency", rig.modes.omega / (2 * np.pi), modes.omega / (2 * np.pi), "Hz"),

@@ -94,7 +94,8 @@ class _Motion:
     """
 
     def __init__(self, model, patch):
-        self.model, self.pair = model, patch.pair
+        self.model = model
+        self.pair = patch.pair
         self.frames = frames_for(model.accuracy.tolerance)
         self.same = (
             model.grooves is None
@@ -134,7 +135,8 @@ def worn_model(model, patch, depth):
     depth : (m,) or (s, m)
         Worn depth [m].
     """
-    wear, new = model.wear, {}
+    wear = model.wear
+    new = {}
     if model.grooves is not None:
         new["grooves"] = model.grooves.after_wear(mean_depth(patch, depth), wear.upper_share)
     if wear.friction is not None:
@@ -180,7 +182,10 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
             "leave out [wear], or leave the column `lateral` out of slide.file",
         )
         raise PatchfemError(text, "wear")
-    clock, wear, motion, stopped = perf_counter(), model.wear, _Motion(model, patch), ""
+    clock = perf_counter()
+    wear = model.wear
+    motion = _Motion(model, patch)
+    stopped = ""
     asked = WearProblem(
         make_force_function(model.patch, patch.pair),
         motion,
@@ -264,7 +269,9 @@ def _wear_fractions(model, depth) -> list:
 
     Only coated pieces are listed.
     """
-    deepest, upper, asked = float(depth.max(initial=0.0)), model.wear.upper_share, model.patch
+    deepest = float(depth.max(initial=0.0))
+    upper = model.wear.upper_share
+    asked = model.patch
     return [
         (part * deepest / piece.thickness, name, piece.thickness)
         for part, piece, name in (
@@ -288,24 +295,27 @@ def _jump(model, asked: WearProblem, state: WearState) -> WearState:
     if model.patch.interface.strips is not None:
         asked.press.begin(state.force)
     how = asked, state, model.accuracy.tolerance, model.wear.jumps
-    found, low, high, last = (
-        take_jump(*how, until=next_row(model.wear, asked, state)),
-        state.cycle,
-        np.inf,
-        0.0,
-    )
-    below, above, end = ahead(state), ahead(found), found.cycle
+    found = take_jump(*how, until=next_row(model.wear, asked, state))
+    low = state.cycle
+    high = np.inf
+    last = 0.0
+    below = ahead(state)
+    above = ahead(found)
+    end = found.cycle
     for _ in range(MOST_TRIES):
         over = ahead(found)
         if abs(over) <= THIN or (over < 0 and (found.cycle < end or high == np.inf)):
             return found
         if over > 0:
             below = below / 2 if high < np.inf and last > 0 else below
-            high, above = found.cycle, over
+            high = found.cycle
+            above = over
         else:
             above = above / 2 if last < 0 else above
-            low, below = found.cycle, over
-        last, end = over, low - below * (high - low) / (above - below)
+            low = found.cycle
+            below = over
+        last = over
+        end = low - below * (high - low) / (above - below)
         found = take_jump(*how, until=end)
     return found
 
@@ -329,7 +339,8 @@ def next_row(wear, asked: WearProblem, state: WearState) -> float:
     float
         inf if there is no further row.
     """
-    change, weight = wear.friction, asked.area / asked.area.sum()
+    change = wear.friction
+    weight = asked.area / asked.area.sum()
     mean = float(np.vdot(state.depth, weight))
     ahead = [] if change is None or wear.jumps else [row for row in change.depth if row > mean]
     if not ahead:

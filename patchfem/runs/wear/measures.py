@@ -58,10 +58,8 @@ def add_wear_measures(result, found, estimate: bool = True):
     lost = measure_patch_wear(model, found, result.measures, estimate)
     if model.wear.friction is not None:
         lost |= worn_friction(model, found, result.measures, lost["worn_volume"].error)
-    gone, notes = (
-        _worn_through_cycle(model, found, lost["worn_depth_max"].error),
-        result.extra.get("notes", []),
-    )
+    gone = _worn_through_cycle(model, found, lost["worn_depth_max"].error)
+    notes = result.extra.get("notes", [])
     outcome = (
         Outcome.WORN_THROUGH
         if gone and result.outcome not in UNBOUNDED_OUTCOMES
@@ -142,10 +140,8 @@ def widen_by_jumps(model, found, measures: dict) -> dict:
         press_patch(model.patch, found.patch.pair, frozen_array(found.state.coarse_depth))
     )
     here = values(found.patch)
-    other, ratio = (
-        values(found.stripped[0]) if found.stripped else here,
-        other_strips(model.patch)[1],
-    )
+    other = values(found.stripped[0]) if found.stripped else here
+    ratio = other_strips(model.patch)[1]
     added = {
         name: error_of_change(here[name] - rough[name])
         + error_of_change(here[name] - other[name], ratio)
@@ -170,7 +166,9 @@ def find_period(model, result) -> float:
 
 def _warn_of_depth(model, found) -> list:
     """Return warnings of a worn depth that invalidates the stiffness of the unworn pieces."""
-    depth, asked, out = float(found.state.depth.max(initial=0.0)), model.patch, []
+    depth = float(found.state.depth.max(initial=0.0))
+    asked = model.patch
+    out = []
     for share, piece, name in (
         (model.wear.upper_share, asked.pieces.upper, "upper"),
         (1 - model.wear.upper_share, asked.pieces.lower, "lower"),
@@ -208,7 +206,8 @@ def measure_patch_wear(model, found, motion: dict, estimate: bool = True) -> dic
     estimate : bool
         Whether errors are computed.
     """
-    state, area = found.state, areas(model.patch, found.patch.pieces.interface)
+    state = found.state
+    area = areas(model.patch, found.patch.pieces.interface)
     share = found.miss + slip_miss(motion) + _coarser(found, motion)
     mine, *others = [
         _worn_measures(model.patch, *one)
@@ -221,10 +220,13 @@ def measure_patch_wear(model, found, motion: dict, estimate: bool = True) -> dic
         + state.path_error * float(area.sum()),
         "worn_depth_max": state.error,
     }
-    out, before, first = {}, found.moments[0].values, model.wear.start
+    out = {}
+    before = found.moments[0].values
+    first = model.wear.start
     meshes = convergence_errors(mine, *others) if others else {}
     for name, value in mine.items():
-        error, more = None, 0.0 if first is None else first.measure_error(name, before[name])
+        error = None
+        more = 0.0 if first is None else first.measure_error(name, before[name])
         if others and estimate and more is not None:
             error = (
                 jumps[name]
@@ -237,7 +239,8 @@ def measure_patch_wear(model, found, motion: dict, estimate: bool = True) -> dic
         out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor, engine=WORN_SOURCE)
     left = found.moments[-1].values.get("groove_amplitude")
     if left is not None:
-        lost, row = out["worn_volume"].error, TABLE["groove_amplitude"]
+        lost = out["worn_volume"].error
+        row = TABLE["groove_amplitude"]
         out[row.name] = Measure(
             left,
             row.unit,
@@ -263,14 +266,17 @@ def worn_friction(model, found, motion: dict, error: float | None) -> dict:
     error : float or None
         Error of the worn volume [m3].
     """
-    change, area = model.wear.friction, float(found.patch.pieces.interface.weight.sum())
+    change = model.wear.friction
+    area = float(found.patch.pieces.interface.weight.sum())
     deep = [mean_depth(found.patch, one.depth) for one in found.moments[-3:]]
     off = None if error is None else error / area
     depths = () if off is None else (deep[-1] - off, deep[-1] + off)
     ends = [change.compute_worn_law(model.friction, max(depth, 0.0)) for depth in depths]
-    law, out = change.compute_worn_law(model.friction, deep[-1]), {}
+    law = change.compute_worn_law(model.friction, deep[-1])
+    out = {}
     for name, key in (("static_coefficient", "static"), ("bond_length", "bond_length")):
-        value, row = getattr(law, key), TABLE[name]
+        value = getattr(law, key)
+        row = TABLE[name]
         if value is not None:
             spread = max((abs(getattr(end, key) - value) for end in ends), default=None)
             out[name] = Measure(value, row.unit, spread, row.floor)
@@ -293,7 +299,8 @@ def _beyond_table_sentence(model, found) -> list:
     change = model.wear.friction
     if change is None:
         return []
-    deep, out = [mean_depth(found.patch, one.depth) for one in found.moments], []
+    deep = [mean_depth(found.patch, one.depth) for one in found.moments]
+    out = []
     if deep[-1] > change.depth[-1]:
         out.append(
             f"the mean worn depth, {format_length(deep[-1], 3)}, is larger than the last value of wear.friction.depth, "
@@ -326,7 +333,8 @@ def _coarser(found, motion: dict) -> float:
 
     The run on the worn patch may have used smaller steps for its tolerance.
     """
-    used, last = found.moments[-1].values.get("slip_amplitude"), motion.get("slip_amplitude")
+    used = found.moments[-1].values.get("slip_amplitude")
+    last = motion.get("slip_amplitude")
     return (
         abs(used / last.value - 1) if used is not None and last is not None and last.value else 0.0
     )
@@ -372,7 +380,8 @@ def frames(found, fields: dict, period: float) -> dict:
     """
     pick = np.unique(np.linspace(0, len(found.moments) - 1, FRAMES).round().astype(int))
     shown = [found.moments[k] for k in pick[:-1]] if len(pick) > 1 else []
-    count, m = len(shown), found.patch.x.size
+    count = len(shown)
+    m = found.patch.x.size
     depth = np.repeat(found.state.depth[None], len(fields["time"]), axis=0)
     states = {
         "time": np.array([one.cycle for one in shown]) * period,
@@ -418,7 +427,8 @@ def edge_peak(pressure) -> float:
     between two nodes moves as the pieces wear, and the element at the edge carries part of the load
     of its neighbours: the error of such a peak is this excess. pressure: (m,) [Pa].
     """
-    bears, top = np.asarray(pressure) > 0, int(np.argmax(pressure))
+    bears = np.asarray(pressure) > 0
+    top = int(np.argmax(pressure))
     inside = (
         np.convolve(np.pad(bears, N_EDGE_NODES, "edge"), np.ones(2 * N_EDGE_NODES + 1), "valid")
         > 2 * N_EDGE_NODES

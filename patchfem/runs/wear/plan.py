@@ -41,7 +41,8 @@ def jumps_about(model) -> int:
     freely with the drive; multiplied by 0.6 tolerance^-0.18, because the edges of a contact of
     pieces need more (193 nodes, tilts and crowns, 1e4 to 1e8 cycles, tolerances of 1e-2 and 1e-3).
     """
-    asked, wear = model.patch, model.wear
+    asked = model.patch
+    wear = model.wear
     if wear.jumps:
         return wear.jumps
     skin = asked.interface.skin
@@ -53,7 +54,8 @@ def jumps_about(model) -> int:
     x = np.linspace(-pieces.length / 2, pieces.length / 2, most + 1)
     area = np.gradient(x) * pieces.width * pieces.pairs
     press = _springs(asked, x, area)
-    path, law = np.full(x.size, _path_about(model)), model.friction
+    path = np.full(x.size, _path_about(model))
+    law = model.friction
     path = path * (law.static if wear.uses_friction_work else 1.0)
 
     def changing(worn):
@@ -67,12 +69,11 @@ def jumps_about(model) -> int:
         changing if wear.uses_friction_work and wear.friction is not None else lambda worn: path
     )
     row = WearProblem(press, slides, area, wear.coefficient, wear.cycles)
-    state, count = start_wear(row, wear.compute_earlier_depth(x, area)), 0
+    state = start_wear(row, wear.compute_earlier_depth(x, area))
+    count = 0
     while state.cycle < wear.cycles and count < MAX_COUNTED_JUMPS:
-        state, count = (
-            take_jump(row, state, model.accuracy.tolerance, until=next_row(wear, row, state)),
-            count + 1,
-        )
+        state = take_jump(row, state, model.accuracy.tolerance, until=next_row(wear, row, state))
+        count = count + 1
     least = min(count, 6)
     return round(least + (count - least) * 0.6 * model.accuracy.tolerance**-0.18)
 
@@ -103,7 +104,8 @@ def _springs(asked, x, area):
     )
     solid = compliance * area.sum()
     # the depth that deforms is proportional to the length in contact
-    share, height = 1.0, max(asked.pieces.lower.height, asked.pieces.upper.height)
+    share = 1.0
+    height = max(asked.pieces.lower.height, asked.pieces.upper.height)
     for _ in range(12):
         soft = solid * min(share, 1.0) + (
             1 / asked.interface.skin.normal_stiffness if asked.interface.skin is not None else 0.0
@@ -111,9 +113,11 @@ def _springs(asked, x, area):
 
         def press(worn, softening, soft=soft):
             """Return the forces (m,) [N] of the springs."""
-            stiff, level = 1 / (soft / area + softening), gap + worn
+            stiff = 1 / (soft / area + softening)
+            level = gap + worn
             order = np.argsort(level)
-            rising, carried = level[order], np.cumsum(stiff[order])
+            rising = level[order]
+            carried = np.cumsum(stiff[order])
             depth = (asked.loading.load + np.cumsum(stiff[order] * rising)) / carried
             last = np.flatnonzero(depth[:-1] <= rising[1:])
             return stiff * np.maximum(depth[last[0] if last.size else -1] - level, 0.0)
@@ -153,7 +157,8 @@ def cost(model, points: int, motion: float) -> Cost:
         CPU seconds of the march or of the bench with its coarse runs, of which a jump needs one
         run.
     """
-    jumps, strips = jumps_about(model), model.patch.interface.strips
+    jumps = jumps_about(model)
+    strips = model.patch.interface.strips
     again = FINE_RUN_FRACTION * motion if _changes_motion(model) else 0.0
     pressings = (
         SOLVES_PER_JUMP if strips is None else max(SOLVES_PER_JUMP, SOLVES_PER_STRIP * strips.count)

@@ -82,7 +82,9 @@ def _bench(model, patch, frames: int) -> CycleSlip:
     outcome = outcome_on_piece(None, model.patch, patch, found.slide)
     if shaped:
         last = found.frames >= found.first
-        local, tau, slide = found.local[last], found.tau[last], found.slide[found.frames[last]]
+        local = found.local[last]
+        tau = found.tau[last]
+        slide = found.slide[found.frames[last]]
         if found.first == 0:
             local, tau = (
                 np.concatenate([np.zeros((1, part.shape[1])), part]) for part in (local, tau)
@@ -116,13 +118,12 @@ def _rig(model, patch, frames: int) -> CycleSlip:
     )
     if shaped:
         slip_frames = fields.collect_frames(model, chosen, patch, found)
-        local, tau = slip_frames["slip"][1:], slip_frames["shear_stress"][1:]
+        local = slip_frames["slip"][1:]
+        tau = slip_frames["shear_stress"][1:]
         if model.grooves is not None:
-            slide, time, window = (
-                slip_frames["holder_slide"][1:],
-                slip_frames["time"][1:],
-                found.response,
-            )
+            slide = slip_frames["holder_slide"][1:]
+            time = slip_frames["time"][1:]
+            window = found.response
             lifted = np.interp(
                 time,
                 window.time,
@@ -142,7 +143,8 @@ def _beat(values: dict, slip) -> float:
 
     It is due to a mode that still beats. slip: (k,) [m] of the last cycle.
     """
-    own, whole = float(np.ptp(slip)) / 2, values.get("slip_amplitude")
+    own = float(np.ptp(slip)) / 2
+    whole = values.get("slip_amplitude")
     return abs(whole / own - 1) if whole is not None and own > 0 else 0.0
 
 
@@ -188,12 +190,11 @@ def _slip_of_strips(model, patch, found, outcome) -> CycleSlip:
     An open strip has the slip of the nearest strip in contact. Every third sample shows the error
     by reversals between samples, as in `_read`.
     """
-    window, loads = found.window, patch.strips.force.sum(axis=1)
+    window = found.window
+    loads = patch.strips.force.sum(axis=1)
     last = window.time >= window.time[-1] - model.rig.drive.signal.period * (1 + 1e-9)
-    slips, forces = (
-        window.extra.get("slips", window.extra["slides"])[last],
-        window.extra["forces"][last],
-    )
+    slips = window.extra.get("slips", window.extra["slides"])[last]
+    forces = window.extra["forces"][last]
     weight = (
         np.abs(forces) / np.where(loads > 0, loads, 1.0)
         if model.wear.uses_friction_work
@@ -206,12 +207,14 @@ def _slip_of_strips(model, patch, found, outcome) -> CycleSlip:
             [_integrate(slip, heavy) for slip, heavy in zip(slips[some].T, weight[some].T)]
         )
 
-    whole, ends = path(np.arange(len(slips))), [0, len(slips) - 1]
+    whole = path(np.arange(len(slips)))
+    ends = [0, len(slips) - 1]
     lost = [
         (whole - path(np.unique([*ends, *range(first, len(slips), 3)]))) @ loads
         for first in range(3)
     ]
-    total, nearest = float(whole @ loads), _nearest(patch.strips.offsets, loads > 0)
+    total = float(whole @ loads)
+    nearest = _nearest(patch.strips.offsets, loads > 0)
     return CycleSlip(
         np.repeat(whole[nearest, None], patch.x.size, axis=1),
         1.5 * float(np.mean(np.abs(lost))) / total if total > 0 else 0.0,
@@ -286,9 +289,11 @@ def slip_path(model, patch, slide, vertical, local, tau) -> tuple:
     local, tau : (f, m)
         Slip [m] and resultant traction [Pa].
     """
-    g, sigma = model.grooves, patch.pressure.sigma_n
+    g = model.grooves
+    sigma = patch.pressure.sigma_n
     t = g.slope(slide)[:, None]
-    long, carried = np.sqrt(1 + t * t), (vertical / patch.pressure.load)[:, None] * sigma
+    long = np.sqrt(1 + t * t)
+    carried = (vertical / patch.pressure.load)[:, None] * sigma
     steps = integrate_steps(slide, lambda q: np.hypot(1, g.slope(q)))
     path = np.append(0.0, np.cumsum(steps))
     if model.wear.uses_friction_work:

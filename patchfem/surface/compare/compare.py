@@ -267,7 +267,9 @@ def _compare_aligned(place: Place, heights, direction: str) -> Comparison:
 
     heights (n,) [m]: those of the second trace before any was left out.
     """
-    before, after, alignment = place.before, place.after, place.alignment
+    before = place.before
+    after = place.after
+    alignment = place.alignment
     if are_identical(before, after):  # except for rounding the fit finds no shift and no tilt
         alignment = replace(alignment, state=frozen_array(np.zeros(5)))
     section = make_section(alignment)
@@ -390,7 +392,9 @@ def _divide_aligned(alignment: Alignment, tracks: Tracks, step: float) -> Ratios
 
 def _compare_apart(place: Place, direction: str) -> Comparison:
     """Compare two traces that have no part of the surface in common."""
-    before, after, reason = place.before, place.after, place.reason
+    before = place.before
+    after = place.after
+    reason = place.reason
     step = _common_step(before, after)
     notes = _note_steps(before, after)
     flanks = find_flanks(before, after)

@@ -191,5 +191,6 @@ def _measure_flanks(second: Profile, box: tuple, traces) -> Flanks:
         # the highest or lowest point of the roughness may lie anywhere in the track
         error = float(np.quantile(np.abs(traces[:, track.span]).max(axis=1), 1 - tail))
         largest = Interval(peak, max(peak - error, 0.0), peak + error)
-    start, end = float(x[track.span.start]), float(x[track.span.stop - 1])
+    start = float(x[track.span.start])
+    end = float(x[track.span.stop - 1])
     return Flanks(start, end, track.line, x, track.depth, area_interval, largest)

@@ -56,7 +56,8 @@ def measure_largest_depth(section: Section, text: str) -> Quantity:
     text : str
         Definition of the quantity.
     """
-    depth, noise = section.depth, section.noise
+    depth = section.depth
+    noise = section.noise
     windows = _fit_windows(depth, noise, section.correlation)
     smooth = np.empty(depth.size)
     deviation = np.empty(depth.size)

@@ -57,7 +57,8 @@ class TraceModel:
         known = ~after.missing
         self.before = even_before
         self.gaps = before.x, before.missing
-        self.x, self.z = after.x[known], after.z[known]
+        self.x = after.x[known]
+        self.z = after.z[known]
         self.spline = CubicSpline(even_before.x, even_before.z)
         self.slope = self.spline.derivative()
         self.half = even_before.length / 2
@@ -99,7 +100,8 @@ class TraceModel:
         """Return the depth (n,) [m] and its Jacobian (n, 5) at the samples in the overlap."""
         at = self.places(state)
         inside = slice(None) if self.is_cut else self.overlap(at)
-        along, at = (self.x[inside] - self.middle) / self.half, at[inside]
+        along = (self.x[inside] - self.middle) / self.half
+        at = at[inside]
         fall = -self.slope(at)
         depth = self.spline(at) - self.z[inside]
         depth += state[0] + state[1] * along + state[4] * along**2
@@ -145,12 +147,15 @@ class TraceModel:
         """Return the model of only those samples that overlap the first trace at parameters `state`."""
         inside = self.overlap(self.places(state))
         out = copy(self)
-        out.x, out.z, out.is_cut = self.x[inside], self.z[inside], True
+        out.x = self.x[inside]
+        out.z = self.z[inside]
+        out.is_cut = True
         return out
 
     def thin(self, count: int) -> "TraceModel":
         """Return the model with about `count` evenly chosen samples of the second trace."""
         every = max(self.x.size // count, 1)
         out = copy(self)
-        out.x, out.z = self.x[::every], self.z[::every]
+        out.x = self.x[::every]
+        out.z = self.z[::every]
         return out

@@ -166,7 +166,8 @@ def divide_sizes(
     if under[place] <= 0:
         return make_unknown("1", text, f"the {part} before wear is zero")
     value = over[place] / under[place]
-    first, second = over.freedom[place], under.freedom[place]
+    first = over.freedom[place]
+    second = under.freedom[place]
     tail = (1 - LEVEL) / 2
     if correlation <= 0:
         low, high = (1 / fdtri(first, second, p) for p in (1 - tail, tail))

@@ -203,7 +203,8 @@ def find_worn_flanks(
     at = x - shift
     both = (at >= before.x[0]) & (at <= before.x[-1]) & ~after.missing
     known = ~before.missing
-    x, off = x[both], np.interp(at[both], before.x[known], before.z[known]) - after.z[both]
+    x = x[both]
+    off = np.interp(at[both], before.x[known], before.z[known]) - after.z[both]
     means = detrended_means(off, (x < flanks.start) | (x > flanks.end))
     slow = float(means.max() - means.min()) if means.size else 0.0
     if slow < MAX_FLANK_ERROR * flanks.largest.value:

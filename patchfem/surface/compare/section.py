@@ -95,7 +95,8 @@ class Section(NamedTuple):
         if not part.size:
             return 0.0, 0.0
         weight = np.where(inside, self.widths, 0.0)
-        low, high = part[0], part[-1] + 1
+        low = part[0]
+        high = part[-1] + 1
         errors = self.draws[:, low:high] @ weight[low:high]
         gap_errors = self.gap_errors[inside[1:] | inside[:-1]]
         variance = np.var(errors) + gap_errors @ gap_errors
@@ -236,7 +237,8 @@ def _select_end(deviances, candidates, low: int, count: int) -> FlankEnd:
     low, count : int
         First sample of the flank, and number of samples.
     """
-    smooth, step = deviances[:-1], deviances[-1]
+    smooth = deviances[:-1]
+    step = deviances[-1]
     shape = int(np.argmin(smooth[: len(OFFSETS)].min(axis=1)))
     is_step = bool(step.min() < smooth.min() - MIN_STEP_DEVIANCE)
     best = int(candidates[int(np.argmin(step if is_step else smooth[shape]))])

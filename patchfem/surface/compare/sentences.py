@@ -193,7 +193,8 @@ def _describe_sizes(sizes: dict) -> str:
     """Return the beginning of a sentence on a track with these dimensions, "" without a track."""
     if not sizes:
         return ""
-    start, end = sizes["from"].value, sizes["to"].value
+    start = sizes["from"].value
+    end = sizes["to"].value
     depths = f"{format_interval(sizes['depth_mean'])} deep on average, its floor {format_interval(sizes['depth_floor'])}; "
     if start is not None and end is not None:
         return f"a track from x = {_format_span(start, end)} in the second trace (after wear), {depths}"

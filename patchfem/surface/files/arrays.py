@@ -132,7 +132,8 @@ def _read_variables(raw: Raw, places: list, z, factors: LengthFactors) -> Profil
 
 def _load_npy(raw: Raw) -> np.ndarray:
     """Load the array of an .npy file as a view of its bytes."""
-    path, file = raw.path, io.BytesIO(raw.data)
+    path = raw.path
+    file = io.BytesIO(raw.data)
     try:
         version = npy_format.read_magic(file)
         if version not in _HEADER_READERS:

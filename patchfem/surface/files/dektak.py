@@ -57,7 +57,8 @@ def read_dektak(raw: Raw) -> Profile:
     settings, _, _ = text[: header.start()].partition("\nFunction,")  # results come after it
     length = _LENGTH.search(settings)
     factor = length and _parse_unit(length[2])
-    x, note = values["x"], ""
+    x = values["x"]
+    note = ""
     if factor and np.isfinite(float(length[1])):
         x, note = _restore_places(x, float(length[1]) * factor, factors[0])
     trace = make_trace(path, x, values["z"], lines, tuple(factors))

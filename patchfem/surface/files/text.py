@@ -110,7 +110,8 @@ def read_text(raw: Raw, units: tuple | None = None) -> Profile | Areal:
 
 def decode_text(raw: Raw) -> str:
     """Return the text of a file with lines that end in \\n, without quotes."""
-    path, data = raw.path, raw.data
+    path = raw.path
+    data = raw.data
     if not data.strip(b"\xef\xbb\xbf \t\r\n"):
         raise PatchfemError(
             f"{path}: the profile is empty; export it again as text with two columns and {EXAMPLE}"

@@ -292,7 +292,8 @@ def _make_quantity(row: Parameter, value: float | None, intervals: Intervals) ->
         and low is not None
         and not (heights.step <= low <= value <= high <= heights.length)
     ):
-        low, high = None, None
+        low = None
+        high = None
     reason = ""
     if low is None and heights.power:
         reason = NO_INTERVAL

@@ -239,7 +239,8 @@ def describe_change(change: Change) -> list:
 def _describe_wear(change: Change) -> list:
     """Describe the wear, or why none is shown, in sentences."""
     values = change.volumes.values
-    worn, grown = values["worn_volume"], values["grown_volume"]
+    worn = values["worn_volume"]
+    grown = values["grown_volume"]
     if worn.low > 0:
         text = (
             f"Worn: {_format_volume(worn)} over {100 * values['worn_share'].value:.3g} % of the "

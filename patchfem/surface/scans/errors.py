@@ -120,7 +120,8 @@ def _estimate_correlation_area(depth, unworn) -> float:
     area = 1.0
     for values, present in ((depth, unworn), (depth.T, unworn.T)):
         lines = np.unique(np.linspace(0, len(values) - 1, min(len(values), N_LINES)).astype(int))
-        values, present = values[lines], present[lines]
+        values = values[lines]
+        present = present[lines]
         area *= _estimate_correlation_along(np.where(present, values, 0.0), present)
     return min(area, MAX_CORRELATION_AREA)
 

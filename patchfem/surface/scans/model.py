@@ -118,7 +118,8 @@ class ScanModel:
         missing = np.isnan(before.z)
         rows, columns = np.nonzero(binary_erosion(~missing))
         chosen = np.random.default_rng(2).permutation(rows.size)[:n_points]
-        self.rows, self.columns = rows[chosen], columns[chosen]
+        self.rows = rows[chosen]
+        self.columns = columns[chosen]
         z = fill_missing(before.z, missing)
         self.short_waves = z - gaussian_filter(z, LONG_WAVES * min(z.shape), truncate=3.0)
         self._compute_slopes(MIN_SMOOTHING)
@@ -126,7 +127,8 @@ class ScanModel:
     @property
     def at(self) -> np.ndarray:
         """Points (k, 2) [m] of the sample, relative to the middle of the first scan."""
-        x, y = self.before.x - self.before.middle[0], self.before.y - self.before.middle[1]
+        x = self.before.x - self.before.middle[0]
+        y = self.before.y - self.before.middle[1]
         return np.column_stack([x[self.columns], y[self.rows]])
 
     @property
@@ -197,11 +199,16 @@ class ScanModel:
 
     def _linearize_place(self, state, place: tuple) -> "_Linearized":
         """Read the second scan at the position of a state, and compute the Jacobian there."""
-        at, slopes, z = self.at, self.slopes, self.before.z[self.rows, self.columns]
+        at = self.at
+        slopes = self.slopes
+        z = self.before.z[self.rows, self.columns]
         places = self.places(at, state)
         if not self.is_cut:
             inside = self.overlap(places)
-            at, slopes, z, places = at[inside], slopes[inside], z[inside], places[:, inside]
+            at = at[inside]
+            slopes = slopes[inside]
+            z = z[inside]
+            places = places[:, inside]
         along = at / self.before.half
         difference = z - self.read(places)
         by_angle = slopes[:, 0] * at[:, 1] - slopes[:, 1] * at[:, 0]
@@ -270,7 +277,8 @@ class ScanModel:
 
     def _parts(self):
         """Yield slices of rows of the first scan and their points (k, 2) [m] relative to its middle."""
-        x, y = self.before.x - self.before.middle[0], self.before.y - self.before.middle[1]
+        x = self.before.x - self.before.middle[0]
+        y = self.before.y - self.before.middle[1]
         count = max(BLOCK // x.size, 1)
         for first in range(0, y.size, count):
             part = slice(first, first + count)

@@ -220,7 +220,8 @@ class _Search:
         half_turn: pi if the image is rotated by 180 degrees first, else 0.
         """
         if half_turn:
-            z, known = np.rot90(z, 2), np.rot90(known, 2)
+            z = np.rot90(z, 2)
+            known = np.rot90(known, 2)
         tried = [_find_maximum(self._correlate_rotated(z, known, angle), angle) for angle in ANGLES]
         best = max(tried)
         values = self._correlate_rotated(z, known, best.angle)

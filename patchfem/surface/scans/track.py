@@ -202,7 +202,10 @@ def find_direction(depth, worn, x, y) -> tuple:
     from scipy.ndimage import binary_dilation, gaussian_filter
 
     every = max(min(depth.shape) // N_DIRECTION, 1)
-    depth, worn, x, y = depth[::every, ::every], worn[::every, ::every], x[::every], y[::every]
+    depth = depth[::every, ::every]
+    worn = worn[::every, ::every]
+    x = x[::every]
+    y = y[::every]
     known = np.isfinite(depth)
     sigma = max(min(depth.shape) * SMOOTHING, 2.0)
     weight = gaussian_filter(known.astype(float), sigma, mode="constant")
@@ -234,7 +237,8 @@ def _rotate_map(depth, x, y, angle: float) -> _RotatedMap:
         reach = float(np.abs(direction) @ half)
         return np.linspace(-reach, reach, int(np.clip(2 * reach / step + 1, 3, most)))
 
-    along, across = places(ahead, MAX_SECTIONS), places(beside, MAX_PLACES)
+    along = places(ahead, MAX_SECTIONS)
+    across = places(beside, MAX_PLACES)
     indices = []
     for axis in (1, 0):  # rows of the map count along y
         position = half[axis] + along[:, None] * ahead[axis] + across * beside[axis]
@@ -299,7 +303,8 @@ def _measure_group(rotated: _RotatedMap, rows, span: tuple) -> dict | None:
     first, last = span
     known = np.flatnonzero(np.isfinite(section))
     known = known[(known > first - 2 * (last - first)) & (known < last + 2 * (last - first))]
-    low, high = int(known[0]), int(known[-1]) + 1
+    low = int(known[0])
+    high = int(known[-1]) + 1
     if not np.isfinite(section[low:high]).all():
         return None
     outside = np.ones(high - low, bool)

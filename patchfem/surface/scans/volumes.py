@@ -185,7 +185,8 @@ def _measure_share(alignment: ScanAlignment, cell, worn, walls, nearest) -> Quan
     rim = float(cell[widen(worn, 1) & ~worn].sum()) / area
     value = min(2 * above_three - above_six, 1.0)
     reach = (value - above_three + rim + float(cell[walls].sum()) / area) / 2
-    low, high = max(value - reach, 0.0), min(value + reach, 1.0)
+    low = max(value - reach, 0.0)
+    high = min(value + reach, 1.0)
     return Quantity(value, low, high, *MEASURES["worn_share"])
 
 

@@ -83,7 +83,8 @@ def _cell(value, unit):
 
 def linear(f, level, own=141.0, zeta=0.03):
     """(absolute acceleration, relative displacement) of a driven oscillator in closed form."""
-    w, wn = 2 * np.pi * f, 2 * np.pi * own
+    w = 2 * np.pi * f
+    wn = 2 * np.pi * own
     z = -level / (wn**2 - w**2 + 2j * zeta * wn * w)
     return float(abs(level - w**2 * z)), float(abs(z))
 
@@ -187,7 +188,8 @@ def test_always_rows_held_out_or_left_out_do_not_change_the_fit(tmp_path, rubbed
     scene = scene_of(
         tmp_path, RUBS, f"structure.bonded.stiffness={TRUE['structure.bonded.stiffness']}"
     )
-    wanted, rows = free("friction.static=0.3..0.6"), rubbed[1::2]
+    wanted = free("friction.static=0.3..0.6")
+    rows = rubbed[1::2]
     other = [
         (f, level, a * 3, y / 2, flag) if f == 150 else (f, level, a, y, flag)
         for f, level, a, y, flag in rows
@@ -234,7 +236,8 @@ def test_exact_a_marched_motion_is_watched_as_it_runs():
             RUBS, sets=["accuracy.method=march", "accuracy.steps_per_cycle=40", "drive.cycles=30"]
         )
     )
-    seen, measures = MotionObserver(model, None)(model.rig.drive.signal), run(model).measures
+    seen = MotionObserver(model, None)(model.rig.drive.signal)
+    measures = run(model).measures
     assert seen.acceleration == measures["absolute_acceleration_peak"].value
     assert seen.displacement == measures["relative_displacement_amplitude"].value
 
@@ -242,7 +245,8 @@ def test_exact_a_marched_motion_is_watched_as_it_runs():
 def test_rows_flagged_u_are_lower_bounds(tmp_path):
     """A computed response above a bound counts nothing, below it as any other; a row left out counts nothing."""
     path = table(tmp_path, [(*row[:4], "U" if row[0] == 143 else "") for row in linear_rows()])
-    cells, scene = read_readings(path), scene_of(tmp_path, LINEAR)
+    cells = read_readings(path)
+    scene = scene_of(tmp_path, LINEAR)
     computed = ModelReadings(ConditionModels(scene, cells.conditions, free(*LINEAR_FREE), path))
     every = np.ones(cells.row.size, bool)
     for damping, is_above in ((0.01, True), (0.1, False)):
@@ -361,11 +365,9 @@ def test_the_verb_answers_as_the_contract_says(tmp_path):
 def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
     """With the ends of all starts, or of the first alone, kept on disk: the same bits with less work; those of another
     question count for nothing."""
-    scene, path, wanted = (
-        scene_of(tmp_path, LINEAR),
-        table(tmp_path, linear_rows(0.05)),
-        free(*LINEAR_FREE),
-    )
+    scene = scene_of(tmp_path, LINEAR)
+    path = table(tmp_path, linear_rows(0.05))
+    wanted = free(*LINEAR_FREE)
     file = tmp_path / "starts.json"
 
     def go(question, resume):
@@ -377,7 +379,8 @@ def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
     kept = json.loads(file.read_text())
     kept["ends"].pop("all/1")
     file.write_text(json.dumps(kept))
-    half, other = go("one", True), go("other", True)
+    half = go("one", True)
+    other = go("other", True)
     assert again.runs < half.runs < first.runs == other.runs
     for one in (again, half, other):
         assert np.array_equal(one.keys.fit.values, first.keys.fit.values)

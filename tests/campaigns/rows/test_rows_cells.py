@@ -107,10 +107,8 @@ def test_table_1_null_scores_are_those_of_the_closed_forms():
         ratio = np.log(cells.measured / a)
         logs, _ = fit_null_model(cells, "constant", train)
         assert np.abs(logs - (ratio[kind & train].mean() - ratio))[kind].max() < 1e-12
-    table, y = (
-        np.stack([0 * f + 1, np.log(a), np.log(f)], axis=1)[cells.felt],
-        np.log(cells.measured)[cells.felt],
-    )
+    table = np.stack([0 * f + 1, np.log(a), np.log(f)], axis=1)[cells.felt]
+    y = np.log(cells.measured)[cells.felt]
     factor = np.linalg.solve(table.T @ table, table.T @ y)
     logs, numbers = fit_null_model(cells, "power_input_frequency", every)
     assert np.abs(logs[cells.felt] - (table @ factor - y)).max() < 1e-8
@@ -122,7 +120,8 @@ def test_table_1_null_scores_are_those_of_the_closed_forms():
 def test_table_1_null_scores_leave_one_frequency_out():
     """The constant and the strong null, as an independent program found them: .125 and .090 of the accelerations."""
     cells = read_readings(TABLE_1)
-    every, found = np.ones(cells.row.size, bool), {}
+    every = np.ones(cells.row.size, bool)
+    found = {}
     for name in NULL_MODELS:
         left = np.full(cells.row.size, np.nan)
         for _, part in cells.parts("frequency", every):

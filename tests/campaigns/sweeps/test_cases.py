@@ -89,8 +89,10 @@ def test_exact_cases_of_the_same_pieces_follow_each_other():
 
 
 def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
-    pinned, chosen = SweepScene(Path("a.toml"), SMALL_PATCH), SweepScene(Path("a.toml"), PATCH)
-    one, two = cases("contact.load=1 N,2 N"), cases("contact.load=1 N,3 N")
+    pinned = SweepScene(Path("a.toml"), SMALL_PATCH)
+    chosen = SweepScene(Path("a.toml"), PATCH)
+    one = cases("contact.load=1 N,2 N")
+    two = cases("contact.load=1 N,3 N")
     assert (
         one.names(pinned)[0] == two.names(pinned)[0]
         and one.names(chosen)[0] != two.names(chosen)[0]
@@ -108,8 +110,10 @@ def test_exact_the_content_of_a_file_is_part_of_the_name(tmp_path):
     path = tmp_path / "path.csv"
     path.write_text("time [s],displacement [m]\n0,0\n1,1e-6\n")
     text = BENCH[: BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'
-    asked, found = SweepScene(tmp_path / "a.toml", text), cases("normal.load=1 N")
-    asked_beside, beside = SweepScene(tmp_path / "a.toml", BENCH), cases("slide.file=path.csv")
+    asked = SweepScene(tmp_path / "a.toml", text)
+    found = cases("normal.load=1 N")
+    asked_beside = SweepScene(tmp_path / "a.toml", BENCH)
+    beside = cases("slide.file=path.csv")
     before = found.names(asked), beside.names(asked_beside)
     path.write_text("time [s],displacement [m]\n0,0\n1,2e-6\n")
     assert found.names(asked)[0] != before[0][0] and beside.names(asked_beside)[0] != before[1][0]
@@ -123,7 +127,8 @@ def test_exact_a_case_is_the_scene_with_its_values_set():
         BENCH + '[sweep]\n"friction.static" = "0.1, 0.2"\n',
     ):
         for sets in (("friction.static=0.1",), ("friction.static=0.2", "normal.load=1 N")):
-            found, want = SweepScene(Path("a.toml"), text).scene(sets), loads(BENCH, "a.toml", sets)
+            found = SweepScene(Path("a.toml"), text).scene(sets)
+            want = loads(BENCH, "a.toml", sets)
             assert found.tables() == want.tables() and found.sweep == () and found.kind == want.kind
 
 

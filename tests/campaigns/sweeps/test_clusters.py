@@ -48,7 +48,8 @@ def test_exact_a_worker_in_another_folder_answers_from_the_files_of_the_scene(sc
     monkeypatch.chdir(scene.parent)
     asked = work(Path("bench.toml"), BY_FILE)
     want, _ = compute_chunk(asked, [0, 1, 2])
-    there, mine = work(scene, BY_FILE), environment_versions(asked)
+    there = work(scene, BY_FILE)
+    mine = environment_versions(asked)
     monkeypatch.chdir(scene.parents[1] / "there")
     _, (found, _) = _answer(there, [0, 1, 2], (mine, Path("bench.toml")))
     assert found.messages == want.messages and len(want.messages) == 1
@@ -62,7 +63,8 @@ class Worn:
     """A future of a scheduler that is gone, or one that failed."""
 
     def __init__(self, status, error=None):
-        self.status, self.error = status, error
+        self.status = status
+        self.error = error
 
     def exception(self):
         return self.error
@@ -112,7 +114,8 @@ def test_refuses_a_worker_of_another_version(monkeypatch):
         dashboard_address=None,
         silence_logs="CRITICAL",
     ) as one:
-        ready, left = Cluster(one.scheduler.address), [[0], [1]]
+        ready = Cluster(one.scheduler.address)
+        left = [[0], [1]]
         monkeypatch.setattr(cluster, "environment_versions", changing)
         with pytest.raises(Missing, match=said):
             Cluster(one.scheduler.address)

@@ -20,11 +20,11 @@ from patchfem.export.sweeps.run import SweepTarget, sweep_into
 def test_exact_a_sweep_takes_what_its_cases_take_but_for_what_is_done_once(text, over):
     asked = SweepScene(Path("a.toml"), text)
     cases = read_cases(asked, Request([over]))
-    told, plans = (
-        estimate_sweep(asked, cases),
-        [plan(asked.model(cases.sets(number))) for number in range(3)],
-    )
-    seconds, least = [one.seconds for one in plans], 0.05  # of the work that is in no plan
+    told = estimate_sweep(asked, cases)
+    plans = [plan(asked.model(cases.sets(number))) for number in range(3)]
+    # of the work that is in no plan
+    seconds = [one.seconds for one in plans]
+    least = 0.05
     assert max(seconds) <= told["seconds"] + least and told["seconds"] <= sum(seconds) + least
     assert sum(seconds) - 3 * SWEEP_SECONDS <= told["seconds"] + least
     assert told["bytes"] == max(one.bytes for one in plans) > min(one.bytes for one in plans)

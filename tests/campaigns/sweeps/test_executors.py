@@ -87,7 +87,8 @@ def one_case_only(tmp_path: Path, once: bool, executor) -> None:
 
 
 def test_exact_chunks_hand_out_every_case_once():
-    chunks, seen = Chunks(range(1000), 2), []
+    chunks = Chunks(range(1000), 2)
+    seen = []
     while (chunk := chunks.take()) is not None:
         seen += chunk
         chunks.record_time(chunk, 0.01 * len(chunk))
@@ -105,7 +106,9 @@ def test_exact_chunks_take_as_long_as_was_asked_and_end_together():
 
 def test_exact_cases_of_lanes_are_handed_out_as_many_as_march_together():
     """A few tell nothing of how long many take: a sweep of 10 000 said "53 min left" after its first four cases."""
-    few, many, kept = work(RIG, 40), work(RIG, 300), replace(work(RIG, 300), keep=print)
+    few = work(RIG, 40)
+    many = work(RIG, 300)
+    kept = replace(work(RIG, 300), keep=print)
     assert [
         len(next(iterate_chunks(one, range(len(one.cases)), Counting()))[0])
         for one in (few, many, kept)
@@ -141,7 +144,9 @@ def test_exact_what_died_is_tried_alone_after_all_others_and_given_up():
 
 def test_exact_a_chunk_that_died_is_halved_until_the_case_that_kills_is_alone():
     """The other 999 cases of it are answered in 10 chunks, not one by one; the one that kills is alone at last."""
-    chunks, tried, lost = Chunks(range(1000), 1, 1000), [], []
+    chunks = Chunks(range(1000), 1, 1000)
+    tried = []
+    lost = []
     while (chunk := chunks.take()) is not None:
         tried.append(chunk)
         lost += chunks.record_death(chunk) if 617 in chunk else []

@@ -116,9 +116,11 @@ def cases_of(seed: int, count: int):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_models_made_from_the_first_are_those_built_from_text(name):
-    asked, alike = SweepScene(Path("a.toml"), SCENES[name], ("normal.load=20 N",)), 0
+    asked = SweepScene(Path("a.toml"), SCENES[name], ("normal.load=20 N",))
+    alike = 0
     for sets, values in cases_of(len(name), 150):
-        found, built = told(asked, sets, values), told(asked, sets, ())
+        found = told(asked, sets, values)
+        built = told(asked, sets, ())
         assert same(found, built), sets
         alike += asked._like(sets, values) is not None if not isinstance(built, str) else 0
     assert alike == 0 if name == "duration" else alike > 5
@@ -126,13 +128,15 @@ def test_exact_models_made_from_the_first_are_those_built_from_text(name):
 
 @pytest.mark.parametrize("name", PATCHES)
 def test_exact_patches_made_from_the_first_are_those_built_from_text(name):
-    asked, r = SweepScene(Path("a.toml"), PATCHES[name]), np.random.default_rng(len(name))
+    asked = SweepScene(Path("a.toml"), PATCHES[name])
+    r = np.random.default_rng(len(name))
     keys = ["contact.load", "contact.tilt.angle"]
     keys += ["friction.static", "drive.acceleration"] if "friction" in PATCHES[name] else []
     for _ in range(20):
         some = list(r.choice(keys, r.integers(1, len(keys) + 1), replace=False))
         values = 10.0 ** r.uniform(-6, 0, (1, len(some)))
-        sets, values = written(some, values, 0), tuple(values[0].tolist())
+        sets = written(some, values, 0)
+        values = tuple(values[0].tolist())
         made = "friction.static" not in some or "kinetic" not in PATCHES[name]
         assert (asked._like(sets, values) is not None) == made
         assert same(told(asked, sets, values), told(asked, sets, ())), sets
@@ -174,7 +178,9 @@ def written(keys: list, values: np.ndarray, case: int) -> list:
 def numbers_of_rig(model) -> tuple:
     """Return the numbers of mode, drive and start that a scene can set."""
     rig = model.rig
-    modes, drive, start = rig.modes, rig.drive.signal, rig.start
+    modes = rig.modes
+    drive = rig.drive.signal
+    start = rig.start
     of_modes = (
         modes.omega[0],
         modes.damping_matrix[0, 0],
@@ -201,7 +207,8 @@ def numbers_of_contact(model) -> tuple:
 @pytest.mark.parametrize("name", LUMPED)
 def test_exact_columns_of_models_are_the_numbers_of_each(name):
     """Of models as one, with an array in place of each number that differs: what lanes and measures take of them."""
-    r, asked = np.random.default_rng(len(name)), SweepScene(Path("a.toml"), LUMPED[name])
+    r = np.random.default_rng(len(name))
+    asked = SweepScene(Path("a.toml"), LUMPED[name])
     for _ in range(20):
         keys = list(
             r.choice([key for key in KEYS if ".1." not in key], r.integers(1, 5), replace=False)
@@ -226,7 +233,8 @@ def test_exact_models_made_from_the_first_see_what_a_new_key_does_to_the_load(mo
     point = load.PointLoad
     monkeypatch.setattr(load, "PointLoad", lambda force, *others: point(2 * force, *others))
     asked = SweepScene(Path("a.toml"), SCENES["coulomb"])
-    sets, values = ("normal.load=3 N",), (3.0,)
+    sets = ("normal.load=3 N",)
+    values = (3.0,)
     assert asked._like(sets, values) is not None
     assert asked.model(sets, values).point.load == 6.0
     assert same(told(asked, sets, values), told(asked, sets, ()))

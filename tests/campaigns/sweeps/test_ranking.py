@@ -67,7 +67,8 @@ def test_always_a_jump_is_within_the_interval(seed):
 def test_exact_a_grid_has_the_shares_of_its_own_cases():
     """y = 2 a + b + a b with a, b of mean 0: parts 4 V(a), V(b), V(a) V(b)."""
     a, b = np.meshgrid([-1.0, 0.0, 1.0], [-3.0, 1.0, 1.0, 1.0], indexing="ij")
-    x, values = np.stack([a.ravel(), b.ravel()], axis=1), (2 * a + b + a * b).ravel()
+    x = np.stack([a.ravel(), b.ravel()], axis=1)
+    values = (2 * a + b + a * b).ravel()
     parts = np.array([4 * 2 / 3, 3.0, 2.0])
     found = of(ranks(x, values, shape=(3, 4)))
     np.testing.assert_allclose(found["first"], parts[:2] / parts.sum(), rtol=1e-12)
@@ -77,7 +78,8 @@ def test_exact_a_grid_has_the_shares_of_its_own_cases():
 
 
 def test_always_what_the_cases_do_not_tell_is_not_ranked():
-    x, rng = drawn(128, 3, 1), np.random.default_rng(1)
+    x = drawn(128, 3, 1)
+    rng = np.random.default_rng(1)
     assert ranks(x, rng.random(128)) is None  # nothing but noise
     assert ranks(x, np.full(128, 3.0)) is None and ranks(x[:20], ishigami(x[:20])) is None
     assert ranks(x, x[:, 0], errors=1.0) is None  # below its numerical error

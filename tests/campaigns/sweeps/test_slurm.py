@@ -36,7 +36,8 @@ OVER = ("friction.static=0.1,0.2,0.3", "slide.amplitude=5 um,10 um")
 @pytest.fixture
 def slurm(tmp_path, monkeypatch) -> Path:
     """The log of what was submitted; commands `sbatch`, `scancel` and `patchfem` are found first."""
-    place, log = tmp_path / "bin", tmp_path / "submitted"
+    place = tmp_path / "bin"
+    log = tmp_path / "submitted"
     place.mkdir()
     for name, text in {
         "sbatch": SBATCH.format(python=sys.executable, log=str(log)),

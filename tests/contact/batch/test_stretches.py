@@ -44,7 +44,8 @@ def test_exact_as_one_solve_each_under_a_held_rotation():
 @pytest.mark.parametrize("spring", [0.0, 50.0])
 @pytest.mark.parametrize("crown", [0.0, 0.5])
 def test_exact_as_one_solve_each_with_a_free_rotation(spring, crown):
-    load, lines = 100.0, np.array([-4.5e-3, -3e-3, -1e-3, 2e-3, 4e-3])
+    load = 100.0
+    lines = np.array([-4.5e-3, -3e-3, -1e-3, 2e-3, 4e-3])
     found = Intervals(C, X).press(
         np.tile(crown * X**2, (5, 1)), np.full(5, load), load * lines, np.full(5, spring)
     )
@@ -59,11 +60,9 @@ def test_exact_edges_and_stiffnesses_are_those_of_the_set():
     load, gap = family(40, 8)
     body = Intervals(C, X)
     found = body.press(gap, load)
-    places, plain, lever = (
-        body.edge_positions(found, np.zeros(X.size), 1e-4),
-        body.stiffness(found),
-        body.stiffness(found, is_rotation=True),
-    )
+    places = body.edge_positions(found, np.zeros(X.size), 1e-4)
+    plain = body.stiffness(found)
+    lever = body.stiffness(found, is_rotation=True)
     for k in np.flatnonzero(found.n_nodes > 1).tolist():
         force = found.force[k]
         ends = edges.find_edges(C, X, force, found.opening[k], None, 1e-4)

@@ -9,7 +9,8 @@ from patchfem.friction.laws.iwan import slider_cells
 
 def test_exact_one_element_is_what_is_left_beside_one_that_carries_nothing():
     for k, y in ((2.0, 3.0), (1e7, 1e-6)):
-        one, two = make_elements([k], [y]), make_elements([k, 0.0], [y, 1.0])
+        one = make_elements([k], [y])
+        two = make_elements([k, 0.0], [y, 1.0])
         np.testing.assert_array_equal(
             [one.stiffness, one.yield_displacement], [two.stiffness, two.yield_displacement]
         )
@@ -42,7 +43,8 @@ def test_order_two_of_the_cells_of_iwans_law():
     on the mean over such loadings."""
     k, most = slider_cells(1.0, 1.0, -0.3, 0.0)
     fine = make_elements(k, most)
-    coarse, coarser = merge_elements(fine), merge_elements(merge_elements(fine))
+    coarse = merge_elements(fine)
+    coarser = merge_elements(merge_elements(fine))
     places = np.linspace(0.3, 0.7, 2001) * most.max()
 
     def force(parts):
@@ -59,7 +61,8 @@ def test_exact_fours_from_another_place_on_and_the_last_slider_alone():
         parts = merge_elements(parts)
     assert parts.stiffness.size == 49
     for first, sizes in ((0, [4] * 12), (2, [2] + [4] * 11 + [2])):
-        found, ends = merge_elements(parts, 4, first), np.cumsum([0, *sizes])
+        found = merge_elements(parts, 4, first)
+        ends = np.cumsum([0, *sizes])
         assert found.stiffness == pytest.approx(
             [*np.add.reduceat(parts.stiffness[:48], ends[:-1]), parts.stiffness[48]], rel=1e-14
         )

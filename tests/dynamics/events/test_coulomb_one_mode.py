@@ -238,7 +238,9 @@ def test_exact_motion_in_40_digits(omega, decay, om):
         return table[0]
 
     modes = modes_of(omega, decay / omega if omega else 0.0)
-    phase, push, v0 = 0.9, 0.7, 0.3
+    phase = 0.9
+    push = 0.7
+    v0 = 0.3
     drive = PiecewiseDrive((DriveSegment(0.0, 0.2, push, om, phase),), 2 * pi / om)
     times = np.array([1e-3, 0.02, 0.2, 0.29, 0.31, 0.8, 2.0, 5.0]) / max(om, omega, 0.1)
     found = evaluate_motion(
@@ -294,7 +296,8 @@ def test_exact_motion_in_40_digits(omega, decay, om):
 )
 def test_exact_drives_in_segments_against_dop853(drive, zeta, static, kinetic):
     cycles = 6 if drive.segments[-1].amplitude else 4.5
-    end, modes = cycles * drive.period, modes_of(zeta=zeta)
+    end = cycles * drive.period
+    modes = modes_of(zeta=zeta)
     wanted = run_reference(modes, drive.segments, static, kinetic, end, np.zeros(1), np.zeros(1))
     wanted = [one for k, one in enumerate(wanted[:-1]) if k == 0 or one[1] != wanted[k - 1][1]]
     found = run(modes, drive, static, kinetic, end)
@@ -328,7 +331,8 @@ def test_exact_more_static_than_kinetic_friction(friction, kinetic, ratio, perio
     """Where static friction is larger there are motions that repeat after many periods, none of which a shorter one
     shows."""
     done = driven(friction, 0.05 if friction > 0.7 else 0.003, ratio, 4000, kinetic=kinetic)
-    late, size = done.amplitudes[-2 * periods - 2 :], np.abs(done.amplitudes[-periods:]).max()
+    late = done.amplitudes[-2 * periods - 2 :]
+    size = np.abs(done.amplitudes[-periods:]).max()
     np.testing.assert_allclose(late[periods:], late[:-periods], rtol=0, atol=1e-10 * size)
     for fewer in (k for k in range(1, periods) if periods % k == 0):
         assert np.abs(late[fewer:] - late[:-fewer]).max() > 1e-3 * size
@@ -347,7 +351,8 @@ def test_exact_energy_balance(zeta):
 @pytest.mark.parametrize("zeta, ratio", [(0.003, 1.0), (0.2, 0.31), (0.0, 1.7)])
 def test_exact_phasor_of_free_sliding_is_its_closed_form(zeta, ratio):
     """Started in the steady motion, every cycle has the transfer function's phasor."""
-    modes, drive = modes_of(1.0, zeta), SineDrive(1.0, ratio)
+    modes = modes_of(1.0, zeta)
+    drive = SineDrive(1.0, ratio)
     size = -1 / complex(1 - ratio**2, 2 * zeta * ratio)  # of sin
     start = InitialState(np.array([size.imag]), np.array([ratio * size.real]))
     done = simulate(modes, drive, 0.0, 0.0, 50, 1, start=start)

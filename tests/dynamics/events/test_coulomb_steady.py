@@ -90,7 +90,8 @@ POINTS = [
 
 def test_exact_steady_points_against_runs():
     for ratio, level in POINTS:
-        modes, drive = basis_of(1.0, 0.08), SineDrive(level, ratio)
+        modes = basis_of(1.0, 0.08)
+        drive = SineDrive(level, ratio)
         found = steady(modes, drive, 1.0, 1.0)
         marched = amplitude_of_run(modes, drive, 1.0, 1.0, 60)
         assert found.amplitude == pytest.approx(marched, rel=1e-9), (ratio, level)
@@ -100,7 +101,8 @@ def test_exact_steady_points_against_runs():
 @pytest.mark.parametrize("level, ratio, wanted", [(3.0, 0.11, 4), (2.0, 0.06, 8), (2.0, 0.05, 10)])
 def test_exact_many_stops_below_resonance(level, ratio, wanted):
     """A slow drive: several stops per cycle, as the run counts them."""
-    modes, drive = basis_of(1.0, 0.0005), SineDrive(level, ratio)
+    modes = basis_of(1.0, 0.0005)
+    drive = SineDrive(level, ratio)
     found = steady(modes, drive, 1.0, 1.0)
     done = simulate(modes, drive, 1.0, 1.0, 80, 10)
     stops = np.count_nonzero((done.log.kind == 0) & (done.log.time > 70 * drive.period)) / 10
@@ -111,7 +113,8 @@ def test_exact_many_stops_below_resonance(level, ratio, wanted):
 
 def test_exact_two_motions_at_one_level():
     """Kinetic below static friction: at rest it stays, kicked it goes on sliding."""
-    modes, drive = basis_of(1.0, 0.05), SineDrive(0.9, 1.0)
+    modes = basis_of(1.0, 0.05)
+    drive = SineDrive(0.9, 1.0)
     rest = steady(modes, drive, 1.0, 0.3)
     moving = steady(modes, drive, 1.0, 0.3, InitialState(np.zeros(1), np.array([8.0])))
     assert (rest.regime, moving.regime) == ("stuck", "sliding") and rest.amplitude == 0
@@ -156,8 +159,11 @@ def test_exact_two_interfaces_against_a_run(seed, ratio):
 def test_exact_derivative_of_the_map(seed, n, faces, ratio):
     """Pieces and saltations against central differences."""
     rng = np.random.default_rng(seed)
-    modes, static = random_basis(rng, n, faces), rng.uniform(0.2, 1.0, faces)
-    x, drive, step = rng.normal(size=2 * n), SineDrive(1.0, 1.2), 1e-6
+    modes = random_basis(rng, n, faces)
+    static = rng.uniform(0.2, 1.0, faces)
+    x = rng.normal(size=2 * n)
+    drive = SineDrive(1.0, 1.2)
+    step = 1e-6
     one = period_map(modes, drive, static, ratio * static, x)
     for j in range(2 * n):
         e = np.zeros(2 * n)
@@ -167,7 +173,9 @@ def test_exact_derivative_of_the_map(seed, n, faces, ratio):
 
 
 def test_exact_multiplier_is_the_decay_of_a_perturbed_run():
-    modes, drive, static = basis_of(1.0, 0.02), SineDrive(1.4, 1.1), 0.5
+    modes = basis_of(1.0, 0.02)
+    drive = SineDrive(1.4, 1.1)
+    static = 0.5
     found = steady(modes, drive, static, static)
     values = found.multipliers
     assert 0.5 < abs(values[0]) < 1

@@ -51,7 +51,8 @@ def test_exact_coupled_systems_against_dop853(seed, n, faces, ratio, rigid):
     rng = np.random.default_rng(seed)
     modes = random_basis(rng, n, faces, True, rigid)
     static = rng.uniform(0.2, 1.0, faces)
-    drive, begin = SineDrive(1.0, 1.2), start_of(rng, n)
+    drive = SineDrive(1.0, 1.2)
+    begin = start_of(rng, n)
     wanted = run_reference(
         modes, drive.segments, static, ratio * static, 6 * drive.period, begin.z, begin.v
     )
@@ -66,7 +67,8 @@ def test_exact_coupled_systems_against_dop853(seed, n, faces, ratio, rigid):
 
 def test_exact_steps_and_sines_in_turn_against_dop853():
     rng = np.random.default_rng(11)
-    modes, static = random_basis(rng, 3, 2), np.array([0.3, 0.5])
+    modes = random_basis(rng, 3, 2)
+    static = np.array([0.3, 0.5])
     drive = drives.PiecewiseDrive(
         (
             DriveSegment(0.0, 0.7),
@@ -78,7 +80,8 @@ def test_exact_steps_and_sines_in_turn_against_dop853():
     )
     wanted = run_reference(modes, drive.segments, static, static, 25.0, np.zeros(3), np.zeros(3))
     found = list(run(modes, drive, static, static, 25.0))
-    times, states = [w[0] for w in wanted], np.array([w[2] for w in wanted])
+    times = [w[0] for w in wanted]
+    states = np.array([w[2] for w in wanted])
     assert len(found) > 12 and set(np.array([4.1, 9.3, 14.0])) <= {round(p.time, 12) for p in found}
     for t, z in zip(times[:-1], states):
         k = int(np.argmin([abs(p.time - t) for p in found]))
@@ -93,7 +96,9 @@ def test_order_dependent_interfaces_against_a_march():
     """Three interfaces between two coordinates: dependent when stuck together; a march with impulses closes in."""
     rng = np.random.default_rng(9)
     modes = random_basis(rng, 2, 3)
-    static, drive, begin = rng.uniform(0.3, 1.0, 3), SineDrive(1.0, 1.2), start_of(rng, 2)
+    static = rng.uniform(0.3, 1.0, 3)
+    drive = SineDrive(1.0, 1.2)
+    begin = start_of(rng, 2)
     done = simulate(modes, drive, static, static, 3, 3, start=begin)
     errors = []
     for steps in (500, 2000):
@@ -143,9 +148,12 @@ def test_always_friction_law_and_energy(seed, n, faces, ratio, coupled, rigid):
 def test_exact_slides_do_not_move_in_stick():
     """To the last bit, in every interface, across the events of the others."""
     rng = np.random.default_rng(5)
-    modes, static = random_basis(rng, 4, 3), np.array([0.9, 1.1, 0.5])
+    modes = random_basis(rng, 4, 3)
+    static = np.array([0.9, 1.1, 0.5])
     done = simulate(modes, SineDrive(1.0, 1.2), static, static, 30, 30, start=start_of(rng, 4))
-    log, extra, time = done.log, done.window.extra, done.window.time
+    log = done.log
+    extra = done.window.extra
+    time = done.window.time
     assert (
         extra["slides"].shape
         == extra["forces"].shape
@@ -175,8 +183,10 @@ def test_exact_two_interfaces_that_stop_together(joined):
     """Two equal blocks, each on its own spring, move as one does alone; also with a third interface between them."""
     faces = [[1, 0], [0, 1], [1, -1]] if joined else [[1, 0], [0, 1]]
     modes = basis_of([1.0, 1.0], 0.01, faces, (1, 1), (1, 0))
-    drive, one = SineDrive(1.0, 1.1), basis_of(1.0, 0.01)
-    twin, alone = simulate(modes, drive, 0.6, 0.6, 20, 20), simulate(one, drive, 0.6, 0.6, 20, 20)
+    drive = SineDrive(1.0, 1.1)
+    one = basis_of(1.0, 0.01)
+    twin = simulate(modes, drive, 0.6, 0.6, 20, 20)
+    alone = simulate(one, drive, 0.6, 0.6, 20, 20)
     np.testing.assert_allclose(twin.amplitudes, alone.amplitudes, atol=1e-13)
     np.testing.assert_allclose(
         twin.window.extra["slides"][:, 1], twin.window.extra["slides"][:, 0], atol=1e-13
@@ -232,10 +242,8 @@ def test_exact_many_interfaces_stop_and_slip_together(count):
     """Equal blocks: seven, more than are tried one by one, and sixteen, more than whose combinations are tried."""
     modes = basis_of(np.ones(count), 0.02, np.eye(count), np.ones(count), np.eye(count)[0])
     drive = SineDrive(1.0, 1.1)
-    many, one = (
-        simulate(modes, drive, 0.5, 0.5, 6, 6),
-        simulate(basis_of(1.0, 0.02), drive, 0.5, 0.5, 6, 6),
-    )
+    many = simulate(modes, drive, 0.5, 0.5, 6, 6)
+    one = simulate(basis_of(1.0, 0.02), drive, 0.5, 0.5, 6, 6)
     np.testing.assert_allclose(many.amplitudes, one.amplitudes, atol=1e-13)
     assert np.ptp(many.window.extra["slides"], axis=1).max() < 1e-13
     assert energy_balance(many.ledger) < 1e-10
@@ -246,7 +254,9 @@ def choice_at_rest(seed, n, faces, ratio):
     rng = np.random.default_rng(seed)
     modes = random_basis(rng, n, faces)
     static = rng.uniform(0.1, 1.0, faces)
-    z, v, rows = rng.normal(size=n), np.zeros(n), np.asarray(modes.interfaces)
+    z = rng.normal(size=n)
+    v = np.zeros(n)
+    rows = np.asarray(modes.interfaces)
     drive = drives.PiecewiseDrive((DriveSegment(0.0, 0.7, 0.5, 1.0, 0.64),), 2 * pi)
     one, first = rows_of(modes, drive, static, ratio * static, 1e-3, InitialState(z, v))
     out = one.evaluate_rows(first, np.zeros(1, np.int64), np.zeros(1))[0]
@@ -293,7 +303,8 @@ FREE = drives.make_release(2 * pi)
 
 def test_exact_belt():
     """Mass on a spring on a belt of speed 0.1, static 1, kinetic 0.6; the belt is a coordinate of near endless mass."""
-    tiny, speed = 1e-8, 0.1
+    tiny = 1e-8
+    speed = 0.1
     modes = basis_of([1.0, 0.0], 0.0, [[1.0, -tiny]], (0, 0), (1, 0))
     begin = InitialState(np.zeros(2), np.array([speed, speed / tiny]))
     done = simulate(modes, drives.make_release(2 * pi), 1.0, 0.6, 30.0, 10, start=begin)
@@ -327,7 +338,8 @@ def test_exact_phase_after_a_million_cycles():
     """Stuck for a million cycles (the clock is put there), then 1.25 times the amplitude: the motion is the one from
     rest, at the same phases."""
     rate = 2 * pi * 0.37
-    drive, modes = drives.make_levels([0.5, 1.25], rate, 10**6), basis_of(rate, 0.003)
+    drive = drives.make_levels([0.5, 1.25], rate, 10**6)
+    modes = basis_of(rate, 0.003)
     _, late = rows_of(modes, drive, 1.0, 1.0, 10**6 + 4, begin=10**6 - 1)
     _, early = rows_of(modes, SineDrive(1.25, rate), 1.0, 1.0, 4)
     late = late[late[:, 5] >= 10**6]
@@ -405,7 +417,8 @@ def test_exact_coordinates_stay_on_the_stuck_slide():
     modes = basis_of([0.0, 1.4], 0.1, [[h, -0.6]], (-h, -0.8))
     one, rows = rows_of(modes, drives.make_levels([4.0, 0.3], 1.14, 3), 1.5, 1.5, 300)
     rows = rows[rows[:, ROW.cycle] >= 20]
-    held, z = rows[0, one._column(0, COLUMN.slide)], rows[:, ROW.motion : ROW.motion + 2]
+    held = rows[0, one._column(0, COLUMN.slide)]
+    z = rows[:, ROW.motion : ROW.motion + 2]
     assert (
         not rows[:, one._column(0, COLUMN.direction)].any()
         and np.all(rows[:, one._column(0, COLUMN.slide)] == held)
@@ -419,10 +432,8 @@ def test_exact_interface_without_friction_among_others():
     modes = basis_of([1.0, 1.7], 0.02, [[1.0, 0.4], [0.3, -1.0]], (1, 0.5), (1, 1))
     alone = basis_of([1.0, 1.7], 0.02, [[0.3, -1.0]], (1, 0.5), (1, 1))
     drive = SineDrive(1.0, 1.2)
-    two, one = (
-        simulate(modes, drive, [0.0, 0.4], [0.0, 0.4], 20, 5),
-        simulate(alone, drive, 0.4, 0.4, 20, 5),
-    )
+    two = simulate(modes, drive, [0.0, 0.4], [0.0, 0.4], 20, 5)
+    one = simulate(alone, drive, 0.4, 0.4, 20, 5)
     np.testing.assert_allclose(two.amplitudes, one.amplitudes, rtol=1e-13)
     np.testing.assert_allclose(two.log.time, one.log.time, rtol=1e-14)
     assert (

@@ -22,17 +22,17 @@ ONE = basis([1.0], [0.003], [1.0], [1.0], [1.0])
 def random_rig(seed, most):
     """(modes, drive, stiffness, yield slide): rigid, overdamped and coupled ones among them."""
     r = np.random.default_rng(seed)
-    n, t = int(r.integers(1, 6)), int(np.exp(r.uniform(0, np.log(most))))
-    omega, zeta = (
-        np.sort(np.exp(r.uniform(-0.7, 1.5, n))),
-        np.exp(r.uniform(np.log(0.001), np.log(0.3), n)),
-    )
+    n = int(r.integers(1, 6))
+    t = int(np.exp(r.uniform(0, np.log(most))))
+    omega = np.sort(np.exp(r.uniform(-0.7, 1.5, n)))
+    zeta = np.exp(r.uniform(np.log(0.001), np.log(0.3), n))
     omega[0] *= r.random() > 0.2
     zeta[-1] = r.uniform(1, 4) if r.random() < 0.2 else zeta[-1]
     slide, base, output = (r.uniform(0.2, 1.0, n) * r.choice([-1, 1], n) for _ in range(3))
     noise = r.normal(size=(n, n)) * 0.2
     damping = np.diag(2 * zeta * omega) + noise @ noise.T if r.random() < 0.3 else None
-    y, k = np.exp(r.uniform(-3, 1, t)), np.exp(r.uniform(-1, 1.5, t))
+    y = np.exp(r.uniform(-3, 1, t))
+    k = np.exp(r.uniform(-1, 1.5, t))
     k *= np.exp(r.uniform(-1.5, 0)) / (k @ y)
     return (
         basis(omega, zeta, slide, base, output, damping),
@@ -70,7 +70,8 @@ def test_exact_amplitude_at_resonance(stiffness, amplitude):
 def test_exact_two_interfaces_against_dop853():
     faces = np.array([[1.0, 0.4], [0.3, -1.0]])
     modes = basis([1.0, 2.3], [0.01, 0.02], faces[0], [1.0, 0.5], [1.0, 0.2], None, faces)
-    drive, elements = SineDrive(1.0, 1.4), [([2.0, 1.0], [0.1, 0.3]), ([1.5], [0.12])]
+    drive = SineDrive(1.0, 1.4)
+    elements = [([2.0, 1.0], [0.1, 0.3]), ([1.5], [0.12])]
     done = simulate(modes, drive, [make_elements(*one) for one in elements], 4, window=2)
     want = Reference(modes, drive, elements).go(4 * drive.period)
     found = np.concatenate([done.response.modal[-1], done.response.modal_rate[-1]])
@@ -81,7 +82,8 @@ def test_exact_two_interfaces_against_dop853():
 def test_exact_an_output_that_turns_with_a_slide():
     """Two interfaces, the output on one of them: both turn at one instant, again and again."""
     faces = np.array([[1.0, 0.4], [0.3, -1.0]])
-    drive, groups = SineDrive(1.0, 1.4), [make_elements([2.0], [0.1]), make_elements([1.5], [0.12])]
+    drive = SineDrive(1.0, 1.4)
+    groups = [make_elements([2.0], [0.1]), make_elements([1.5], [0.12])]
     runs = [
         simulate(
             basis([1.0, 2.3], [0.01, 0.02], faces[0], [1.0, 0.5], output, None, faces),
@@ -98,7 +100,8 @@ def test_exact_an_output_that_turns_with_a_slide():
 
 def test_exact_grazing_yield():
     """A push that brings the slide just short of its yield, or just past it."""
-    stiff, zeta = 3.0, 0.05
+    stiff = 3.0
+    zeta = 0.05
     held = basis([2.0], [zeta / 2], [1.0], [1.0], [1.0])
     drive = SineDrive(1.0, 0.9)
     peak = np.abs(
@@ -121,7 +124,8 @@ def test_exact_travel_ends_the_run_where_it_is_passed():
 
 
 def test_exact_snapshots_carry_the_force():
-    k, y = np.array([1.0, 3.0, 2.0]), np.array([0.2, 0.05, 0.1])
+    k = np.array([1.0, 3.0, 2.0])
+    y = np.array([0.2, 0.05, 0.1])
     done = simulate(ONE, SineDrive(1.0, 0.8), [make_elements(k, y)], 5.5, window=2, frames=8)
     assert len(done.snapshots) == 8
     for shot in done.snapshots:
@@ -176,11 +180,9 @@ SWEPT = [
     ids=["linear", "log", "displacement", "log displacement", "record"],
 )
 def test_exact_sweeps_and_records_against_dop853(drive):
-    modes, k, y = (
-        basis([1.0, 2.2], [0.02, 0.01], [1.0, 0.5], [1.0, 0.6], [1.0, 0.3]),
-        [2.0, 1.0],
-        [0.1, 0.3],
-    )
+    modes = basis([1.0, 2.2], [0.02, 0.01], [1.0, 0.5], [1.0, 0.6], [1.0, 0.3])
+    k = [2.0, 1.0]
+    y = [0.1, 0.3]
     end = 1.1 * drive.duration
     done = simulate(modes, drive, [make_elements(k, y)], end / drive.period, window=2)
     reference = Reference(modes, drive, [(k, y)])
@@ -199,7 +201,8 @@ def test_exact_sweeps_and_records_against_dop853(drive):
 def test_exact_elements_that_yield_at_one_instant_yield_in_any_order(mirrored):
     """Two equal masses with a mode in which they part: both sets of elements turn and yield at the same instants,
     whichever stands first, and each moves as one mass alone does; equal forces leave the other mode at rest."""
-    h, sign = np.sqrt(0.5), -1.0 if mirrored else 1.0
+    h = np.sqrt(0.5)
+    sign = -1.0 if mirrored else 1.0
     rows = np.array([[h, h], [sign * h, -sign * h]])
     both = ModalBasis(
         ("with", "against"),
@@ -212,7 +215,8 @@ def test_exact_elements_that_yield_at_one_instant_yield_in_any_order(mirrored):
         faces=rows,
     )
     alone = ModalBasis(("with",), *(np.array([x]) for x in (1.0, 0.02, h, 1.0, h)), 1.0)
-    k, y = np.array([0.4, 1.0, 0.3]), np.array([0.1, 0.3, 0.8])
+    k = np.array([0.4, 1.0, 0.3])
+    y = np.array([0.1, 0.3, 0.8])
     one = simulate(alone, SineDrive(1.5, 1.1), [make_elements(2 * k, y)], 40, 5)
     two = simulate(both, SineDrive(1.5, 1.1), [make_elements(k, y)] * 2, 40, 5)
     np.testing.assert_allclose(two.amplitudes, one.amplitudes, rtol=1e-11)

@@ -27,13 +27,12 @@ def jenkins_amplitude(stiffness, limit, zeta, ratio, guess):
 
     def moved(x, spring, force, phase, time):
         matrix = np.zeros((5, 5))
-        matrix[0, 1], matrix[1, :2], matrix[1, 2], matrix[1, 4] = (
-            1.0,
-            (-1 - spring, -2 * zeta),
-            -1.0,
-            -force,
-        )
-        matrix[2, 3], matrix[3, 2] = ratio, -ratio
+        matrix[0, 1] = 1.0
+        matrix[1, :2] = (-1 - spring, -2 * zeta)
+        matrix[1, 2] = -1.0
+        matrix[1, 4] = -force
+        matrix[2, 3] = ratio
+        matrix[3, 2] = -ratio
         return (expm(matrix * time) @ [*x, np.sin(phase), np.cos(phase), 1.0])[:2]
 
     def misses(unknown):
@@ -59,7 +58,8 @@ def test_exact_printed_amplitudes_at_resonance(stiffness, printed):
 
 @pytest.mark.parametrize(("ratio", "limit"), [(1.0, 0.5), (1.2, 0.3), (0.7, 0.2), (1.4, 0.6)])
 def test_exact_one_element_in_closed_form(ratio, limit):
-    modes, group = basis([1.0], [0.05], [1.0], [1.0], [1.0]), [make_elements([3.0], [limit / 3])]
+    modes = basis([1.0], [0.05], [1.0], [1.0], [1.0])
+    group = [make_elements([3.0], [limit / 3])]
     drive = SineDrive(1.0, ratio)
     found = steady(modes, drive, group)
     run = simulate(
@@ -88,11 +88,10 @@ def test_exact_random_rigs_against_long_runs(seed, cycles):
     """The symmetric motion has the amplitude and the rates of a long run, also if it starts from an early cycle."""
     modes, drive, k, y = random_rig(seed, 200)
     group = [make_elements(k, y)]
-    found, run = steady(modes, drive, group), simulate(modes, drive, group, 60, window=1)
-    mine, long = (
-        settled(modes, drive, group, *run.end),
-        simulate(modes, drive, group, cycles, window=1),
-    )
+    found = steady(modes, drive, group)
+    run = simulate(modes, drive, group, 60, window=1)
+    mine = settled(modes, drive, group, *run.end)
+    long = simulate(modes, drive, group, cycles, window=1)
     before = simulate(modes, drive, group, cycles - 1, window=1).end[0]
     end = np.concatenate([long.end[0].z, long.end[0].v])
     size = np.abs(end).max()
@@ -134,11 +133,14 @@ def columns(one, drive, point, half, step):
 @pytest.mark.parametrize("half", [False, True])
 @pytest.mark.parametrize("rig", ["two interfaces", "elements"])
 def test_order_the_derivative_is_that_of_finite_differences(rig, half):
-    modes, drive, groups = PAIR, SineDrive(1.0, 0.7), TWO
+    modes = PAIR
+    drive = SineDrive(1.0, 0.7)
+    groups = TWO
     if rig == "elements":
         modes, drive, k, y = random_rig(104, 200)
         groups = [make_elements(k, y)]
-    one, found = PeriodMap(modes, groups), steady(modes, drive, groups)
+    one = PeriodMap(modes, groups)
+    found = steady(modes, drive, groups)
     slope = one(drive, found.point, half).slope
     assert slope.shape == (found.point.numbers.size,) * 2 and slope.shape[0] > 2 * modes.omega.size
     # between two events the map is a sum of sines and exponentials: differences are of second order
@@ -163,7 +165,8 @@ def test_exact_work_in_is_what_a_cycle_dissipates(seed):
 
 def linear_amplitude(modes, drive, stiffness):
     """Output of modes beside a spring, by the complex response."""
-    n, face = modes.omega.size, modes.slide
+    n = modes.omega.size
+    face = modes.slide
     matrix = (
         np.diag(modes.omega**2)
         + stiffness * np.outer(face, face) / modes.mass
@@ -197,16 +200,17 @@ def test_refuses_what_does_not_repeat():
 def test_exact_a_last_step_that_forgets_a_turn_ends_the_search():
     """Newton's last step may leave a turning place that the period behind it slips past: the point before it counts."""
     r = np.random.default_rng(1068)
-    count, omega = (
-        int(np.exp(r.uniform(0, np.log(40)))),
-        r.choice([0.0, 1.0, np.exp(r.uniform(-1, 2))]),
-    )
+    count = int(np.exp(r.uniform(0, np.log(40))))
+    omega = r.choice([0.0, 1.0, np.exp(r.uniform(-1, 2))])
     zeta = float(r.choice([0.0, 0.003, 0.1, 1.0, 2.5]))
-    shares, mass = r.uniform(0.3, 1.5, 3) * r.choice([-1, 1], 3), float(np.exp(r.uniform(-1, 1)))
+    shares = r.uniform(0.3, 1.5, 3) * r.choice([-1, 1], 3)
+    mass = float(np.exp(r.uniform(-1, 1)))
     modes = replace(basis([omega], [zeta], *([one] for one in shares)), mass=mass)
-    y, k = np.exp(r.uniform(-3, 0, count)), np.exp(r.uniform(-1, 2, count))
+    y = np.exp(r.uniform(-3, 0, count))
+    k = np.exp(r.uniform(-1, 2, count))
     k *= mass * np.exp(r.uniform(-2, 0.3)) / (k @ y)
-    drive, groups = SineDrive(1.0, float(np.exp(r.uniform(-1, 1)))), [make_elements(k, y)]
+    drive = SineDrive(1.0, float(np.exp(r.uniform(-1, 1))))
+    groups = [make_elements(k, y)]
     done = simulate(modes, drive, groups, 40, window=4)
     one = settled(modes, drive, groups, *done.end)
     on = simulate(modes, drive, groups, 2, window=1, start=one.start, memory=one.memory)

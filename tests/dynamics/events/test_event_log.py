@@ -34,7 +34,8 @@ def one_mode(zeta=0.003, slide=1.0):
 
 
 def test_exact_borders_of_levels_are_listed():
-    modes, drive = one_mode(0.05), make_levels([1.0, 2.0, 0.5, 1.5], 0.9, 3)
+    modes = one_mode(0.05)
+    drive = make_levels([1.0, 2.0, 0.5, 1.5], 0.9, 3)
     log = event_run.simulate(modes, drive, 0.6, 0.6, 12, 2).log
     assert log.time[log.kind == event_list.BORDER] == pytest.approx(
         2 * np.pi / 0.9 * np.array([3, 6, 9])
@@ -44,7 +45,8 @@ def test_exact_borders_of_levels_are_listed():
 def test_exact_levels_of_a_scene_are_those_of_one_run():
     """The scene runs level after level; the list is that of one run through all segments."""
     result = run(plan(RIG), estimate=False)
-    found, model = result.extra["events"], result.plan.model
+    found = result.extra["events"]
+    model = result.plan.model
     drive = model.rig.drive.signal
     assert isinstance(drive, PiecewiseDrive)
     limit = 0.3 * model.point.load
@@ -56,7 +58,8 @@ def test_exact_levels_of_a_scene_are_those_of_one_run():
 
 def test_exact_the_last_events_are_kept_and_all_counted():
     """Four events in each cycle of a motion that slides both ways."""
-    modes, drive = one_mode(), SineDrive(1.0, 1.0)
+    modes = one_mode()
+    drive = SineDrive(1.0, 1.0)
     cycles = event_list.MAX_EVENTS // 4 + 20_000
     log = event_run.simulate(modes, drive, 0.8, 0.8, cycles, 2).log
     assert (
@@ -72,7 +75,8 @@ def test_exact_events_of_the_drive_at_the_onset():
     """phase 0.538622 of the release and 2.472613 of the slip at D = 0.8 and damping 0.003."""
     log = event_run.simulate(one_mode(), SineDrive(1.0, 1.0), 0.8, 0.8, 200, 2).log
     found = events_of_log(log)
-    release, stop = (found.kind == 1) | (found.kind == 2), found.kind == 0
+    release = (found.kind == 1) | (found.kind == 2)
+    stop = found.kind == 0
     assert log.phase[np.flatnonzero(release)[-10:]] % np.pi == pytest.approx(0.538622, abs=1e-6)
     assert found.time[stop][-10:] - found.time[release][-10:] == pytest.approx(2.472613, abs=1e-6)
     assert np.abs(found.slide[stop][-10:]) == pytest.approx(0.28704671337871602595, abs=1e-12)

@@ -85,7 +85,8 @@ def agrees(modes, drive, static, ratio, end, count):
     )
     found = [p for p in run(modes, drive, static, ratio * static, end) if p.span > 1e-9]
     assert len(found) > 4
-    times, states = [w[0] for w in wanted], np.array([w[2] for w in wanted])
+    times = [w[0] for w in wanted]
+    states = np.array([w[2] for w in wanted])
     size = np.abs(states).max()
     for phase in found:
         k = int(np.argmin(np.abs(np.array(times) - phase.time)))

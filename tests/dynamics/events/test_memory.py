@@ -17,15 +17,19 @@ class Follower:
     """Elements along prescribed slides, by the memory of the engine and one by one."""
 
     def __init__(self, stiffness, yield_displacement):
-        self.k, self.y = np.asarray(stiffness, float), np.asarray(yield_displacement, float)
+        self.k = np.asarray(stiffness, float)
+        self.y = np.asarray(yield_displacement, float)
         self.group = make_elements(self.k, self.y)
         self.table = make_element_table([self.group])
         self.memory = unstretched_memory(self.table, [0.0])
-        self.stretch, self.lost, self.depth = np.zeros(self.k.size), 0.0, 0
+        self.stretch = np.zeros(self.k.size)
+        self.lost = 0.0
+        self.depth = 0
 
     def to(self, slide: float) -> float:
         """Slide straight to a place [m]; the force [N] there."""
-        memory, way = self.memory, 1.0 if slide > self.memory.slide[0] else -1.0
+        memory = self.memory
+        way = 1.0 if slide > self.memory.slide[0] else -1.0
         if memory.n_slipping[0] and memory.direction[0] != way:
             kernels.store_turning_point.py_func(0, memory)
         while (

@@ -19,18 +19,23 @@ GROUP = [make_elements([2.0, 1.0], [0.1, 0.3])]
 
 def first_harmonic(window, omega):
     """2/T int y exp(-i omega t) of the displacement by Simpson's rule on its cubics, from samples alone."""
-    t, y, v = window.time, window.output, window.output_rate
+    t = window.time
+    y = window.output
+    v = window.output_rate
     h = np.diff(t)
     middle = (y[1:] + y[:-1]) / 2 - h / 8 * np.diff(v)
-    ends, half = y * np.exp(-1j * omega * t), middle * np.exp(-1j * omega * (t[:-1] + h / 2))
+    ends = y * np.exp(-1j * omega * t)
+    half = middle * np.exp(-1j * omega * (t[:-1] + h / 2))
     return 2 / (t[-1] - t[0]) * np.sum(h / 6 * (ends[:-1] + 4 * half + ends[1:]))
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_exact_readings_are_those_of_a_marched_period(seed):
     modes, drive, k, y = random_rig(seed, 12)
-    modes, group = replace(modes, gauge=modes.output[::-1].copy()), [make_elements(k, y)]
-    seen, one = PeriodicMotionFinder(modes, group)(drive), steady(modes, drive, group)
+    modes = replace(modes, gauge=modes.output[::-1].copy())
+    group = [make_elements(k, y)]
+    seen = PeriodicMotionFinder(modes, group)(drive)
+    one = steady(modes, drive, group)
     done = simulate(modes, drive, group, 1.0, 1, start=one.start, memory=one.memory)
     gauged = simulate(
         replace(modes, output=modes.gauge), drive, group, 1.0, 1, start=one.start, memory=one.memory
@@ -44,7 +49,8 @@ def test_exact_readings_are_those_of_a_marched_period(seed):
 
 def test_exact_a_start_of_other_elements_counts_as_none():
     """A memory speaks of so many elements: one of four is no start for two, nor one of two for four."""
-    drive, four = SineDrive(1.0, 1.0), [make_elements([2.0, 1.0, 0.5, 0.2], [0.1, 0.3, 0.4, 0.6])]
+    drive = SineDrive(1.0, 1.0)
+    four = [make_elements([2.0, 1.0, 0.5, 0.2], [0.1, 0.3, 0.4, 0.6])]
     for mine, other in ((GROUP, four), (four, GROUP)):
         assert (
             PeriodicMotionFinder(MODES, mine)(
@@ -57,7 +63,8 @@ def test_exact_a_start_of_other_elements_counts_as_none():
 def test_exact_other_modes_and_elements_take_the_same_room():
     """One after the other in the room of the first, every digit is that of fresh room; other numbers ask for their own
     and leave what is there as it was."""
-    orbits, drives = PeriodicMotionFinder(MODES, GROUP), [SineDrive(1.0, 1.0), SineDrive(2.0, 1.05)]
+    orbits = PeriodicMotionFinder(MODES, GROUP)
+    drives = [SineDrive(1.0, 1.0), SineDrive(2.0, 1.05)]
     stiff = basis([1.3, 2.0], [0.05, 0.02], [0.7, 1.0], [1.0, 0.5], [0.4, 0.2])
     gauged = replace(MODES, gauge=np.array([0.3, 1.0]))
     others = (stiff, GROUP), (gauged, [make_elements([3.0, 0.4], [0.2, 0.25])]), (MODES, GROUP)

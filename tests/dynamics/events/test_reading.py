@@ -39,7 +39,8 @@ def several() -> tuple:
 
 def run_of(modes, drive, groups, cycles=24, window=5) -> tuple:
     """(the run, its rows in the window, what it shows)."""
-    run, kept = histories.start_event_run(modes, drive, groups, cycles, window), []
+    run = histories.start_event_run(modes, drive, groups, cycles, window)
+    kept = []
     ended = run._close_rows
     run._close_rows = lambda late: kept.append(ended(late)) or kept[-1]
     done = run.run(0, None)
@@ -70,15 +71,17 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
         several() if many else (basis(1.0, 0.05), [make_elements([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])])
     )
     run, rows, done = run_of(modes, drive, groups)
-    n, half = modes.omega.size, rows[:, 1:2] / 2
+    n = modes.omega.size
+    half = rows[:, 1:2] / 2
     owner = np.repeat(np.arange(len(rows)), PLACE.size)
-    tau, weight = (half * (1 + PLACE)).ravel(), (half * WEIGHT).ravel()
-    out, time, ends = run.evaluate_rows(rows, owner, tau), rows[owner, 0] + tau, done.window
-    friction_force, span, x = (
-        run._response_from_columns(out, time).acceleration,
-        weight.sum(),
-        done.reading,
-    )
+    tau = (half * (1 + PLACE)).ravel()
+    weight = (half * WEIGHT).ravel()
+    out = run.evaluate_rows(rows, owner, tau)
+    time = rows[owner, 0] + tau
+    ends = done.window
+    friction_force = run._response_from_columns(out, time).acceleration
+    span = weight.sum()
+    x = done.reading
     assert x.span == pytest.approx(span, rel=1e-13) and x.period == drive.period
     turn = np.exp(-1j * drive.omega * time) * weight
     size = np.abs(friction_force).max()
@@ -122,7 +125,8 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
         assert x.interface_value(INTERFACE.secant, f) == pytest.approx(
             secant_stiffness(turns), rel=1e-9
         )
-    slide, end = out[:, 2 * n + 1], rows[-1, 0] + rows[-1, 1]
+    slide = out[:, 2 * n + 1]
+    end = rows[-1, 0] + rows[-1, 1]
     means = [
         np.sum((weight * slide)[part])
         for part in (time < rows[0, 0] + drive.period, time > end - drive.period)
@@ -132,7 +136,8 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
 
 def test_exact_releases_are_those_of_the_log():
     """Mean phase modulo pi of the releases of the first interface within the window."""
-    modes, groups = basis(1.0, 0.05), [make_elements([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])]
+    modes = basis(1.0, 0.05)
+    groups = [make_elements([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])]
     _, rows, done = run_of(modes, SineDrive(1.5, 1.3), groups)
     late = (done.log.time > rows[0, 0]) & (np.abs(done.log.kind) == 1)
     assert late.sum() == done.reading.run[RUN.n_releases] > 4
@@ -170,7 +175,8 @@ def test_exact_a_run_in_brief_shows_what_the_run_shows():
 
 def test_exact_ring_of_an_element_that_holds():
     """In closed form, as a fit to the samples finds it, at the frequency of mode and element together."""
-    modes, drive = basis(1.0, 0.02), SineDrive(1.0, 0.31)
+    modes = basis(1.0, 0.02)
+    drive = SineDrive(1.0, 0.31)
     done = histories.simulate(modes, drive, [make_elements([60.0], [0.02])], 20, window=4)
     amplitude, own, damping = done.ring
     assert own == pytest.approx(np.sqrt(61.0 - 0.02**2)) and damping == pytest.approx(

@@ -33,7 +33,8 @@ def case(modes: int, faces: int, elements: int) -> tuple:
 
 def in_parts(modes, drive, groups, cycles: int, each: int) -> list:
     """PieceRuns of `each` cycles one after the other, each without a state of the cycle before its first."""
-    out, state = [], (None, None)
+    out = []
+    state = (None, None)
     for _ in range(cycles // each):
         out.append(
             histories.simulate(modes, drive, groups, each, 1, start=state[0], memory=state[1])
@@ -81,7 +82,8 @@ def test_exact_a_motion_that_repeats_is_counted_on(shape):
     )
     assert late.sum() == pytest.approx(1000 * each, abs=1)
     assert np.all(np.diff(run.response.time) >= -1e-9 * drive.period)
-    lost, time = run.response.extra["ledger"][2], run.response.time / drive.period
+    lost = run.response.extra["ledger"][2]
+    time = run.response.time / drive.period
     assert np.all(np.diff(lost) >= -1e-12 * lost[-1])
     of_cycle = sum(one.ledger["friction"] for one in parts[-10:]) / 40
     assert np.ptp(np.interp([1000, 3000], time, lost)) == pytest.approx(2000 * of_cycle, rel=2e-3)

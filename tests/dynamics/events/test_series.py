@@ -9,13 +9,15 @@ series = load_uncompiled("patchfem.dynamics.events.series_kernels")
 
 
 def test_exact_first_root_of_a_long_series_is_the_first_of_several():
-    random, rooms = np.random.default_rng(4), np.zeros((series.MAX_HALVINGS + 2, series.HULL_WIDTH))
+    random = np.random.default_rng(4)
+    rooms = np.zeros((series.MAX_HALVINGS + 2, series.HULL_WIDTH))
     later = 0
     for case in range(400):
         places = np.sort(random.uniform(0.02, 1.4, int(random.integers(1, 5))))
         if case % 4 == 0:
             places = np.append(places, places[0] + 10.0 ** random.uniform(-5, -1))  # a pair
-        poly, factor = np.array([1.0]), random.uniform(-2, 2)
+        poly = np.array([1.0])
+        factor = random.uniform(-2, 2)
         for place in places:
             poly = np.convolve(poly, [1.0, -1 / place])
         # exp(factor u) has no root; its terms beyond the 20th are below round-off

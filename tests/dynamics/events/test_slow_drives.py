@@ -130,7 +130,8 @@ def test_exact_the_limit_of_slow_motion_is_statics(zeta):
 def test_exact_the_limit_of_slow_motion_of_elements_is_statics():
     """Three elements beside a spring, all in statics: the loop is that of Masing's rule, force by force."""
     modes = ModalBasis(("m",), *(np.array([x]) for x in (1.0, 0.05, 1.0, 1.0, 1.0)), 1.0)
-    k, y = np.array([0.5, 1.0, 0.4]), np.array([0.1, 0.2, 0.4])
+    k = np.array([0.5, 1.0, 0.4])
+    y = np.array([0.1, 0.2, 0.4])
     (loop,) = histories.simulate(modes, SineDrive(1.0, 1e-7), [make_elements(k, y)], 3, 1).loops
     slide = 1.0 - np.sum(k * y)  # all slip at the peak
     assert abs(loop.displacement_harmonic) == pytest.approx(slide, rel=0.1) and slide > 0.4

@@ -45,7 +45,10 @@ def twin(law, grooves, slide):
     the normal force R = N sqrt(1 + t^2) + f t, half of whose change comes before the motion."""
     slope = grooves.slope
     normal = np.array([LOAD * np.hypot(1, slope(slide[0]))])
-    state, held, forces, losses = law.start(normal), 0.0, [], []
+    state = law.start(normal)
+    held = 0.0
+    forces = []
+    losses = []
     for q, end in pairwise(slide):
         dq = end - q
         inner = 0.5 * (q + end) + 0.5 * dq * np.array([-np.sqrt(0.6), 0, np.sqrt(0.6)])
@@ -56,22 +59,28 @@ def twin(law, grooves, slide):
             before = law.press(state, normal, half)
             step = law.step(before.state, path, half, half, 1.0)
             pulled = float(step.mean[0])
-            last, old = np.clip(2 * pulled - held, -MU * after[0], MU * after[0]), after
+            last = np.clip(2 * pulled - held, -MU * after[0], MU * after[0])
+            old = after
             after = np.array([LOAD * np.hypot(1, slope(end)) + last * slope(end)])
             if abs(after - old)[0] < 1e-13 * LOAD:
                 break
         final = law.press(step.state, half, after)
         forces.append((LOAD * float(grooves.height_difference(q, end)) + pulled * path) / dq)
         losses.append(float((before.dissipated + step.dissipated + final.dissipated)[0]))
-        state, normal, held = final.state, after, float(law.traction(final.state)[0])
+        state = final.state
+        normal = after
+        held = float(law.traction(final.state)[0])
     return np.array(forces), np.array(losses)
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_a_slow_slide_by_the_numpy_law(law):
-    grooves, slide = Grooves(80e-6, 7.5e-6, 0.4), 30e-6 * np.sin(np.linspace(0, 7.3, 101))
+    grooves = Grooves(80e-6, 7.5e-6, 0.4)
+    slide = 30e-6 * np.sin(np.linspace(0, 7.3, 101))
     model = ClimbingModel(grooves, LOAD, LAWS[law][0](2e-6))
-    forces, energies, contact = np.zeros((101, 3)), np.zeros((101, 2)), model.build()
+    forces = np.zeros((101, 3))
+    energies = np.zeros((101, 2))
+    contact = model.build()
     assert follow_path(slide, 1e-3, model.kind, contact, 1e-9, energies, forces) == 0
     mean, lost = twin(LAWS[law][1](2e-6), grooves, slide)
     np.testing.assert_allclose(forces[:-1, 1], mean, rtol=1e-9, atol=1e-9 * LOAD)
@@ -128,10 +137,8 @@ def test_always_a_lifted_mass_that_leaves_the_grooves_is_said():
 
 def test_order_two_a_lifted_mass_that_starts_with_a_speed():
     """Next to no friction, no drive: the motion of the exact steps without any."""
-    grooves, start = (
-        Grooves(80e-6, 7.5e-6, 0.4, 0.5),
-        InitialState(np.array([10e-6]), np.array([0.02])),
-    )
+    grooves = Grooves(80e-6, 7.5e-6, 0.4, 0.5)
+    start = InitialState(np.array([10e-6]), np.array([0.02]))
     still = SineDrive(0.0, DRIVE.omega)
     true = march(
         BASIS, still, make_model(grooves, LOAD, 0.0, 0.0, None, BASIS), 1, 100, start=start

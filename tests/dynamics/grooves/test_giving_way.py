@@ -31,7 +31,9 @@ GROOVES = Grooves(80e-6, 7.5e-6, 0.3)
 
 
 def march_slides(model, slide):
-    forces, energies, contact = np.zeros((slide.size, 3)), np.zeros((slide.size, 2)), model.build()
+    forces = np.zeros((slide.size, 3))
+    energies = np.zeros((slide.size, 2))
+    contact = model.build()
     assert follow_path(slide, 1e-3, model.kind, contact, 1e-9, energies, forces) == 0
     return forces, energies
 
@@ -70,7 +72,9 @@ def test_exact_on_flat_ground_they_are_the_exact_set_of_elements():
 def spring_before_all(grooves, slide, stiffness):
     """Force against the slide of one elastic-plastic point behind one spring [N/m] along the flank, by small explicit
     steps: f = K (s - l), l the path of the point, f = mu R/eps times what of l is elastic, |f| <= mu R."""
-    force, along, springs = np.zeros(slide.size), 0.0, LOAD * np.hypot(1, grooves.slope(slide[0]))
+    force = np.zeros(slide.size)
+    along = 0.0
+    springs = LOAD * np.hypot(1, grooves.slope(slide[0]))
     force[0] = LOAD * grooves.slope(slide[0])
     for i in range(1, slide.size):
         t = float(grooves.slope(slide[i]))
@@ -92,7 +96,8 @@ def spring_before_all(grooves, slide, stiffness):
 
 
 def test_exact_one_spring_before_all_points_by_small_steps():
-    steps, fine = 400, 40
+    steps = 400
+    fine = 40
     for stiffness in (2e7, 2e8):
         model = giving(LAWS["elastic-plastic"], GROOVES, np.full((COUNT, COUNT), 1 / stiffness))
         here = march_slides(model, wave(steps))[0][:, 0]
@@ -130,12 +135,10 @@ def test_exact_coulombs_points_on_flat_ground_are_their_exact_elements(tolerance
 def coulombs_points(grooves, slide, compliance):
     """Force against the slide of Coulomb points behind a compliance [m/N] along the flank: at the end of every step
     the forces f are those of least f C f/2 - f (path - slip) with |f| <= mu share R, by Gauss and Seidel."""
-    force, f, slip, path = (
-        np.full(slide.size, LOAD * grooves.slope(slide[0])),
-        np.zeros(COUNT),
-        np.zeros(COUNT),
-        0.0,
-    )
+    force = np.full(slide.size, LOAD * grooves.slope(slide[0]))
+    f = np.zeros(COUNT)
+    slip = np.zeros(COUNT)
+    path = 0.0
     for i in range(1, slide.size):
         t = float(grooves.slope(slide[i]))
         path += np.hypot(1, grooves.slope(0.5 * (slide[i] + slide[i - 1]))) * (
@@ -156,7 +159,8 @@ def coulombs_points(grooves, slide, compliance):
 
 def test_exact_coulombs_points_on_the_flank_by_least_energy():
     """Soft pieces, of which some points slip over most of a stroke of a quarter of a wave."""
-    soft, slide = 40 * GIVING, 20e-6 * np.sin(np.linspace(0, 7.3, 401))
+    soft = 40 * GIVING
+    slide = 20e-6 * np.sin(np.linspace(0, 7.3, 401))
     true = coulombs_points(GROOVES, slide, soft)
     here = march_slides(coulomb(GROOVES, 1e-3, soft), slide)[0][:, 0]
     np.testing.assert_allclose(here[:-1], true[:-1], rtol=0, atol=2e-3 * np.abs(true).max())
@@ -232,7 +236,8 @@ steps_per_cycle = 100
     for motion in (slide, rig):
         found = pf.run(load(text + motion))
         area = found.patch.pieces.interface.weight
-        tau, time = found.fields["shear_stress"], found.fields["time"]
+        tau = found.fields["shear_stress"]
+        time = found.fields["time"]
         force = np.interp(time, found.response.time, found.response.force)
         np.testing.assert_allclose(tau[1:] @ area, force[1:], rtol=1e-6, atol=1e-6 * 115.65)
         assert (

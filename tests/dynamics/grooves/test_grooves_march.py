@@ -34,7 +34,8 @@ def marched(case, cycles: int, steps: int):
 def test_exact_without_friction_it_is_a_pendulum(angle):
     """A mass in a cosine valley, released at the angle k q: period 4 K(sin^2(angle/2))/w, small motions w^2 = N k^2
     A/m."""
-    grooves, basis = Grooves(80e-6, 7.5e-6), modes(0.0, mass=1.2)
+    grooves = Grooves(80e-6, 7.5e-6)
+    basis = modes(0.0, mass=1.2)
     place = angle / grooves.wave_number
     period = 4 * ellipk(np.sin(angle / 2) ** 2) / np.sqrt(grooves.stiffness(115.0) / 1.2)
     done = march(
@@ -115,7 +116,10 @@ def test_exact_the_vertical_force_and_the_work_against_the_load_by_dop853(seed):
 def test_exact_it_breaks_away_at_the_limits_of_the_flank(place):
     """At rest F lies between N (t - mu)/(1 + mu t) and N (t + mu)/(1 - mu t): a push just below either holds for ever,
     one just beyond moves."""
-    grooves, basis, load, mu = Grooves(80e-6, 5e-6), modes(0.0), 100.0, 0.3
+    grooves = Grooves(80e-6, 5e-6)
+    basis = modes(0.0)
+    load = 100.0
+    mu = 0.3
     q = place * 80e-6
     t = flank(case_of(0)._replace(wavelength=80e-6, amplitude=5e-6, phase=0.0), q)[0]
     for way, limit in ((1, load * (t + mu) / (1 - mu * t)), (-1, load * (t - mu) / (1 + mu * t))):
@@ -145,7 +149,8 @@ def test_exact_a_lifted_mass_leaves_the_grooves_when_dop853_says(seed):
     case = case_of(seed)
     done = marched(case, 4, 50)
     assert done.outcome is Outcome.LEAVES_GROOVES and "leaves the grooves" in done.message
-    time, step = done.response.time, 2 * np.pi / case.drive / 50
+    time = done.response.time
+    step = 2 * np.pi / case.drive / 50
     lifted = run(case, time[-1] + step, time)[1]
     assert -1e-6 * step < time[-1] - lifted < step
 
@@ -154,7 +159,8 @@ def test_exact_a_lifted_mass_leaves_the_grooves_when_dop853_says(seed):
 def test_always_a_rig_of_80_um_grooves_runs_away_from_rest_at_8_g(frequency, stays, leaves):
     """26 lbf, mu = .4, slip from 4.2 g, flanks of slope .51 on 80 um that lift the moving mass, yaw at 129 Hz of share
     .0932: beyond 2 mil from rest at 8.0 g and 143 Hz, 8.25 g and 135 Hz, where the rig of the report was unstable."""
-    load, g = 115.65, 9.80665
+    load = 115.65
+    g = 9.80665
     mass = 0.4 * load / (4.2 * g)
     basis = ModalBasis(
         ("axial", "yaw"),
@@ -179,8 +185,10 @@ def test_always_a_rig_of_80_um_grooves_runs_away_from_rest_at_8_g(frequency, sta
 @pytest.mark.parametrize("lifted", [0.0, 0.4])
 def test_exact_a_force_that_follows_the_speed_along_the_flank(lifted):
     """phi = mu tanh(sqrt(1 + t^2) v/v_0), by Newton's laws and DOP853."""
-    case, speed = case_of(3)._replace(lifted=lifted), 5e-3
-    basis, end = modes(case.omega, case.zeta, case.mass), 3 * 2 * np.pi / case.drive
+    case = case_of(3)._replace(lifted=lifted)
+    speed = 5e-3
+    basis = modes(case.omega, case.zeta, case.mass)
+    end = 3 * 2 * np.pi / case.drive
     grooves = Grooves(case.wavelength, case.amplitude, case.phase, case.lifted)
     done = march(
         basis,
@@ -205,10 +213,8 @@ def test_exact_a_force_that_follows_the_speed_along_the_flank(lifted):
 def test_always_a_fork_goes_on_as_the_march_does():
     """A copy of a march goes on under the same drive to the last digit, and a jump of levels is met."""
     case = case_of(3)
-    basis, drive = (
-        modes(case.omega, case.zeta, case.mass),
-        make_levels([case.acceleration, 0.0], case.drive, 2),
-    )
+    basis = modes(case.omega, case.zeta, case.mass)
+    drive = make_levels([case.acceleration, 0.0], case.drive, 2)
     model = make_model(
         Grooves(case.wavelength, case.amplitude, case.phase, case.lifted),
         case.load,

@@ -76,7 +76,8 @@ def test_always_bonds_follow_the_recursion(seed, count, size):
     )
     cycle = np.concatenate([track.q, places])[order]
     law = Bonds(0.3, 0.4)
-    state, last = np.array([[1.0], [0.0], [0.0]]), cycle[-1]
+    state = np.array([[1.0], [0.0], [0.0]])
+    last = cycle[-1]
     for _ in range(int(10 / np.abs(np.diff(cycle)).sum()) + 3):
         forces = []
         for q in cycle:
@@ -99,8 +100,11 @@ def test_always_bonds_follow_the_recursion(seed, count, size):
     ids=lambda law: type(law).__name__,
 )
 def test_exact_slopes_are_the_derivative_of_the_forces(law):
-    group, q = LawGroup(sdof(), law, 4096), harmonics(3, 5)[None]
-    fold, v, eps = group(q, 1.3), pack_harmonics(harmonics(3, 5)[None]), 1e-6
+    group = LawGroup(sdof(), law, 4096)
+    q = harmonics(3, 5)[None]
+    fold = group(q, 1.3)
+    v = pack_harmonics(harmonics(3, 5)[None])
+    eps = 1e-6
 
     def force(x, omega=1.3):
         return group(unpack_harmonics(x, 1), omega).force[0]
@@ -266,7 +270,8 @@ def test_always_work_in_is_what_is_lost(omega):
 
 def test_order_of_what_is_cut_off():
     """Smooth: spectral. Elements: the slide's harmonics fall like k^-4, so the error like H^-3 or better."""
-    modes, drive = sdof(0.05), SineDrive(1.0, 0.5)
+    modes = sdof(0.05)
+    drive = SineDrive(1.0, 0.5)
     best = find_point(modes, drive, Spring(0.5, 3.0), harmonics=41).amplitude([1.0])
     errors = [
         abs(find_point(modes, drive, Spring(0.5, 3.0), harmonics=h).amplitude([1.0]) / best - 1)
@@ -305,7 +310,8 @@ def test_exact_both_rows_of_a_group():
 )
 def test_exact_other_laws_obey_the_equation_of_motion(law):
     """The accelerations of the harmonics against those the law's own force gives."""
-    modes, drive = sdof(0.05), SineDrive(1.0, 1.2)
+    modes = sdof(0.05)
+    drive = SineDrive(1.0, 1.2)
     found = find_point(modes, drive, law, tolerance=1e-7 if isinstance(law, Interlock) else 1e-5)
     r = make_cycle_response(found, modes, drive, 512)
     k = np.arange(found.modal.shape[0])[:, None]

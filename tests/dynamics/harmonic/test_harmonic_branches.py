@@ -208,7 +208,10 @@ def test_exact_a_perturbed_march_of_elements(omega):
 
 def test_exact_bonds_forget_as_a_march_does():
     """One mode and the recursion: the whole map (z, v, u) by DOP853 on z'' and u' = (q' - |q'| u)/length."""
-    modes, drive, limit, length = sdof(0.05), SineDrive(1.0, 1.2), 0.4, 0.3
+    modes = sdof(0.05)
+    drive = SineDrive(1.0, 1.2)
+    limit = 0.4
+    length = 0.3
     p = find_point(modes, drive, bonds(limit, length), tolerance=1e-6)
     r = make_cycle_response(p, modes, drive, 4096)
 
@@ -302,7 +305,8 @@ steps_per_cycle = 600
 )
 def test_exact_backbone_is_that_of_the_loops_of_a_bench(text, law):
     """A scene's bench measures stiffness and area of the loop; with one harmonic they are the backbone's."""
-    omega, amplitudes = W, np.array([4.0])
+    omega = W
+    amplitudes = np.array([4.0])
     found = find_backbone(RIG, law, amplitudes * 1e-6, harmonics=1)
     for k, amplitude in enumerate(amplitudes):
         result = run(plan(BENCH.format(law=text, amplitude=amplitude)))
@@ -343,7 +347,8 @@ def test_order_of_the_loss_of_an_iwan_joint():
 
 def test_exact_backbone_is_where_the_response_is_in_quadrature():
     """With one harmonic the forced motion 90 degrees behind, at the balancing level, is the free one."""
-    law, modes = Jenkins([0.2], [0.5]), sdof(0.01)
+    law = Jenkins([0.2], [0.5])
+    modes = sdof(0.01)
     free = find_backbone(modes, law, np.array([2.0]), harmonics=1)
     omega = 2 * np.pi * free.frequency[0]
     level = 2 * free.damping[0] * omega**2 * 2.0

@@ -35,11 +35,9 @@ def test_exact_measures_of_a_run_of_a_scene(law):
     """The last ten of 300 cycles of a marched run at 5 g and the measures of the balance."""
     scene = loads(SCENE.format(law=law), sets=["drive.cycles=300"])
     result = run(plan(scene), estimate=False)
-    found, modes, drive = (
-        result.measures,
-        result.plan.model.rig.modes,
-        result.plan.model.rig.drive.signal,
-    )
+    found = result.measures
+    modes = result.plan.model.rig.modes
+    drive = result.plan.model.rig.drive.signal
     limit = 0.3 * LOAD
     p = find_point(
         modes,
@@ -103,7 +101,8 @@ def test_exact_many_interfaces_on_few_modes():
 
 
 def test_always_a_sweep_finds_what_cold_starts_find():
-    modes, law = sdof(0.01), Jenkins([4.0, 1.0], [0.05, 0.5])
+    modes = sdof(0.01)
+    law = Jenkins([4.0, 1.0], [0.05, 0.5])
     values = np.linspace(0.12, 0.4, 15)
     swept = trace_over_frequency(modes, SineDrive(1.0, 1.0), law, values, tolerance=1e-4)
     assert swept.ended == "listed" and swept.values == pytest.approx(values)
@@ -114,7 +113,8 @@ def test_always_a_sweep_finds_what_cold_starts_find():
 
 def test_exact_regimes():
     """Slides of a given swing through elements that slip at 0.1 and 0.5."""
-    modes, law = sdof(0.0), Jenkins([1.0, 1.0], [0.1, 0.5])
+    modes = sdof(0.0)
+    law = Jenkins([1.0, 1.0], [0.1, 0.5])
     for amplitude, want in (
         (0.05, ("stuck", 0.0)),
         (0.3, ("partial slip", 0.1 / 0.6)),
@@ -138,7 +138,8 @@ def test_exact_regimes():
 @pytest.mark.parametrize("limit, bounded", [(0.9, True), (0.7, False)])
 def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit, bounded):
     """The threshold pi/4 of the notes: below it no motion balances, and the reason is named."""
-    modes, law = sdof(0.0), Jenkins([20.0], [limit / 20.0])
+    modes = sdof(0.0)
+    law = Jenkins([20.0], [limit / 20.0])
     if not bounded:
         with pytest.raises(
             NotConverged, match="undamped mode that is driven at its natural frequency"
@@ -148,7 +149,8 @@ def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit
     p = find_point(modes, DRIVE, law, tolerance=1e-4)
     assert np.abs(p.forces[0, 1] - 1j) < 1e-6  # the whole drive of the first harmonic
     r = make_cycle_response(p, modes, DRIVE, 4000)
-    k, w = np.array([20.0]), np.array([limit / 20.0])
+    k = np.array([20.0])
+    w = np.array([limit / 20.0])
     stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), k, w)[1]
     rows, _ = march(
         modes, DRIVE, k, w, np.array([r.modal[0, 0], r.modal_rate[0, 0]]), stretch, 4000

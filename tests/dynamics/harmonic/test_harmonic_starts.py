@@ -11,7 +11,9 @@ from patchfem.dynamics.harmonic.laws import Jenkins, Spring
 @pytest.mark.slow
 def test_exact_three_motions_near_the_end_of_the_upper_branch():
     """Two of them 8 % apart: between neighbours of the scan."""
-    w, mass, limit = 2 * np.pi * 143, 0.884, 0.3 * 26 * 4.4482216152605
+    w = 2 * np.pi * 143
+    mass = 0.884
+    limit = 0.3 * 26 * 4.4482216152605
     one = np.ones(1)
     modes = ModalBasis(("axial",), w * one, 0.003 * one, one, one, one, mass)
     laws = [(0, Jenkins([limit / 1e-6], [1e-6])), (modes.output, Spring(0.0, 2e10))]

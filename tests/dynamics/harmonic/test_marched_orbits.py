@@ -19,7 +19,8 @@ BASIS = ModalBasis(("axial",), np.array([OMEGA]), np.array([ZETA]), ONE, ONE, ON
 
 def test_exact_a_spring_beside_a_mode():
     """An element that never slips: amplitude, multipliers and books of a linear oscillator."""
-    spring, drive = 2e5, SineDrive(10.0, 2 * np.pi * 120)
+    spring = 2e5
+    drive = SineDrive(10.0, 2 * np.pi * 120)
     run = start_run(BASIS, drive, element_model(parallel_element([spring], [1.0])), 400)
     left = orbits.march_to_periodic(run)
     assert left < orbits.PERIODIC_TOL and run.outcome is None
@@ -29,7 +30,8 @@ def test_exact_a_spring_beside_a_mode():
     # the march is of order two
     assert float(np.ptp(mark.amplitudes)) / 2 == pytest.approx(true, rel=1e-4)
     assert energy_balance(mark.ledger) < 1e-11
-    found, beat = orbits.estimate_multipliers(run), np.sqrt(own - (ZETA * OMEGA) ** 2)
+    found = orbits.estimate_multipliers(run)
+    beat = np.sqrt(own - (ZETA * OMEGA) ** 2)
     kept = np.exp((-ZETA * OMEGA + 1j * beat) * drive.period)
     np.testing.assert_allclose(np.abs(found), abs(kept), rtol=1e-5)
     np.testing.assert_allclose(
@@ -40,7 +42,8 @@ def test_exact_a_spring_beside_a_mode():
 @pytest.mark.parametrize("level", [49.0, 60.0])
 def test_exact_coulombs_law_on_flanks_of_no_height_is_the_map_of_events(level):
     """States and multipliers of a motion with stops, and of one that slides all the time."""
-    drive, limit = SineDrive(level, OMEGA * 1.03), 0.35 * 115.65
+    drive = SineDrive(level, OMEGA * 1.03)
+    limit = 0.35 * 115.65
     true = steady(BASIS, drive, np.array([limit]), np.array([limit]))
     run = start_run(
         BASIS, drive, make_model(Grooves(80e-6, 1e-17), 115.65, 0.35, 0.35, None, BASIS), 64

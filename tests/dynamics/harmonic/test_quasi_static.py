@@ -28,7 +28,8 @@ def held(modes, group):
 
 def test_exact_one_mode_on_elastic_plastic_elements():
     """omega^2 = omega_0^2 + F(A)/(m A) and zeta = zeta_0 omega_0/omega + loss/(2 pi m omega^2 A^2)."""
-    group, a = LawGroup(ONE, Jenkins(STIFF, LIMIT)), np.geomspace(3e-5, 3e-3, 9)
+    group = LawGroup(ONE, Jenkins(STIFF, LIMIT))
+    a = np.geomspace(3e-5, 3e-3, 9)
     force = (STIFF * np.minimum(a[:, None], LIMIT)).sum(axis=1)
     loss = (4 * STIFF * LIMIT * np.maximum(a[:, None] - LIMIT, 0)).sum(axis=1)
     omega = np.sqrt(700.0**2 + force / (0.5 * a))
@@ -48,11 +49,9 @@ def test_exact_one_mode_on_elastic_plastic_elements():
 
 
 def test_exact_an_amplitude_without_an_equilibrium_leaves_the_others_as_they_are(monkeypatch):
-    group, a, plain = (
-        LawGroup(ONE, Jenkins(STIFF, LIMIT)),
-        np.geomspace(3e-5, 3e-3, 4),
-        quasi_static._solve_equilibrium,
-    )
+    group = LawGroup(ONE, Jenkins(STIFF, LIMIT))
+    a = np.geomspace(3e-5, 3e-3, 4)
+    plain = quasi_static._solve_equilibrium
     whole = quasi_static.find_static_motions(ONE, group, a, held(ONE, group))
 
     def failing(modes, laws, mode, share, *more):
@@ -82,7 +81,8 @@ def test_exact_a_linear_spring_is_the_held_mode():
 def test_exact_two_modes_hold_at_the_least_energy():
     """At a share q of the shape the coordinates make the energy of modes and elements least."""
     modes = modes_of([700.0, 2500.0], [0.002, 0.01], [1.0, 0.6], [1.0, -0.3])
-    group, share = LawGroup(modes, Jenkins(STIFF, LIMIT)), 3e-4
+    group = LawGroup(modes, Jenkins(STIFF, LIMIT))
+    share = 3e-4
     omega, shape = held(modes, group)
     [found] = quasi_static.find_static_motions(modes, group, [share], (omega, shape))
 

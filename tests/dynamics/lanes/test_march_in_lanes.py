@@ -15,12 +15,15 @@ ALWAYS = 0, 1, 2, 3, 5  # each law is a loop to compile: one of those that flow
 def cases(law: str, count: int, seed: int = 1) -> run.Cases:
     """Random cases that slip, stop and stick, near resonance and away; static friction above kinetic in some."""
     r = np.random.default_rng(seed)
-    square, one = r.uniform(0.3, 3, count) ** 2, np.ones(count)
+    square = r.uniform(0.3, 3, count) ** 2
+    one = np.ones(count)
     slip = 10 ** r.uniform(-1.5, -0.1, count)
     spring = r.uniform(0.5, 5, count) if law in ("yielding", "masing") else 0 * one
-    length, numbers = slip / np.where(spring > 0, spring, 1) * (spring > 0), np.zeros((count, 0))
+    length = slip / np.where(spring > 0, spring, 1) * (spring > 0)
+    numbers = np.zeros((count, 0))
     if law == "masing":
-        chi, beta = r.uniform(-0.9, 0, count), r.choice([0, 0.3, 3], count)
+        chi = r.uniform(-0.9, 0, count)
+        beta = r.choice([0, 0.3, 3], count)
         length = max_yield_displacement(slip, spring, chi, beta)
         slips = (chi + 1) / ((chi + 2) * (1 + beta) - 1)
         numbers = np.stack(
@@ -31,10 +34,8 @@ def cases(law: str, count: int, seed: int = 1) -> run.Cases:
         spring, length = (np.array(part) for part in zip(*((k.sum(), y[-1]) for k, y in sets)))
         numbers = run.curve_tables(sets)
     if law in FLOWS:
-        speed, length = (
-            slip * r.uniform(0.3, 2, count),
-            (0 if "tanh" in law else 1) * r.uniform(0.6, 2, count),
-        )
+        speed = slip * r.uniform(0.3, 2, count)
+        length = (0 if "tanh" in law else 1) * r.uniform(0.6, 2, count)
         spring = np.divide(slip, length, out=0 * slip, where=length > 0)
         numbers = np.array(
             {
@@ -80,7 +81,8 @@ def elements(r, limit: float) -> tuple:
 def test_always_a_thin_layer_needs_no_fine_steps(law, size, most):
     """A speed of reference of 1/200 of the speed, a bond length of 1/300 of the slide: so well do 128 steps a cycle
     know the amplitude. Without parts of a step tanh erred by up to 1e-3, by rates of the stretch bonds ran away."""
-    some, tanh = cases(law, 40), law == FLOWS[0]
+    some = cases(law, 40)
+    tanh = law == FLOWS[0]
     numbers = np.stack(
         [some.kinetic, 0 * some.kinetic + 1 / size]
         if tanh
@@ -116,17 +118,17 @@ LEAPS = (
 def test_exact_a_case_leaps_to_where_it_would_march(law):
     """Motion, extremes and phasors of a march that leaps are those of a march by three cycles at a time, which never
     leaps."""
-    some, cycles = cases(law, 60, 11), 150
+    some = cases(law, 60, 11)
+    cycles = 150
     begun = run.initial_motion(law, some)
     history, motion = run.continue_march(law, some, begun, cycles, 96)
-    parts, step = [], begun
+    parts = []
+    step = begun
     for _ in range(cycles // 3):
         part, step = run.continue_march(law, some, step, 3, 96)
         parts.append(part)
-    sizes, apart = (
-        np.ptp(history[:, -1, :2], axis=1),
-        np.abs(history - np.concatenate(parts, axis=1)).max(axis=(1, 2)),
-    )
+    sizes = np.ptp(history[:, -1, :2], axis=1)
+    apart = np.abs(history - np.concatenate(parts, axis=1)).max(axis=(1, 2))
     assert np.all(apart < 2e-6 * sizes) and np.mean(apart > 0) > 0.5
     for place in (at.SLIDE, at.SPEED, at.MEMORY):
         assert np.all(np.abs(motion - step)[:, place] < 2e-6 * sizes)
@@ -135,7 +137,8 @@ def test_exact_a_case_leaps_to_where_it_would_march(law):
 def test_exact_a_case_does_not_leap_while_its_extremes_are_at_the_ends_of_its_cycles():
     """While this amplitude grows, the largest slide of a cycle is that of its end, and then moves to a turn. A leap
     extrapolated the first: the range was off by 1e-4 for good."""
-    one, none = np.ones(1), np.zeros(1)
+    one = np.ones(1)
+    none = np.zeros(1)
     some = run.Cases(
         0.00412636 * one,
         0.84066824 * one,
@@ -151,7 +154,8 @@ def test_exact_a_case_does_not_leap_while_its_extremes_are_at_the_ends_of_its_cy
         np.array([[0.50039206, 0.25, 1.0]]),
     )
     begun = run.initial_motion("masing", some)
-    history, step = run.continue_march("masing", some, begun, 300, 96)[0], begun
+    history = run.continue_march("masing", some, begun, 300, 96)[0]
+    step = begun
     for _ in range(100):
         part, step = run.continue_march("masing", some, step, 3, 96)
     np.testing.assert_allclose(history[0, -1], part[0, -1], rtol=0, atol=1e-6)
@@ -193,7 +197,8 @@ def test_order_of_events_is_above_three(law):
 def test_always_energies_balance(law):
     """What the drive gives is what friction and damping take and what is left: to 1e-4 of it at 96 steps in 98 of 100
     cases, and 8 times less at twice the steps in their middle, 4 times behind a table."""
-    some, gaps = cases(law, 100), []
+    some = cases(law, 100)
+    gaps = []
     for steps in (96, 192):
         book = reading.run_energies(law, some, run.march(law, some, 40, 4, steps), np.ones(100))
         gap = np.abs(book["work_in"] - book["stored"] - book["friction"] - book["viscous"])
@@ -209,7 +214,8 @@ def test_always_a_march_that_ran_away_has_no_numbers_and_prints_nothing(law):
     some = cases(law, 60, 3)
     some = some._replace(stiffness=some.stiffness * np.where(np.arange(60) % 2, 1, 100))
     found = run.march(law, some, 60, 6, 8)
-    book, angle = reading.run_energies(law, some, found, np.ones(60)), np.ones((60, 6, 2))
+    book = reading.run_energies(law, some, found, np.ones(60))
+    angle = np.ones((60, 6, 2))
     reading.reading_of_runs(law, some, found, np.ones(60), np.ones(60), angle)
     assert np.isfinite(book["work_in"][1::2]).all() and np.isnan(book["work_in"][::2]).any()
     assert (np.isnan(book["stored"]) == np.isnan(found.motion[:, at.SLIDE])).all()
@@ -218,7 +224,8 @@ def test_always_a_march_that_ran_away_has_no_numbers_and_prints_nothing(law):
 def test_exact_without_friction_a_march_is_the_closed_form():
     """At any steps the motion after some cycles is that of the linear oscillator."""
     none = np.zeros(3)
-    damp, square = np.array([0.02, 0.3, 2.5]), np.array([1.0, 2.0, 1.3])
+    damp = np.array([0.02, 0.3, 2.5])
+    square = np.array([1.0, 2.0, 1.3])
     some = run.Cases(
         damp,
         square,
@@ -248,13 +255,17 @@ def test_exact_without_friction_a_march_is_the_closed_form():
 @pytest.mark.parametrize("law", ["table", "friction.laws.stretch_kernels"])
 def test_exact_accelerations_are_those_of_the_equation(law):
     """At every fourth step, where a march of so many steps alone ends: by its motion and friction."""
-    some, steps = cases(law, 35), 64
-    begun, table = run.initial_motion(law, some), run.drive_table(64)
-    found, motion = run.output_accelerations(law, some, begun, 2, steps), begun.copy()
+    some = cases(law, 35)
+    steps = 64
+    begun = run.initial_motion(law, some)
+    table = run.drive_table(64)
+    found = run.output_accelerations(law, some, begun, 2, steps)
+    motion = begun.copy()
     numbers = run.case_numbers(law, some, steps)
     for k in range(4, 2 * steps + 1, 4):
         first = (k - 4) % steps
-        part, workspace = table[:, first : first + 5].copy(), run.make_workspace(numbers, motion)
+        part = table[:, first : first + 5].copy()
+        workspace = run.make_workspace(numbers, motion)
         run.load_loop(law).march(
             numbers,
             np.arange(35),
@@ -265,10 +276,8 @@ def test_exact_accelerations_are_those_of_the_equation(law):
             np.zeros(35, np.int64),
             *workspace,
         )
-        sine, pull = (
-            table[0, k % steps],
-            run.law_state(law, motion, "FRICTION") if law in FLOWS else motion[:, at.MEMORY],
-        )
+        sine = table[0, k % steps]
+        pull = run.law_state(law, motion, "FRICTION") if law in FLOWS else motion[:, at.MEMORY]
         want = (
             some.output_gain
             * (

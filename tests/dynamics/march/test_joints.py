@@ -156,7 +156,8 @@ def test_exact_one_element_is_the_contact_of_its_own_loop(law, beside):
 )
 def test_exact_potential_springs_keep_their_energy_and_find_their_period(element, period):
     """Undamped free motion from 1: k_3 q^3 alone, and interlocking peaks as a pendulum; order two, 30 cycles."""
-    start, errors = InitialState(np.array([1.0]), np.zeros(1)), []
+    start = InitialState(np.array([1.0]), np.zeros(1))
+    errors = []
     for steps in (20, 100, 500):
         model = JointsModel(None, (element,), np.ones((1, 1)), 1.0, ALL)
         got = march(
@@ -179,7 +180,9 @@ def by_dop853(modes, drive, elements, duration, at):
     k, most = (np.array(part) for part in zip(*[(k, most) for _, k, most in elements]))
 
     def rate_of(t, y):
-        z, v, s = y[:n], y[n : 2 * n], y[2 * n :]
+        z = y[:n]
+        v = y[n : 2 * n]
+        s = y[2 * n :]
         slip = rows @ v
         push = (
             -modes.base * drive.values(np.array([t]))[0]
@@ -245,7 +248,8 @@ def march_random_chain(seed):
     modes = chain(
         rng.uniform(0.0, 5.0, n) * (rng.random(n) > 0.2), zeta=rng.uniform(0, 0.1), faces=faces
     )
-    limit, length = rng.uniform(0.05, 2.0, n), 10 ** rng.uniform(-3, 0, n)
+    limit = rng.uniform(0.05, 2.0, n)
+    length = 10 ** rng.uniform(-3, 0, n)
     kinds = [rng.choice(["coulomb", "ep", "bonds", "tanh"]) for _ in range(n)]
     kinetic = limit * rng.choice([0.3, 1.0], n)
     makers = {
@@ -298,7 +302,8 @@ def test_random_chains_whose_solution_was_hard_to_find_converge(seed):
 def test_order_two_of_interfaces_with_kinetic_friction_below_static(seed, faces, modes, coupled):
     """Stops and releases of faces that feel each other, one of them held by the others, against the exact engine."""
     rng = np.random.default_rng(seed)
-    rows, root = rng.uniform(-1, 1, (faces, modes)), rng.normal(size=(modes, modes))
+    rows = rng.uniform(-1, 1, (faces, modes))
+    root = rng.normal(size=(modes, modes))
     limit = rng.uniform(0.1, 0.5, faces)
     basis = ModalBasis(
         tuple("abc"[:modes]),
@@ -311,7 +316,8 @@ def test_order_two_of_interfaces_with_kinetic_friction_below_static(seed, faces,
         0.05 * root @ root.T if coupled else None,
         rows,
     )
-    drive, errors = SineDrive(1.0, 0.8), []
+    drive = SineDrive(1.0, 0.8)
+    errors = []
     truth = simulate(basis, drive, limit, 0.4 * limit, 5, 5)
     model = JointsModel(
         None, tuple(coulomb(k, f, 0.4 * f) for k, f in enumerate(limit)), rows, 1.0, ALL

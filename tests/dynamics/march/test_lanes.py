@@ -44,7 +44,8 @@ BOOKS = {
 def patch(points: int = 6):
     """(area (p,), pressure (p,), modes) of a patch that a tilt presses harder at one end."""
     compliance, x = half_plane(points, 1e-7)
-    area, sigma = np.full(points, 1 / points), 60.0 * (1 + 0.8 * x)
+    area = np.full(points, 1 / points)
+    sigma = 60.0 * (1 + 0.8 * x)
     return area, sigma, shear_modes(compliance, LAW.static * area * sigma, LAW.length, 2)
 
 
@@ -118,7 +119,8 @@ def test_exact_what_is_read_off_samples_side_by_side(pairs):
     book = {"peak_stored": found.book["peak"]} | found.book
     values = seen.values(book, np.full(4, 1e5), np.full(4, 60.0))
     for k, one in enumerate(alone):
-        w, drive = one.window, SineDrive(PUSHES[k], OMEGA)
+        w = one.window
+        drive = SineDrive(PUSHES[k], OMEGA)
         here = Response(
             w.time,
             found.z[:, :, k],

@@ -31,7 +31,8 @@ def half_plane(count, scale=1.0):
 @pytest.mark.parametrize("growth", [{}, GROWTH])
 def test_exact_prescribed_path_of_points_is_the_recursion(growth):
     law = Bonds(0.4, 1.0, initial=0.7, **growth)
-    area, sigma = np.array([0.5, 1.0, 0.25]), np.array([2.0, 1.0, 3.0])
+    area = np.array([0.5, 1.0, 0.25])
+    sigma = np.array([2.0, 1.0, 3.0])
     path = random_walk(2, 80, 0.6)
     forces, energies, bad, _ = follow(points_model(law, area, sigma), path)
     run = walk(FirstOrderBonds(law), path, upper_pressure(sigma), 0.3)
@@ -64,8 +65,10 @@ def test_exact_prescribed_path_of_a_list_is_the_quadrature(order):
 def dense_steps(law, compliance, area, sigma, path):
     """The same step without modes: nodal deflections d with (d_0 + d_1)/2 = C f, f the step-mean nodal forces."""
     m = area.size
-    bonds, d = np.stack([law.initial * sigma, np.zeros(m), np.zeros(m)]), np.zeros(m)
-    weight, rows = law.static * area / law.length, []
+    bonds = np.stack([law.initial * sigma, np.zeros(m), np.zeros(m)])
+    d = np.zeros(m)
+    weight = law.static * area / law.length
+    rows = []
     for dq in np.diff(path):
         new = d.copy()
         for _ in range(80):
@@ -97,7 +100,8 @@ def test_exact_shear_modes_are_the_full_tangential_compliance(stiffness, step):
     up to half of one, where all points take the way without a branch."""
     law = Bonds(0.4, 1.0)
     compliance, x = half_plane(24, stiffness)
-    area, sigma = np.full(24, 1 / 24), 1 + 0.8 * x
+    area = np.full(24, 1 / 24)
+    sigma = 1 + 0.8 * x
     modes = shear_modes(compliance, law.static * area * sigma, law.length, 24)
     path = random_walk(11, 60, step)
     forces, energies, bad, contact = follow(points_model(law, area, sigma, modes), path)
@@ -116,14 +120,17 @@ def test_exact_points_that_drag_move_as_their_bonds_say(size):
     """A march whose steps drag in closed form, beside the same steps by the solve of all points: gross slip of many
     bond lengths a step, and a few."""
     law, compliance, x = Bonds(0.4, 1e-6), *half_plane(24, 1e-10)
-    area, sigma = np.full(24, 1 / 24), 50 * (1 + 0.8 * x)
+    area = np.full(24, 1 / 24)
+    sigma = 50 * (1 + 0.8 * x)
     model = points_model(
         law, area, sigma, shear_modes(compliance, law.static * area * sigma, law.length, 8)
     )
-    modes, drive = one_mode(OMEGA, 0.05, 1.0), SineDrive(size * 9.80665, OMEGA)
+    modes = one_mode(OMEGA, 0.05, 1.0)
+    drive = SineDrive(size * 9.80665, OMEGA)
     quick, plain = (start_run(modes, drive, model, 200) for _ in range(2))
     rows = quick.march_cycle(600, 0, [])[1]
-    dragged, every = 0, []
+    dragged = 0
+    every = []
     for _ in range(600):
         plain.contact.flow[0] = 0.0
         every.append(plain.march_cycle(1, 0, [])[1][0])
@@ -146,7 +153,9 @@ def test_exact_points_that_drag_move_as_their_bonds_say(size):
 )
 def test_order_of_the_march_against_integrated_bonds(growth):
     """143 Hz, damping 0.003, 1 kg, 39 N, bond length 1 um and 5 g: the rate equations by LSODA; order two."""
-    length, limit, drive = 1e-6, 0.4 * 98.0665, 5 * 9.80665
+    length = 1e-6
+    limit = 0.4 * 98.0665
+    drive = 5 * 9.80665
     law = Bonds(0.4, length, **growth)
 
     def rhs(t, y):
@@ -260,7 +269,8 @@ def test_hard_a_step_whose_place_and_pressure_disagree_is_booked():
     """Steps longer than the waves of the pressure: where the new bonds' pressure and the slide do not settle, it is
     said; steps that follow the waves settle all."""
     x = np.linspace(-30e-6, 30e-6, 1201)
-    sigma, area = 1e6 * np.maximum(0.0, 0.3 + np.sin(x / 1e-6)), np.full(1201, 1e-4 / 1201)
+    sigma = 1e6 * np.maximum(0.0, 0.3 + np.sin(x / 1e-6))
+    area = np.full(1201, 1e-4 / 1201)
     drive = SineDrive(1.5 * 0.4 * area @ sigma, OMEGA)
     coarse, fine = (
         march(
@@ -283,7 +293,8 @@ def test_hard_a_step_whose_place_and_pressure_disagree_is_booked():
 @pytest.mark.parametrize("cycles, travel", [(40.3, np.inf), (3, np.inf), (40, 0.8)])
 def test_exact_a_run_without_histories_has_the_same_last_cycles(cycles, travel):
     """Long pieces of which nothing is kept, also where the flexure's stop at a share of the way ends one of them."""
-    model, drive = jenkins_model([2e5, 1e5], [1e-6, 2e-6]), SineDrive(49.0, OMEGA)
+    model = jenkins_model([2e5, 1e5], [1e-6, 2e-6])
+    drive = SineDrive(49.0, OMEGA)
     if np.isfinite(travel):  # of the amplitude that the run would reach
         travel *= march(one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2).amplitudes.max()
     one, other = (

@@ -25,7 +25,8 @@ DRIVE, BASIS, CYCLES, STEPS = SineDrive(49.0, OMEGA), one_mode(OMEGA, 0.05, 1.0)
 
 def sheared():
     law, (compliance, x) = Bonds(0.4, 1e-6), half_plane(12, 1e-7)
-    area, sigma = np.full(12, 1 / 12), 60.0 * (1 + 0.8 * x)
+    area = np.full(12, 1 / 12)
+    sigma = 60.0 * (1 + 0.8 * x)
     return points_model(
         law, area, sigma, shear_modes(compliance, law.static * area * sigma, law.length, 12)
     )
@@ -55,7 +56,8 @@ CASES = {
 def marched(case: str, monkeypatch, repeats: bool, **more):
     """(result, share of the steps that were marched)."""
     basis, model = CASES[case]()
-    steps, moved = [], marching.Run._march_rows
+    steps = []
+    moved = marching.Run._march_rows
     monkeypatch.setattr(marching, "PERIODIC_TOL", 1e-12 if repeats else -1.0)
     monkeypatch.setattr(
         marching.Run,
@@ -167,7 +169,8 @@ def test_always_what_creeps_beats_or_has_another_period_does_not_repeat(
     monkeypatch.setattr(
         run, "_carried_state", lambda: [np.array([1.0 + motion(run.done // STEPS), 1.0])]
     )
-    run.looks, found = np.zeros((3, 2)), False
+    run.looks = np.zeros((3, 2))
+    found = False
     for number in range(1, 1025):
         run.done = number * STEPS
         found = found or run.is_periodic(100_000)

@@ -44,7 +44,8 @@ BOOKS = (
 
 def both(basis, push: float, cycles: float, steps: int = 80, **more) -> tuple:
     """A march that keeps every sample worth it, and one that folds."""
-    drive, model = SineDrive(push, OMEGA), sheared()
+    drive = SineDrive(push, OMEGA)
+    model = sheared()
     return march(basis, drive, model, cycles, steps, 5, **more), march(
         basis, drive, model, cycles, steps, 5, keeps_samples=False, keeps_extremes=True, **more
     )

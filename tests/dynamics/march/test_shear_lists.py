@@ -39,7 +39,9 @@ PRINTED = [
 
 def follow(model, path, dt=1e-3):
     """(forces (k, 3), energies (k, 2), failed steps, contact) of a model along a path."""
-    contact, energies, forces = model.build(), np.zeros((path.size, 2)), np.zeros((path.size, 3))
+    contact = model.build()
+    energies = np.zeros((path.size, 2))
+    forces = np.zeros((path.size, 3))
     bad = load_instances().follow_path(
         path, dt, model.kind, contact, 1e-11 * model.limit, energies, forces
     )
@@ -61,7 +63,8 @@ def turning(steps: int) -> np.ndarray:
 
 @pytest.mark.parametrize(("reading", "order"), PRINTED)
 def test_exact_points_of_rigid_pieces_are_one_list(reading, order):
-    law, path = Bonds(0.4, 1e-6, order, reading), turning(80)
+    law = Bonds(0.4, 1e-6, order, reading)
+    path = turning(80)
     one = follow(bond_list_model(law, LIMIT.sum(), 25.0, 0.02), path)[0]
     model = point_lists_model(law, LIMIT, np.ones(4), RIGID, 25.0, 0.02)
     forces, _, bad, _ = follow(model, path)
@@ -81,7 +84,9 @@ def test_exact_points_of_rigid_pieces_are_one_list(reading, order):
 def test_exact_a_point_behind_a_spring_is_loaded_by_the_virgin_curve(order, virgin):
     """With full first bonds the print is P(p, s/eps), by P(p + 1, x) + x^p exp(-x)/Gamma(p + 1) = P(p, x); p = 0 is
     Coulomb's law. The holder's slide is s + force/stiffness; to the second order of the step."""
-    law, stiffness, path = Bonds(0.4, 1e-6, order, "report"), 3e6, np.linspace(0, 4e-6, 1601)
+    law = Bonds(0.4, 1e-6, order, "report")
+    stiffness = 3e6
+    path = np.linspace(0, 4e-6, 1601)
     forces, _, bad, _ = follow(
         point_lists_model(law, [2.0], [1.0], spring(stiffness), 745.0, 0.0), path
     )
@@ -109,7 +114,8 @@ def test_exact_the_ledger_closes(reading, order, grows):
         if grows
         else {}
     )
-    law, path = Bonds(0.4, 1e-6, order, reading, **more), turning(160)
+    law = Bonds(0.4, 1e-6, order, reading, **more)
+    path = turning(160)
     draw = np.random.default_rng(3)
     shape = SimpleNamespace(
         shape=draw.normal(size=(4, 3)) / np.sqrt(LIMIT)[:, None],
@@ -141,15 +147,18 @@ def test_always_points_follow_the_sum_by_hand(reading, order, grows):
     more = (
         {"ratio": 0.8, "rest_growth": 0.1, "slip_growth": 3e-7, "rest_speed": 1e-3} if grows else {}
     )
-    law, draw = Bonds(0.4, 1e-6, order, reading, initial=0.5, **more), np.random.default_rng(8)
-    limit, root = draw.uniform(0.5, 2, 5), draw.normal(size=(5, 5))
+    law = Bonds(0.4, 1e-6, order, reading, initial=0.5, **more)
+    draw = np.random.default_rng(8)
+    limit = draw.uniform(0.5, 2, 5)
+    root = draw.normal(size=(5, 5))
     c = 2e-8 * (root @ root.T + np.eye(5))
     values, vectors = np.linalg.eigh(np.sqrt(limit)[:, None] * c * np.sqrt(limit))
     modes = SimpleNamespace(
         shape=vectors / np.sqrt(limit)[:, None], stiffness=1 / values, points=np.arange(5)
     )
     steps = 900
-    path, dt = turning(steps), 0.05 / steps
+    path = turning(steps)
+    dt = 0.05 / steps
     model = point_lists_model(law, limit, np.ones(5), modes, 40.0, 0.01)
     forces, _, bad, _ = follow(model, path, dt)
     keys = SimpleNamespace(
@@ -162,10 +171,14 @@ def test_always_points_follow_the_sum_by_hand(reading, order, grows):
         slip_growth=law.slip_growth,
         initial_bonds=law.initial,
     )
-    bonds, s, before, found = BondsByHand(keys, 5, law.rest_speed), np.zeros(5), np.zeros(5), [0.0]
+    bonds = BondsByHand(keys, 5, law.rest_speed)
+    s = np.zeros(5)
+    before = np.zeros(5)
+    found = [0.0]
     for q in path[1:]:
         new, force = settled(bonds, limit, c, q, dt, 2 * s - before)
-        before, s = s, new
+        before = s
+        s = new
         bonds.weight(s, dt, keep=True)
         found.append(force.sum())
     assert bad == 0 and np.abs(forces[:, 0] - found).mean() < 3e-4 * limit.sum()
@@ -178,7 +191,8 @@ def test_always_a_step_has_the_balance_downhill_where_bonds_weaken():
     path = np.linspace(0, 6e-6, 301)
     model = point_lists_model(law, [2.0], [1.0], spring(2e5), 30.0, 0.01)
     forces, energies, bad, contact = follow(model, path, 1e-4)
-    work, lost = np.cumsum(forces[:-1, 1] * np.diff(path)), np.cumsum(energies[:-1, 0])
+    work = np.cumsum(forces[:-1, 1] * np.diff(path))
+    lost = np.cumsum(energies[:-1, 0])
     assert bad == 0 and np.abs(work - lost - energies[1:, 1]).max() < 1e-12 * work[-1]
     assert contact.statuses[0, STATUS.created] <= 1e-6 * contact.statuses[0, STATUS.dissipated]
 
@@ -188,7 +202,8 @@ def test_order_points_under_the_pressure_of_the_lower_piece_are_the_numpy_sum(re
     """Rigid pieces slide a wedge of pressure that ends in the path: points enter it and leave it. A bond forms under
     the pressure half way through its step there, under the mean of both ends here, and a point is freed at a sample."""
     law = Bonds(0.4, 1e-6, order, reading, initial=0.5)
-    x, sigma = np.linspace(0, 12e-6, 5), np.array([0.0, 0.6, 1.2, 0.7, 0.0])
+    x = np.linspace(0, 12e-6, 5)
+    sigma = np.array([0.0, 0.6, 1.2, 0.7, 0.0])
     steps = 300
     path = turning(steps)
     model = point_lists_model(
@@ -201,8 +216,12 @@ def test_order_points_under_the_pressure_of_the_lower_piece_are_the_numpy_sum(re
         lower_pressure_fields(x, sigma, 1.0),
     )
     forces, energies, bad, contact = follow(model, path)
-    twin, weight = Quadrature(law, 0.0), LIMIT[0]
-    state, before, found, stored = twin.start(sigma), sigma, [0.0], [0.0]
+    twin = Quadrature(law, 0.0)
+    weight = LIMIT[0]
+    state = twin.start(sigma)
+    before = sigma
+    found = [0.0]
+    stored = [0.0]
     for here, after in pairwise(path):
         now = np.interp(x + after, x, sigma, left=0.0, right=0.0)
         state = twin.advance(state, after - here, before, now, 1e-3)
@@ -218,7 +237,8 @@ def test_order_points_under_the_pressure_of_the_lower_piece_are_the_numpy_sum(re
     )
     assert np.abs(forces[:, 0] - found)[away].max() < 6e-3 * model.limit
     assert np.abs(energies[:, 1] - stored)[away].max() < 6e-3 * model.limit * 1e-6
-    work, lost = np.cumsum(forces[:-1, 1] * np.diff(path)), np.cumsum(energies[:-1, 0])
+    work = np.cumsum(forces[:-1, 1] * np.diff(path))
+    lost = np.cumsum(energies[:-1, 0])
     assert np.abs(work - lost - energies[1:, 1]).max() < 1e-12 * np.abs(np.diff(work)).sum()
 
 
@@ -249,11 +269,13 @@ def test_order_two_a_prescribed_load_is_that_of_the_numpy_sum(order, grows):
             2,
             load=load,
         )
-        response, dt = done.response, 1 / 143 / steps
+        response = done.response
+        dt = 1 / 143 / steps
         twin = Quadrature(law, 0.0)
         loads = load(dt * np.arange(2 * steps + 1))
         assert response.extra["normal_load"] == pytest.approx(loads, abs=1e-9)
-        state, found = twin.start(loads[:1]), [0.0]
+        state = twin.start(loads[:1])
+        found = [0.0]
         for k, dq in enumerate(np.diff(response.slide)):
             state = twin.advance(state, dq, loads[k : k + 1], loads[k + 1 : k + 2], dt)
             found.append(twin.traction(state)[0])

@@ -41,7 +41,8 @@ def closes(done):
 
 def falling(modes, drive, static, kinetic, cycles, steps):
     """Largest error of the extremes of all cycles over the largest of them, beside the exact engine, by steps."""
-    truth, errors = simulate(modes, drive, static, kinetic, cycles, 2), []
+    truth = simulate(modes, drive, static, kinetic, cycles, 2)
+    errors = []
     for count in steps:
         done = march(modes, drive, coulomb_model(static, kinetic), cycles, count, window=cycles)
         balance, created = closes(done)

@@ -23,7 +23,8 @@ POINTED = [
 @pytest.mark.parametrize("row", [0, 1])
 def test_order_small_heave_and_pitch_swing_at_the_frequency_of_the_tangent(row):
     """z = A cos(sqrt(omega^2 + K r^2/m) t) on the flat full contact, K = K_n or K_rot; the error falls as dt^2."""
-    sets, part = elastic(), [1.0, 300.0][row]
+    sets = elastic()
+    part = [1.0, 300.0][row]
     basis = modes([200.0], [0.0], [part * (row == 0)], [part * (row == 1)], base=[0.0])
     stiff = np.linalg.inv(sets.c)
     k = stiff.sum() if row == 0 else sets.x @ stiff @ sets.x
@@ -69,7 +70,8 @@ def test_exact_energy_stays_while_the_block_bounces():
         10,
         start=InitialState([12e-7, 0, 9e-7], [0.0, 15e-3, 6e-3]),
     )
-    total, force = mechanical(done.response, basis), done.response.extra["normal_load"]
+    total = mechanical(done.response, basis)
+    force = done.response.extra["normal_load"]
     assert np.ptp(total) <= 1e-12 * total[0] and done.outcome is None
     assert (force == 0).sum() > 500 and force.max() > 2 * LOAD
     assert (
@@ -80,7 +82,8 @@ def test_exact_energy_stays_while_the_block_bounces():
 
 def test_exact_nodal_forces_are_those_of_the_unilateral_solve():
     """At every frame of a ramp of tilt: the forces of a fresh solve at the approach and rotation of the moment."""
-    sets, slow = crowned(), SineDrive(200.0, 2 * np.pi * 2)
+    sets = crowned()
+    slow = SineDrive(200.0, 2 * np.pi * 2)
     basis = modes([40.0], [1.0], [0.0], [400.0], 0.5)
     done = varying_load.march(basis, slow, sets, LAWS["plastic"], 1, 200, 1, frames=40)
     touching = set()
@@ -101,8 +104,12 @@ def brute_block(basis, drive, stiff, mu, start, cycles, steps):
         LOAD - stiff * start * np.cos(np.sqrt(basis.omega[1] ** 2 + stiff / MASS) * t), 0
     )
     force = -drive.acceleration * np.sin(drive.omega * t)
-    limit, w2, d = mu * load / MASS * dt, basis.omega[0] ** 2, 2 * basis.zeta[0] * basis.omega[0]
-    q, v, out = 0.0, 0.0, np.empty(cycles * steps)
+    limit = mu * load / MASS * dt
+    w2 = basis.omega[0] ** 2
+    d = 2 * basis.zeta[0] * basis.omega[0]
+    q = 0.0
+    v = 0.0
+    out = np.empty(cycles * steps)
     for i in range(t.size):
         free = v + dt * (force[i] - w2 * (q + 0.5 * dt * v) - d * v)
         v = max(free - limit[i], 0.0) + min(free + limit[i], 0.0)
@@ -128,7 +135,8 @@ def test_exact_coulomb_block_under_a_swinging_load():
         normal=basis.normal,
         pitch=basis.pitch,
     )
-    drive, start = SineDrive(8 * 9.80665 * 0.5, 2 * np.pi * 143), 0.9 * LOAD / stiff
+    drive = SineDrive(8 * 9.80665 * 0.5, 2 * np.pi * 143)
+    start = 0.9 * LOAD / stiff
     want = brute_block(basis, drive, stiff, 0.3, start, 2, 100_000)
     done = varying_load.march(
         basis,
@@ -153,7 +161,8 @@ def test_exact_coulomb_block_under_a_swinging_load():
 def test_order_two_where_modes_carry_both(name):
     """Slide, heave and pitch in every mode, sets that change: the error falls by four when the step is halved."""
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
-    drive, ends = SineDrive(40.0, 2 * np.pi * 143), []
+    drive = SineDrive(40.0, 2 * np.pi * 143)
+    ends = []
     for steps in (1600, 3200, 6400, 12800):
         done = varying_load.march(basis, drive, crowned(), LAWS[name], 1, steps, 1)
         ends.append(
@@ -168,7 +177,8 @@ def test_order_two_where_modes_carry_both(name):
 def test_order_the_accelerometer_feels_the_normal_forces():
     """Absolute acceleration at the output against differences of the output's rate plus the base."""
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
-    drive, errors = SineDrive(40.0, 2 * np.pi * 143), []
+    drive = SineDrive(40.0, 2 * np.pi * 143)
+    errors = []
     for steps in (6400, 12800):
         r = varying_load.march(basis, drive, crowned(), LAWS["plastic"], 1, steps, 1).response
         slope = np.gradient(r.output_rate, r.time) + drive.values(r.time)
@@ -257,7 +267,8 @@ def loses(name, seed, steps):
     assert balance(done, basis) <= 1e-11
     _, held, spent, created = r.extra["ledger"]
     assert created[-1] == 0 and (np.diff(spent) >= -1e-12 * done.ledger["peak_stored"]).all()
-    held, spent = held[-1], spent[-1]
+    held = held[-1]
+    spent = spent[-1]
     assert done.ledger["friction"] == pytest.approx(spent, abs=1e-9 * (spent + held) + 1e-18)
     assert (np.abs(r.force) <= 0.3 * r.extra["normal_load"] + 1e-9 * LOAD).all()
 

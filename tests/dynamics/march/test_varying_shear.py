@@ -38,7 +38,8 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
     """Slides, friction forces and energy lost by a march on the nodes themselves: displacements u (m,) of the pieces
     behind the stiffness C^-1, bench laws, a general root finder; the nodal forces from heave and turn of a run."""
     p = make_propagator(basis, drive, steps)
-    table, beta = p.tables(drive, 0, steps), p.beta[0, 0]
+    table = p.tables(drive, 0, steps)
+    beta = p.beta[0, 0]
     stiff = np.linalg.inv(giving(sets.x))
     motion = zip(-response.extra["heave"], response.extra["turn"])
     loads = np.array(
@@ -48,7 +49,10 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
         ]
     )
     z = v = 0.0
-    u, state, slides, forces = np.zeros(sets.x.size), law.start(loads[0]), [0.0], [0.0]
+    u = np.zeros(sets.x.size)
+    state = law.start(loads[0])
+    slides = [0.0]
+    forces = [0.0]
     bonds = isinstance(law, FirstOrderBonds)
 
     def moved(state, xi, load):
@@ -62,7 +66,8 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
 
     for i in range(len(loads) - 1):
         middle = (loads[i] + loads[i + 1]) / 2
-        ready, row = law.press(state, loads[i], middle).state, table[i % steps]
+        ready = law.press(state, loads[i], middle).state
+        row = table[i % steps]
         rest = (
             p.free[0, 0] * z + p.free[1, 0] * v + row[0],
             p.free[2, 0] * z + p.free[3, 0] * v + row[1],
@@ -82,9 +87,11 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
             return stiff @ (u + 1e-6 * y) - law.traction(moved(state, -1e-6 * y, load)[1])
 
         y_back = 1e-6 * root(away, np.zeros(u.size), tol=1e-14).x
-        state, u = moved(state, -y_back, loads[i + 1])[1], u + y_back
+        state = moved(state, -y_back, loads[i + 1])[1]
+        u = u + y_back
         accel = -(rest[0] - z - y[0]) / beta / MASS
-        z, v = rest[0] + p.push[0, 0] * accel, rest[1] + p.push[1, 0] * accel
+        z = rest[0] + p.push[0, 0] * accel
+        v = rest[1] + p.push[1, 0] * accel
         slides.append(z)
         forces.append(law.traction(state).sum())
     return np.array(slides), np.array(forces), loads
@@ -94,7 +101,10 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
 def test_exact_all_modes_are_the_nodes_themselves(name):
     """Every mode kept, sets that open and close: the march of the nodes behind the dense compliance."""
     basis = modes([143.0, 300.0, 410.0], [1.0, 0, 0], [0, 1.0, 0], [0, 0, 250.0], 0.01, [1.0, 0, 0])
-    drive, sets, law, steps = SineDrive(120.0, 2 * np.pi * 143), crowned(), LAWS[name], 60
+    drive = SineDrive(120.0, 2 * np.pi * 143)
+    sets = crowned()
+    law = LAWS[name]
+    steps = 60
     done = varying_load.march(
         basis,
         drive,
@@ -108,7 +118,8 @@ def test_exact_all_modes_are_the_nodes_themselves(name):
     )
     single = modes([143.0], [1.0], [0.0], [0.0], 0.01)
     slides, forces, loads = dense(single, drive, SOFT[name], sets, done.response, steps)
-    r, touching = done.response, (loads > 0).sum(axis=1)
+    r = done.response
+    touching = (loads > 0).sum(axis=1)
     assert touching.min() < 10 and touching.max() == 21 and np.abs(r.force).max() > 0.9 * 0.3 * LOAD
     assert r.slide == pytest.approx(slides, abs=1e-8 * np.abs(slides).max())
     assert r.force == pytest.approx(forces, abs=1e-7 * 0.3 * LOAD)
@@ -121,8 +132,11 @@ def test_exact_a_still_load_is_the_march_on_the_preload(name):
     """normal = 1e-9: bonds as by shear modes of the preloaded set, elastic-plastic as by its exact parallel elements.
     The two differ by what springs back, which falls with the square of the step, to 3e-8 at 3200 steps a cycle."""
     basis = modes([143.0, 700.0], [1.0, 0.3], [1e-9, 0.0], [0.0, 0.0], 0.01)
-    drive, sets, law = SineDrive(40.0, 2 * np.pi * 300), crowned(), LAWS[name]
-    force, soft = sets.reference.forces(0.0, 0.0), giving(crowned().x)
+    drive = SineDrive(40.0, 2 * np.pi * 300)
+    sets = crowned()
+    law = LAWS[name]
+    force = sets.reference.forces(0.0, 0.0)
+    soft = giving(crowned().x)
     if name == "plastic":
         group = jenkins_set(soft, 0.3 * force, 1e-6)
         model = models.jenkins_model(group.stiffness, group.yield_displacement)
@@ -189,7 +203,8 @@ def test_always_pieces_that_give_way_create_nothing(name, seed, steps, count, de
         rng.normal(size=n) * rng.choice([0, 50.0, 300.0]),
         0.01,
     )
-    drive, law = SineDrive(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143), LAWS[name]
+    drive = SineDrive(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143)
+    law = LAWS[name]
     done = varying_load.march(
         basis,
         drive,
@@ -219,14 +234,16 @@ def test_always_pieces_that_give_way_create_nothing(name, seed, steps, count, de
 def test_exact_a_fork_goes_on_by_itself(count):
     """The twin of a run, forked after a cycle and marched after the run itself went on: the same samples."""
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
-    law, drive = LAWS["bonds"], SineDrive(60.0, 2 * np.pi * 143)
+    law = LAWS["bonds"]
+    drive = SineDrive(60.0, 2 * np.pi * 143)
     shear = reduced(crowned(), law, count) if count else None
     run = plain.start_run(
         basis, drive, varying_load.make_model(basis, law, crowned(), None, shear), 200
     )
     run.march_cycle(200, 0, [])
     twin = run.fork(drive)
-    first, second = run.march_cycle(200, 0, [])[1], twin.march_cycle(200, 0, [])[1]
+    first = run.march_cycle(200, 0, [])[1]
+    second = twin.march_cycle(200, 0, [])[1]
     assert np.abs(first - second).max() <= 1e-13 * np.abs(first).max() and np.ptp(first[:, 0]) > 0
 
 
@@ -250,7 +267,9 @@ def test_order_two_of_pieces_that_give_way(name):
     """Slide, heave and pitch in every mode, sets that change: the error falls by nearly four when the step is halved;
     what springs back at the end of a step does not lower the order."""
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
-    drive, law, ends = SineDrive(40.0, 2 * np.pi * 143), LAWS[name], []
+    drive = SineDrive(40.0, 2 * np.pi * 143)
+    law = LAWS[name]
+    ends = []
     for steps in (800, 1600, 3200, 6400):
         done = varying_load.march(
             basis, drive, crowned(), law, 1, steps, 1, shear=reduced(crowned(), law, 8)

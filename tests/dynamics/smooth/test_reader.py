@@ -23,7 +23,8 @@ def parts(slide, slip=None, count: int = 61):
     """StepParts of functions of time [s], in `count` steps of uneven length."""
     edges = PERIOD * CYCLES * np.linspace(0, 1, count + 1) ** 1.2
     time = (edges[:-1, None] + np.diff(edges)[:, None] * NODE_FRACTIONS).ravel()
-    none, one = np.zeros((time.size, 1)), slide(time)
+    none = np.zeros((time.size, 1))
+    one = slide(time)
     return StepParts(
         Response(
             time,
@@ -109,7 +110,8 @@ def test_exact_peaks_are_those_of_the_motion_seen_closely(name):
     start = None if name == "tanh" else InitialState(np.full(1, 2e-5), np.zeros(1))
     modes = one_mode(OMEGA, zeta, MASS)
     run, close = (Motion(modes, drive, element(law, load), 40, 1e-9, start=start) for _ in range(2))
-    end, begin = 40 * drive.period, 30 * drive.period
+    end = 40 * drive.period
+    begin = 30 * drive.period
     fine, _ = run.run_last_cycles(end, end - begin)[1]
     close.run_to(begin)
     close.tolerance *= 1e-2

@@ -35,14 +35,16 @@ def test_exact_cycles_that_are_left_out_are_as_the_last_one(name):
     scale = [size, size * OMEGA]
     assert left.arrays.state[:2] / scale == pytest.approx(whole.arrays.state[:2] / scale, abs=1e-7)
     assert left.record.cycles[:2] / size == pytest.approx(whole.record.cycles[:2] / size, abs=1e-7)
-    one, other = left.energy_ledger(), whole.energy_ledger()
+    one = left.energy_ledger()
+    other = whole.energy_ledger()
     for key in ("work_in", "viscous", "friction"):
         assert one[key] == pytest.approx(other[key], rel=1e-7), key
     # a sum of |work| over steps, which may differ
     assert one["power"] == pytest.approx(other["power"], rel=1e-3)
     miss = one["work_in"] - one["stored"] - one["friction"] - one["viscous"]
     assert abs(miss) < 1e-8 * one["power"]
-    one, other = np.concatenate(left.turns), np.concatenate(whole.turns)
+    one = np.concatenate(left.turns)
+    other = np.concatenate(whole.turns)
     assert len(one) == len(other) and one[-1] == pytest.approx(other[-1], rel=1e-5, abs=1e-6 * size)
 
 

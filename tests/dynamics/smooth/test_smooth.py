@@ -41,11 +41,10 @@ def element(law):
 
 def compared(modes, law, form, cycles=3, drive=SINE, kink=None, start=None, tolerance=1e-11):
     """(largest error of the coordinates, of the force) over their sizes, against SciPy's integrator."""
-    run, end = (
-        Motion(modes, drive, element(law), cycles, tolerance, start=start),
-        cycles * drive.period,
-    )
-    times, n = np.linspace(0, end, 50 * cycles + 1), modes.omega.size
+    run = Motion(modes, drive, element(law), cycles, tolerance, start=start)
+    end = cycles * drive.period
+    times = np.linspace(0, end, 50 * cycles + 1)
+    n = modes.omega.size
     rows = run.run_to(end, times)
     z, force = ref.integrate(modes, drive, form(law, LOAD), end, times, start, kink)
     return (
@@ -156,7 +155,8 @@ def test_exact_a_stuck_contact_is_a_spring():
     stiff = OMEGA**2 + 0.3 * LOAD / SHORT.length / MASS
     ratio = done.integrated.loops[0].displacement_harmonic / done.integrated.loops[0].force_harmonic
     assert ratio == pytest.approx(SHORT.length / (0.3 * LOAD), rel=1e-4)
-    decay, time = ONE.zeta[0] * ONE.omega[0], done.response.time
+    decay = ONE.zeta[0] * ONE.omega[0]
+    time = done.response.time
     turn = np.sqrt(stiff - decay**2)
     # z = Im(steady exp(i OMEGA t)) after the start
     steady = -1e-4 / complex(stiff - OMEGA**2, 2 * decay * OMEGA)
@@ -230,16 +230,16 @@ def test_exact_slides_far_below_the_bond_length_cost_no_small_steps(drive):
     start = (
         InitialState(np.array([1e-14]), np.zeros(1)) if not drive.segments[0].amplitude else None
     )
-    run, end = Motion(ONE, drive, element(SHORT), 4, 1e-11, start=start), 4 / 143
+    run = Motion(ONE, drive, element(SHORT), 4, 1e-11, start=start)
+    end = 4 / 143
     times = np.linspace(0, end, 201)
-    rows, stiff = run.run_to(end, times), 0.3 * LOAD / SHORT.length / MASS
+    rows = run.run_to(end, times)
+    stiff = 0.3 * LOAD / SHORT.length / MASS
     free = np.sqrt(OMEGA**2 + stiff - (0.003 * OMEGA) ** 2)
     if start is not None:
         # the bonds are unstretched at the start
-        decay, rest = (
-            0.003 * OMEGA,
-            1e-14 * stiff / (stiff + OMEGA**2),
-        )
+        decay = 0.003 * OMEGA
+        rest = 1e-14 * stiff / (stiff + OMEGA**2)
         sway = np.exp(-decay * times) * (np.cos(free * times) + decay / free * np.sin(free * times))
         want = rest + (1e-14 - rest) * sway
         assert rows[:, 1] == pytest.approx(want, abs=1e-7 * 1e-14)

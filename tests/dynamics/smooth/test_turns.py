@@ -52,7 +52,8 @@ def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
     """104 cycles of a rate law far above critical damping: z falls by 1e31. A state within round-off of rest that
     sets off is no stop; it was taken for one at a 1e-12 of each step, for ever (hundreds of steps are enough)."""
     omega = 2 * np.pi * 162.4
-    free, law = drives.make_release(1 / 162.4), TanhLaw(0.671, 1.569e-3).element(15.46)
+    free = drives.make_release(1 / 162.4)
+    law = TanhLaw(0.671, 1.569e-3).element(15.46)
     run = Motion(
         one_mode(omega, 0.05, 0.7626),
         free,
@@ -63,11 +64,9 @@ def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
     )
     for cycle in range(105):
         run.run_to(cycle / 162.4)
-    z, v, done = (
-        abs(run.arrays.state[0]),
-        abs(run.arrays.state[1]),
-        run.record.counters[COUNT.accepted : COUNT.refused + 1].sum(),
-    )
+    z = abs(run.arrays.state[0])
+    v = abs(run.arrays.state[1])
+    done = run.record.counters[COUNT.accepted : COUNT.refused + 1].sum()
     assert run.outcome is None and done < 2000
     assert z < 1e-25 * 4.631e-5 and v < 1e-25 * 4.631e-5 * omega
     # what friction and damping took is the energy of the start
@@ -83,11 +82,11 @@ def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for
     """Of a release that bonds 500 times as stiff as its spring catch far from rest: it rings on them at 23 times its
     frequency and dies out. The round-off of their force counted as an error of the step then: 839 000 steps in the
     first 40 cycles, 13 000 in all 108 now."""
-    omega, load, length = 2 * np.pi * 62.86, 8.528, 1.523e-7
-    law, start = (
-        points_element(Bonds(0.588, length), [1.0], [load]),
-        InitialState(np.array([1.023e-5]), np.zeros(1)),
-    )
+    omega = 2 * np.pi * 62.86
+    load = 8.528
+    length = 1.523e-7
+    law = points_element(Bonds(0.588, length), [1.0], [load])
+    start = InitialState(np.array([1.023e-5]), np.zeros(1))
     run = Motion(
         one_mode(omega, 0.05, 0.4143),
         drives.make_release(1 / 62.86),
@@ -97,7 +96,8 @@ def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for
         start=start,
     )
     run.run_to(108 / 62.86)
-    y, force = run.arrays.state, run.read_state()[0][5]
+    y = run.arrays.state
+    force = run.read_state()[0][5]
     assert (
         run.outcome is None
         and run.record.counters[COUNT.accepted : COUNT.refused + 1].sum() < 40_000
@@ -109,7 +109,8 @@ def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for
 
 def test_exact_a_long_call_is_left_now_and_then_and_goes_on_to_the_last_bit():
     """So a signal is heard. The room for turns ends calls elsewhere; neither changes the motion."""
-    law, told = element(Bonds(0.3, 5e-6)), []
+    law = element(Bonds(0.3, 5e-6))
+    told = []
     often, long = (Motion(ONE, SineDrive(49.0, OMEGA), law, 2500, 1e-9) for _ in range(2))
     long.record = long.record._replace(turns=np.zeros((9000, 9)))
     long.progress = told.append

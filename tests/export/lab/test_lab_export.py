@@ -77,7 +77,8 @@ def test_exact_round_trip_of_a_universal_file_imported_fitted_overlaid_and_expor
             and found[name]["x"].tobytes() == time.tobytes()
         )
         assert found[name]["ordinate_spec_data_type"] == kind and found[name]["func_type"] == 1
-    measured, fitted = found["force over displacement"], found["fitted over displacement"]
+    measured = found["force over displacement"]
+    fitted = found["fitted over displacement"]
     assert (
         measured["x"].tobytes() == slide.tobytes() and measured["data"].tobytes() == force.tobytes()
     )
@@ -109,7 +110,8 @@ def test_exact_histories_of_a_run_in_every_format(bench, tmp_path):
         assert (
             answer.code == 0 and f"{truth['time'].size} rows of relative_displacement" in answer.out
         ), answer.err
-    uff, mat = functions(tmp_path / "a.uff"), loadmat(tmp_path / "a.mat", simplify_cells=True)
+    uff = functions(tmp_path / "a.uff")
+    mat = loadmat(tmp_path / "a.mat", simplify_cells=True)
     table = np.genfromtxt(tmp_path / "a.csv", delimiter=",", names=True, deletechars="")
     head = (tmp_path / "a.csv").read_text().splitlines()[0]
     for name in set(truth) - {"time"}:

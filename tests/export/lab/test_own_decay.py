@@ -58,7 +58,8 @@ CASES = {
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
     """name of CASES -> results folder, each once."""
-    folder, kept = tmp_path_factory.mktemp("decays"), {}
+    folder = tmp_path_factory.mktemp("decays")
+    kept = {}
 
     def of(name):
         if name not in kept:

@@ -14,7 +14,8 @@ def table() -> dict:
     )
     amplitude = 1e-5 * (1 + load / 10) * np.log10(tilt / 1e-7)
     outcome = ["steady"] * 12
-    outcome[7], outcome[11] = "failed", "grows"
+    outcome[7] = "failed"
+    outcome[11] = "grows"
     amplitude[7] = np.nan
     return {
         "title": "Tilt </script><b>&amp;",

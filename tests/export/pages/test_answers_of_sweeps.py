@@ -73,7 +73,8 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
 
 
 def test_always_a_peak_at_an_end_is_none_and_a_side_that_stays_up_has_no_width():
-    name, x = "relative_displacement_amplitude", np.linspace(80, 120, 41)
+    name = "relative_displacement_amplitude"
+    x = np.linspace(80, 120, 41)
     for values in (x, -x + 200, np.where(x < 99, np.nan, curve(x, 98, 0.05))):
         assert (
             peaks.find_peaks(
@@ -327,10 +328,8 @@ def test_exact_too_few_settled_cases_are_no_ranking():
 
 def test_exact_curves_that_are_largest_at_an_end_are_counted():
     """Of five curves two are largest at 372 Hz, one at 300 Hz, one inside; a motionless one is not counted."""
-    height, place = (
-        np.array([4.0, 3, 0.2, 0.1, 0.0]) * 1e-3,
-        np.array([364.0, 372, 372 * (1 + 1e-13), 300, 300]),
-    )
+    height = np.array([4.0, 3, 0.2, 0.1, 0.0]) * 1e-3
+    place = np.array([364.0, 372, 372 * (1 + 1e-13), 300, 300])
     loads = {
         **key("normal.load", [1, 2, 3, 4, 5], [f"{one} N" for one in range(1, 6)]),
         "unit": "N",
@@ -406,7 +405,8 @@ def test_always_motions_that_run_away_are_told_before_those_that_settle(tmp_path
 
 
 def test_exact_unsettled_cases_that_are_no_end_of_the_key_are_counted():
-    name, size = "relative_displacement_amplitude", np.array([1.0, 2.0, 3.0, 4.0])
+    name = "relative_displacement_amplitude"
+    size = np.array([1.0, 2.0, 3.0, 4.0])
     keys = [key("normal.load", size, [f"{one:g} N" for one in size]) | {"unit": "N"}]
 
     def said(outcome, values):
@@ -435,7 +435,8 @@ def test_exact_unsettled_cases_that_are_no_end_of_the_key_are_counted():
 
 def test_exact_a_width_that_the_cases_do_not_tell_has_its_reason():
     """A peak of 1 Hz between cases 5 Hz apart, and a curve whose cases end above peak/sqrt2. Both stood as a dash."""
-    x, name = np.linspace(80, 120, 9), "relative_displacement_amplitude"
+    x = np.linspace(80, 120, 9)
+    name = "relative_displacement_amplitude"
     wide = np.linspace(98, 102, 9)
 
     def table(at, centre, damping):
@@ -460,7 +461,8 @@ def test_exact_the_scatter_of_the_cases_that_settled_is_not_told_where_many_have
     rng = np.random.default_rng(7)
     keys = [key(name, rng.random(100)) for name in ("a.a", "b.b")]
     values = 1e-6 * (1 + rng.random(100))
-    name, late = "relative_displacement_amplitude", np.arange(100) % 3 == 0
+    name = "relative_displacement_amplitude"
+    late = np.arange(100) % 3 == 0
     values[late] *= 1e3
     outcome = np.where(late, "transient", "steady").tolist()
 
@@ -495,12 +497,11 @@ def test_exact_the_scatter_of_the_cases_that_settled_is_not_told_where_many_have
 
 
 def test_exact_keys_whose_intervals_overlap_stand_in_no_order():
-    name, load = "loop_area", SobolIndex("contact.load", 0.5, 0.58, 0.46, 0.66)
-    friction, damping, tilt = (
-        SobolIndex("friction.static", 0.5, 0.56, 0.44, 0.6),
-        SobolIndex("damping", 0.01, 0.02, 0.0, 0.06),
-        SobolIndex("tilt", 0.0, 0.001, 0.0, 0.04),
-    )
+    name = "loop_area"
+    load = SobolIndex("contact.load", 0.5, 0.58, 0.46, 0.66)
+    friction = SobolIndex("friction.static", 0.5, 0.56, 0.44, 0.6)
+    damping = SobolIndex("damping", 0.01, 0.02, 0.0, 0.06)
+    tilt = SobolIndex("tilt", 0.0, 0.001, 0.0, 0.04)
     said = ranked.ranking_sentence({name: [load, friction, damping, tilt]}, 56, True, 64)
     assert said.startswith(
         "56 of 64 cases have not settled; with their last values included, loop area depends most "

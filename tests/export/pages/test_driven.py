@@ -102,7 +102,8 @@ def test_exact_the_page_of_a_recorded_slide_shows_the_force_measured_with_it(
     tmp_path, column, share
 ):
     time = np.linspace(0.0, 1.0, 201)
-    slide, force = 10 * np.sin(4 * np.pi * time), 2.5 * np.cos(4 * np.pi * time)
+    slide = 10 * np.sin(4 * np.pi * time)
+    force = 2.5 * np.cos(4 * np.pi * time)
     (tmp_path / "loop.csv").write_text(
         f"time [s],displacement [um],{column}\n"
         + "\n".join(

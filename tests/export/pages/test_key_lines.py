@@ -11,7 +11,8 @@ def key(values, texts) -> dict:
 
 def test_exact_values_have_the_digits_that_their_spacing_resolves():
     """A range wrote them; what a person wrote stays as it is."""
-    wide, close = np.geomspace(2, 200, 5), np.linspace(1, 1.004, 5)
+    wide = np.geomspace(2, 200, 5)
+    close = np.linspace(1, 1.004, 5)
     as_written = np.array([1, 3.14159, 9.87654, 20, 30])
     for values, third in (
         (wide, "20 urad"),

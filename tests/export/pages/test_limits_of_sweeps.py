@@ -161,11 +161,9 @@ def test_exact_nothing_that_moves_changes():
 def test_exact_a_limit_that_errors_leave_open_is_told_with_the_case_that_is_surely_beyond():
     """The rig at 1, 150, 170 and 190 urad: the loop falls by 4.5, 5.007 and 5.23 %, known to 0.05 %, so that 5 % lie
     between 150 and 190 urad; the slip, 5.03 % off in the last case, is left open there."""
-    tilt, loop, slip = (
-        np.array([1e-3, 0.15, 0.17, 0.19]),
-        [1, 0.955, 0.94993, 0.9477],
-        [1, 0.96, 0.9495, 0.9497],
-    )
+    tilt = np.array([1e-3, 0.15, 0.17, 0.19])
+    loop = [1, 0.955, 0.94993, 0.9477]
+    slip = [1, 0.96, 0.9495, 0.9497]
     want = (
         "Tilt may reach at least 0.15 mrad (1.9 um over the patch) before slip amplitude or loop area changes by 5 "
         "%; loop area has changed by more than 5 % at 0.19 mrad."
@@ -215,7 +213,8 @@ def test_exact_of_several_lines_the_one_that_allows_least():
         key(tilt) | {"unit": "rad", "log": False},
         key(slope, "normal.load", "N") | {"unit": "N", "log": False},
     ]
-    values, good = 1 + slope * (tilt - 0.05), {"loop_area": np.ones(10, bool)}
+    values = 1 + slope * (tilt - 0.05)
+    good = {"loop_area": np.ones(10, bool)}
     (one,) = find_limits(keys, {"loop_area": (values, 0 * values)}, good).found
     assert one.value == pytest.approx(0.15)
     assert find_limits(keys, {"loop_area": (values, 0 * values)}, good, grid=False).key is None
@@ -223,10 +222,8 @@ def test_exact_of_several_lines_the_one_that_allows_least():
 
 def swept() -> dict:
     """A sweep over the tilt: straight lines, a pressure in proportion, two cases that miss the tolerance."""
-    line, tilt = (
-        1 + 0.25 * (TILT - 0.05),
-        key() | {"unit": "rad", "log": False, "values": TILT * 1e-3},
-    )
+    line = 1 + 0.25 * (TILT - 0.05)
+    tilt = key() | {"unit": "rad", "log": False, "values": TILT * 1e-3}
     known = {
         "loop_area": ("J", line),
         "relative_displacement_amplitude": ("m", 1e-5 * line**0.5),
@@ -258,10 +255,8 @@ def swept() -> dict:
 
 def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
     """(1 + s)^0.5 is 1.05 at s = 0.1025, a tilt of 0.46 mrad; 2 MPa are doubled at 0.15 mrad; 1 - 0.1 t at 0.5475."""
-    text, found = (
-        own_part(page_html(swept())),
-        sweep_summary(summarise_sweep(swept()), swept()["outcome"]),
-    )
+    text = own_part(page_html(swept()))
+    found = sweep_summary(summarise_sweep(swept()), swept()["outcome"])
     want = (
         "Tilt may reach 0.25 mrad (3.2 um over the patch; interpolated between the cases at 0.2 and 0.5 mrad) "
         "before relative displacement amplitude or loop area changes by 5 % (first to change: loop area or "

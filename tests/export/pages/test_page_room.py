@@ -11,10 +11,8 @@ from patchfem.export.pages.document import document_html
 def test_exact_a_sampled_line_keeps_its_extremes_and_its_ends(size):
     rng = np.random.default_rng(size)
     # neither is monotonic, as in a loop
-    x, y = (
-        np.cumsum(rng.normal(size=size)),
-        rng.normal(size=size),
-    )
+    x = np.cumsum(rng.normal(size=size))
+    y = rng.normal(size=size)
     keep = charts.sample_indices(x, y, 1000)
     assert keep.size <= 1000 and keep[0] == 0 and keep[-1] == size - 1 and np.all(np.diff(keep) > 0)
     for values in (x, y):

@@ -16,7 +16,8 @@ TURN = "const e=document.getElementById('shown');e.value='map';e.dispatchEvent(n
 
 def stress_map() -> str:
     """A page with a map of cells and a line beside it, as a run has them."""
-    x, y = np.linspace(0.0, 4.0, 5), np.linspace(0.0, 3.0, 4)
+    x = np.linspace(0.0, 4.0, 5)
+    y = np.linspace(0.0, 3.0, 4)
     value = np.add.outer(np.arange(4.0), np.arange(3.0))
     drawn = [
         charts.make_chart(

@@ -41,7 +41,8 @@ def grid(x, depth) -> tuple:
 @pytest.fixture(scope="module")
 def graded() -> tuple:
     """A grid of 90 by 24 cells, finer towards both ends and the top, four rows of it coated."""
-    x, depth = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 91)), np.linspace(0, 1, 25) ** 2
+    x = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 91))
+    depth = np.linspace(0, 1, 25) ** 2
     points, cells = grid(x, depth)
     return points, cells, np.tile(np.arange(24) < 4, 90)
 
@@ -51,7 +52,8 @@ def test_exact_means_keep_the_integral_and_a_linear_field_its_middle_value(grade
     mesh = reduce_mesh(points, cells, coated, 300)
     middle = points[cells].mean(axis=1)
     field = np.stack([3 + 2 * middle[:, 0] - middle[:, 1], np.sin(9 * middle[:, 0])], axis=1)
-    means, size = mesh.means(field), quadrilateral_areas(points[mesh.nodes], mesh.cells)
+    means = mesh.means(field)
+    size = quadrilateral_areas(points[mesh.nodes], mesh.cells)
     np.testing.assert_allclose(
         size @ means, quadrilateral_areas(points, cells) @ field, rtol=1e-12, atol=1e-13
     )
@@ -110,7 +112,8 @@ def test_exact_numbers_and_places_are_those_of_the_fields(coarse):
     with Series(coarse) as series:
         numbers = last_consecutive_frames(series.times)
         assert film["of"] == len(numbers)
-        gap, aside = 200.0, 50.0
+        gap = 200.0
+        aside = 50.0
         for at, time in list(enumerate(film["times"]))[::5]:
             frame = series.frame(int(np.searchsorted(series.times, time)))
             drawn = make_panels(frame, (gap, gap), aside=aside)[0]
@@ -159,14 +162,12 @@ def opened(bench, film, chromium):
         '<img src=x onerror="window.hacked=1"></script><script>window.hacked=1</script>'
     )
     with h5netcdf.File(bench / "result.nc", "r") as file:
-        x, fields = (
-            file["x"][...],
-            {
-                "normal_stress": file["normal_stress"][...],
-                "time": file["frame_time"][...],
-                "shear_stress": file["shear_stress"][...],
-            },
-        )
+        x = file["x"][...]
+        fields = {
+            "normal_stress": file["normal_stress"][...],
+            "time": file["frame_time"][...],
+            "shear_stress": file["shear_stress"][...],
+        }
     text = report.page_html(
         RunData(
             SceneText("a", "</pre><b id=evil>&", ""),
@@ -228,7 +229,8 @@ def test_exact_in_a_browser_the_pointer_reads_values(opened, film):
         float(part.split()[1 if at == 0 else 0])
         for at, part in enumerate((tip.split(":")[0], tip.split(": pressure ")[1]))
     )
-    x, sigma = unpacked(film["x"]), unpacked(film["curves"][0]["values"])[0]
+    x = unpacked(film["x"])
+    sigma = unpacked(film["curves"][0]["values"])[0]
     assert value == pytest.approx(sigma[np.argmin(np.abs(x - place))], rel=1e-3)
     left, top, wide, high = opened.js(
         "(({x, y, width, height}) => [x, y, width, height])"

@@ -121,7 +121,8 @@ def test_always_a_sweep_without_a_value_has_a_page_without_pictures(table):
 
 
 def test_always_many_cases_are_thinned_to_a_page_below_three_megabytes_with_all_extremes(table):
-    many, r = 200_000, np.random.default_rng(3)
+    many = 200_000
+    r = np.random.default_rng(3)
     for one in table["keys"]:
         one["values"] = r.uniform(1, 2, many)
         one["texts"] = [f"{value} N" for value in one["values"].tolist()]
@@ -162,7 +163,8 @@ def test_always_many_cases_are_thinned_to_a_page_below_three_megabytes_with_all_
 
 def test_always_a_grid_that_is_too_large_is_thinned_to_points_with_its_extremes(table):
     places = [one.ravel() for one in np.meshgrid(np.arange(500), np.arange(100), indexing="ij")]
-    many, r = places[0].size, np.random.default_rng(4)
+    many = places[0].size
+    r = np.random.default_rng(4)
     table["keys"] = [
         {
             "name": f"key{k}",
@@ -177,7 +179,8 @@ def test_always_a_grid_that_is_too_large_is_thinned_to_points_with_its_extremes(
         one["values"], one["errors"] = r.normal(size=many), np.full(many, 1e-3)
     table |= {"outcome": ["steady"] * many, "messages": {}, "folders": None}
     text = page_html(table)
-    data, values = data_of(text), table["measures"]["relative_displacement_amplitude"]["values"]
+    data = data_of(text)
+    values = table["measures"]["relative_displacement_amplitude"]["values"]
     shown = np.array([one["values"] for one in data["keys"]])
     assert len(text.encode()) < 3e6 and 400 < shown.shape[1] < many
     assert (
@@ -325,7 +328,8 @@ def test_always_a_browser_draws_it(table, browser, shown):
 
 def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_relative_error():
     """5 kPa of 2 MPa is a quarter of a percent, and 9e-9 of 9e-3 more than 8e-8 of 8: the relative error counts."""
-    lost, settled = np.nan, np.array([True, True, False])
+    lost = np.nan
+    settled = np.array([True, True, False])
     measures = {
         "loop_area": ([lost] * 3, [lost] * 3, "J"),
         "pressure_peak": ([2e6, 3.1415926e6, 9e9], [5e3, lost, 1e9], "Pa"),
@@ -481,7 +485,8 @@ def test_always_a_picture_is_one_stop_of_the_tab_key_and_obeys_keys(chromium, ta
 
 def test_exact_a_fraction_is_told_in_percent_as_a_run_tells_it():
     """0.2193 of the length is 21.93 % in sentence, table and picture alike."""
-    values, none = np.array([1.0, 0.2193, 0.1231]), np.zeros(3)
+    values = np.array([1.0, 0.2193, 0.1231])
+    none = np.zeros(3)
     assert (
         span_sentence(
             {"contact_fraction": (values, none, "1")},

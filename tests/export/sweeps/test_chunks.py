@@ -76,7 +76,8 @@ def test_exact_a_file_gives_back_what_was_written(tmp_path, count):
 def test_exact_cases_are_found_by_their_names_in_any_order(tmp_path):
     """Of files with cases of other sweeps, a case that stands twice, and one that two files have: the later counts."""
     names = np.arange(1, 12, dtype=np.uint64) ** 5
-    first, second = some(6, 1), some(5, 2)
+    first = some(6, 1)
+    second = some(5, 2)
     chunks.write_chunk(tmp_path, range(6), names[:6], first)
     chunks.write_chunk(tmp_path, range(6, 11), names[[5, 7, 8, 9, 10]], second)
     wanted = Chunks(tmp_path, names[[9, 2, 0, 9, 5, 6]])
@@ -104,7 +105,8 @@ def test_exact_cases_are_found_by_their_names_in_any_order(tmp_path):
 
 
 def test_exact_small_files_are_packed(tmp_path):
-    names, found = np.arange(300, dtype=np.uint64) * 7919, some(300, 5)
+    names = np.arange(300, dtype=np.uint64) * 7919
+    found = some(300, 5)
     for first in range(0, 300, 3):
         chunks.write_chunk(
             tmp_path,
@@ -171,7 +173,8 @@ def test_always_a_damaged_file_is_run_again(swept, scene, tmp_path, monkeypatch,
 
 def test_exact_a_folder_of_summaries_alone_is_gone_on_with(scene, tmp_path, monkeypatch):
     """As sweeps were kept before they had columns; a summary that is damaged is run again."""
-    out, words = tmp_path / "out", ("sweep", scene, *OVER, "-o", tmp_path / "out")
+    out = tmp_path / "out"
+    words = ("sweep", scene, *OVER, "-o", tmp_path / "out")
     assert cli(*words).code == 3
     before = {name: (out / name).read_bytes() for name in TABLES}
     shutil.rmtree(out / "chunks")

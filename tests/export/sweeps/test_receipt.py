@@ -62,7 +62,8 @@ def test_always_whatever_has_changed_is_looked_at(swept, change):
         == 3
     )
     file = next((out / "chunks").glob("*.h5")) if change == "chunk" else out / "sweep.csv"
-    text, stamp = scene.read_text("utf-8"), file.stat()
+    text = scene.read_text("utf-8")
+    stamp = file.stat()
     if change in ("chunk", "table"):
         os.utime(file, ns=(stamp.st_atime_ns, stamp.st_mtime_ns + 1))
     if change == "gone":

@@ -62,7 +62,8 @@ def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
     path = random_walk(7, 80, 0.4)
     model = points_model(law, [1.0], [1.0])
     contact = model.build()
-    energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
+    energies = np.zeros((path.size, 2))
+    forces = np.zeros((path.size, 3))
     assert (
         load_instances().follow_path(path, 1.0, model.kind, contact, 1e-12, energies, forces) == 0
     )
@@ -117,7 +118,8 @@ def worst_loss(seed, points, count):
         )
     )
     sigma = rng.uniform(0, 2, points)
-    state, worst = law.start(sigma), 0.0
+    state = law.start(sigma)
+    worst = 0.0
     for _ in range(count):
         after = rng.uniform(0, 2, points) * (rng.random(points) < 0.9)
         press = law.press(state, sigma, after)
@@ -135,7 +137,8 @@ def worst_loss(seed, points, count):
             - step.dissipated
         )
         assert np.abs(gain / size).max() <= 1e-11
-        state, sigma = step.state, ahead
+        state = step.state
+        sigma = ahead
     return worst
 
 

@@ -23,7 +23,8 @@ LAWS = [
 
 def drawn(rng, reading, order):
     """(law, path, time step) by chance: steps of 1e-6 to 3 bond lengths, dwells, growth in every other one."""
-    size, grown = 10 ** rng.uniform(-4, 0.5), {}
+    size = 10 ** rng.uniform(-4, 0.5)
+    grown = {}
     steps = rng.normal(size=150) * size * 10 ** rng.uniform(-2, 1, 150)
     steps[rng.random(150) < 0.05] = 0.0
     if rng.random() < 0.5:
@@ -45,7 +46,8 @@ def books_close(seed, count, reading, order, engine):
         law, path = drawn(rng, reading, order)
         model = bond_list_model(law, 1.0, cutoff_age(order, tail) if tail else np.inf, merge)
         forces, energies, bad, _ = follow(model, path, 10 ** rng.uniform(-2, 1))
-        work, lost = forces[:-1, 1] * np.diff(path), energies[:-1, 0]
+        work = forces[:-1, 1] * np.diff(path)
+        lost = energies[:-1, 0]
         passed = np.abs(work).sum()
         assert bad == 0
         assert work.sum() - lost.sum() == pytest.approx(energies[-1, 1], abs=1e-12 * passed)
@@ -70,7 +72,8 @@ def test_order_of_the_work_check_of_a_list_is_two(reading, order, engine):
     """Trapezoid of the force against the work of the path means, with growth; order -0.5 is steep at every turn."""
     tail, merge = ENGINES[engine]
     law = Bonds(1.0, 1.0, order, reading, 0.6, 0.3, 0.4, 1e-2, 0.0)
-    model, gaps = bond_list_model(law, 1.0, cutoff_age(order, tail) if tail else np.inf, merge), []
+    model = bond_list_model(law, 1.0, cutoff_age(order, tail) if tail else np.inf, merge)
+    gaps = []
     for steps in (100, 400):
         path = 1.7 * np.sin(2 * np.pi * np.arange(2 * steps + 1) / steps)
         forces, _, _, _ = follow(model, path, 2 * np.pi / steps)

@@ -17,11 +17,13 @@ def share(law, path, steps, tolerance):
     """Largest error of merging over the stated one, and the strips kept of those there are."""
     moves = np.diff(path)
     way = np.sign(moves[moves != 0])
-    strokes, dt = 1 + np.count_nonzero(way[1:] != way[:-1]), 2 * np.pi / steps
+    strokes = 1 + np.count_nonzero(way[1:] != way[:-1])
+    dt = 2 * np.pi / steps
     chosen = choose_engine(
         law, tolerance, np.abs(moves).sum() / strokes, max(way.size / strokes, 1), MERGED
     )
-    whole, got = follow_list(law, path, dt), follow_list(law, path, dt, chosen.merge, chosen.tail)
+    whole = follow_list(law, path, dt)
+    got = follow_list(law, path, dt, chosen.merge, chosen.tail)
     moved = np.abs(moves) > 1e-9 * np.abs(moves).max()
     off = max(np.abs(got.after - whole.after).max(), np.abs(got.mean - whole.mean)[moved].max())
     return off / chosen.error, got.status[STATUS.max_strips] / whole.status[STATUS.max_strips]
@@ -68,15 +70,11 @@ ORDERS = {"report": [-0.9, -0.5, 0, 0.3, 0.5, 1, 1.5, 2, 3.3], "stretch": [0, 0.
 
 def drawn(rng):
     """(law, path, steps per cycle) by chance."""
-    reading, steps, size = (
-        str(rng.choice([*ORDERS])),
-        int(rng.choice([30, 100, 400])),
-        10 ** rng.uniform(-2.5, 0.7),
-    )
-    order, turn = (
-        float(rng.choice(ORDERS[reading])),
-        np.arange(min(8 * steps, 1500) + 1) / steps * 2 * np.pi,
-    )
+    reading = str(rng.choice([*ORDERS]))
+    steps = int(rng.choice([30, 100, 400]))
+    size = 10 ** rng.uniform(-2.5, 0.7)
+    order = float(rng.choice(ORDERS[reading]))
+    turn = np.arange(min(8 * steps, 1500) + 1) / steps * 2 * np.pi
     path = (
         size
         * (

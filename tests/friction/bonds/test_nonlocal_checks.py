@@ -41,7 +41,8 @@ def settled_at(law, speed, ell):
         [np.linspace(0, 4 * ell / unit, 40), np.geomspace(4 * ell / unit, 6, 120)[1:]]
     )
     back = np.concatenate([young, np.linspace(6, 90, 600)[1:]])[::-1]
-    engine, one = Quadrature(law, tail=0.0), np.ones(1)
+    engine = Quadrature(law, tail=0.0)
+    one = np.ones(1)
     state = engine.start(one)
     for dq in np.diff(unit * (back[0] - back)):
         # the means of the steps are not asked for
@@ -77,7 +78,8 @@ def test_exact_c8_dwell_of_the_stretch_in_closed_form(hold):
     law = FirstOrderBonds(
         Bonds(1.0, 1.0, ratio=0.5, rest_growth=10.0, slip_growth=1e30, rest_speed=1.0)
     )
-    state, one = BondState(np.array([[1.0], [0.5], [0.5]]), 0.5), np.ones(1)
+    state = BondState(np.array([[1.0], [0.5], [0.5]]), 0.5)
+    one = np.ones(1)
     held = law.step(state, 0.0, one, one, hold)
     eps = 1 - 0.5 * np.exp(-10 * hold)
     assert held.state.eps == pytest.approx(eps, rel=1e-14) and law.traction(held.state)[0] == 0.5
@@ -366,7 +368,8 @@ def test_exact_speeds_of_nothing_are_a_dwell(speed, growth):
         for maker in (
             (Quadrature, FirstOrderBonds) if (order, reading) == (1.0, "stretch") else (Quadrature,)
         ):
-            engine, one = maker(law), np.ones(1)
+            engine = maker(law)
+            one = np.ones(1)
             state = engine.start(one)
             for dq in (0.4, 0.7, -0.2):
                 state = engine.step(state, dq, one, one, 0.3).state
@@ -413,7 +416,8 @@ def test_order_of_the_march_with_bonds_of_a_nanometre_is_half_towards_coulomb():
 
     A step spans thousands of bond lengths; every one converges and the ledger closes.
     """
-    drive, w = 6 * 9.80665, 2 * np.pi * 135
+    drive = 6 * 9.80665
+    w = 2 * np.pi * 135
     coulomb = sliding_amplitude(135 / 143, 4 / 6, 0.05) * drive / OMEGA**2
     short = []
     for length in (1e-7, 1e-8, 1e-9):
@@ -430,7 +434,8 @@ def test_order_of_the_march_with_bonds_of_a_nanometre_is_half_towards_coulomb():
 def test_exact_march_with_bonds_of_a_metre_is_a_linear_spring():
     """k = mu_s N/eps_0 in parallel: the steady amplitude of a damped linear mode at 5 g."""
     model = points_model(Bonds(0.4, 1.0), [1e-4], [98.0665e4])
-    drive, hertz = 5 * 9.80665, 100.0
+    drive = 5 * 9.80665
+    hertz = 100.0
     stiff = OMEGA**2 + 39.2266
     w = 2 * np.pi * hertz
     want = drive / np.hypot(stiff - w**2, 2 * 0.05 * OMEGA * w)

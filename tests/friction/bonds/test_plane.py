@@ -24,7 +24,8 @@ GROWING = Bonds(0.7, 1.0, 1.0, "stretch", 0.6, 2.0, 0.3, 1e-3, 0.8)
 
 def along(law, path, sigma=ONE, dt=1.0, pressures=None):
     """(means (k, 2, m), tractions, dissipated (k, m), stored, state) of a polygon path (k + 1, 2)."""
-    state, rows = law.start(sigma if pressures is None else pressures[0], 2), []
+    state = law.start(sigma if pressures is None else pressures[0], 2)
+    rows = []
     for k, dq in enumerate(np.diff(path, axis=0)):
         s0, s1 = (sigma, sigma) if pressures is None else pressures[k : k + 2]
         step = law.step(state, dq, s0, s1, dt)
@@ -73,7 +74,8 @@ STEPS = st.lists(st.floats(-2, 2), min_size=1, max_size=12)
 
 @given(STEPS, st.sampled_from([0, 1]), st.floats(0.05, 3))
 def test_always_one_direction_is_the_scalar_state(steps, axis, dt):
-    knots, sigma = np.cumsum([0.0, *steps]), np.array([1.0, 0.3])
+    knots = np.cumsum([0.0, *steps])
+    sigma = np.array([1.0, 0.3])
     path = np.zeros((len(knots), 2))
     path[:, axis] = knots
     one = walk(FirstOrderBonds(GROWING), knots, lambda q: sigma, dt)
@@ -131,12 +133,11 @@ def test_always_a_turned_path_turns_the_traction(seed, angle):
 def turned(seed: int, angle: float) -> None:
     """A random path of eight legs and the same turned by an angle: turned tractions, the same losses."""
     rng = np.random.default_rng(seed)
-    path, turn = (
-        random_path(rng, 8),
-        np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]),
-    )
+    path = random_path(rng, 8)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     for law in (FirstOrderBonds(GROWING), Quadrature(GROWING)):
-        one, other = along(law, path, dt=0.3), along(law, path @ turn.T, dt=0.3)
+        one = along(law, path, dt=0.3)
+        other = along(law, path @ turn.T, dt=0.3)
         assert other[1] == pytest.approx(np.einsum("ij,kjm->kim", turn, one[1]), abs=1e-13)
         assert other[2] == pytest.approx(one[2], abs=1e-12)
 
@@ -160,12 +161,14 @@ def by_hand(law, path, dt):
     after = np.cumsum(length[::-1])[::-1] - length
     total = np.zeros(2)
     for k, leg in enumerate(legs):
-        e, a = leg / length[k], path[-1] - path[k + 1]
+        e = leg / length[k]
+        a = path[-1] - path[k + 1]
         turn = float(np.clip(-(a @ e), 0, length[k]))
         for c in (0, 1):
 
             def bond(y, c=c, e=e, a=a, k=k):
-                u, travel = a + y * e, after[k] + y
+                u = a + y * e
+                travel = after[k] + y
                 size = max(np.hypot(*u), 1e-300)
                 x = size if law.reading == "stretch" else travel
                 return x**law.order * np.exp(-travel) / gamma(law.order + 1) * u[c] / size
@@ -217,7 +220,8 @@ def test_exact_initial_bonds_point_back_to_the_start():
     bare = Bonds(1.0, 1.0, 2.0, "stretch", initial=0.0)
     path = np.array([[0, 0], [0.3, 0.1], [0.2, 0.8]])
     more = along(Quadrature(law), path)[1][-1, :, 0] - along(Quadrature(bare), path)[1][-1, :, 0]
-    u, r = np.hypot(0.2, 0.8), np.hypot(0.3, 0.1) + np.hypot(0.1, 0.7)
+    u = np.hypot(0.2, 0.8)
+    r = np.hypot(0.3, 0.1) + np.hypot(0.1, 0.7)
     assert more == pytest.approx(u**2 * np.exp(-r) / 2 * np.array([0.2, 0.8]) / u, rel=1e-13)
 
 
@@ -226,7 +230,8 @@ def test_exact_initial_bonds_point_back_to_the_start():
 
 def worst_gain(seed, paths, legs=24):
     """Least of (work so far, dissipation, miss of the ledger) over random closed-in paths, all over the work done."""
-    rng, worst = np.random.default_rng(seed), [np.inf, np.inf, 0.0]
+    rng = np.random.default_rng(seed)
+    worst = [np.inf, np.inf, 0.0]
     for _ in range(paths):
         law = FirstOrderBonds(
             Bonds(
@@ -272,7 +277,8 @@ def test_exact_work_and_loss_of_a_leg_are_those_of_its_parts(law):
     fine = np.vstack(
         [path[:1]] + [a + (b - a) * (np.arange(20)[:, None] + 1) / 20 for a, b in pairwise(path)]
     )
-    one, two = along(Quadrature(law, 0.0), path), along(Quadrature(law, 0.0), fine)
+    one = along(Quadrature(law, 0.0), path)
+    two = along(Quadrature(law, 0.0), fine)
     work = [
         np.einsum("kcm,kc->k", part[0], np.diff(way, axis=0))
         for part, way in ((one, path), (two, fine))

@@ -109,7 +109,8 @@ def test_exact_printed_law_with_growing_bonds_at_steps_of_any_length(order):
     for parts in (1, 2, 4):
         path = triangle(1.0, 1, 8 * parts)[: 20 * parts + 1]
         run = pulled(Quadrature(law, tail=0.0), path, ONE, dt=0.4 / parts)
-        found, wanted = run.traction[-1, 0], sum_by_hand(law, path, ONE, 0.4 / parts)[0]
+        found = run.traction[-1, 0]
+        wanted = sum_by_hand(law, path, ONE, 0.4 / parts)[0]
         assert found == pytest.approx(wanted, abs=2e-6 if order > -0.5 else 1e-4)
 
 
@@ -133,12 +134,11 @@ def columns(part) -> list:
 )
 @pytest.mark.parametrize("tail", [0.0, 1e-2])
 def test_exact_bonds_that_are_only_carried_are_those_of_a_step(reading, order, growth, tail):
-    law, pressure = (
-        Quadrature(Bonds(0.4, 1.0, order, reading, **growth), tail),
-        lower_pressure(np.zeros(3), 5.0, 0.5),
-    )
+    law = Quadrature(Bonds(0.4, 1.0, order, reading, **growth), tail)
+    pressure = lower_pressure(np.zeros(3), 5.0, 0.5)
     path = np.concatenate([random_path(6, 12, 0.4), [0.0, 0.0, 30.0]])
-    stepped, carried = walk(law, path, pressure, 0.3), pulled(law, path, pressure, 0.3)
+    stepped = walk(law, path, pressure, 0.3)
+    carried = pulled(law, path, pressure, 0.3)
     assert np.array_equal(stepped.traction, carried.traction)
     for each in fields(Strips):
         one, two = (columns(getattr(run.state, each.name)) for run in (stepped, carried))

@@ -43,7 +43,8 @@ def test_exact_recursion_is_the_sum_over_bonds(piece, growth, seed):
     rng = np.random.default_rng(seed)
     steps = rng.normal(0, 1, 120) * 10.0 ** rng.uniform(-3, 0.7, 120)
     steps[rng.integers(0, 120, 10)] = 0.0
-    path, times = np.concatenate([[0], np.cumsum(steps)]), rng.uniform(0.01, 1, 120)
+    path = np.concatenate([[0], np.cumsum(steps)])
+    times = rng.uniform(0.01, 1, 120)
     law = Bonds(0.4, 1.0, initial=0.8, **growth)
     fast = walk(FirstOrderBonds(law), path, pressures(piece), times)
     slow = walk(Quadrature(law, tail=0.0), path, pressures(piece), times)
@@ -74,7 +75,8 @@ def test_exact_step_mean_is_the_average_along_the_step():
 
 
 def test_exact_slope_is_the_derivative_of_the_mean():
-    bonds, sigma = np.array([[0.7, 0.2], [0.4, -0.1], [0.5, 0.3]]), np.array([1.0, 0.6])
+    bonds = np.array([[0.7, 0.2], [0.4, -0.1], [0.5, 0.3]])
+    sigma = np.array([1.0, 0.6])
     for dq in (-3.0, -0.4, -0.02, 0.01, 0.2, 1.5):
         h = 1e-5 * abs(dq)
         slope = (
@@ -141,7 +143,8 @@ def test_exact_huge_steps_end_in_steady_sliding(growth):
 def test_exact_steps_of_no_length_and_no_time_change_nothing():
     law = Bonds(0.3, 1.0, **GROWTH[1])
     for maker in (FirstOrderBonds, Quadrature):
-        path, times = np.array([0, 0.4, 0.4, 0.4, 0.9]), np.array([0.5, 0.0, 0.0, 0.5])
+        path = np.array([0, 0.4, 0.4, 0.4, 0.9])
+        times = np.array([0.5, 0.0, 0.0, 0.5])
         run = walk(maker(law), path, pressures("upper"), times)
         short = walk(maker(law), path[[0, 1, 4]], pressures("upper"), times[[0, 3]])
         assert run.traction[-1] == pytest.approx(short.traction[-1], abs=1e-14)

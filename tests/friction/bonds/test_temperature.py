@@ -93,7 +93,8 @@ def test_refuses_rates_beyond_floating_point(surface, key):
 def test_exact_points_of_their_own_temperature_are_separate_runs(breakaway):
     """Three points at 250, 293.15 and 450 K in one call = three recursions with rates by hand."""
     law = Bonds(0.6, 2e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, breakaway=breakaway)
-    hot, sigma = np.array([250.0, 293.15, 450.0]), np.array([1.0, 2.0, 0.5])
+    hot = np.array([250.0, 293.15, 450.0])
+    sigma = np.array([1.0, 2.0, 0.5])
     rest, slip = growth_at_temperature(
         law.rest_growth, law.slip_growth, hot, 293.15, 2500.0, 1500.0
     )
@@ -114,10 +115,8 @@ def test_exact_points_of_their_own_temperature_are_separate_runs(breakaway):
         )
         for t in hot
     ]
-    state, states = (
-        engine.start(sigma),
-        [one.start(sigma[i : i + 1]) for i, one in enumerate(alone)],
-    )
+    state = engine.start(sigma)
+    states = [one.start(sigma[i : i + 1]) for i, one in enumerate(alone)]
     rng = np.random.default_rng(1)
     for dq in np.append(rng.normal(0, 1e-6, 60), [0.0, 2e-6]):
         new = sigma * rng.uniform(0.5, 1.5)
@@ -126,7 +125,8 @@ def test_exact_points_of_their_own_temperature_are_separate_runs(breakaway):
             one.step(s, dq, sigma[i : i + 1], new[i : i + 1], 1e-3)
             for i, (one, s) in enumerate(zip(alone, states))
         ]
-        state, states = step.state, [one.state for one in ones]
+        state = step.state
+        states = [one.state for one in ones]
         assert step.mean == pytest.approx([one.mean[0] for one in ones], rel=1e-12, abs=1e-14)
         assert step.dissipated == pytest.approx(
             [one.dissipated[0] for one in ones], rel=1e-10, abs=1e-20
@@ -140,8 +140,10 @@ def test_exact_points_of_their_own_temperature_are_separate_runs(breakaway):
 
 
 def test_exact_a_surface_at_its_reference_is_the_scene_without_the_table():
-    text, cold = POINT + GROWING, ["friction.temperature.surface=293.15 K"]
-    plain, warm = loads(text + TRIANGLE), loads(text + WARM + TRIANGLE, sets=cold)
+    text = POINT + GROWING
+    cold = ["friction.temperature.surface=293.15 K"]
+    plain = loads(text + TRIANGLE)
+    warm = loads(text + WARM + TRIANGLE, sets=cold)
     one, two = (bench.run(build(scene), None, 200) for scene in (plain, warm))
     assert (one.force == two.force).all() and one.values == two.values
     assert plan(plain).groups == plan(warm).groups
@@ -149,10 +151,8 @@ def test_exact_a_surface_at_its_reference_is_the_scene_without_the_table():
 
 def test_exact_steady_friction_of_a_warm_bench():
     """mu(v) of 2.18 with the rates of 2.13; the warm surface is the stronger one at this speed."""
-    rest, slip = (
-        10 * np.exp(2500 * (1 / 293.15 - 1 / 393.15)),
-        2e-7 * np.exp(1500 * (1 / 393.15 - 1 / 293.15)),
-    )
+    rest = 10 * np.exp(2500 * (1 / 293.15 - 1 / 393.15))
+    slip = 2e-7 * np.exp(1500 * (1 / 393.15 - 1 / 293.15))
     scene = loads(POINT + GROWING + WARM + SLIDE)
     found = bench.run(build(scene), None, 2000).values["friction_ratio_end"]
     truth = 0.6 * friction_forms.steady_bond_length(5e-3, 2e-6, 0.7, rest, slip) / 2e-6
@@ -179,7 +179,8 @@ def test_exact_a_warm_rig_is_a_rig_with_the_rates_of_the_warm_surface():
 
 
 def test_exact_the_plan_names_the_temperature():
-    warm, plain = plan(loads(POINT + GROWING + WARM + SLIDE)), plan(loads(POINT + GROWING + SLIDE))
+    warm = plan(loads(POINT + GROWING + WARM + SLIDE))
+    plain = plan(loads(POINT + GROWING + SLIDE))
     assert (
         "friction.temperature" in warm.effects and "friction.temperature" not in warm.not_in_scene
     )
@@ -240,7 +241,8 @@ def test_exact_a_table_without_effect_is_remarked(text, says):
 )
 def test_exact_rise_of_a_half_space_under_constant_heat(time, printed, within):
     """0.2 W on 1 cm2 of titanium: heat balance of the exact field 2 q sqrt(at) ierfc(z/2 sqrt(at))/k."""
-    k, c = 7.0, 2.3e6
+    k = 7.0
+    c = 2.3e6
     rise = surface_temperature_rise(2000.0, time, k, c)
     assert rise == pytest.approx(printed, rel=within)
     reach = np.sqrt(k / c * time)

@@ -26,9 +26,11 @@ def test_exact_the_sum_over_bonds_lets_go_what_the_recursion_does():
     rng = np.random.default_rng(4)
     for growth, share in (({}, 0.0), (GROWTH, 0.0), (GROWTH, 0.4)):
         law = Bonds(0.4, 1.0, initial=0.6, breakaway=share, **growth)
-        sum_, state_law = Quadrature(law, 0.0), FirstOrderBonds(law)
+        sum_ = Quadrature(law, 0.0)
+        state_law = FirstOrderBonds(law)
         sigma = rng.uniform(0, 2, 4)
-        a, b = sum_.start(sigma), state_law.start(sigma)
+        a = sum_.start(sigma)
+        b = state_law.start(sigma)
         for dq in np.diff(random_walk(2, 60, 0.8)):
             after = rng.uniform(0, 2, 4) * (rng.random(4) < 0.9)
             pressed = sum_.press(a, sigma, after), state_law.press(b, sigma, after)
@@ -46,7 +48,8 @@ def test_exact_the_sum_over_bonds_lets_go_what_the_recursion_does():
 def test_exact_other_orders_let_the_last_formed_bonds_go_first(order):
     """Slid one length from no bonds: those of the last 0.1 hold the least; a load down to their end takes these."""
     law = Quadrature(Bonds(1.0, 1.0, order, initial=0.0), 0.0)
-    one, state = np.ones(1), law.start(np.ones(1))
+    one = np.ones(1)
+    state = law.start(np.ones(1))
     for _ in range(10):
         state = law.step(state, 0.1, one, one, 1.0).state
     mass = 1 - np.exp(-1.0)
@@ -72,21 +75,25 @@ LAWS = [
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_lost_contact_takes_force_and_memory(law):
     """After a lift-off the law follows a slide as one that never carried."""
-    one, state = np.ones(1), law.start(np.ones(1))
+    one = np.ones(1)
+    state = law.start(np.ones(1))
     for dq in (0.7, 0.4, -0.2):
         state = law.step(state, dq, one, one, 1.0).state
     held = law.stored_energy(state)[0]
     off = law.press(state, one, 0 * one)
     assert law.traction(off.state)[0] == law.stored_energy(off.state)[0] == off.mean[0] == 0.0
     assert off.dissipated[0] == pytest.approx(held, abs=1e-15)
-    state, new = law.press(off.state, 0 * one, one).state, law.start(one)
+    state = law.press(off.state, 0 * one, one).state
+    new = law.start(one)
     report = isinstance(law, Quadrature) and law.law.reading == "report"
     for dq in (0.3, 0.3, -0.5):
-        a, b = law.step(state, dq, one, one, 1.0), law.step(new, dq, one, one, 1.0)
+        a = law.step(state, dq, one, one, 1.0)
+        b = law.step(new, dq, one, one, 1.0)
         if not report:  # the print forms no bonds at rest: it starts without the first cohort
             assert a.mean[0] == pytest.approx(b.mean[0], abs=1e-14)
         assert np.isfinite(a.mean[0])
-        state, new = a.state, b.state
+        state = a.state
+        new = b.state
 
 
 @pytest.mark.share(0, 1, 2, 3, 4, 5, 6)
@@ -94,7 +101,8 @@ def test_exact_lost_contact_takes_force_and_memory(law):
 @pytest.mark.parametrize("size", [0.1, 0.2])
 def test_exact_no_drift_under_a_load_dither_at_half_the_limit(law, size):
     """The slide that restores half the limit after every half cycle of the load is the same in every cycle: 0."""
-    one, state = np.ones(1), law.start(np.ones(1))
+    one = np.ones(1)
+    state = law.start(np.ones(1))
     for _ in range(400):  # up to half the limit in small steps
         after = law.step(state, 0.01, one, one, 0.01)
         if law.traction(after.state)[0] > 0.15:

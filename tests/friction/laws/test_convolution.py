@@ -134,7 +134,8 @@ def test_exact_a_long_slide_over_a_pressure_below_settles_to_the_average(law, or
 
 def test_exact_short_bonds_and_even_pressure_are_coulomb():
     path = triangle(2.0, 2, 8)
-    nodes, sigma = np.linspace(0, 100, 41), np.full(41, 2.0)
+    nodes = np.linspace(0, 100, 41)
+    sigma = np.full(41, 2.0)
     inner = (nodes > 45) & (nodes < 55)
     plain = walk(Coulomb(0.3), path, upper_pressure(sigma))
     for law in (Convolution(0.3, 0.5, 1.0, nodes), Convolution(0.3, 0.5, 1.0)):
@@ -149,7 +150,8 @@ def test_exact_short_bonds_and_even_pressure_are_coulomb():
 
 
 def test_exact_at_rest_the_last_traction_is_kept():
-    law, one = Convolution(0.3, 1.0), np.ones(1)
+    law = Convolution(0.3, 1.0)
+    one = np.ones(1)
     state = law.step(law.start(one), -0.1, one, one, 1.0).state
     still = law.step(state, 0.0, one, one, 5.0)
     assert (
@@ -212,7 +214,9 @@ def test_exact_force_of_a_patch_bench_is_the_resultant_of_the_average(order):
     patch, found = bench_of(
         SMALL_PATCH + AVERAGED + SLIDE, "contact.tilt.angle=0.1 mrad", f"friction.order={order}"
     )
-    x, sigma, weight = patch.x, patch.pressure.sigma_n, patch.pieces.interface.weight
+    x = patch.x
+    sigma = patch.pressure.sigma_n
+    weight = patch.pieces.interface.weight
     for way, force in ((1, found.force.max()), (-1, -found.force.min())):
         truth = sum(
             w * by_quadrature(y, x, sigma, way, 1e-3, order)

@@ -47,9 +47,11 @@ def test_order_dissipation_of_micro_slip_is_chi_plus_three(chi):
     """A cycle of slide amplitude u loses 4 R u^(chi + 3)/((chi + 2)(chi + 3)); the force is nearly as the slide."""
     law = LAW.replace("-0.4", str(chi))
     r, _, top = density(FORCE, STIFFNESS, chi, BETA)
-    forces, losses = [], []
+    forces = []
+    losses = []
     for share in (1e-3, 1e-2):
-        u, time = share * top, np.arange(801) / 40000
+        u = share * top
+        time = np.arange(801) / 40000
         found = bench_along(law, time, u * np.sin(2 * np.pi * 100 * time))
         losses.append(found.ledger[2, -1] - found.ledger[2, 400])
         forces.append(np.abs(found.force).max())
@@ -68,14 +70,13 @@ def test_exact_a_bench_loop_is_the_density_itself():
     r, s, top = density(FORCE, STIFFNESS, CHI, BETA)
     count = 200_000
     phi = top * ((np.arange(count) + 0.5) / count) ** (1 / (CHI + 1))  # alike in stiffness
-    weight, stretch, last, force = (
-        r * top ** (CHI + 1) / (CHI + 1) / count,
-        np.zeros(count),
-        0.0,
-        [0.0],
-    )
+    weight = r * top ** (CHI + 1) / (CHI + 1) / count
+    stretch = np.zeros(count)
+    last = 0.0
+    force = [0.0]
     for dq in np.diff(slide):
-        stretch, last = np.clip(stretch + dq, -phi, phi), min(max(last + dq, -top), top)
+        stretch = np.clip(stretch + dq, -phi, phi)
+        last = min(max(last + dq, -top), top)
         force.append(weight * stretch.sum() + s * last)
     assert np.abs(found.force).max() == pytest.approx(FORCE, rel=1e-9)  # all slips once
     assert np.abs(found.force - force).max() <= 1e-6 * FORCE

@@ -35,14 +35,17 @@ def test_always_elastic_plastic_creates_no_energy(rows, length):
     """Pressure rising, falling and vanishing between and along the steps: the ledger closes, no loss is negative."""
     law = ElasticPlastic(0.4, length)
     state = law.start(np.array([rows[0][1]]))
-    work, total, spent = 0.0, 0.0, 0.0
+    work = 0.0
+    total = 0.0
+    spent = 0.0
     for dq, s0, s1 in rows:
         step = law.step(state, dq, np.array([s0]), np.array([s1]), 1.0)
         state = step.state
         assert step.dissipated[0] >= -1e-15 and abs(law.traction(state)[0]) <= 0.4 * (
             s0 + s1
         ) / 2 * (1 + 1e-12)
-        work, spent = work + step.mean[0] * dq, spent + step.dissipated[0]
+        work = work + step.mean[0] * dq
+        spent = spent + step.dissipated[0]
         total += abs(step.mean[0] * dq)
     assert work - spent - law.stored_energy(state)[0] == pytest.approx(
         0, abs=1e-12 * max(total, 1e-3)
@@ -51,7 +54,8 @@ def test_always_elastic_plastic_creates_no_energy(rows, length):
 
 def test_exact_falling_pressure_takes_energy_at_rest():
     """Springs of 1 stretched by 0.8: under half the pressure the limit 0.5 is left, with 0.5^2/2 of the 0.8^2/2."""
-    law, one = ElasticPlastic(1.0, 1.0), np.ones(1)
+    law = ElasticPlastic(1.0, 1.0)
+    one = np.ones(1)
     state = law.step(law.start(one), 0.8, one, one, 1.0).state
     for step in (law.step(state, 0.0, one / 2, one / 2, 1.0), law.press(state, one, one / 2)):
         assert law.traction(step.state)[0] == pytest.approx(0.5)
@@ -63,7 +67,8 @@ def test_exact_falling_pressure_takes_energy_at_rest():
 
 
 def test_exact_rising_pressure_brings_unstressed_springs_and_slip_breaks_those_in_excess():
-    law, one = ElasticPlastic(1.0, 1.0), np.ones(1)
+    law = ElasticPlastic(1.0, 1.0)
+    one = np.ones(1)
     state = law.step(law.start(one), 0.8, one, one, 1.0).state
     state = law.press(state, one, 2 * one).state
     assert law.traction(state)[0] == 0.8 and law.stored_energy(state)[0] == pytest.approx(

@@ -21,10 +21,12 @@ DAMPED = LUGRE + 'micro_damping = "900 N s/m"\nviscous = "300 N s/m"\n'
 )
 def test_exact_a_march_settles_on_the_harmonic_balance(law):
     """The measures of the two engines differ by no more than their stated errors."""
-    marched, steady = rig(law), rig(law, "accuracy.method=harmonic")
+    marched = rig(law)
+    steady = rig(law, "accuracy.method=harmonic")
     assert marched.outcome.value == "steady"
     for name in ("relative_displacement_amplitude", "friction_force_peak", "loop_area"):
-        a, b = marched.measures[name], steady.measures[name]
+        a = marched.measures[name]
+        b = steady.measures[name]
         assert abs(a.value - b.value) <= a.error + b.error + 1e-3 * abs(b.value), name
     assert marched.measures["energy_balance"].value < 1e-9
     assert (
@@ -37,7 +39,8 @@ def test_exact_a_march_settles_on_the_harmonic_balance(law):
 @pytest.mark.parametrize("more", ["", "breakaway = 0.2\n", "initial_bonds = 0.0\n"])
 def test_exact_bonds_released_from_a_displaced_start_slip_as_in_the_smooth_engine(more):
     """Slip is the relative displacement less the stretch of the bonds, which is zero at the start."""
-    smooth, marched = released(BONDS + more), released(BONDS + more, "accuracy.method=march")
+    smooth = released(BONDS + more)
+    marched = released(BONDS + more, "accuracy.method=march")
     for run in (smooth, marched):
         assert run.slide[0] == run.slip[0] == 60e-6
         # the stretch that the slip leaves is that of the bonds
@@ -55,7 +58,8 @@ def test_exact_two_alike_interfaces_move_alike(law, monkeypatch):
     if law == IWAN:
         share_one_loop(monkeypatch)
     both = masses(law, 2)
-    slides, alone = both.response.extra["slides"], masses(law, 1).response.slide
+    slides = both.response.extra["slides"]
+    alone = masses(law, 1).response.slide
     assert slides[:, 0] == pytest.approx(slides[:, 1], abs=1e-12 * np.abs(slides).max())
     assert slides[:, 0] == pytest.approx(alone, abs=1e-7 * np.abs(alone).max())
 

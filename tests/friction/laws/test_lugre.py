@@ -36,7 +36,8 @@ def test_exact_dahl_is_the_stretch_reading():
     """Without weakening and damping z relaxes over mu N/stiffness whatever the speed: eq. 2.17 with p = 1."""
     time, slide = shrinking()
     bonds = f'law = "nonlocal"\nstatic = 0.31\nbond_length = "{STATIC / STIFFNESS!r} m"\n'
-    a, b = bench_along(DAHL, time, slide), bench_along(bonds, time, slide)
+    a = bench_along(DAHL, time, slide)
+    b = bench_along(bonds, time, slide)
     assert a.force == pytest.approx(b.force, abs=1e-10 * STATIC)
     top = np.abs(a.slide).max() * STIFFNESS / STATIC
     assert a.force.max() == pytest.approx(STATIC * -np.expm1(-top), rel=2e-2)  # first loading
@@ -45,7 +46,8 @@ def test_exact_dahl_is_the_stretch_reading():
 def test_exact_straight_legs_are_the_equations():
     """At coarse steps: the stretch after every leg and the work over it, by an integration of order eight."""
     time, slide = shrinking(40)
-    found, z = bench_along(DAMPED, time, slide), 0.0
+    found = bench_along(DAMPED, time, slide)
+    z = 0.0
     for k, (dq, dt) in enumerate(zip(np.diff(slide), np.diff(time))):
         v = dq / dt
 

@@ -22,7 +22,8 @@ def by_rates(stretch, move) -> tuple:
     def edge(t, y):
         return (y[0] ** 2 + y[1] ** 2) / MOST**2 - 1
 
-    edge.terminal, edge.direction = True, 1
+    edge.terminal = True
+    edge.direction = 1
     how = {"rtol": 1e-12, "atol": 1e-18, "method": "DOP853"}
     y = np.array([*stretch, 0.0, 0.0, 0.0])
     begins = abs(edge(0, y)) < 1e-9 and stretch @ move > 0
@@ -58,7 +59,8 @@ def test_always_a_step_finds_the_slide_that_its_give_and_its_law_agree_on(seed):
     draw = np.random.default_rng(seed)
     half = draw.normal(size=(2, 2)) * 10 ** draw.uniform(-2, 2)
     give = half @ half.T / K
-    turn, free = draw.uniform(0, 2 * np.pi), MOST * draw.normal(size=2) * 10 ** draw.uniform(-1, 2)
+    turn = draw.uniform(0, 2 * np.pi)
+    free = MOST * draw.normal(size=2) * 10 ** draw.uniform(-1, 2)
     stretch = MOST * draw.choice([draw.uniform(), 1.0]) * np.array([np.cos(turn), np.sin(turn)])
     *slide, x, y, count = plane.solve_plane_step(
         tuple(free),

@@ -76,7 +76,8 @@ def test_order_loop_of_a_sine_is_two(speed):
 
 
 def test_always_a_jump_in_no_time_and_rest_are_answered():
-    law, sigma = TanhLaw(0.3, 1e-3), np.array([2.0, 5.0])
+    law = TanhLaw(0.3, 1e-3)
+    sigma = np.array([2.0, 5.0])
     jump = law.step(law.start(sigma), -1e-6, sigma, sigma, 0.0)
     assert jump.mean == pytest.approx(-0.3 * sigma) and jump.dissipated.min() > 0
     assert law.step(jump.state, 0.0, sigma, sigma, 1e-3).mean == pytest.approx(0.0 * sigma)
@@ -104,7 +105,8 @@ def reference(speed, level, cycles, tolerance=1e-10):
 @pytest.mark.share(0)
 @pytest.mark.parametrize("speed, level", [(1e-2, 49.03), (1e-3, 49.03), (1e-3, 20.0)])
 def test_order_the_march_is_the_differential_equation(speed, level):
-    exact, errors = reference(speed, level, 20), []
+    exact = reference(speed, level, 20)
+    errors = []
     for steps in (400, 800, 1600):
         result = found(RIG.format(speed, level, 20, steps))
         value = result.measures["relative_displacement_amplitude"]
@@ -116,7 +118,8 @@ def test_order_the_march_is_the_differential_equation(speed, level):
 
 def test_exact_below_the_limit_it_is_a_damper_that_never_holds():
     """At a hundredth of the limit F = (mu N/v_0) v: the amplitude of the linear oscillator, and never `stuck`."""
-    speed, level = 1e-1, 0.01 * LIMIT / MASS
+    speed = 1e-1
+    level = 0.01 * LIMIT / MASS
     result = found(RIG.format(speed, level, 40, 800))
     damper = LIMIT / speed + 0.006 * OMEGA * MASS
     assert result.measures["relative_displacement_amplitude"].value == pytest.approx(

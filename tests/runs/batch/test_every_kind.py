@@ -34,8 +34,10 @@ ENDS = {"pressure_peak": 1e-9, "loaded_fraction": 1e-9}
 
 def cases(kind: str, seed: int, count: int) -> list:
     """Models of a kind, two to three loads, tilts or levels to a patch as the axes of a sweep have them."""
-    r, out = np.random.default_rng(seed), []
-    tilts, loads = 10 ** r.uniform(-6, -2.3, max(2, count // 5)), 10 ** r.uniform(1.5, 2.7, 3)
+    r = np.random.default_rng(seed)
+    out = []
+    tilts = 10 ** r.uniform(-6, -2.3, max(2, count // 5))
+    loads = 10 ** r.uniform(1.5, 2.7, 3)
     for _ in range(count):
         sets = {
             "contact.tilt.angle": float(r.choice(tilts)) * float(r.choice([-1, 1])),

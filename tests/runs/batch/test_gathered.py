@@ -48,7 +48,8 @@ def models(seed: int, count: int) -> list:
 
 def beside(found, real) -> tuple:
     """(values compared, those apart by more than NARROW of the sum of both bars and floors, beyond all of it)."""
-    apart, bars = [], []
+    apart = []
+    bars = []
     for name, column in found.values.items():
         gap = np.abs(column - real.values[name])
         gap = np.minimum(gap, np.pi - gap) if name == "slip_start_phase" else gap
@@ -58,7 +59,8 @@ def beside(found, real) -> tuple:
         bars.append(
             (np.nan_to_num(found.errors[name] + real.errors[name]) + found.floors[name])[there]
         )
-    apart, bars = np.concatenate(apart), np.concatenate(bars)
+    apart = np.concatenate(apart)
+    bars = np.concatenate(bars)
     return (
         apart.size,
         int((apart > NARROW * bars + 1e-300).sum()),
@@ -72,7 +74,8 @@ def held(seed: int, count: int) -> tuple:
         batches.choose_batch(one, 32).name == "gathered" and batches.choose_batch(one, 31) is None
         for one in cases
     )
-    found, real = gathered.solve(cases), one_by_one.solve(cases)
+    found = gathered.solve(cases)
+    real = one_by_one.solve(cases)
     assert (found.outcome == real.outcome).all() and not found.messages
     assert without_sizes(found.warnings) == without_sizes(real.warnings)
     return beside(found, real)
@@ -109,5 +112,6 @@ def test_always_what_lanes_do_not_take_runs_by_itself():
     assert gathered.group(fewer) is None and gathered.group(held_fast) is not None
     for one in (held_fast, fewer):
         cases = with_shared_meshes([one, one])[:1]
-        found, real = gathered.solve(cases), one_by_one.solve(cases)
+        found = gathered.solve(cases)
+        real = one_by_one.solve(cases)
         assert (found.outcome == real.outcome).all() and beside(found, real)[2] == 0

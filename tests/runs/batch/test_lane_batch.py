@@ -53,7 +53,8 @@ def held(law: str, seed: int, count: int, most: int | None = None) -> None:
 
 def lumped_answers(cases):
     """Answers of the exact batch, group by group."""
-    found, groups = batches.CaseResults.blank(len(cases)), {}
+    found = batches.CaseResults.blank(len(cases))
+    groups = {}
     for case, model in enumerate(cases):
         groups.setdefault(lumped.group(model), []).append(case)
     for places in groups.values():
@@ -74,7 +75,8 @@ def test_exact_few_cases_are_those_of_single_runs():
     cases = models("coulomb", 3, 31)
     assert all(batches.choose_batch(one, 31).name == "lumped.lumped" for one in cases)
     assert all(batches.choose_batch(one, 64).name == "lumped.lanes" for one in cases)
-    found, ones = batches.solve_models(cases), lumped_answers(cases)
+    found = batches.solve_models(cases)
+    ones = lumped_answers(cases)
     for name, values in ones.values.items():
         np.testing.assert_array_equal(found.values[name], values)
 
@@ -82,10 +84,8 @@ def test_exact_few_cases_are_those_of_single_runs():
 def test_exact_chunks_of_a_study_are_its_whole():
     """To the last bit, and a chunk of few cases too: what is beside a case does not touch it."""
     cases = models("coulomb", 4, 80)
-    whole, parts = (
-        batches.solve_models(cases),
-        [batches.solve_models(part, study=80) for part in (cases[:1], cases[1:30], cases[30:])],
-    )
+    whole = batches.solve_models(cases)
+    parts = [batches.solve_models(part, study=80) for part in (cases[:1], cases[1:30], cases[30:])]
     for name, values in whole.values.items():
         joined = np.concatenate(
             [part.values.get(name, np.full(len(part), np.nan)) for part in parts]
@@ -104,7 +104,8 @@ def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
         return runs, *rest
 
     monkeypatch.setattr(lanes, "collect_runs", wrong)
-    found, ones = batches.solve_models(cases), lumped_answers(cases)
+    found = batches.solve_models(cases)
+    ones = lumped_answers(cases)
     assert all(one["engine"] == "exact" for one in found.numerics.values())
     assert all(
         "checked against the exact engine and" in notes[-1] and "loop_area" in notes[-1]
@@ -147,7 +148,8 @@ def test_exact_lanes_answer_stuck_cases(law):
         for load in (300, 1000, 3000)
         for damping in (0.003, 0.03)
     ]
-    found, ones = batches.solve_models(cases, study=64), lumped_answers(cases)
+    found = batches.solve_models(cases, study=64)
+    ones = lumped_answers(cases)
     assert np.sum(found.outcome == "stuck") > 2 and all(
         one["engine"] == "lanes" for one in found.numerics.values()
     )
@@ -197,6 +199,7 @@ def test_exact_where_a_motion_that_will_yield_no_more_goes_is_within_its_bar():
 
 def test_always_cases_that_all_run_away_are_not_judged_by_a_loop():
     """Motions that grow have no friction loop; the damping ratio was held against it, and the whole batch was lost."""
-    cases, found = models("lugre", 5, 3), CaseResults.blank(3)
+    cases = models("lugre", 5, 3)
+    found = CaseResults.blank(3)
     found.measure("equivalent_damping", "1")
     assert "loop_area" not in found.values and not lanes.has_large_error(cases, found).any()

@@ -24,10 +24,12 @@ SIZES = {"base": 'acceleration = "5 g"', "force": 'force = "5 N"'}
 
 def models(law: str, seed: int, count: int) -> list:
     """Random cases of a law: sizes that stick, that stop and that slide all the time, near resonance and away."""
-    r, out = np.random.default_rng(seed), []
+    r = np.random.default_rng(seed)
+    out = []
     for _ in range(count):
         kind = str(r.choice(["base", "base", "force"]))
-        push, mode = 10 ** r.uniform(0.3, 2), "structure.mode.axial"
+        push = 10 ** r.uniform(0.3, 2)
+        mode = "structure.mode.axial"
         sets = {
             "normal.load": r.uniform(2, 1.5 * push),
             "drive.frequency": r.uniform(60, 250),
@@ -54,7 +56,8 @@ def models(law: str, seed: int, count: int) -> list:
 def batch(cases):
     """Answers of the batch, group by group."""
 
-    found, groups = CaseResults.blank(len(cases)), {}
+    found = CaseResults.blank(len(cases))
+    groups = {}
     for case, model in enumerate(cases):
         assert lumped.refuses(model) == ""
         groups.setdefault(lumped.group(model), []).append(case)
@@ -81,7 +84,8 @@ def test_always_errors_of_few_cells_hold_the_result_of_many():
             build(base.override([f"drive.acceleration={push}", f"accuracy.tolerance={tolerance}"]))
             for tolerance in (1e-3, 1e-6)
         )
-        found, best = lumped.solve([few]), lumped.solve([many])
+        found = lumped.solve([few])
+        best = lumped.solve([many])
         for name, value in found.values.items():
             if np.isfinite(value[0]) and name not in ("energy_balance", "work_check"):
                 assert (

@@ -101,7 +101,8 @@ ENDS = {  # what is changed, the outcome and, where there is one, that its stead
 def alike(model):
     """Answers of a batch, held against those of a single run: what is said, and every number to 1e-10 of its size."""
     said = []
-    found, one = batches.solve_models([model], say=said.append), one_by_one.solve([model])
+    found = batches.solve_models([model], say=said.append)
+    one = one_by_one.solve([model])
     assert [line for line in said if "one by one" in line] == []
     assert found.outcome.tolist() == one.outcome.tolist() and found.messages == one.messages
     assert (found.warnings, found.notes, found.numerics, found.reasons) == (

@@ -24,7 +24,8 @@ SKIN = (
 
 def models(law: str, seed: int, count: int) -> list:
     """Random tilts, loads and levels, near resonance and away, on meshes of their own, pinned or shared."""
-    r, out = np.random.default_rng(seed), []
+    r = np.random.default_rng(seed)
+    out = []
     for k in range(count):
         sets = {
             "contact.tilt.angle": float(10 ** r.uniform(-6, -2.3)) * float(r.choice([-1, 1])),
@@ -43,7 +44,9 @@ def models(law: str, seed: int, count: int) -> list:
 
 def held(law: str, seed: int, count: int) -> int:
     """Cases held against runs of their own; how many the batch answered itself."""
-    cases, alone, real = models(law, seed, count), [], one_by_one.solve
+    cases = models(law, seed, count)
+    alone = []
+    real = one_by_one.solve
     assert all(batches.choose_batch(one).name == "lumped.sheared" for one in cases)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(

@@ -36,7 +36,8 @@ BATCHES = {"rig": "gathered", "jenkins": "lumped.tabled", "static": "patches", "
 
 def models(kind: str, seed: int, count: int) -> list:
     """Random tilts over two decades, loads, frictions and levels, on meshes that they share."""
-    r, out = np.random.default_rng(seed), []
+    r = np.random.default_rng(seed)
+    out = []
     for _ in range(count):
         sets = {
             "contact.tilt.angle": float(10 ** r.uniform(-5, -3)),
@@ -59,11 +60,15 @@ def held(kind: str, seed: int, count: int) -> tuple:
     """(measures compared, those outside, cases with one outside or another outcome)."""
     cases = models(kind, seed, count)
     assert all(batches.choose_batch(one, 64).name == BATCHES[kind] for one in cases)
-    found, ones = batches.solve_models(cases, study=max(count, 64)), one_by_one.solve(cases)
+    found = batches.solve_models(cases, study=max(count, 64))
+    ones = one_by_one.solve(cases)
     assert not found.messages and not ones.messages
-    compared, outside, apart = 0, 0, found.outcome != ones.outcome
+    compared = 0
+    outside = 0
+    apart = found.outcome != ones.outcome
     for name, column in found.values.items():
-        value, gap = ones.values[name], np.abs(column - ones.values[name])
+        value = ones.values[name]
+        gap = np.abs(column - ones.values[name])
         gap = np.minimum(gap, np.pi - gap) if name == "slip_start_phase" else gap
         bar = (
             np.nan_to_num(found.errors[name])
@@ -71,11 +76,9 @@ def held(kind: str, seed: int, count: int) -> tuple:
             + found.floors[name]
         )
         beyond = (gap > bar) | (np.isnan(column) != np.isnan(value))
-        compared, outside, apart = (
-            compared + int((~np.isnan(value)).sum()),
-            outside + int(beyond.sum()),
-            apart | beyond,
-        )
+        compared = compared + int((~np.isnan(value)).sum())
+        outside = outside + int(beyond.sum())
+        apart = apart | beyond
     print(
         f"{kind}: seed {seed}, {count} cases, {compared} measures, {outside} outside in {int(apart.sum())} cases"
     )

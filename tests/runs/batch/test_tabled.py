@@ -19,7 +19,8 @@ def missed(family: str, seed: int, count: int) -> tuple:
     models = meshes.with_shared_meshes(draw_patches(family, seed, count))
     assert all(batches.choose_batch(one, 64).name == "lumped.tabled" for one in models)
     assert all(batches.choose_batch(one, 63).name == "lumped.sheared" for one in models)
-    found, ones = tabled.solve(models), sheared.solve(models)
+    found = tabled.solve(models)
+    ones = sheared.solve(models)
     assert list(found.outcome) == list(ones.outcome) and not found.messages
     pairs = [row for some in rows(found, ones) for row in some]
     return found, [row for row in pairs if not row.holds], len(pairs)
@@ -36,7 +37,8 @@ def test_always_a_set_beyond_the_table_is_exact(monkeypatch):
     """Sets of more elements than a table has room for, as of a finer mesh, march from yield to yield."""
     models = meshes.with_shared_meshes(draw_patches("frequency x load", 9, 3))
     monkeypatch.setattr(tabled, "load", lambda _: type("Few", (), {"N_YIELDS": 8}))
-    found, ones = tabled.solve(models), sheared.solve(models)
+    found = tabled.solve(models)
+    ones = sheared.solve(models)
     assert all(one["engine"] == "piecewise" for one in found.numerics.values())
     for name, column in ones.values.items():
         np.testing.assert_array_equal(found.values[name], column)
@@ -56,7 +58,8 @@ def test_always_a_patch_that_sticks_is_answered_in_lanes():
     models = meshes.with_shared_meshes(
         [pf.build(base.override(format_assignments(one))) for one in sets]
     )
-    found, ones = tabled.solve(models), sheared.solve(models)
+    found = tabled.solve(models)
+    ones = sheared.solve(models)
     assert all(one["engine"] == "lanes" for one in found.numerics.values())
     assert list(found.outcome) == list(ones.outcome) == 3 * ["stuck"]
     for name in ("relative_displacement_amplitude", "friction_force_peak", "ring_frequency"):

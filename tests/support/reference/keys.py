@@ -79,7 +79,8 @@ def _is_table(model: type, name: str) -> bool:
 
 
 def _keys() -> list:
-    heads, out = {}, []
+    heads = {}
+    out = []
     for header, model in tables():
         heads.setdefault(model, []).append(header)
     for model, named in heads.items():
@@ -113,7 +114,8 @@ def _keys() -> list:
 
 def _row(model: type, key: str, at: str) -> tuple:
     name = attributes_by_key(model)[key]
-    field, path = model.model_fields[name], f"{at}.{key}".strip(".")
+    field = model.model_fields[name]
+    path = f"{at}.{key}".strip(".")
     default = "" if field.is_required() or field.default in (None, "") else field.default
     if isinstance(default, int | float):
         default = " ".join(
@@ -196,7 +198,8 @@ def bounds() -> Iterator[tuple]:
         for key, name in attributes_by_key(model).items():
             if _is_table(model, name):
                 continue
-            said, bound = _kind(model, name), _limits(model, name)
+            said = _kind(model, name)
+            bound = _limits(model, name)
             if bound and ("whole number" in said or any(one.startswith("<") for one in bound)):
                 yield f"{header.strip('[]')}.{key}".strip("."), said
 

@@ -75,7 +75,8 @@ def torture(
     with tempfile.TemporaryDirectory(prefix="torture") as place:
         warm(command, Path(place))
         for name in names:
-            begin, faults = perf_counter(), []
+            begin = perf_counter()
+            faults = []
             numbers = (
                 [only] if only is not None else range(max(1, round(share * CAMPAIGNS[name].size)))
             )

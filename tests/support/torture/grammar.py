@@ -204,7 +204,8 @@ def slide(trial: Trial) -> dict:
 
 def modes(trial: Trial, kind: str = "rig") -> dict:
     """[structure] of one to three modes."""
-    first, out = trial.wide(40, 300), []
+    first = trial.wide(40, 300)
+    out = []
     for k in range(trial.draw(1, 1, 1, 2, 3)):
         mode = {
             "name": f"m{k}",

@@ -130,7 +130,8 @@ def zip_slip(trial: Trial) -> list:
 
 def xml_bomb(trial: Trial) -> list:
     """Entities of entities, or of a file."""
-    name, text = trial.draw("x.vtu", "x.x3p"), trial.draw(BOMB, OUTSIDE)
+    name = trial.draw("x.vtu", "x.x3p")
+    text = trial.draw(BOMB, OUTSIDE)
     if name == "x.x3p":
         with zipfile.ZipFile(name, "w") as archive:
             archive.writestr("main.xml", text)

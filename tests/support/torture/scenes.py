@@ -157,7 +157,8 @@ def mutate(trial: Trial, tables: dict) -> None:
     if how == "add":
         _add(trial, tables)
         return
-    holder, key = parent(tables, path), path[-1]
+    holder = parent(tables, path)
+    key = path[-1]
     value = holder[key]
     if how == "value":
         holder[key] = anything(trial, value)

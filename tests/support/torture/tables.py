@@ -91,7 +91,9 @@ def numbers(trial: Trial, kind: str) -> list:
 
 def csv(trial: Trial, kind: str) -> tuple:
     """(bytes of a table with wounds, whether it must be refused)."""
-    rows, head, bad = numbers(trial, kind), HEADS[kind], False
+    rows = numbers(trial, kind)
+    head = HEADS[kind]
+    bad = False
     how = trial.draw(
         "whole",
         "cell",
@@ -113,24 +115,25 @@ def csv(trial: Trial, kind: str) -> tuple:
     if how == "cell":
         rows[row][int(trial.r.integers(2))] = trial.draw(*ODD)
     elif how == "word":
-        rows[row][int(trial.r.integers(2))], bad = (
-            trial.draw("abc", "1.5 apples", "--", "1..2", "1e"),
-            True,
-        )
+        rows[row][int(trial.r.integers(2))] = trial.draw("abc", "1.5 apples", "--", "1..2", "1e")
+        bad = True
     elif how == "unit":
-        head, bad = (
-            head.replace("[um]", "[parsec]").replace("[s]", "[fortnight]").replace("[Hz]", "[rpm]"),
-            True,
+        head = (
+            head.replace("[um]", "[parsec]").replace("[s]", "[fortnight]").replace("[Hz]", "[rpm]")
         )
+        bad = True
     elif how == "empty":
-        rows, bad = [], kind != "rows"
+        rows = []
+        bad = kind != "rows"
     elif how == "headless":
-        head, bad = "", True
+        head = ""
+        bad = True
     elif how == "back" and kind in ("signal", "path", "loop"):
         rows[1:] = rows[:0:-1]
         bad = True
     elif how == "short":
-        rows[row], bad = rows[row][:1], True
+        rows[row] = rows[row][:1]
+        bad = True
     elif how == "long":
         rows[row] = [*rows[row], "1", "2"]
     elif how == "order":

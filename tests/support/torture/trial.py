@@ -52,13 +52,11 @@ class Trial:
         tell: Callable,
         patience: float = 1.0,
     ):
-        self.r, self.folder, self.command, self.tell, self.patience = (
-            r,
-            folder,
-            command,
-            tell,
-            patience,
-        )
+        self.r = r
+        self.folder = folder
+        self.command = command
+        self.tell = tell
+        self.patience = patience
 
     def run(self, *words, seconds: float = 0.0) -> Ended:
         """A command in this process, judged; seconds: what it announced. More CPU than that and PATIENCE ends it."""
@@ -270,7 +268,8 @@ def _heard(child: int, reading: int, clock: float) -> list:
     import select
     from time import monotonic
 
-    end, text = monotonic() + clock, b""
+    end = monotonic() + clock
+    text = b""
     while True:
         ready, _, _ = select.select([reading], [], [], max(0.0, end - monotonic()))
         part = os.read(reading, 65536) if ready else b""

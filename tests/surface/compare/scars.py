@@ -31,10 +31,8 @@ SHAPES = {
 def rough(seed: int):
     """Height [um] of a surface of 160 sines as a function of x [um]."""
     random = np.random.default_rng([seed, 0])
-    length, phase = (
-        np.exp(random.uniform(np.log(8), np.log(300), 160)),
-        random.uniform(0, 2 * np.pi, 160),
-    )
+    length = np.exp(random.uniform(np.log(8), np.log(300), 160))
+    phase = random.uniform(0, 2 * np.pi, 160)
     size = np.sqrt(length)
     size *= 0.3 / np.sqrt((size**2).sum() / 2)
     return lambda x: np.sin(2 * np.pi * np.asarray(x)[:, None] / length + phase) @ size
@@ -49,8 +47,11 @@ def pair(kind: str, seed: int) -> tuple:
         "vee": ("triangle", 2000, 1.5),
     }.get(kind, ("parabola", 2000, 0.0))
     if kind == "wide":
-        shape, width, depth = list(SHAPES)[seed % 4], random.uniform(5000, 5900), 1.5
-    x, first = np.arange(0, LENGTH, 2), LENGTH / 2 - width / 2
+        shape = list(SHAPES)[seed % 4]
+        width = random.uniform(5000, 5900)
+        depth = 1.5
+    x = np.arange(0, LENGTH, 2)
+    first = LENGTH / 2 - width / 2
 
     def worn(x):
         u = (x - LENGTH / 2) / (width / 2)
@@ -98,7 +99,9 @@ def score(kind: str, seeds) -> tuple:
     from patchfem.surface.compare.compare import compare_traces
     from patchfem.surface.compare.verdict import compose_verdict
 
-    heads, held, false = {}, {}, 0
+    heads = {}
+    held = {}
+    false = 0
     for seed in seeds:
         traces, true = pair(kind, seed)
         found = compare_traces(*traces)

@@ -55,7 +55,8 @@ def test_always_the_order_of_150_made_traces_is_known():
 def test_exact_the_headline_names_the_order_first(share):
     """Unworn traces have no order: nothing is said about it either way."""
     p = pair(30077, share=share)
-    there, back = compare_traces(p.before, p.after), compare_traces(p.after, p.before)
+    there = compare_traces(p.before, p.after)
+    back = compare_traces(p.after, p.before)
     assert not there.is_exchanged and EXCHANGED not in compose_verdict([there])[0]
     assert back.is_exchanged == (share > 0) and compose_verdict([back])[0].startswith(
         EXCHANGED

@@ -53,7 +53,8 @@ def faults(kind: str, seed: int) -> tuple:
     before, after, worn = made_pair(kind, seed)
     one = compare_traces(before, after)
     headline, sentences = compose_verdict([one])
-    text, held = " ".join((headline, *sentences)), []
+    text = " ".join((headline, *sentences))
+    held = []
     false = [
         kind not in RUBBED and headline.replace("; ", "").startswith("worn"),
         kind not in RUBBED and "at most" in text,
@@ -68,7 +69,8 @@ def faults(kind: str, seed: int) -> tuple:
     ]
     if one.alignment is not None and one.worn.mean.value is not None:
         x = one.alignment.x
-        there, width = np.interp(x, after.x, worn), sample_lengths(x)
+        there = np.interp(x, after.x, worn)
+        width = sample_lengths(x)
         held = [
             q.low <= true <= q.high
             for q, true in (
@@ -104,7 +106,8 @@ def test_always_no_sentence_is_false(kind):
 def test_always_no_sentence_of_200_pairs_is_false(kinds, first, count):
     """Intervals hold 90 to 100 of 100; one of 50 pairs may be called what it is not, as chance does at 95 of 100."""
     found = [faults(kind, seed) for kind in kinds for seed in range(first, first + count)]
-    false, held = [text for one, _ in found for text in one], [one for _, one in found if one]
+    false = [text for one, _ in found for text in one]
+    held = [one for _, one in found if one]
     assert len(false) <= len(found) // 50, false
     assert (np.mean(held, axis=0) >= 0.9).all(), np.mean(held, axis=0)
 
@@ -162,7 +165,8 @@ def test_exact_dust_and_dropouts_of_many_samples_are_no_wear(shape):
     samples after, as material that grew."""
     pair = made("groove", HELD_OUT + 75)
     k = np.arange(pair.before.x.size)
-    before, after = np.array(pair.before.z), np.array(pair.after.z)
+    before = np.array(pair.before.z)
+    after = np.array(pair.after.z)
     if shape == "speck":
         before += 60 * UM * np.exp(-0.5 * ((k - 120) / 3) ** 2)
     elif shape == "grown":

@@ -21,7 +21,8 @@ def milled(
     seed: int, noise: float = 0.1, waves: float = 1.5, depth: float = 4.0, moved: int = 0
 ) -> tuple:
     """Before, after, worn depth at the samples of after [m], shift [m]; noise, waves, depth [um]."""
-    random, spare = np.random.default_rng([seed, 1987]), 50
+    random = np.random.default_rng([seed, 1987])
+    spare = 50
     step = 10e-3 / (COUNT - 1)
     kernel = np.exp(-0.5 * (np.arange(-12, 13) / 3) ** 2)
     rough = np.convolve(random.standard_normal(COUNT + 2 * spare + 24), kernel, "valid")
@@ -93,7 +94,8 @@ def test_always_shallow_wear_is_no_exchange(count):
 @pytest.mark.parametrize("count", [2, pytest.param(60, marks=pytest.mark.slow)])
 def test_refuses_traces_of_two_places_also_at_a_told_shift(count):
     for seed in range(HELD_OUT, HELD_OUT + count):
-        before, after = milled(seed)[0], milled(seed + 1000)[1]
+        before = milled(seed)[0]
+        after = milled(seed + 1000)[1]
         assert find_place_as_given(before, after).alignment is None
         told = find_place_as_given(before, after, 0.0)
         assert told.alignment is None and told.reason.startswith("at the given shift of 0")
@@ -110,7 +112,8 @@ def turned() -> tuple:
 
 def test_exact_a_told_shift_places_a_surface_that_repeats_itself():
     before, after, worn = turned()
-    blind, found = compare_traces(before, after), compare_traces(before, after, shift=1 * UM)
+    blind = compare_traces(before, after)
+    found = compare_traces(before, after, shift=1 * UM)
     reason = blind.motion.shift.reason
     assert "periodic, with a period of 80 um" in reason and "--shift '0 mm'" in reason
     assert (
@@ -167,7 +170,8 @@ def test_always_a_track_at_the_end_of_the_traces_has_its_inner_edge(count):
         first, last = span(worn)
         kept = last - 20
         sides = [Profile(one.x[:kept], one.z[:kept], one.source) for one in (before, after)]
-        there, back = compare_traces(*sides), compare_traces(*map(_mirrored, sides))
+        there = compare_traces(*sides)
+        back = compare_traces(*map(_mirrored, sides))
         for found, inner, outer, true in (
             (there, "track_from", "track_to", after.x[first]),
             (back, "track_to", "track_from", after.x[kept - 1] - after.x[first]),

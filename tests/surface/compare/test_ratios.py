@@ -47,7 +47,8 @@ def test_always_unchanged_surfaces_are_called_reduced_in_5_of_100_cases_at_most(
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [5, MANY])
 def test_always_unchanged_surfaces_in_one_place_are_called_reduced_in_5_of_100_cases_at_most(count):
-    words, widths = [], []
+    words = []
+    widths = []
     for seed in range(30100, 30100 + count):
         p = pair(seed, share=0.0)
         one = compare_traces(p.before, p.after)
@@ -60,7 +61,8 @@ def test_always_unchanged_surfaces_in_one_place_are_called_reduced_in_5_of_100_c
 
 def test_exact_intervals_of_fisher_and_of_pitman():
     """Both by other functions: quantiles of F by drawing chi-squares; Pitman's bounds as roots of his statistic."""
-    one, other = Size(2.0, 0.4, (14.0, 60.0), None), Size(1.0, 0.4, (9.0, 60.0), None)
+    one = Size(2.0, 0.4, (14.0, 60.0), None)
+    other = Size(1.0, 0.4, (9.0, 60.0), None)
     found = divide_sizes("amplitude", "", one, other)
     random = np.random.default_rng(0)
     drawn = np.sqrt(random.chisquare(14, 400000) / 14 / (random.chisquare(9, 400000) / 9))
@@ -99,7 +101,8 @@ def scan(seed: int, squeeze: int = 1) -> Areal:
 
 
 def test_always_an_areal_scan_shows_which_direction_is_smoother():
-    before, after = scan(3), scan(3, 4)
+    before = scan(3)
+    after = scan(3, 4)
     # no search for a place, which they do not share
     filled = tuple(map(fill_scan, (before, after)))
     parts = [_compare_waves((before, after), filled, name) for name in ("x", "y")]

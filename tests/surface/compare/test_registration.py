@@ -131,9 +131,11 @@ def test_always_unworn_traces_of_one_place_show_no_wear(count):
 def test_always_surfaces_that_wear_each_other_have_their_depth_or_none(high, rows):
     """Wear by 3 um leaves valleys that both traces share; by 6 um hardly any, and no depth may be claimed. The wear
     runs out slowly between worn and unworn heights here, and only about half of the intervals hold the truth."""
-    step, count = 2 * UM, 512
+    step = 2 * UM
+    count = 512
     pieces = [report_area((high, count), step, seed)[2] for seed in (0, 1)]
-    x, random = np.arange(count) * step, np.random.default_rng(1)
+    x = np.arange(count) * step
+    random = np.random.default_rng(1)
     for worn, registered in ((3 * UM, True), (6 * UM, False)):
         lower = rub(*pieces, step, 3 * step, 2 * worn, bite=0.05 * UM).lower
         errors = []
@@ -190,7 +192,8 @@ def test_always_deposits_do_not_count_as_less_wear():
 
 def test_always_gaps_in_both_traces_do_no_harm():
     p = pair(5)
-    before, after = np.array(p.before.z), np.array(p.after.z)
+    before = np.array(p.before.z)
+    after = np.array(p.after.z)
     before[700:720] = np.nan
     after[300:340] = np.nan
     found = compare_traces(
@@ -220,7 +223,8 @@ def groove(seed: int, depth: float, rough: float) -> tuple:
 @pytest.mark.parametrize("count", [1, pytest.param(10, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("depth, rough, rms", [(10 * UM, 1 * UM, 0.1), (20 * UM, 0.5 * UM, 0.04)])
 def test_always_a_groove_between_unworn_flanks_has_its_area(depth, rough, rms, count):
-    held, errors = [], []
+    held = []
+    errors = []
     for seed in range(count):
         before, after, area = groove(60000 + seed, depth, rough)
         found = compare_traces(before, after)

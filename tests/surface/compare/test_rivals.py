@@ -21,7 +21,8 @@ MM = 1e-3
 
 def worn_pair(seed: int, depth, bow: float = 0.0) -> tuple:
     """(comparison, worn area [m2]) of a surface and of the same less depth(x [m]) [m], with a sag [m] of the datum."""
-    random, x = np.random.default_rng(seed), (np.arange(4200) - 100) * UM
+    random = np.random.default_rng(seed)
+    x = (np.arange(4200) - 100) * UM
     parts = [
         size * part / part.std()
         for size, part in (
@@ -29,7 +30,8 @@ def worn_pair(seed: int, depth, bow: float = 0.0) -> tuple:
             (0.25 * UM, gaussian_filter1d(random.standard_normal(x.size), 300)),
         )
     ]
-    z, lost = sum(parts), depth(x)
+    z = sum(parts)
+    lost = depth(x)
     after = z - lost + bow * ((x - 2 * MM) / (2 * MM)) ** 2
     traces = [
         Profile(
@@ -111,7 +113,8 @@ def test_exact_a_bow_a_narrow_track_an_edge_and_a_deposit_have_no_rival(depth, b
 
 def test_always_each_of_two_tracks_is_told_with_its_area():
     """Sentence and table described one of them, and nothing said that there were two."""
-    one, two = scar(0.5 * MM, 2, 0.8 * UM), scar(0.7 * MM, 2, 1.2 * UM)
+    one = scar(0.5 * MM, 2, 0.8 * UM)
+    two = scar(0.7 * MM, 2, 1.2 * UM)
     found, true = worn_pair(HELD_OUT, lambda x: one(x + 0.8 * MM) + two(x - 0.9 * MM))
     said = " ".join(compose_verdict([found])[1])
     assert "2 tracks were found" in said and len(found.tracks.others) == 1

@@ -55,11 +55,9 @@ def test_always_a_floor_of_another_roughness_has_one_track():
     """A floor that reaches the unworn height here and there ended in a division by zero."""
     x = np.arange(0, 6000, 2.0)
     inside = abs(x - 3000) <= 1000
-    random, first, other = (
-        np.random.default_rng(HELD_OUT),
-        rough(HELD_OUT)(x),
-        rough(HELD_OUT + 1)(x) * 5 / 3,
-    )
+    random = np.random.default_rng(HELD_OUT)
+    first = rough(HELD_OUT)(x)
+    other = rough(HELD_OUT + 1)(x) * 5 / 3
     readings = first, np.where(inside, other - 1.5, first)
     traces = [
         Profile(frozen_array(x * UM), frozen_array((z + random.normal(0, 0.01, x.size)) * UM), name)
@@ -74,7 +72,8 @@ def parabola(width: float) -> tuple:
     """(traces before and after, depth (n,) [um]) of a scar of so many um on 6 mm, 1.5 um deep."""
     x = np.arange(0, 6000, 2.0)
     deep = 1.5 * np.clip(1 - ((x - 3000) / (width / 2)) ** 2, 0, None)
-    random, first = np.random.default_rng(HELD_OUT), rough(HELD_OUT)(x)
+    random = np.random.default_rng(HELD_OUT)
+    first = rough(HELD_OUT)(x)
     return [
         Profile(frozen_array(x * UM), frozen_array((z + random.normal(0, 0.01, x.size)) * UM), name)
         for z, name in ((first, "before"), (first - deep, "after"))
@@ -104,7 +103,8 @@ def test_always_a_told_shift_does_not_make_worn_flanks_unworn():
 def test_always_a_told_shift_is_believed_where_nearly_all_heights_agree():
     """Noise of a tenth of the roughness over a scar within it was called no better than chance."""
     x = np.arange(0, 6000, 2.0)
-    random, first = np.random.default_rng(HELD_OUT), rough(HELD_OUT)(x)
+    random = np.random.default_rng(HELD_OUT)
+    first = rough(HELD_OUT)(x)
     deep = 0.02 * np.clip(1 - ((x - 3000) / 1000) ** 2, 0, None)
     before, after = (
         Profile(

@@ -21,7 +21,9 @@ HELD_OUT = 90000
 
 def scored(kind: str, count: int) -> tuple:
     """Of each seed: the error of the largest depth [m], whether its interval holds it, and those of both ends."""
-    errors, held, ends = [], [], []
+    errors = []
+    held = []
+    ends = []
     for seed in range(HELD_OUT, HELD_OUT + count):
         p = track(kind, seed)
         worn = compare_traces(p.before, p.after, shift=p.shift + 0.3 * UM).worn
@@ -71,7 +73,8 @@ def test_exact_without_noise_the_depth_and_the_place():
 @pytest.mark.parametrize("seed", [18, 37])
 def test_exact_digits_of_a_tilted_trace_are_no_wear(seed):
     """Six digits of heights that rise by 4 um along the second trace: their last one is ten times coarser there."""
-    r, x = np.random.default_rng(seed), np.arange(4000) * 0.5
+    r = np.random.default_rng(seed)
+    x = np.arange(4000) * 0.5
     first = 0.2 * np.convolve(r.standard_normal(4040), np.ones(20) / 4, "same")[:4000]
     depth = 3 * np.clip(1 - ((x - 1000) / 200) ** 2, 0, None)
     traces = [
@@ -111,7 +114,8 @@ def test_always_flanks_rougher_than_the_trace_before_are_not_unworn():
 
 def test_always_a_comparison_says_where_and_warns_of_the_wrong_order():
     p = track("band", 90301, 2001)
-    found, back = compare_traces(p.before, p.after), compare_traces(p.after, p.before)
+    found = compare_traces(p.before, p.after)
+    back = compare_traces(p.after, p.before)
     assert not any("wrong order" in text for text in compose_verdict([found])[1])
     assert any("wrong order" in text for text in compose_verdict([back])[1])
     on = p.after.x[p.worn > 0]

@@ -28,15 +28,18 @@ def ridged(
 ):
     """(before, after, truth by name [SI]) of a rough trace (0.3 um) with a track and a triangular ridge [um] beside
     either end; noise 20 nm in each trace."""
-    random, spare = np.random.default_rng([seed, 1987]), 100
+    random = np.random.default_rng([seed, 1987])
+    spare = 100
     rough = np.convolve(
         random.standard_normal(COUNT + 2 * spare + 120),
         np.exp(-0.5 * (np.arange(-60, 61) / 10) ** 2),
         "valid",
     )
     rough *= 0.3 / rough.std()
-    x, moved = np.arange(float(COUNT)), int(random.integers(-60, 61))
-    middle, place = random.uniform(0.4, 0.6) * COUNT, x - moved
+    x = np.arange(float(COUNT))
+    moved = int(random.integers(-60, 61))
+    middle = random.uniform(0.4, 0.6) * COUNT
+    place = x - moved
     shape, share, step = SHAPES[kind]
     t = (place - middle) / (width / 2)
     after = rough[spare - moved : spare - moved + COUNT] - np.where(
@@ -75,7 +78,8 @@ def ridged(
 
 def scored(kind: str, sides: tuple, seeds) -> tuple:
     """Share of intervals that hold the truth, and the error over the truth by name, of tracks of a kind."""
-    held, off = [], {}
+    held = []
+    off = {}
     for seed in seeds:
         before, after, truth = ridged(kind, seed, *sides)
         found = compare_traces(before, after).tracks.sizes
@@ -159,7 +163,8 @@ def test_always_without_pile_up_none_is_said_and_its_interval_is_not_nothing():
 def test_always_tops_worn_between_unworn_valleys_have_a_depth_over_the_worn_extent():
     """No track, as valleys within it are unworn: the mean over the whole length alone would hide it."""
     before = ridged("band", HELD_OUT + 3, 0.0, 0.0)[0]
-    x, z = before.x / UM, before.z / UM
+    x = before.x / UM
+    z = before.z / UM
     worn = np.where((x > 700) & (x < 1700), np.maximum(z, 0.0), 0.0)
     noise = 0.02 * np.random.default_rng(5).standard_normal(x.size)
     found = compare_traces(
@@ -179,7 +184,8 @@ LONG = 12000  # samples of a trace with a track of 2 mm
 def rounded(seed: int, deep: float, shape: str = "parabola") -> tuple:
     """(before, after) of a rough trace (0.85 um) of 12 mm, the second with a dip of 2 mm, 40.4 um further on, tilted by
     200 urad and with fresh noise of 0.1 um; deep [um]."""
-    random, x = np.random.default_rng([seed, 1988]), np.arange(float(LONG))
+    random = np.random.default_rng([seed, 1988])
+    x = np.arange(float(LONG))
     waves = np.fft.rfftfreq(16384)
     rough = sum(
         size
@@ -190,7 +196,8 @@ def rounded(seed: int, deep: float, shape: str = "parabola") -> tuple:
             for one, long in ((0.8, 40), (0.24, 6))
         )
     )
-    t, moved = (x - 40.4 - 6000) / 1000, np.interp(x - 40.4, np.arange(16384), rough)
+    t = (x - 40.4 - 6000) / 1000
+    moved = np.interp(x - 40.4, np.arange(16384), rough)
     dip = {
         "parabola": np.maximum(1 - t**2, 0.0),
         "cosine": np.where(abs(t) < 1, (1 + np.cos(np.pi * t)) / 2, 0.0),

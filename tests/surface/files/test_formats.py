@@ -384,9 +384,12 @@ def test_exact_other_instruments_through_surface_topography(tmp_path, use_interp
         for name, values, size in (("x", np.arange(6) * 0.5, 3.0), ("y", np.arange(4) * 0.75, 3.0)):
             file.createDimension(name, values.size)
             axis = file.createVariable(name, "f8", (name,))
-            axis[:], axis.length, axis.unit = values, size, "um"
+            axis[:] = values
+            axis.length = size
+            axis.unit = "um"
         heights = file.createVariable("heights", "f8", ("x", "y"))
-        heights[:], heights.unit = Z.T * 1e6, "um"
+        heights[:] = Z.T * 1e6
+        heights.unit = "um"
     found = read_surface(tmp_path / "scan.nc")
     same(found, Z, 1e-18)
     assert "read as NC by SurfaceTopography 1." in found.notes[0]

@@ -82,7 +82,8 @@ def mutated(seed: bytes, rng: random.Random) -> bytes:
     """One to four damages: bytes turned over, cut out, doubled, put in, or the end cut off."""
     data = bytearray(seed)
     for _ in range(rng.randint(1, 4)):
-        at, size = rng.randrange(len(data) + 1), rng.choice((1, 1, 2, 4, 8, 40))
+        at = rng.randrange(len(data) + 1)
+        size = rng.choice((1, 1, 2, 4, 8, 40))
         kind = rng.randrange(6)
         if kind == 0 and at < len(data):
             data[at] ^= 1 << rng.randrange(8)
@@ -123,7 +124,8 @@ def campaign(name: str, count: int, use_interpreter) -> Counter:
     # A file that has no known format any more starts no process.
     use_interpreter("/none")
     file, seed, make = SEEDS[name]
-    rng, told = random.Random(f"surfaces {name}"), Counter()
+    rng = random.Random(f"surfaces {name}")
+    told = Counter()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / file
         path.write_bytes(make(seed))

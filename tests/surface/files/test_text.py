@@ -106,7 +106,8 @@ def test_exact_samples_at_one_place_become_their_mean(tmp_path):
 
 @pytest.mark.parametrize("step", [0.15625, 0.052, 0.0999, 0.1003, 0.37137, 7.3])
 def test_exact_rounded_x_is_evened(tmp_path, step):
-    x, z = np.arange(2000) * step, np.random.default_rng(0).normal(size=2000)
+    x = np.arange(2000) * step
+    z = np.random.default_rng(0).normal(size=2000)
     profile = read(
         tmp_path, "x [um],z [um]\n" + "".join(f"{a:.1f},{b:.5f}\n" for a, b in zip(x, z))
     )

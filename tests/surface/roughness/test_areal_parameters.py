@@ -34,8 +34,10 @@ def plane_wave(m, n, wave, degrees, step=1.0) -> np.ndarray:
 def gaussian(m, n, across, along, degrees=0.0, seed=0) -> np.ndarray:
     """Heights whose autocorrelation is exp(-(u/across)^2 - (v/along)^2), u and v turned by an angle; periodic."""
     fy, fx = np.meshgrid(np.fft.fftfreq(m), np.fft.fftfreq(n), indexing="ij")
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    u, v = c * fx + s * fy, -s * fx + c * fy
+    c = np.cos(np.radians(degrees))
+    s = np.sin(np.radians(degrees))
+    u = c * fx + s * fy
+    v = -s * fx + c * fy
     power = np.exp(-((np.pi * u * across) ** 2) - (np.pi * v * along) ** 2)
     noise = np.fft.fft2(np.random.default_rng(seed).standard_normal((m, n)))
     z = np.fft.ifft2(np.sqrt(power) * noise).real
@@ -58,7 +60,9 @@ def test_exact_a_ramp_before_it_is_levelled():
 
 def test_exact_a_sine_of_whole_periods():
     """z = A cos(2 pi x / L): two-point slopes A sqrt(2) sin(pi h / L) / h; Sq, Sp, Sv, the Abbott curve of a sine."""
-    n, wave, high = 3997, 399.7, 3.0
+    n = 3997
+    wave = 399.7
+    high = 3.0
     z = np.tile(high * np.cos(2 * np.pi * (np.arange(n) + 0.5) / wave), (8, 1))
     report = make_report(scan(z * UM))
     assert report["Sq"].value == pytest.approx(high * UM / np.sqrt(2), rel=1e-9)

@@ -34,14 +34,17 @@ def test_exact_a_sine_through_the_filter(cutoff, known):
 def test_exact_the_mean_line_is_the_weighted_mean(cutoff, seed):
     """Every sample by the definition, the weights that lie within the trace scaled to one."""
     z = np.random.default_rng(seed).normal(size=500)
-    line, x = mean_line(z, cutoff), np.arange(500)
+    line = mean_line(z, cutoff)
+    x = np.arange(500)
     for k in (0, 1, 37, 250, 498, 499):
         weight = np.exp(-np.pi * ((x - k) / (ALPHA * cutoff)) ** 2)
         assert line[k] == pytest.approx(weight @ z / weight.sum(), abs=1e-8)
 
 
 def test_exact_the_tilted_ends_are_weighted_lines():
-    z, x, cutoff = np.random.default_rng(3).normal(size=400), np.arange(400), 90.0
+    z = np.random.default_rng(3).normal(size=400)
+    x = np.arange(400)
+    cutoff = 90.0
     line = mean_line(z, cutoff, tilted=True)
     for k in (0, 5, 60, 200, 399):
         weight = np.exp(-np.pi * ((x - k) / (ALPHA * cutoff)) ** 2)

@@ -70,8 +70,10 @@ def test_exact_a_cylinder_under_a_scan(degrees, tilt):
     """Radius 8 mm, its axis turned and tilted: heights by the distance of a line, roughness of 0.1 um on top."""
     rng = np.random.default_rng(1)
     y, x = np.meshgrid(np.arange(150) * 10 * UM, np.arange(200) * 10 * UM, indexing="ij")
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    u, v = c * x + s * y, -s * x + c * y
+    c = np.cos(np.radians(degrees))
+    s = np.sin(np.radians(degrees))
+    u = c * x + s * y
+    v = -s * x + c * y
     v = v - v.mean() + 0.1 * MM
     z = u * tilt - np.sqrt(1 + tilt**2) * (8 * MM - np.sqrt((8 * MM) ** 2 - v**2))
     rough = rng.normal(size=z.shape) * 0.1 * UM
@@ -91,7 +93,8 @@ def test_exact_a_cylinder_under_a_scan(degrees, tilt):
 @pytest.mark.parametrize("count", [15, pytest.param(60, marks=pytest.mark.slow)])
 def test_always_the_error_of_a_radius_holds(count):
     """90 of 100 made circles hold theirs, less three deviations of the count and 5 of 60 for a jackknife of ten."""
-    x, held = np.arange(1500) * UM, 0
+    x = np.arange(1500) * UM
+    held = 0
     for seed in range(count):
         noise = (
             np.convolve(

@@ -109,7 +109,8 @@ def test_always_a_longer_trace_tells_more():
     """Four times the length halves the interval, by degrees of freedom and by made traces alike."""
     z = traces(1, 64e-3, UM, 6e-6, 5)[0]
     for name in ("Rq", "Ra", "Rsk"):
-        row, widths = TABLE[name], []
+        row = TABLE[name]
+        widths = []
         for size in (16_000, 64_000):
             heights = Heights(z[:size], UM)
             low, high = Intervals(heights, None).interval(row, row.compute(heights))

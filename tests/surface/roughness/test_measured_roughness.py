@@ -75,7 +75,8 @@ def test_exact_the_instruments_own_results_between_its_cursors(traces, truth):
 
 @pytest.mark.parametrize("name", TRACES)
 def test_exact_the_primary_profile_of_three_codes(traces, truth, name):
-    report, known = make_report(traces[name]), truth[name]
+    report = make_report(traces[name])
+    known = truth[name]
     assert report.treatment.cutoff is None and report.surface.roughness is None
     for key, unit in (("Pa", UM), ("Pq", UM), ("Pt", UM), ("Psk", 1), ("Pku", 1)):
         assert report[key].value == pytest.approx(known[key] * unit, rel=1e-6)
@@ -109,7 +110,8 @@ def test_exact_the_roughness_profile_of_another_code(traces, truth, name, cutoff
 @pytest.mark.parametrize("name", TRACES)
 def test_exact_the_core_of_another_code(traces, truth, name):
     """To 5 %: the other code reads a curve of classes."""
-    found, known = make_report(traces[name]), truth[name]["surfalize"]
+    found = make_report(traces[name])
+    known = truth[name]["surfalize"]
     for key in ("k", "pk", "vk"):
         assert found["P" + key].value == pytest.approx(known["R" + key] * UM, rel=0.05)
 
@@ -117,10 +119,8 @@ def test_exact_the_core_of_another_code(traces, truth, name):
 @pytest.mark.parametrize("name", ["nanovea-test1.txt.gz", "nanovea-test2.txt.gz"])
 def test_exact_areal_parameters_of_three_codes(data, truth, name):
     z = np.loadtxt(data / name, delimiter=",")[:, 2].reshape(101, 101) * UM
-    report, known = (
-        make_report(Areal(np.arange(101) * 5 * UM, np.arange(101) * 5 * UM, z, name)),
-        truth[name],
-    )
+    report = make_report(Areal(np.arange(101) * 5 * UM, np.arange(101) * 5 * UM, z, name))
+    known = truth[name]
     for key, unit in (("Sa", UM), ("Sq", UM), ("Sz", UM), ("Ssk", 1), ("Sku", 1)):
         assert report[key].value == pytest.approx(known[key] * unit, rel=1e-6)
         # plateaus with pits

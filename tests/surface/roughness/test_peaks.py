@@ -55,7 +55,8 @@ def summits(alpha: float) -> tuple:
     whole, first, second = (
         quad(lambda t, n=n: t**n * weight(t), 0, 40, epsabs=0, epsrel=1e-12)[0] for n in range(3)
     )
-    mean, square = first / whole, second / whole
+    mean = first / whole
+    square = second / whole
     # given t a height is Gaussian, of mean 3 t/4 and variance alpha - 3/2
     return (
         whole / np.sqrt(2 * np.pi * 8 / 3) / (2 * np.pi),
@@ -78,10 +79,8 @@ def test_exact_peaks_by_quadrature_of_the_law_of_curvatures(alpha):
 
 def test_exact_units_scale():
     """Heights in other units, lengths along in others: radius, density and deviation follow."""
-    one, other = (
-        gaussian_peaks(Moments(2.0, 0.3, 0.2)),
-        gaussian_peaks(Moments(2.0 * 3, 0.3 * 3 / 7, 0.2 * 3 / 49)),
-    )
+    one = gaussian_peaks(Moments(2.0, 0.3, 0.2))
+    other = gaussian_peaks(Moments(2.0 * 3, 0.3 * 3 / 7, 0.2 * 3 / 49))
     assert other == pytest.approx(
         (one.radius * 49 / 3, one.density / 49, one.deviation * 3), rel=1e-12
     )
@@ -89,12 +88,14 @@ def test_exact_units_scale():
 
 def test_exact_moments_of_known_sines():
     """Whole waves of two lengths: mean squares in closed form, a difference sees a wave k as sin(k h/2)/(k h/2)."""
-    n, step = 4096, 0.5e-6
+    n = 4096
+    step = 0.5e-6
     x = step * np.arange(n + 1)
     waves = [(64, 0.3e-6, 0.4), (410, 0.05e-6, 1.1)]
     z = sum(a * np.cos(2 * np.pi * k * x / (n * step) + p) for k, a, p in waves)
     for every in (1, 2):
-        found, h = rms_moments(level(trace_of(z, step)), every), every * step
+        found = rms_moments(level(trace_of(z, step)), every)
+        h = every * step
         k = np.array([2 * np.pi * k / (n * step) for k, _, _ in waves])
         a = np.array([a for _, a, _ in waves])
         for order, value in enumerate(found):
@@ -106,7 +107,8 @@ def test_exact_moments_of_known_sines():
 
 def test_a_made_surface_has_the_peaks_of_its_traces():
     """Moments of rows of a made surface against its spectrum, and its peaks, counted on the grid, against theirs."""
-    n, step = 768, 1.0
+    n = 768
+    step = 1.0
     z = gaussian(n, step, (12.0, 60.0))
     z /= z.std()
     found = Moments(
@@ -118,13 +120,11 @@ def test_a_made_surface_has_the_peaks_of_its_traces():
     k = 2 * np.pi * np.fft.fftfreq(n, step)
     truth = [np.sqrt(np.sum(power * (2 * np.sin(k / 2)) ** (2 * order))) for order in range(3)]
     assert found == pytest.approx(truth, rel=0.05)
-    one, around = (
-        gaussian_peaks(Moments(*truth)),
-        [
-            np.roll(z, shift, axis=(0, 1))
-            for shift in ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (1, -1), (-1, 1))
-        ],
-    )
+    one = gaussian_peaks(Moments(*truth))
+    around = [
+        np.roll(z, shift, axis=(0, 1))
+        for shift in ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (1, -1), (-1, 1))
+    ]
     top = (z > around).all(axis=0)
     count = top.sum()
     assert count / n**2 == pytest.approx(one.density, rel=4 / np.sqrt(count))
@@ -142,7 +142,8 @@ def test_exact_what_dust_is_left_out_of_a_table_and_what_dust_is_in_it_is_said()
     grains = np.zeros(z.size)
     for k in range(6):
         grains[1500 * (k + 1) : 1500 * (k + 1) + 8] = 6e-6 if k else 2.6e-6
-    clean, dusty = trace_moments(trace_of(z, step)), trace_moments(trace_of(z + grains, step))
+    clean = trace_moments(trace_of(z, step))
+    dusty = trace_moments(trace_of(z + grains, step))
     assert clean.dust == () and "are left out" in dusty.dust[0]
     said = re.search(
         r"make up ([\d.]+) % .* rms_slope is (\S+) and rms_curvature (\S+) 1/m", dusty.dust[-1]

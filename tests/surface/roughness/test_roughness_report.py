@@ -154,7 +154,8 @@ def test_exact_a_trace_as_long_as_its_waves_has_no_interval_of_heights():
 
 
 def scan(lost=False) -> Areal:
-    x, y = np.arange(120) * UM, np.arange(80) * UM
+    x = np.arange(120) * UM
+    y = np.arange(80) * UM
     z = np.random.default_rng(2).normal(0, UM, (80, 120)) + 0.02 * x + 0.03 * y[:, None]
     if lost:
         z[:, 10] = np.nan

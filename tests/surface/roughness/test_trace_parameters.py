@@ -52,7 +52,8 @@ def test_exact_sections_of_a_growing_sine():
 @given(st.integers(0, 2**32 - 1), st.integers(20, 300), st.floats(0.1, 10))
 def test_always_heights_scale_and_numbers_do_not(seed, count, factor):
     z = np.random.default_rng(seed).normal(0, UM, count)
-    one, other = Heights(z, UM), Heights(factor * z, UM)
+    one = Heights(z, UM)
+    other = Heights(factor * z, UM)
     for row in PRIMARY:
         grown = 1.0 if row.name in ("PSm", "PMr1", "PMr2", "Psk", "Pku") else factor
         value = row.compute(one)

@@ -21,9 +21,11 @@ def trace_amplitude(trace: Profile, low: float = BAND[0], high: float = BAND[1])
 @pytest.mark.parametrize("tapers", [1, 3, 16])
 def test_exact_the_tapers_by_their_definition(tapers):
     """One transform gives what each sine taper and its own transform give."""
-    z, step = np.random.default_rng(2).normal(size=300), 0.5
+    z = np.random.default_rng(2).normal(size=300)
+    step = 0.5
     z -= z.mean()
-    found, n = estimate_spectrum(z, step, tapers), 300
+    found = estimate_spectrum(z, step, tapers)
+    n = 300
     k = np.arange(1, tapers + 1)[:, None]
     window = np.sqrt(2 / (n + 1)) * np.sin(np.pi * k * np.arange(1, n + 1) / (n + 1))
     slow = (2 * step * np.abs(np.fft.rfft(window * z, 2 * (n + 1), axis=1)) ** 2).mean(axis=0)[1:]

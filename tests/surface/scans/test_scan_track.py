@@ -19,7 +19,8 @@ def made(angle: float, length: float, ridges=(0.0, 0.0), middle=(5e-6, -8e-6)) -
     x, y = np.meshgrid(axis - middle[0], axis - middle[1])
     beside = np.array([-np.sin(angle), np.cos(angle)])
     beside *= np.sign(beside[np.argmax(abs(beside))])
-    across, along = x * beside[0] + y * beside[1], x * np.cos(angle) + y * np.sin(angle)
+    across = x * beside[0] + y * beside[1]
+    along = x * np.cos(angle) + y * np.sin(angle)
     out = np.maximum(abs(along) - length / 2, 0.0) if length else 0 * along
     depth = DEPTH * np.clip(1 - (np.hypot(across, out) / (WIDTH / 2)) ** 2, 0.0, None)
     for height, side in zip(ridges, (-1, 1)):
@@ -46,7 +47,8 @@ def tracked(depth, noise: float = 2e-9, seed: int = 0):
 )
 def test_exact_a_track_has_its_direction_section_and_volume(angle, length, ridges):
     depth, middle = made(angle, length, ridges)
-    found, area = tracked(depth), 2 / 3 * DEPTH * WIDTH
+    found = tracked(depth)
+    area = 2 / 3 * DEPTH * WIDTH
     left, right = (one * RIDGE / 2 for one in ridges)
     truth = {
         "direction": angle,
@@ -115,7 +117,8 @@ def test_exact_the_direction_of_a_rotated_track():
 @pytest.mark.slow
 def test_always_two_scans_tell_their_track():
     depth, _ = made(0.35, 0.0, middle=(0.0, 0.0))
-    random, axis = np.random.default_rng(3), CELL * np.arange(COUNT)
+    random = np.random.default_rng(3)
+    axis = CELL * np.arange(COUNT)
     from test_scans import waves
 
     x, y = np.meshgrid(axis, axis)

@@ -37,7 +37,8 @@ def waves(x, y, seed=0):
 
 def scans(wear, angle=0.03, shift=(12e-6, -18e-6), noise=2e-9, holes=0.03, seed=0):
     """Scans before and after of a surface; wear(x, y, z): depth [m] at places of the scan before."""
-    axis, draw = STEP * np.arange(COUNT), np.random.default_rng(seed)
+    axis = STEP * np.arange(COUNT)
+    draw = np.random.default_rng(seed)
     x, y = np.meshgrid(axis, axis)
     away = np.stack([x - SIDE / 2 - shift[0], y - SIDE / 2 - shift[1]])
     at = np.tensordot(rotation(-angle), away, 1) + SIDE / 2
@@ -90,7 +91,8 @@ def worn(grooved):
 
 def test_exact_a_groove_between_unworn_parts_has_its_volume_and_its_place(worn):
     found = worn
-    truth, volume = common(0.03, (12e-6, -18e-6), groove), found.values["worn_volume"]
+    truth = common(0.03, (12e-6, -18e-6), groove)
+    volume = found.values["worn_volume"]
     assert volume.value == pytest.approx(truth, rel=5e-3) and volume.low <= truth <= volume.high
     assert found.values["worn_depth_max"].value == pytest.approx(0.6e-6, rel=0.01)
     place = {name: one.value for name, one in found.registration.items()}
@@ -167,7 +169,8 @@ def test_always_either_side_of_an_edge_may_be_the_unworn_one():
         return 0.8e-6 * np.clip((x - 0.55 * SIDE) / SIDE, 0.0, None)
 
     found = change.compare_scans(*scans(wedge))
-    truth, volume = common(0.03, (12e-6, -18e-6), wedge), found.values["worn_volume"]
+    truth = common(0.03, (12e-6, -18e-6), wedge)
+    volume = found.values["worn_volume"]
     assert volume.low <= truth <= volume.high and found.alignment.alternative is not None
     assert any("edge" in text for text in change.describe_change(found))
 
@@ -217,7 +220,8 @@ def test_exact_single_holes_are_bridged_to_the_fourth_order():
 
 
 def test_always_spikes_are_left_out_and_pits_are_not(grooved):
-    scan, z = grooved[0], grooved[0].z.copy()
+    scan = grooved[0]
+    z = grooved[0].z.copy()
     z[50:52, 60:62] += 9e-6
     z[100, 100] -= 5e-6
     x, y = np.meshgrid(np.arange(COUNT), np.arange(COUNT))
@@ -246,7 +250,8 @@ def test_always_what_grew_stands_beside_the_reason_why_no_wear_is_shown():
 
 def test_always_a_spike_on_a_slope_is_left_out():
     """Each height of a slope is the median of those around it."""
-    axis, draw = STEP * np.arange(60), np.random.default_rng(3)
+    axis = STEP * np.arange(60)
+    draw = np.random.default_rng(3)
     z = 5e-2 * axis + 2e-2 * axis[:, None] + 1e-10 * draw.normal(size=(60, 60))
     z[30:32, 20:22] += 12e-6
     kept, count = change.remove_spikes(Areal(axis, axis, z, "a scan"))
@@ -255,7 +260,8 @@ def test_always_a_spike_on_a_slope_is_left_out():
 
 @pytest.mark.slow
 def test_always_kept_spikes_count_and_the_others_do_not(grooved, worn):
-    scan, z = grooved[1], grooved[1].z.copy()
+    scan = grooved[1]
+    z = grooved[1].z.copy()
     z[120:122, 20:22] += 4e-6
     grown = [
         change.compare_scans(grooved[0], replace(scan, z=z), keep)

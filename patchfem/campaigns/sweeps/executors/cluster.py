@@ -108,15 +108,14 @@ class Cluster:
         from distributed import as_completed
         from distributed.client import ClosedClientError
 
-        path, want = work.asked.path, environment_versions(work)
+        path = work.asked.path
+        want = environment_versions(work)
         there = replace(work, asked=replace(work.asked, path=Path(os.path.abspath(path))))
         try:
             # Dask repeats this task if all workers that store its result have died.
             shared = self.client.submit(_identity, there, pure=False)
-            ready, on_the_way = (
-                as_completed(loop=self.client.loop, with_results=True, raise_errors=False),
-                {},
-            )
+            ready = as_completed(loop=self.client.loop, with_results=True, raise_errors=False)
+            on_the_way = {}
             while True:
                 while (
                     len(on_the_way) < CHUNKS_PER_WORKER * self.workers
@@ -228,7 +227,8 @@ def _answer(work: Work, chunk: list, asked: tuple) -> tuple | dict:
     if (own := environment_versions(work)) != want:
         return own
     seconds, (found, told) = compute_timed(replace(work, write=None), chunk)
-    folder, named = f"{work.asked.path.parent}{os.sep}", str(path.parent / "_")[:-1]
+    folder = f"{work.asked.path.parent}{os.sep}"
+    named = str(path.parent / "_")[:-1]
     found.messages.update(
         {case: text.replace(folder, named) for case, text in found.messages.items()}
     )

@@ -81,13 +81,12 @@ class Worker:
         try:
             seconds, found = self.pipe.recv()
         except (EOFError, OSError):
-            seconds, found = (
-                0.0,
-                Died(
-                    f"the process that ran this case died ({_describe_status(self.process.wait())})"
-                ),
+            seconds = 0.0
+            found = Died(
+                f"the process that ran this case died ({_describe_status(self.process.wait())})"
             )
-        chunk, self.chunk = self.chunk, None
+        chunk = self.chunk
+        self.chunk = None
         return chunk, seconds, found
 
     def end(self) -> None:
@@ -101,7 +100,8 @@ class Pool:
     """Executor with several processes of this machine."""
 
     def __init__(self, workers: int):
-        self.workers, self.ready = workers, []
+        self.workers = workers
+        self.ready = []
 
     def begin(self, work: Work, count: int, say: Callable | None = None) -> None:
         """Start the processes, which import what a case needs while the shared meshes are chosen.
@@ -126,7 +126,8 @@ class Pool:
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
         """Yield (chunk, seconds, answer or Died) of each chunk that `take` returns, as they come in."""
-        workers, self.ready = self.ready, []
+        workers = self.ready
+        self.ready = []
         try:
             for one in workers:
                 one.send_work(work)

@@ -149,7 +149,8 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         CaseResults; which cases (n,) must be run by themselves; which (n,) have all errors, except
         that of the steady estimate, within the tolerance.
     """
-    n, values = len(models), dict(runs.values)
+    n = len(models)
+    values = dict(runs.values)
     values[MAIN_MEASURE] = runs.values.get(MAIN_MEASURE, runs.amplitudes)
     values["energy_balance"] = energy_balance(runs.book)
     nothing = np.zeros(n)
@@ -164,7 +165,8 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         for name, value in values.items()
     }
     sizes = collect_sizes(models)
-    tolerance, moved = sizes.tolerance, sizes.moved
+    tolerance = sizes.tolerance
+    moved = sizes.moved
     outcome, (steady, error) = _outcome(
         sizes,
         runs,
@@ -197,12 +199,14 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     errors[STEADY_AMPLITUDE] = error_of_steady(
         steady, error, values[MAIN_MEASURE], errors[MAIN_MEASURE]
     )
-    resolved, wide_of = np.ones(n, bool), np.zeros(n, bool)
+    resolved = np.ones(n, bool)
+    wide_of = np.zeros(n, bool)
     for name, value in values.items():
         there = ~np.isnan(value)
         if not there.any():
             continue
-        row, floor = TABLE[name], error_floor(name, moved)
+        row = TABLE[name]
+        floor = error_floor(name, moved)
         wide = there & (errors[name] > tolerance * np.abs(value) + floor)
         floor = np.fmax(floor, tolerance * larger_term(name, values))
         wide_of |= wide & (errors[name] > tolerance * np.abs(value) + floor) & ~grows
@@ -210,7 +214,8 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
             alone |= wide & ~grows
         if not name.endswith("_steady"):
             resolved &= ~wide
-        found.units[name], found.values[name] = row.unit, value
+        found.units[name] = row.unit
+        found.values[name] = value
         found.errors[name] = np.where(there & ~grows, errors[name], np.nan)
         found.floors[name] = np.where(there, floor, np.nan)
     _reasons(models, sizes, runs, found)
@@ -266,12 +271,10 @@ def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
     floor = AMPLITUDE_ROUND_OFF * (sizes.largest / (2 * np.pi / sizes.period) ** 2)
     decay = sizes.decay * runs.window * sizes.period
     with np.errstate(all="ignore"):
-        steady, bounded = (
-            extrapolate_steady_amplitudes(
-                ends[:, -N_FINAL_WINDOWS:], runs.phasors[:, -N_FINAL_WINDOWS:]
-            ),
-            False,
+        steady = extrapolate_steady_amplitudes(
+            ends[:, -N_FINAL_WINDOWS:], runs.phasors[:, -N_FINAL_WINDOWS:]
         )
+        bounded = False
         if runs.steady is not None:
             bounded = ~np.isnan(runs.steady[0])
             steady = [np.where(bounded, known, seen) for known, seen in zip(runs.steady, steady)]
@@ -293,10 +296,8 @@ def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
 
 def _rings(sizes: Sizes, runs: Runs, outcome, amplitude) -> dict:
     """Return the warnings of `warn_of_ringing` for the cases that stick but still vibrate, by case."""
-    n, cases = (
-        len(amplitude),
-        np.flatnonzero([one is Outcome.STUCK for one in outcome] & (amplitude != 0)),
-    )
+    n = len(amplitude)
+    cases = np.flatnonzero([one is Outcome.STUCK for one in outcome] & (amplitude != 0))
     tolerance, decay, floor = (
         np.broadcast_to(one, n)[cases]
         for one in (
@@ -414,7 +415,8 @@ def _by_law(models: SimilarModels, found: CaseResults) -> np.ndarray:
         return np.ones(len(models), bool)
     if "drift_per_cycle" not in found.values:  # runs of less than a cycle have no drift
         return np.zeros(len(models), bool)
-    drift, error = found.values["drift_per_cycle"], found.errors["drift_per_cycle"]
+    drift = found.values["drift_per_cycle"]
+    error = found.errors["drift_per_cycle"]
     return (np.abs(drift) > np.nan_to_num(error)) & (found.outcome != str(Outcome.TRANSIENT))
 
 

@@ -192,7 +192,9 @@ def law_numbers(model: Model) -> tuple:
 
     The length is 0 for a law without one.
     """
-    f, load, limit = model.friction, model.point.load, model.friction_limits(model.point.load)[0]
+    f = model.friction
+    load = model.point.load
+    limit = model.friction_limits(model.point.load)[0]
     if f.law == "tanh":
         return limit, 1 / f.reference_speed, 0.0
     if law_has_trait(f.law, "bonds"):
@@ -239,11 +241,9 @@ def fastest_rate(model: Model, stiffness):
 
 def _rate(model: Model) -> tuple:
     """Return the fastest rate of a model over that of its drive; inf if lanes cannot follow it."""
-    modes, omega, damper = (
-        model.rig.modes,
-        model.rig.drive.signal.omega,
-        model.rig.modes.damping_matrix[0, 0],
-    )
+    modes = model.rig.modes
+    omega = model.rig.drive.signal.omega
+    damper = model.rig.modes.damping_matrix[0, 0]
     scale = modes.slide[0] ** 2 / modes.mass
     stiff = _contact(model)[0] * scale
     if not march.has_one_stretch(KINDS[model.friction.law]):
@@ -270,9 +270,11 @@ def _rate(model: Model) -> tuple:
 
 def _contact(model: Model) -> tuple:
     """Return stiffness in stick [N/m], length [m] and other numbers of a contact (see `Cases`)."""
-    friction, static = model.friction, model.friction_limits(model.point.load)[0]
+    friction = model.friction
+    static = model.friction_limits(model.point.load)[0]
     if friction.law == "iwan":
-        chi, share = friction.chi, 1 / (1 + friction.beta)
+        chi = friction.chi
+        share = 1 / (1 + friction.beta)
         # fraction of the friction that slips before the last slider does
         slips = share * (chi + 1) / (chi + 2 - share)
         half = np.minimum(1.0, (0.5 / slips) ** (1 / (chi + 2)))
@@ -338,10 +340,8 @@ def _solve_cases(models: Sequence[Model], say) -> CaseResults:
         models, (*make_cases(models), None), steps_per_cycle(models), exact
     )
     if law == "tanh":
-        speeds, first = (
-            collect_columns(models, lambda model: (model.friction.reference_speed,))[0],
-            models[0].friction,
-        )
+        speeds = collect_columns(models, lambda model: (model.friction.reference_speed,))[0]
+        first = models[0].friction
         notes = {
             one: creeping_note(first.model_copy(update={"reference_speed": one}))
             for one in {*speeds.tolist()}
@@ -371,16 +371,15 @@ def solve_and_check(models: Sequence[Model], cases: tuple, steps, exactly: Calla
     tuple
         CaseResults; which (n,) were not computed by lanes; largest output (n,) [m].
     """
-    begin, law = perf_counter(), lane_kind(models[0])
+    begin = perf_counter()
+    law = lane_kind(models[0])
     found, exact, steps, reach = _side_by_side(models, cases, steps)
     found.seconds[:] = (perf_counter() - begin) / len(models)
     marks = np.column_stack(cases[0])
     looked = select_checked_cases(marks, ~exact)
     ones = exactly(looked, True) if looked else None
-    times, again = (
-        SHORT if law == "masing" else 1.0,
-        np.flatnonzero(~exact & (2 * steps <= SMOOTH[-1])),
-    )
+    times = SHORT if law == "masing" else 1.0
+    again = np.flatnonzero(~exact & (2 * steps <= SMOOTH[-1]))
     wrong = find_differences(found, ones, looked, exact, times)
     if wrong and again.size and march.has_one_stretch(law):
         finer, exact[again], *_ = _side_by_side(
@@ -394,7 +393,8 @@ def solve_and_check(models: Sequence[Model], cases: tuple, steps, exactly: Calla
         free[looked] = False
         more = select_checked_cases(marks, free, IN_DOUBT)
         others = find_differences(found, exactly(more, True) if more else None, more, exact, times)
-        looked, wrong = [*looked, *more], wrong | others
+        looked = [*looked, *more]
+        wrong = wrong | others
     whole = len(wrong) > WRONG * len(looked)
     exact[list(wrong)] = True
     exact |= whole
@@ -437,11 +437,18 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
         CaseResults; which (n,) must be run otherwise; steps per cycle (n,); largest output (n,)
         [m].
     """
-    found, exact, steps = CaseResults.blank(len(models)), np.zeros(len(models), bool), steps.copy()
+    found = CaseResults.blank(len(models))
+    exact = np.zeros(len(models), bool)
+    steps = steps.copy()
     reach = np.zeros(len(models))
-    law, cycles, meshed = lane_kind(models[0]), group(models[0])[0], {}
-    fewest, known, flows = steps // 2, {}, march.has_one_stretch(law)
-    now, smooth = int(fewest.min()), flows or law in march.MASING
+    law = lane_kind(models[0])
+    cycles = group(models[0])[0]
+    meshed = {}
+    fewest = steps // 2
+    known = {}
+    flows = march.has_one_stretch(law)
+    now = int(fewest.min())
+    smooth = flows or law in march.MASING
     finest = (SMOOTH if smooth else RATES[-1])[-1]
 
     def tell_mesh(places, fine: dict) -> None:
@@ -474,7 +481,8 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
         here = np.flatnonzero((fewest <= now) & (steps >= now))
         ready = np.flatnonzero(steps[here] == now)
         if here.size:
-            seen, places = measured(here, now), here[ready]
+            seen = measured(here, now)
+            places = here[ready]
             tells = fewest[here] == now
             if meshed and ready.size:
                 own = _select(seen[0], ready)
@@ -524,10 +532,8 @@ def _march_cases(
     Also returns which cases (n,) must be run otherwise, and which need more steps. The parameters
     are those of `collect_runs`.
     """
-    window, wide_of = (
-        count_evaluated_cycles(group(models[0])[0]),
-        partial(has_large_error, models, meshed=cases[2]),
-    )
+    window = count_evaluated_cycles(group(models[0])[0])
+    wide_of = partial(has_large_error, models, meshed=cases[2])
     runs, exact, lost = collect_runs(models, cases, steps, seen, coarser)
     found, alone, _ = batch_answers(
         models, runs, {"engine": "exact", "window_cycles": window}, wide_of
@@ -549,10 +555,8 @@ def run_exact_cases(models: Sequence[Model], say, finer: int = 0) -> CaseResults
         How often the cells of a density are doubled.
     """
     models = list(models)
-    found, fit = (
-        CaseResults.blank(len(models)),
-        np.array([not lumped.refuses(model) for model in models]),
-    )
+    found = CaseResults.blank(len(models))
+    fit = np.array([not lumped.refuses(model) for model in models])
     for cases, solves in (
         (np.flatnonzero(fit), partial(lumped.solve, finer=finer)),
         (np.flatnonzero(~fit), one_by_one.solve),
@@ -575,10 +579,8 @@ def has_large_error(models, found: CaseResults, meshed: dict | None = None) -> n
     meshed : dict, optional
         Errors due to the mesh, (n,) by name.
     """
-    tolerance, out = (
-        collect_columns(models, lambda model: (model.accuracy.tolerance,))[0],
-        np.zeros(len(models), bool),
-    )
+    tolerance = collect_columns(models, lambda model: (model.accuracy.tolerance,))[0]
+    out = np.zeros(len(models), bool)
     for name, values in found.values.items():
         if name in RING:  # the fit of a single run is no more accurate
             continue
@@ -691,12 +693,15 @@ def collect_runs(models, cases: tuple, steps: int, seen: tuple, coarser: list) -
         [np.isnan(values[name]) != np.isnan(coarser[0][name]) for name in values], axis=0
     )
     rings, told, untold, faint = _rings(law, cases, c, found, (stuck, window, steps))
-    errors, exact, steady = errors | told, exact | untold, None
+    errors = errors | told
+    exact = exact | untold
+    steady = None
     if law in MARCH_ON:
         steady, open_ones = _march_until_settled(
             law, cases, found, steps, window_amplitude_means(extremes, window)[0], ~stuck
         )
-        steady, exact = tuple(np.abs(c["ratio"]) * one for one in steady), exact | open_ones
+        steady = tuple(np.abs(c["ratio"]) * one for one in steady)
+        exact = exact | open_ones
     if law in march.MASING:
         exact |= march.law_state(law, found.motion, "MAX_DROPPED_GAP") > DROPPED_LOOP_RATIO
     phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
@@ -773,7 +778,8 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
     out = tuple({name: np.full(n, np.nan) for name in RING} for _ in range(2))
     if law == "rigid":  # a rigid interface with one mode does not move while it sticks
         return *out, faint, faint
-    rings, marched = may_ring(cases, found), found.n_before >= found.history.shape[1] - window
+    rings = may_ring(cases, found)
+    marched = found.n_before >= found.history.shape[1] - window
     held = found.reading("STICK_ANGLE") > 2 * np.pi * (found.n_observed - 1e-6)
     if law == "yielding":
         _ring_on_springs(cases, c, found, held & rings & marched, out)
@@ -785,7 +791,8 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
         if law in march.MASING
         else may_contain_transient(cases, found) & (stuck | rings)
     )
-    untold, told = may & ~held, may & held
+    untold = may & ~held
+    told = may & held
     strides = steps / (
         SAMPLES_PER_PERIOD * np.sqrt(np.maximum(cases.stiffness + cases.spring, 1.0))
     )
@@ -800,13 +807,15 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
         else ()
     )
     for case, signal in zip(where.tolist(), every):
-        omega, signal = float(c["omega"][case]), signal[:: strides[case]]
+        omega = float(c["omega"][case])
+        signal = signal[:: strides[case]]
         time = np.linspace(0, 2 * np.pi * window / omega, len(signal))
         values, apart = measure_ringing(time, signal, [(0.0, time[-1])], omega)
         # with so few steps, a ringing may be missed
         faint[case] = not values and march.has_one_stretch(law) and steps < RINGING
         for name, value in values.items():
-            out[0][name][case], out[1][name][case] = value, OF_FIT * apart[name]
+            out[0][name][case] = value
+            out[1][name][case] = OF_FIT * apart[name]
     return *out, untold, faint
 
 
@@ -816,14 +825,14 @@ def _ring_on_springs(cases, c: dict, found, held, out: tuple) -> None:
     It is known in closed form, with the criteria of `response.ringing`; `out` is filled: values and
     errors by name.
     """
-    beta, half, angle = (
-        cases.stiffness + cases.spring,
-        cases.damping / 2,
-        2 * np.pi * found.n_observed,
-    )
-    own, far = np.sqrt(np.maximum(beta - half**2, 0.0)), beta - 1
+    beta = cases.stiffness + cases.spring
+    half = cases.damping / 2
+    angle = 2 * np.pi * found.n_observed
+    own = np.sqrt(np.maximum(beta - half**2, 0.0))
+    far = beta - 1
     whole = far**2 + cases.damping**2
-    begun, place = found.observed_start, found.observed_start[:, at.MEMORY]
+    begun = found.observed_start
+    place = found.observed_start[:, at.MEMORY]
     with np.errstate(
         all="ignore"
     ):  # the motion without that of the sine and without the stretch of the spring
@@ -841,7 +850,8 @@ def _ring_on_springs(cases, c: dict, found, held, out: tuple) -> None:
             & (size > MIN_SINUSOID * found.reading("MAX_ACCELERATION"))
         )
     for name, value in zip(RING, (own * c["omega"] / (2 * np.pi), damping)):
-        out[0][name][told], out[1][name][told] = value[told], 0.0
+        out[0][name][told] = value[told]
+        out[1][name][told] = 0.0
 
 
 def _march_until_settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
@@ -869,15 +879,19 @@ def _march_until_settled(law: str, cases, found, steps: int, amplitudes, free) -
         needed; which cases (n,) do not settle within MORE times their cycles, even by
         extrapolation.
     """
-    out, part = np.full((2, len(free)), np.nan), found.history.shape[1]
+    out = np.full((2, len(free)), np.nan)
+    part = found.history.shape[1]
     if amplitudes.shape[1] > 2:
         free = free & (np.ptp(amplitudes[:, -3:], axis=1) > CHANGES * TIGHTEST * amplitudes[:, -1])
-    lost, where, motion = free.copy(), np.flatnonzero(free), found.motion[free]
+    lost = free.copy()
+    where = np.flatnonzero(free)
+    motion = found.motion[free]
     history = found.history[where]
     for share in PACES:
         if not where.size:
             break
-        here, before = _select(cases, where), motion
+        here = _select(cases, where)
+        before = motion
         more, motion = march.continue_march(law, here, before, max(1, int(share * part)), steps)
         history = np.concatenate([history, more], axis=1)
         late = history.shape[1] > MORE * part
@@ -888,8 +902,11 @@ def _march_until_settled(law: str, cases, found, steps: int, amplitudes, free) -
         known = error < near * ranges[:, -1]
         if law == "yielding":
             known &= _slips_until_steady(ranges, cases.yield_length[where], value, error)
-        out[:, where[known]], lost[where[known]] = (value[known], error[known]), False
-        where, motion, history = where[~known], motion[~known], history[~known]
+        out[:, where[known]] = (value[known], error[known])
+        lost[where[known]] = False
+        where = where[~known]
+        motion = motion[~known]
+        history = history[~known]
     return tuple(out), lost
 
 
@@ -907,10 +924,8 @@ def _slips_until_steady(ranges, length, value, error) -> np.ndarray:
     value, error : (n,)
         Half the range in the steady state and its error [m].
     """
-    least, most = (
-        np.minimum(ranges.min(axis=1), value - error),
-        np.maximum(ranges.max(axis=1), value + error),
-    )
+    least = np.minimum(ranges.min(axis=1), value - error)
+    most = np.maximum(ranges.max(axis=1), value + error)
     return (least > length) | (most < length)
 
 
@@ -920,7 +935,8 @@ def _bound_free_motion(cases, before, motion, cycles: int) -> np.ndarray:
     It follows from the change in `cycles` cycles, and from the smallest decay by the damper in
     them: with a slow beat, the extremes hardly change while it is largest.
     """
-    own, half = np.sqrt(cases.stiffness + cases.spring), cases.damping / 2
+    own = np.sqrt(cases.stiffness + cases.spring)
+    half = cases.damping / 2
     step = np.hypot(
         motion[:, at.SLIDE] - before[:, at.SLIDE], (motion[:, at.SPEED] - before[:, at.SPEED]) / own
     )
@@ -953,8 +969,10 @@ def _steady_half_range(history, part: int, least, near: float) -> tuple:
     tuple
         NaN if it is not known.
     """
-    ranges, count = np.ptp(history[:, :, :2], axis=2) / 2, history.shape[1]
-    last, left = ranges[:, -1], 2 * np.ptp(ranges[:, -part:], axis=1)
+    ranges = np.ptp(history[:, :, :2], axis=2) / 2
+    count = history.shape[1]
+    last = ranges[:, -1]
+    left = 2 * np.ptp(ranges[:, -part:], axis=1)
     before = 2 * np.ptp(ranges[:, -2 * part : -part], axis=1) if count >= 2 * part else np.inf
     closes = (np.maximum(left, least) < near * last) & (left <= np.maximum(before, 1e-9 * last))
     ends = np.arange(
@@ -981,7 +999,9 @@ def make_cases(models, contacts=None) -> tuple:
     static, kinetic, load, spring, length, *numbers = (
         collect_columns(models, _contact_numbers) if contacts is None else contacts
     )
-    law, scale, numbers = lane_kind(models[0]), slide**2 / (mass * w**2), np.array(numbers).T
+    law = lane_kind(models[0])
+    scale = slide**2 / (mass * w**2)
+    numbers = np.array(numbers).T
     numbers = (
         numbers * march.number_scales(law, scale, w)
         if march.has_one_stretch(law)
@@ -1014,7 +1034,9 @@ def make_cases(models, contacts=None) -> tuple:
 
 def _rig_numbers(model: Model) -> tuple:
     """Return the numbers of a model, except its contact, for `make_cases`."""
-    modes, drive, start = model.rig.modes, model.rig.drive.signal, model.rig.start
+    modes = model.rig.modes
+    drive = model.rig.drive.signal
+    start = model.rig.start
     return (
         modes.omega[0],
         modes.damping_matrix[0, 0],
@@ -1071,10 +1093,8 @@ def _march_and_measure(law: str, cases, c: dict, cycles: int, steps: int) -> tup
     Returns the measures by name, energies [J], Marched, extremes of the output (n, c, 2) [m], and
     the increase of the friction force [N].
     """
-    found, window = (
-        march.march(law, cases, cycles, count_evaluated_cycles(cycles), steps),
-        count_evaluated_cycles(cycles),
-    )
+    found = march.march(law, cases, cycles, count_evaluated_cycles(cycles), steps)
+    window = count_evaluated_cycles(cycles)
     extremes = found.history[:, :, :2] * c["ratio"][:, None, None]
     extremes[c["ratio"] < 0] = extremes[c["ratio"] < 0, :, ::-1]
     book = reading.run_energies(law, cases, found, c["energy"])

@@ -97,7 +97,8 @@ def solve(models: Sequence[Model], say=None, finer: int = 0) -> CaseResults:
 
 def _solve_cases(models, say, pairs: int, check: bool = False) -> CaseResults:
     """Return the case results of at most MAX_CASES_PER_CALL models."""
-    begin, cycles = perf_counter(), int(models[0].rig.drive.cycles)
+    begin = perf_counter()
+    cycles = int(models[0].rig.drive.cycles)
     window = min(10, cycles // 10)
     runs = pieces.run_pieces(models, cycles, window, say, pairs)
     found, alone, resolved = batch_answers(

@@ -172,7 +172,8 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
     Work on rigid elements is all dissipated. They keep a single mode at rest during stick, so that
     nothing rings, and their drift has the round-off of two means.
     """
-    reading, models = join_readings([one.reading for one in done]), [case.model for case in cases]
+    reading = join_readings([one.reading for one in done])
+    models = [case.model for case in cases]
     book = {name: np.array([one.ledger[name] for one in done]) for name in done[0].ledger}
     stiffness, size, held, load, tolerance = (
         np.array(column)
@@ -189,14 +190,13 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
             )
         )
     )
-    loop, rigid = reading.loop(), cases[0].groups[0].static > 0
+    loop = reading.loop()
+    rigid = cases[0].groups[0].static > 0
     stuck = loop.slip_range / 2 <= np.maximum(
         held, COORDINATE_ROUND_OFF * reading.run[:, RUN.max_coordinate]
     )
-    lost, rings = (
-        np.zeros(len(done), bool),
-        {name: np.full(len(done), np.nan) for name in ("ring_frequency", "ring_damping")},
-    )
+    lost = np.zeros(len(done), bool)
+    rings = {name: np.full(len(done), np.nan) for name in ("ring_frequency", "ring_damping")}
     known = np.full((2, len(done)), np.nan)
     for k, (model, one) in enumerate(zip(models, done)):
         ring = (
@@ -261,7 +261,8 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
 
 def _rings(case: Case, one) -> dict | None:
     """Return the ringing of a run from its samples: {} for none, None if a single run is needed."""
-    modes, drive = case.model.rig.modes, case.model.rig.drive.signal
+    modes = case.model.rig.modes
+    drive = case.model.rig.drive.signal
     stuck = one.reading.loop().stuck_time >= one.reading.span * (1 - 1e-12)
     # without stick nothing rings, and in a periodic motion that sticks the ringing has decayed
     if not one.slips or (one.repeats and stuck):

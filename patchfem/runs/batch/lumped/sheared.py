@@ -111,7 +111,8 @@ def solve_cases(models: Sequence[Model], say, move: Callable, together: int) -> 
 
 def _solve_pressed_cases(models, say, move: Callable) -> CaseResults:
     """Return the case results of models whose patches are pressed."""
-    begin, out = perf_counter(), CaseResults.blank(len(models))
+    begin = perf_counter()
+    out = CaseResults.blank(len(models))
     held = dict.fromkeys(range(len(models)))
     for case in sorted(
         held, key=lambda case: id(models[case].patch.solved)

@@ -52,7 +52,8 @@ def move_cases(models, held: list, say) -> tuple:
     steps = lanes.steps_at_rate(rates, lanes.OF_TABLE)
     most = load(f"{march.HERE}.table_curve_kernels").N_YIELDS - 1
     fit = (steps > 0) & [max(one.stiffness.size for one in pair) < most for pair in sets]
-    found, lost = CaseResults.blank(len(models)), np.zeros(len(models), bool)
+    found = CaseResults.blank(len(models))
+    lost = np.zeros(len(models), bool)
 
     def exactly(places) -> CaseResults:
         """Return the results of some cases by the exact batch or by single runs."""

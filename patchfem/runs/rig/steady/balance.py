@@ -72,7 +72,8 @@ class BalanceFinder:
     It starts near the point of a curve that it gets, if there are several motions.
     """
 
-    tries_another, leaves = False, (1e-2, 0.1)
+    tries_another = False
+    leaves = (1e-2, 0.1)
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         load("dynamics.harmonic.cycle_kernels", say)
@@ -84,14 +85,13 @@ class BalanceFinder:
             parts.append((0, Interlock(*rig.springs.interlock)))
         if rig.springs.cubic is not None:
             parts.append((rig.modes.output, Spring(0.0, rig.springs.cubic)))
-        self.model, self.modes, self.patch, self.harmonics = (
-            model,
-            rig.modes,
-            patch,
-            model.accuracy.harmonics,
-        )
+        self.model = model
+        self.modes = rig.modes
+        self.patch = patch
+        self.harmonics = model.accuracy.harmonics
         self.numerics = numerics
-        self.group, self.tolerance = LawGroup(rig.modes, parts), model.accuracy.tolerance
+        self.group = LawGroup(rig.modes, parts)
+        self.tolerance = model.accuracy.tolerance
 
     def point(self, drive, near=None) -> tuple:
         """Return the Solution of the steady motion under a sine, and its SteadyMotion.
@@ -108,7 +108,8 @@ class BalanceFinder:
         found = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
         )
-        stable, notes = add_stability(found, self.modes), ()
+        stable = add_stability(found, self.modes)
+        notes = ()
         if not stable.stable:
             found, stable, notes = self._lasting(drive, found, stable)
         values, response, book = self._compute_measures(found, drive)
@@ -129,9 +130,11 @@ class BalanceFinder:
             "harmonics": found.harmonics,
         }
         amplitude = np.array([values["relative_displacement_amplitude"]])
-        outcome, message = Outcome.STUCK if held else Outcome.STEADY, ""
+        outcome = Outcome.STUCK if held else Outcome.STEADY
+        message = ""
         if not stable.stable:
-            outcome, message = Outcome.NOT_CONVERGED, describe_instability(stable.multipliers)
+            outcome = Outcome.NOT_CONVERGED
+            message = describe_instability(stable.multipliers)
         return Solution(
             values,
             response,
@@ -207,7 +210,8 @@ class BalanceFinder:
 
     def _curve_point(self, found) -> CurvePoint:
         """Return a SteadyMotion, whose multipliers are known, as a point of a curve."""
-        kind, stable = balanced_regime(found)[0], bool(found.stable)
+        kind = balanced_regime(found)[0]
+        stable = bool(found.stable)
         drive = SineDrive(found.level, found.omega, self.model.rig.drive.signal.moving)
         return CurvePoint(
             drive,

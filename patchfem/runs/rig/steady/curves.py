@@ -177,7 +177,8 @@ def start_frequencies(modes, drive) -> np.ndarray:
     may be narrower than their spacing.
     """
     space = np.geomspace if drive.logarithmic else np.linspace
-    ends, own = sorted((drive.low, drive.high)), modes.omega / (2 * np.pi)
+    ends = sorted((drive.low, drive.high))
+    own = modes.omega / (2 * np.pi)
     places = np.union1d(
         space(*ends, drive.starts or POINTS), own[(own > ends[0]) & (own < ends[1])]
     )
@@ -205,18 +206,19 @@ def sweep_around_peak(drive, curve: dict, at: float):
         None if another peak is nearly as high, or the neighbourhood is most of the curve.
     """
     order = np.argsort(curve["frequency"], kind="stable")
-    places, heights = curve["frequency"][order], np.nan_to_num(curve["amplitude"][order])
+    places = curve["frequency"][order]
+    heights = np.nan_to_num(curve["amplitude"][order])
     best = int(np.argmin(np.abs(places - at)))
     low = heights < PEAK_END_RATIO * heights[best]
-    before, after = np.flatnonzero(low[:best]), np.flatnonzero(low[best:])
-    first, last = (
-        (before[-1] if before.size else 0),
-        (best + after[0] if after.size else len(places) - 1),
-    )
+    before = np.flatnonzero(low[:best])
+    after = np.flatnonzero(low[best:])
+    first = before[-1] if before.size else 0
+    last = best + after[0] if after.size else len(places) - 1
     outside = np.delete(heights, slice(first, last + 1))
     if heights[best] <= 0 or outside.max(initial=0.0) > PEAK_END_RATIO * heights[best]:
         return None
-    a, b = places[first], places[last]
+    a = places[first]
+    b = places[last]
     ends = np.clip([a - (b - a) / 4, b + (b - a) / 4], places[0], places[-1])
     if not 0 < ends[1] - ends[0] < MAX_PEAK_FRACTION * (places[-1] - places[0]):
         return None
@@ -266,7 +268,9 @@ def motion_at_levels(finder, drive):
     NotConverged
         If no level has a steady motion.
     """
-    points, said, best = [], [], None
+    points = []
+    said = []
+    best = None
     for part in drive.segments:
         sine = SineDrive(part.amplitude, part.omega, drive.moving)
         near = points[-1].near if points and points[-1].stable else None

@@ -74,17 +74,17 @@ class Maps(Followed):
     `repeating` finds a motion; it starts from `near` if there are several.
     """
 
-    name, elements, tries_another = "", None, False
+    name = ""
+    elements = None
+    tries_another = False
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         histories.load_event_kernels(say)
-        self.model, self.numerics, self.modes, self.patch, self.frames = (
-            model,
-            numerics,
-            model.rig.modes,
-            patch,
-            frames,
-        )
+        self.model = model
+        self.numerics = numerics
+        self.modes = model.rig.modes
+        self.patch = patch
+        self.frames = frames
         self.found = self.elements(model, numerics, patch)
         self.groups = self.found.groups
 
@@ -94,7 +94,8 @@ class Maps(Followed):
 
     def point(self, drive, near=None) -> tuple:
         """Return the Solution of two cycles of the steady motion, and a start for a motion nearby."""
-        begin, one = perf_counter(), self.repeating(drive, near)
+        begin = perf_counter()
+        one = self.repeating(drive, near)
         reader = PieceReader(
             self.model, replace(self.numerics, cycles=2.0, window=1), self.patch, self.found
         )
@@ -123,7 +124,8 @@ class Maps(Followed):
         )
         message = raw.message
         if not one.lasting:
-            outcome, message = Outcome.NOT_CONVERGED, describe_instability(one.multipliers)
+            outcome = Outcome.NOT_CONVERGED
+            message = describe_instability(one.multipliers)
         extra = {
             "regime": one.words,
             "multipliers": one.multipliers,
@@ -152,7 +154,9 @@ class Maps(Followed):
         done = histories.simulate(
             self.modes, drive, self.groups, 1, 1, start=one.start, memory=one.memory
         )
-        window, gauge, extremes = done.window, self.modes.gauge, done.amplitudes
+        window = done.window
+        gauge = self.modes.gauge
+        extremes = done.amplitudes
         amplitude = (
             float(extremes[:, 1].max() - extremes[:, 0].min()) / 2
             if gauge is None
@@ -196,7 +200,8 @@ def _curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
 class YieldFinder(Maps):
     """Finder of steady motions with elastic-plastic elements, by the map from yield to yield."""
 
-    name, elements = "yields", YieldingElements
+    name = "yields"
+    elements = YieldingElements
 
     def __init__(self, model, *given):
         super().__init__(model, *given)
@@ -226,7 +231,8 @@ class YieldFinder(Maps):
 class EventFinder(Maps):
     """Finder of steady motions with Coulomb friction or without friction, by the event map."""
 
-    name, elements = "events", RigidElements
+    name = "events"
+    elements = RigidElements
 
     @cached_property
     def forces(self) -> np.ndarray:
@@ -269,10 +275,8 @@ class EventFinder(Maps):
         """
         if self.forces.any():
             return super().curve_point(drive, near)
-        modes, gauge = (
-            self.modes,
-            self.modes.output if self.modes.gauge is None else self.modes.gauge,
-        )
+        modes = self.modes
+        gauge = self.modes.output if self.modes.gauge is None else self.modes.gauge
         try:
             seen, felt = (
                 compute_receptance(modes, drive.omega, [gauge, modes.output], modes.base)[0, :, 0]

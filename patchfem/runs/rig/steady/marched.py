@@ -47,7 +47,8 @@ def solution_beyond_grooves(model, numerics, patch, drive, contact) -> Solution 
     """
     if not model.grooves.lifted_mass:
         return None
-    begin, found = perf_counter(), []
+    begin = perf_counter()
+    found = []
     rig = model.rig.with_signal(drive, levels=DriveLevels(), waveform=SINE_WAVEFORM)
     for steps in (START_STEPS, START_STEPS // 2):
         done = engine.march(
@@ -70,10 +71,14 @@ def solution_beyond_grooves(model, numerics, patch, drive, contact) -> Solution 
 class MarchFinder(Followed):
     """Finder of steady motions over grooves, by a march whose initial state is corrected."""
 
-    tries_another, leaves = True, (0.3, 30.0)  # the points have errors of the size of the tolerance
+    # the points have errors of the size of the tolerance
+    tries_another = True
+    leaves = (0.3, 30.0)
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
-        self.model, self.patch, self.frames = model, patch, frames
+        self.model = model
+        self.patch = patch
+        self.frames = frames
         self.contact = make_contact(model, numerics, patch)
         exact = self.contact.set_valued
         self.steps = model.accuracy.steps_per_cycle or (EXACT if exact else START_STEPS)
@@ -133,27 +138,29 @@ class MarchFinder(Followed):
         The steps are doubled until the amplitude differs from that with half as many by less than
         the tolerance. The error of a measure contains its difference from half of the steps.
         """
-        begin, name = perf_counter(), "relative_displacement_amplitude"
+        begin = perf_counter()
+        name = "relative_displacement_amplitude"
         run, left = self._run(drive, near, self.steps)
         half = self._read(self._run(drive, run, self.steps // 2)[0], self.steps // 2)[0]
-        steps, read = self.steps, self._read(run, self.steps, self.frames)
+        steps = self.steps
+        read = self._read(run, self.steps, self.frames)
         while self._rough(read[0][name], half[name]) and run.outcome is None:
             if 2 * steps > MAX_STEPS or self.model.accuracy.steps_per_cycle is not None:
                 break
-            steps, half = 2 * steps, read[0]
+            steps = 2 * steps
+            half = read[0]
             run, left = self._run(drive, run, steps)
             read = self._read(run, steps, self.frames)
         values, mark, snapshots, stuck = read
         between = peak_sampling_errors(mark.window, True)
         found = orbits.estimate_multipliers(run) if run.outcome is None else np.zeros(0)
         regime = "stuck" if stuck else "stick-slip" if values.get("stick_fraction") else "sliding"
-        outcome, message = run.outcome or (Outcome.STUCK if stuck else Outcome.STEADY), run.message
+        outcome = run.outcome or (Outcome.STUCK if stuck else Outcome.STEADY)
+        message = run.message
         if not stuck and np.abs(found).max(initial=0.0) > 1 + ROUGH:
-            outcome, message, regime = (
-                Outcome.NOT_CONVERGED,
-                describe_instability(found),
-                f"{regime}, unstable",
-            )
+            outcome = Outcome.NOT_CONVERGED
+            message = describe_instability(found)
+            regime = f"{regime}, unstable"
         errors = {
             key: abs(v - half.get(key, v)) + abs(v) * (left + READ) + between.get(key, 0.0)
             for key, v in values.items()

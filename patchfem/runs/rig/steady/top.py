@@ -65,7 +65,8 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
     points = list(points)
     for left in range(MAX_ADDED_POINTS, -1, -1):
         s = np.cumsum([0.0, *(finder.curve_distance(a, b) for a, b in pairwise(points))])
-        y, lasting = _heights(points), np.array([one.stable for one in points])
+        y = _heights(points)
+        lasting = np.array([one.stable for one in points])
         best, (reach, at) = index_of_largest(points), concave_bounds(s, y)
         if not y[best] > 0 or not reach.size:
             return RefinedPeak(points, best, 0.0)
@@ -109,7 +110,8 @@ def _choose_added_point(s, y, best: int, share: float) -> tuple | None:
     want = share * min(
         _width(y[best:], s[best:] - s[best]), _width(y[best::-1], s[best] - s[best::-1])
     )
-    before, after = s[best] - s[best - 1], s[best + 1] - s[best]
+    before = s[best] - s[best - 1]
+    after = s[best + 1] - s[best]
     if max(before, after) <= want:
         return None
     slopes = (y[best] - y[best - 1]) / before, (y[best + 1] - y[best]) / after
@@ -153,14 +155,16 @@ def concave_bounds(s, y) -> tuple:
     tuple
         Bounds and fractions, (n - 1,) each.
     """
-    h, ends = np.diff(s), np.maximum(y[:-1], y[1:])
+    h = np.diff(s)
+    ends = np.maximum(y[:-1], y[1:])
     with np.errstate(all="ignore"):
         slope = np.diff(y) / h
         # slopes of the lines from the left and from the right
         rise, fall = np.full((2, h.size), np.nan)
         rise[1:] = np.where(y[:-2] >= CAP * ends[1:], slope[:-1], np.nan)
         fall[:-1] = np.where(y[2:] >= CAP * ends[:-1], slope[1:], np.nan)
-        left, right = y[:-1] + rise * h, y[1:] - fall * h
+        left = y[:-1] + rise * h
+        right = y[1:] - fall * h
         # intersection of both lines as a fraction of the interval
         meet = (right - y[:-1]) / (rise - fall) / h
         inside = (meet > 0) & (meet < 1)
@@ -183,18 +187,22 @@ def solve_peak(points: list, folds, finder) -> Solution:
     points, best, above = refine_peak(points, finder, finder.model.accuracy.tolerance)
     top = points[best]
     raw = finder.point(top.drive, top.near)[0]
-    errors, extra = dict(raw.errors or {}), {"curve": curve_columns(points, folds), "at": top.drive}
-    height, y = top.values.get(AMPLITUDE, 0.0), _heights(points)
+    errors = dict(raw.errors or {})
+    extra = {"curve": curve_columns(points, folds), "at": top.drive}
+    height = top.values.get(AMPLITUDE, 0.0)
+    y = _heights(points)
     if not height > 0 or AMPLITUDE not in raw.values:
         # None means that there is no peak
         return replace(raw, extra=raw.extra | extra | {"at_error": None if height == 0 else 0.0})
     # difference from the point of the curve, which is computed with fewer samples
     missed = abs(seen_by_gauge(finder.model, raw).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
-    places, off = np.array([one.drive.omega for one in points]) / (2 * np.pi), 0.0
+    places = np.array([one.drive.omega for one in points]) / (2 * np.pi)
+    off = 0.0
     open_ones = dict.fromkeys(raw.values, 0.0)
     for way in (-1, 1):
-        heights, away = y[best::way], np.abs(places[best::way] - places[best])
+        heights = y[best::way]
+        away = np.abs(places[best::way] - places[best])
         if heights.size < 2:
             continue
         # points at which the largest amplitude cannot be
