@@ -125,7 +125,11 @@ def run_both_surfaces(
             sides.append(None)
             failed.append(f"the surface {name}: {error}")
     known = {
-        name for one in sides if one is not None for name, m in one.measures.items() if _is_known(m)
+        name
+        for side in sides
+        if side is not None
+        for name, m in side.measures.items()
+        if _is_known(m)
     }
     lacking = (
         tuple(

@@ -110,9 +110,9 @@ def find_relay_cycles(modes: ModalBasis, row, slides: float, holds: float) -> li
         In increasing amplitude.
     """
     return sorted(
-        one
+        mode_relay_cycle
         for mode in find_unstable_modes(modes)
-        for one in _find_mode_relay_cycles(modes, row, (slides, holds), mode)
+        for mode_relay_cycle in _find_mode_relay_cycles(modes, row, (slides, holds), mode)
     )
 
 
@@ -167,7 +167,9 @@ def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode
             damping=modes.damping_matrix - (own + np.exp(log_more)) * np.eye(modes.omega.size),
         )
         found = [
-            one for one in _find_mode_relay_cycles(lifted, row, forces, mode) if one.amplitude > 0
+            mode_relay_cycle
+            for mode_relay_cycle in _find_mode_relay_cycles(lifted, row, forces, mode)
+            if mode_relay_cycle.amplitude > 0
         ]
         return min(found, key=lambda one: abs(one.omega - modes.omega[mode]), default=None)
 

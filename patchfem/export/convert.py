@@ -111,7 +111,7 @@ def _create_parent_folder(out: Path | None) -> Iterator[None]:
 
     Missing if it cannot be created.
     """
-    places = [] if out is None else [one for one in out.parents if not one.exists()]
+    places = [] if out is None else [parent for parent in out.parents if not parent.exists()]
     try:
         if places:
             _make_folder(places[0], out)

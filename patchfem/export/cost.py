@@ -71,7 +71,7 @@ def format_cost(knob: str, runs: list, tolerance: float) -> list[str]:
     """
     if knob != TOLERANCE:
         names = measures_with_error(runs)
-        rows = [(one, worst_error(one, names, tolerance), "") for one in runs]
+        rows = [(run, worst_error(run, names, tolerance), "") for run in runs]
         last = [cost_sentence(runs, tolerance)]
     else:
         groups = _by_tolerance(runs)
@@ -92,11 +92,11 @@ def format_cost(knob: str, runs: list, tolerance: float) -> list[str]:
 def _by_tolerance(runs: list) -> list[list]:
     """Group the runs of a curve over tolerances: each tolerance with the settings tried for it."""
     out: list[list] = []
-    for one in runs:
-        if out and out[-1][0].tolerance == one.tolerance:
-            out[-1].append(one)
+    for run in runs:
+        if out and out[-1][0].tolerance == run.tolerance:
+            out[-1].append(run)
         else:
-            out.append([one])
+            out.append([run])
     return out
 
 
@@ -134,8 +134,8 @@ def format_details(knob: str, runs: list, tolerance: float) -> list[str]:
     list of str
     """
     names = detailed_measures(runs, tolerance)
-    waited = any(one.has_waited() for one in runs)
-    width = max(len(knob), *(len(one.label) for one in runs))
+    waited = any(run.has_waited() for run in runs)
+    width = max(len(knob), *(len(run.label) for run in runs))
     head = [
         f"{knob:<{width}}",
         f"{'CPU s':>7}",
@@ -149,15 +149,15 @@ def format_details(knob: str, runs: list, tolerance: float) -> list[str]:
             + ["stated (distance)".rjust(max(17, len(one))) for one in names]
         )
     )
-    for one in runs:
+    for run in runs:
         cells = [
-            f"{one.label:<{width}}",
-            f"{one.seconds:7.3f}",
-            *[f"{one.wall_seconds:7.3f}"] * waited,
+            f"{run.label:<{width}}",
+            f"{run.seconds:7.3f}",
+            *[f"{run.wall_seconds:7.3f}"] * waited,
         ]
         out.append(
             "  ".join(
-                cells + [_format_shares(one, name).rjust(max(17, len(name))) for name in names]
+                cells + [_format_shares(run, name).rjust(max(17, len(name))) for name in names]
             )
         )
     return [*out, cost_sentence(runs, tolerance)]
@@ -173,7 +173,8 @@ def _format_shares(one: Cost, name: str) -> str:
         part[name] / size if size and name in part else None for part in (one.errors, one.distances)
     )
     stated, away = (
-        "-" if one is None else "exact" if one < ROUND_OFF else f"{one:.1e}" for one in shares
+        "-" if share is None else "exact" if share < ROUND_OFF else f"{share:.1e}"
+        for share in shares
     )
     return f"{stated} ({away})"
 
@@ -186,7 +187,7 @@ def detailed_measures(runs: list, tolerance: float) -> list:
     """
     turned = changed_measures(runs) or measures_with_error(runs)
     names = measures_with_error(runs)
-    worst = {worst_error(one, names, tolerance).name for one in runs if one.errors or one.distances}
+    worst = {worst_error(run, names, tolerance).name for run in runs if run.errors or run.distances}
     return [name for name in (*MAIN, *sorted(worst.difference(MAIN))) if name in turned] or turned
 
 
@@ -206,7 +207,7 @@ def write(folder: Path, curves: dict) -> Path:
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     names = list(
-        dict.fromkeys(name for runs in curves.values() for one in runs for name in one.values)
+        dict.fromkeys(name for runs in curves.values() for run in runs for name in run.values)
     )
     table = folder / "cost.csv"
     head = [
@@ -224,18 +225,18 @@ def write(folder: Path, curves: dict) -> Path:
             *(
                 [
                     knob,
-                    one.label,
-                    f"{one.seconds:.6g}",
-                    f"{one.wall_seconds:.6g}",
-                    one.timings,
+                    run.label,
+                    f"{run.seconds:.6g}",
+                    f"{run.wall_seconds:.6g}",
+                    run.timings,
                     *(
                         repr(float(part[name])) if name in part else ""
                         for name in names
-                        for part in (one.values, one.errors, one.distances)
+                        for part in (run.values, run.errors, run.distances)
                     ),
                 ]
                 for knob, runs in curves.items()
-                for one in runs
+                for run in runs
             ),
         ],
     )
@@ -273,14 +274,14 @@ def cost_data(knob: str, runs: list, tolerance: float) -> dict:
         "distances",
     )
     out = []
-    for one in runs:
-        worst = worst_of_run(one)
+    for run in runs:
+        worst = worst_of_run(run)
         out.append(
-            {name: getattr(one, name) for name in parts}
+            {name: getattr(run, name) for name in parts}
             | {
                 "worst": {"measure": worst.name, "error": worst.share},
-                "meets_tolerance": one.meets_tolerance(),
-                "remedies": list(one.remedies),
+                "meets_tolerance": run.meets_tolerance(),
+                "remedies": list(run.remedies),
             }
         )
     alone = knob != TOLERANCE
@@ -307,8 +308,8 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
     """
     names = measures_with_error(runs)
     worst = [
-        worst_of_run(one) if knob == TOLERANCE else worst_error(one, names, tolerance)
-        for one in runs
+        worst_of_run(run) if knob == TOLERANCE else worst_error(run, names, tolerance)
+        for run in runs
     ]
     points = [
         Point(one, found.share)
@@ -321,19 +322,23 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
         )
     ]
     for text, is_met in (("meets its tolerance", True), ("misses its tolerance", False)):
-        alike = [one for one in points if (one.share <= (one.run.tolerance or tolerance)) == is_met]
+        alike = [
+            point
+            for point in points
+            if (point.share <= (point.run.tolerance or tolerance)) == is_met
+        ]
         if alike:
             x = [one.run.seconds for one in alike]
             y = [one.share for one in alike]
             marks.append(charts.make_dots(x, y, "accent", text, size=6, hollow=not is_met))
-    ends = _axis_range([one.seconds for one in runs], MIN_SECONDS_RATIO)
+    ends = _axis_range([run.seconds for run in runs], MIN_SECONDS_RATIO)
     limit = f"tolerance of the scene, {tolerance:g}"
     marks.append(
         charts.make_line(ends, [tolerance, tolerance], "soft", limit, dash="dashed", width=1.0)
     )
     x_axis = charts.make_axis("CPU seconds of a run", "", True) | {"range": ends}
     y_axis = charts.make_axis("error of the worst measure", "", True)
-    y_axis["range"] = _axis_range([tolerance, *(one.share for one in points)], MIN_ERROR_RATIO)
+    y_axis["range"] = _axis_range([tolerance, *(point.share for point in points)], MIN_ERROR_RATIO)
     title = f"What accuracy costs, by {AXES[knob]}"
     labels = _place_labels(points, x_axis["range"], y_axis["range"])
     return charts.make_chart(title, x_axis, y_axis, marks) | {"labels": labels}

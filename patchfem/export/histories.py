@@ -135,7 +135,7 @@ def _interface_histories(result: Result) -> dict:
         )
         if f"lateral_{many}" in r.extra
     }
-    loads = np.array([one.load for one in result.plan.model.rig.friction.interfaces])
+    loads = np.array([interface.load for interface in result.plan.model.rig.friction.interfaces])
     return {
         "output_displacement": r.output,
         "output_velocity": r.output_rate,
@@ -160,19 +160,19 @@ def _coordinate_description(rig) -> str:
 def _level_columns(levels) -> dict:
     """Return the columns of a run in levels: drive, sticking, outcome, measures and errors."""
     out = {
-        "level_drive": (levels[0].unit, np.array([one.drive for one in levels])),
-        "level_stuck": ("1", np.array([one.stuck for one in levels], np.int8)),
+        "level_drive": (levels[0].unit, np.array([level.drive for level in levels])),
+        "level_stuck": ("1", np.array([level.stuck for level in levels], np.int8)),
     }
-    if any(one.outcome for one in levels):
-        out["level_outcome"] = ("", np.array([one.outcome for one in levels]))
+    if any(level.outcome for level in levels):
+        out["level_outcome"] = ("", np.array([level.outcome for level in levels]))
     for name in LEVEL_MEASURES:
-        if any(name in one.values for one in levels):
+        if any(name in level.values for level in levels):
             out[f"level_{name}"] = (
                 TABLE[name].unit,
-                np.array([one.values.get(name, np.nan) for one in levels]),
+                np.array([level.values.get(name, np.nan) for level in levels]),
             )
             out[f"level_{name}_error"] = (
                 TABLE[name].unit,
-                np.array([one.errors.get(name, np.nan) for one in levels]),
+                np.array([level.errors.get(name, np.nan) for level in levels]),
             )
     return out

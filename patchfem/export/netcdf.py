@@ -471,7 +471,7 @@ def add_faces(data: Contents, faces) -> Contents:
             for name, (dimensions, *rest) in part.items():
                 dimensions = (dimensions,) if isinstance(dimensions, str) else dimensions
                 name = {"x": over["x"], "frame_time": f"{frame}_time"}.get(name, f"{name}{ending}")
-                found[name] = (tuple(over[one] for one in dimensions), *rest)
+                found[name] = (tuple(over[dimension] for dimension in dimensions), *rest)
     return data.also(out, places)
 
 

@@ -280,7 +280,7 @@ def _interface_picture(data: RunData) -> Picture | None:
 
 def _faces_picture(data: RunData) -> Picture | None:
     """Return the picture of the stresses on interfaces that have a patch."""
-    found = [one for one in data.patch.faces if np.any(one[1]["normal_stress"][0] > 0)]
+    found = [face for face in data.patch.faces if np.any(face[1]["normal_stress"][0] > 0)]
     part = any(charts.contact_range(x, fields["normal_stress"][0]) for x, fields, _ in found)
     shear = any(np.any(fields.get("shear_stress", 0.0)) for _, fields, _ in found)
     moved = (
@@ -583,7 +583,7 @@ def _levels_section(levels: list) -> Section:
     the interface sticks.
     """
     rows = []
-    judged = any(one.get("outcome") for one in levels)
+    judged = any(level.get("outcome") for level in levels)
     for number, one in enumerate(levels, 1):
         cells = []
         for name, unit in LEVEL_COLUMNS:
@@ -603,7 +603,7 @@ def _levels_section(levels: list) -> Section:
                 "stuck" if one["stuck"] else "slips",
             ]
         )
-    sized = "force" if any(one.get("unit") == "N" for one in levels) else "base acceleration"
+    sized = "force" if any(level.get("unit") == "N" for level in levels) else "base acceleration"
     texts = (
         "half the peak-to-peak motion",
         "peak acceleration",

@@ -116,7 +116,11 @@ def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str
     if not lost:
         ran = int(
             np.any(
-                [np.isfinite(np.asarray(one["values"], float)) for one in measures.values()], axis=0
+                [
+                    np.isfinite(np.asarray(measure["values"], float))
+                    for measure in measures.values()
+                ],
+                axis=0,
             ).sum()
         )
         some = next(

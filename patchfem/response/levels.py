@@ -164,4 +164,4 @@ def largest_hysteresis(levels, name: str = AMPLITUDE) -> tuple | None:
         (abs(a.values[name] - b.values[name]), a.errors.get(name, 0.0) + b.errors.get(name, 0.0))
         for a, b in pairs
     ]
-    return max((one for one in gaps if np.isfinite(one[0])), default=None)
+    return max((gap for gap in gaps if np.isfinite(gap[0])), default=None)

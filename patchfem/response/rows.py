@@ -772,10 +772,10 @@ def larger_term(name: str, values: dict):
         return 0.0
     return row.larger_term[1](
         {
-            remove_interface_number(one): values.get(
-                remove_interface_number(one) + number, values[one]
+            remove_interface_number(value): values.get(
+                remove_interface_number(value) + number, values[value]
             )
-            for one in values
+            for value in values
         }
     )
 

@@ -51,7 +51,9 @@ def patch_stiffness(model: Model, patch) -> float:
         return held
     length = f.static * load / held  # 0 for a law that is rigid in stick
     if patch.strips is not None:
-        return float(sum(one[0].sum() for one in strip_elements(patch, f.static, length)))
+        return float(
+            sum(strip_element[0].sum() for strip_element in strip_elements(patch, f.static, length))
+        )
     return float(elements(patch, f.static, length).stiffness.sum())
 
 

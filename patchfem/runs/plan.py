@@ -290,10 +290,10 @@ def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
     f = model.friction
     laws = [] if f is None else [f]
     if rig is not None:
-        laws = [one.numbers for one in rig.friction.interfaces]
+        laws = [interface.numbers for interface in rig.friction.interfaces]
     words = [
         engine,
-        *sorted({f"{one.law} {one.reading} {one.order not in (None, 0, 1)}" for one in laws}),
+        *sorted({f"{law.law} {law.reading} {law.order not in (None, 0, 1)}" for law in laws}),
     ]
     if rig is not None:
         words += [

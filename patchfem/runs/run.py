@@ -303,5 +303,5 @@ def marches(what: Plan) -> bool:
 def _has_no_load(model: Model) -> bool:
     """Return whether no interface of a model without a patch carries a load."""
     if model.rig is not None and len(model.rig.friction.names):
-        return not any(one.load for one in model.rig.friction.interfaces)
+        return not any(interface.load for interface in model.rig.friction.interfaces)
     return model.point is not None and model.point.load == 0

@@ -65,8 +65,8 @@ def swept(tilts=TILTS, loads=LOADS, levels=LEVELS, **more):
         scene(**more),
         {
             "contact.tilt.angle": list(tilts),
-            "contact.load": [one * LBF for one in loads],
-            "drive.acceleration": [one * G for one in levels],
+            "contact.load": [load * LBF for load in loads],
+            "drive.acceleration": [level * G for level in levels],
         },
     )
 
@@ -183,4 +183,4 @@ if __name__ == "__main__":
         )
     for g in LEVELS:
         print(f"26 lbf, {g:g} g: {allowed(26.0, g, asked)}")
-    print("yaw " + ", ".join(f"{1e6 * one:.2f}" for one in yaws(asked)) + " um")
+    print("yaw " + ", ".join(f"{1e6 * yaw:.2f}" for yaw in yaws(asked)) + " um")

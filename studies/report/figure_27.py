@@ -79,7 +79,7 @@ def scene(model: str) -> str:
         )
     if model == "grooves":  # what lifts would leave them
         lines = (HERE / "grooved.toml").read_text("utf-8").splitlines()
-        return "\n".join(one for one in lines if not one.startswith(("lifted_mass", "travel")))
+        return "\n".join(line for line in lines if not line.startswith(("lifted_mass", "travel")))
     text = (HERE.parent / "table_1" / "second_path.toml").read_text("utf-8")
     text = POINT + text[text.index("static =") : text.index("[measured]")]
     return text.replace('method = "harmonic"', 'method = "march"')

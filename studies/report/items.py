@@ -620,7 +620,7 @@ def link(path: str) -> str:
 def table(items=ITEMS) -> str:
     """The page in Markdown."""
     counts = [
-        (sum(one.verdict.split(":")[0] == verdict for one in items), words)
+        (sum(item.verdict.split(":")[0] == verdict for item in items), words)
         for verdict, words in VERDICTS.items()
     ]
     rows = [

@@ -146,7 +146,7 @@ def series(
 
 def as_onsets(readings: list) -> str:
     """[wear.friction] that follows the onset of slip from column to column, over the worn depth of a series."""
-    first = {one.column: one.before for one in reversed(readings)}
+    first = {reading.column: reading.before for reading in reversed(readings)}
     depth = ", ".join(f'"{first[column]!r} m"' for column in sorted(first))
     factor = ", ".join(f"{one / ONSETS[0]:.5f}" for one in ONSETS)
     return f"[wear.friction]\ndepth = [{depth}]\ncoefficient_factor = [{factor}]\n"
@@ -154,11 +154,15 @@ def as_onsets(readings: list) -> str:
 
 def pairs(readings: list) -> np.ndarray:
     """Logarithms of the repeat over the first reading, (k, 2): as read, as the model has it, of what was read twice."""
-    first = {(one.row.frequency, one.row.input): one for one in readings if "R" not in one.row.flag}
+    first = {
+        (reading.row.frequency, reading.row.input): reading
+        for reading in readings
+        if "R" not in reading.row.flag
+    }
     both = [
-        (first.get((one.row.frequency, one.row.input)), one)
-        for one in readings
-        if "R" in one.row.flag
+        (first.get((reading.row.frequency, reading.row.input)), reading)
+        for reading in readings
+        if "R" in reading.row.flag
     ]
     return np.log(
         [
@@ -178,10 +182,10 @@ def main(coefficients=(COEFFICIENT,)) -> dict:
     the onset of slip; the repeats printed."""
     out = {}
     with tempfile.TemporaryDirectory() as folder:
-        for one in coefficients:
-            place = Path(folder) / f"{one:g}"
+        for coefficient in coefficients:
+            place = Path(folder) / f"{coefficient:g}"
             place.mkdir()
-            out[f"{one:g}"] = series(place, one)
+            out[f"{coefficient:g}"] = series(place, coefficient)
         place = Path(folder) / "onset"
         place.mkdir()
         first = next(iter(out.values()))

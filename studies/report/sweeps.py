@@ -99,12 +99,12 @@ def swept(model: str, level: float) -> Swept:
 def critical(sweeps: list) -> np.ndarray:
     """Level [g] (k,) at which the waveform becomes distorted, at the frequencies of the sweeps of one model, which rise
     in level: between two of them by the logarithm of the distortion."""
-    logs = np.log(np.maximum([one.distortion for one in sweeps], 1e-6) / DISTORTED)
+    logs = np.log(np.maximum([sweep.distortion for sweep in sweeps], 1e-6) / DISTORTED)
     first = np.argmax(logs > 0, axis=0)
     k = np.arange(logs.shape[1])
     low = logs[first - 1, k]
     high = logs[first, k]
-    levels = np.array([one.level for one in sweeps])
+    levels = np.array([sweep.level for sweep in sweeps])
     return levels[first - 1] + (levels[first] - levels[first - 1]) * low / (low - high)
 
 
@@ -142,7 +142,7 @@ def main(path: Path | None = HERE / "sweeps.svg", models=tuple(MODELS)) -> list:
     """[Swept], printed and drawn."""
     sweeps = [swept(model, level) for model in models for level in LEVELS]
     for model in models:
-        mine = [one for one in sweeps if one.model == model]
+        mine = [sweep for sweep in sweeps if sweep.model == model]
         level = critical(mine)
         still = mine[0]
         above = level[still.frequency > 136]

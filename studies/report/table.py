@@ -108,7 +108,7 @@ def table(found: list, seconds: dict) -> str:
         for one in found
     ]
     figures = [one for one in found if one.reproduced]
-    yes = sum(one.reproduced == "yes" for one in figures)
+    yes = sum(figure.reproduced == "yes" for figure in figures)
     known = [seconds[one.path] for one in found if seconds.get(one.path) is not None]
     return "\n".join(
         [

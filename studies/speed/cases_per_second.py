@@ -169,7 +169,7 @@ def by_patchfem(cases: np.ndarray):
 def by_exact(cases: np.ndarray):
     """The same by the exact engine alone, in its batch."""
     lanes = batches.BATCHES
-    batches.BATCHES = tuple(one for one in lanes if one.name != "lumped.lanes")
+    batches.BATCHES = tuple(lane for lane in lanes if lane.name != "lumped.lanes")
     try:
         return by_patchfem(cases)
     finally:

@@ -90,9 +90,9 @@ def row(rung: str, reading: str, values, frequency: float) -> dict:
 def main(shown=SHOWN, frequencies=FREQUENCIES) -> list:
     """Print and return a `row` per rung and frequency."""
     known = {
-        (one["rung"], one["reading"]): one
-        for one in json.loads((HERE / "scores.json").read_text("utf-8"))
-        if one["protocol"] == "143" and not one["placebo"]
+        (load["rung"], load["reading"]): load
+        for load in json.loads((HERE / "scores.json").read_text("utf-8"))
+        if load["protocol"] == "143" and not load["placebo"]
     }
     out = []
     for rung, reading in shown:

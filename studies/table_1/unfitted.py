@@ -55,8 +55,8 @@ def main(cycles: float = 800, models=("coulomb", "patch")) -> dict:
         )["acceleration"]
     }
     for name in models:
-        runs = [answer(name, *one, cycles, estimate=False) for one in cells.conditions]
-        both = np.array([[one[measure].value for one in runs] for measure in MEASURES])
+        runs = [answer(name, *condition, cycles, estimate=False) for condition in cells.conditions]
+        both = np.array([[run[measure].value for run in runs] for measure in MEASURES])
         out[name] = {"cells": both, **scores(cells, cells.logs(*both), every)}
         print(
             f"{name}: all {out[name]['all']:.2f}, accelerations {out[name]['acceleration']:.2f}, displacements "

@@ -119,7 +119,9 @@ class Joint(NamedTuple):
         interfaces = self.model.rig.friction.interfaces
         others = 0.0
         if len(interfaces) > 1:
-            others = sum(one.numbers.static * (one.load or 0.0) for one in interfaces)
+            others = sum(
+                interface.numbers.static * (interface.load or 0.0) for interface in interfaces
+            )
         return not (self.friction_limit or others or self.model.rig.springs.is_nonlinear)
 
     @property
@@ -127,8 +129,8 @@ class Joint(NamedTuple):
         """Whether friction sticks without any elastic displacement."""
         interfaces = self.model.rig.friction.interfaces
         return not self.model.partial_slip and any(
-            law_has_trait(one.numbers.law, "set-valued") and not one.partial_slip
-            for one in interfaces
+            law_has_trait(interface.numbers.law, "set-valued") and not interface.partial_slip
+            for interface in interfaces
         )
 
     @property
@@ -233,7 +235,8 @@ class Joint(NamedTuple):
         """Return the errors of read(LawGroup) due to the mesh and to the discrete sliders of a law."""
         model = self.model
         has_cells = any(
-            law_has_trait(one.numbers.law, "cells") for one in model.rig.friction.interfaces
+            law_has_trait(interface.numbers.law, "cells")
+            for interface in model.rig.friction.interfaces
         )
         slips_in_parts = model.partial_slip or model.rig.friction.has_partial_slip
         error = 0.0
@@ -275,7 +278,9 @@ def build_joint(model: Model, name: str) -> Joint:
     modes = model.rig.modes
     number = _find_mode(model.rig, name)
     if modes.lateral_faces is not None:
-        key = next(one.key for one in model.rig.friction.interfaces if one.lateral)
+        key = next(
+            interface.key for interface in model.rig.friction.interfaces if interface.lateral
+        )
         refusal = describe_unsupported("a backbone with interfaces that slide in a plane", "out")
         raise PatchfemError(refusal, f"{key}.lateral")
     patch = None

@@ -93,7 +93,9 @@ class Problem:
     @property
     def box(self) -> SearchSpace:
         """The space of the values."""
-        return make_space([one.low for one in self.bounds], [one.high for one in self.bounds])
+        return make_space(
+            [bound.low for bound in self.bounds], [bound.high for bound in self.bounds]
+        )
 
     def own_values(self) -> list:
         """Return starting values: those of the scene, else the middle of each range."""

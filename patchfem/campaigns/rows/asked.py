@@ -69,7 +69,9 @@ class ConditionModels:
         self.base = BaseScene(start)
         self.read = start.measured
         self.inner = [k for k, one in enumerate(wanted) if one.key not in READINGS]
-        self.rigs = [build(self.base.override(condition_sets(*one))).rig for one in conditions]
+        self.rigs = [
+            build(self.base.override(condition_sets(*condition))).rig for condition in conditions
+        ]
 
     def _refuse(self, measured) -> None:
         """Raise PatchfemError for a scene or a key that cannot be fitted to rows."""

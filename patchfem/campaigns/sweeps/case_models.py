@@ -146,7 +146,7 @@ class SweepScene:
         modes = tomllib.loads(self.text).get("structure", {})
         modes = modes.get("mode") if isinstance(modes, dict) else None
         if pieces[:2] == ["structure", "mode"] and len(pieces) > 2 and isinstance(modes, list):
-            names = [one.get("name") if isinstance(one, dict) else None for one in modes]
+            names = [mode.get("name") if isinstance(mode, dict) else None for mode in modes]
             pieces[2] = str(names.index(pieces[2])) if pieces[2] in names else pieces[2]
         return ".".join(pieces)
 

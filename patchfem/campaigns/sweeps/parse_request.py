@@ -120,7 +120,7 @@ def read_cases(asked: SweepScene, request: Request) -> Cases:
         parts += [listed] if listed is not None else []
     wrong += _check_measure(request.of)
     axes, mistakes = read_axes(request.over, sampled=request.count > 0)
-    wrong += [f"--over {one.removeprefix('--over ')}" for one in mistakes]
+    wrong += [f"--over {mistake.removeprefix('--over ')}" for mistake in mistakes]
     if not request.over and request.file is None:
         axes, mistakes = asked.axes()
         wrong += mistakes
@@ -236,8 +236,10 @@ def _refuse_all(asked: SweepScene, cases: Cases) -> None:
         if not mistakes:
             return
         # Random values differ from case to case, but the mistake that they cause is the same.
-        for one in mistakes:
-            found.setdefault(re.sub(NUMBER_PATTERN, "", one) if cases.drawn else one, one)
+        for mistake in mistakes:
+            found.setdefault(
+                re.sub(NUMBER_PATTERN, "", mistake) if cases.drawn else mistake, mistake
+            )
     lines = list(found.values())
     raise SceneError(
         lines[:MAX_PRINTED]

@@ -76,7 +76,7 @@ def compute_sobol_indices(keys: Sequence[tuple], measures: dict, shape: tuple | 
         found = {name: _grid_indices(values.reshape(shape)) for name, values in whole.items()}
         along = [place for place, (name, _) in enumerate(keys) if name in names]
         return {
-            name: _sort_shares(names, [one[along] for one in shares])
+            name: _sort_shares(names, [share[along] for share in shares])
             for name, shares in found.items()
         }
     levels = np.stack([_rank_fraction(values) for _, values in moving], axis=1)

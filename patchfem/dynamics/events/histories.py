@@ -156,9 +156,9 @@ def announce_runs(
         Number of runs.
     """
     march, dense, read = load_event_kernels()
-    stiff = max((float(one.stiffness.sum()) for one in groups), default=0.0)
+    stiff = max((float(group.stiffness.sum()) for group in groups), default=0.0)
     shown = min(cycles, window)
-    each = python_seconds(modes, drive, stiff, sum(one.stiffness.size for one in groups))
+    each = python_seconds(modes, drive, stiff, sum(group.stiffness.size for group in groups))
     march.march.add_python_cost(runs * cycles * each)
     march.stored_energy.add_python_cost(runs * each)
     dense.evaluate_rows.add_python_cost(runs * shown * SAMPLES_PER_CYCLE * sample_seconds(modes))

@@ -142,7 +142,7 @@ class PeriodMap:
         """
         same = (
             modes.omega.size == self.n
-            and [one.stiffness.size for one in groups] == self.table.n_elements.tolist()
+            and [group.stiffness.size for group in groups] == self.table.n_elements.tolist()
         )
         if same:
             self._set_system(modes, groups)
@@ -198,7 +198,7 @@ class PeriodMap:
                 )
             if len(self.clocks) >= MAX_KEPT_DRIVES:
                 self.clocks.clear()
-            stiff = max(float(one.stiffness.sum()) for one in self.groups)
+            stiff = max(float(group.stiffness.sum()) for group in self.groups)
             seconds = python_seconds(self.modes, drive, stiff, int(self.table.n_elements.sum()))
             self.clocks[id(drive)] = drive, start_time_state(drive, len(self.groups)), seconds
         _, time_state, self.seconds = self.clocks[id(drive)]

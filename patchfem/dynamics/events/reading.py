@@ -151,7 +151,7 @@ def join_readings(readings) -> Reading:
     """Join the Readings of runs with the same number of interfaces."""
     return Reading(
         *(
-            np.array([getattr(one, name) for one in readings])
+            np.array([getattr(reading, name) for reading in readings])
             for name in Reading.__dataclass_fields__
         )
     )

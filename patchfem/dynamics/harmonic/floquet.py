@@ -112,7 +112,9 @@ def _find_equal_cells(coefficients: list, marks) -> np.ndarray:
 
     A cell with a turning point is a run of its own.
     """
-    table = np.concatenate([one.reshape(-1, one.shape[-1]) for one in coefficients])
+    table = np.concatenate(
+        [coefficient.reshape(-1, coefficient.shape[-1]) for coefficient in coefficients]
+    )
     new = np.append(True, (table[:, 1:] != table[:, :-1]).any(axis=0))
     for mark in marks:
         new[mark.cell : mark.cell + 2] = True

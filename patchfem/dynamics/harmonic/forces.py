@@ -198,9 +198,9 @@ def find_response(tracks: list, sampled: list) -> ContactResponse:
             slope[i] += found[at : at + len(hold), : h + 1].T @ basis
             at += len(hold)
     for i, laws in enumerate(sampled):
-        for one in laws:
-            if one.tangent is not None:
-                to_slide, to_omega = one.tangent()
+        for law in laws:
+            if law.tangent is not None:
+                to_slide, to_omega = law.tangent()
                 slope[i] += find_harmonics(to_slide.T, h).T
                 rate[i] += find_harmonics(to_omega, h)
     return ContactResponse(found[:rows, : h + 1], slope, rate if turns else None)

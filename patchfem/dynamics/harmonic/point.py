@@ -340,8 +340,10 @@ def _iterate_starts(balance, x, omega, level, h: int):
                 balance, balance.lift @ unpack_harmonics(x[: r * (2 * have + 1)], r), x, have, h
             )
     yield _solve_stuck(balance, omega, level, h)
-    for one in find_one_harmonic_roots(balance, omega, level):
-        yield with_harmonics(balance, balance.slides(one, omega, 1), one, 1, h)
+    for one_harmonic_root in find_one_harmonic_roots(balance, omega, level):
+        yield with_harmonics(
+            balance, balance.slides(one_harmonic_root, omega, 1), one_harmonic_root, 1, h
+        )
 
 
 def _climb_harmonics(balance, omega, level, h: int) -> np.ndarray:

@@ -88,7 +88,7 @@ class JointsModel:
     def limit(self) -> float:
         """Friction limit of patch and joints together [N]."""
         return (self.patch.limit if self.patch is not None else 0.0) + sum(
-            one.element.limit for one in self.joints if one.mate >= 0
+            joint.element.limit for joint in self.joints if joint.mate >= 0
         )
 
     @property
@@ -115,7 +115,7 @@ class JointsModel:
     def laws(self) -> tuple:
         """Modules of the compiled laws, each once."""
         return tuple(
-            sorted({*self.also, *(one.element.kernels or COULOMB_LAW for one in self.joints)})
+            sorted({*self.also, *(joint.element.kernels or COULOMB_LAW for joint in self.joints)})
         )
 
     @property

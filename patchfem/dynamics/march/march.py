@@ -455,9 +455,9 @@ def _repeat_last_cycle(samples: MarchSamples, run, count: int) -> int:
 def read_output_extremes(cycles, run) -> list:
     """Return the smallest and largest output [m] of each of the cycles (first step, rows, work)."""
     return [
-        one
+        cycle_extreme
         for _, rows, _ in cycles
-        for one in find_cycle_extremes(rows[None], run.modes, run.prop.dt)
+        for cycle_extreme in find_cycle_extremes(rows[None], run.modes, run.prop.dt)
     ]
 
 

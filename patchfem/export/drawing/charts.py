@@ -188,7 +188,7 @@ def faces_charts(found: list) -> list:
 
     Each entry of `found` contains the arguments of `interface_charts`.
     """
-    return [one for each in found for one in interface_charts(*each)]
+    return [interface_chart for each in found for interface_chart in interface_charts(*each)]
 
 
 def contact_window(x, depth, sigma, ratio: float) -> tuple:

@@ -131,8 +131,8 @@ class _Bodies:
         self.borders = [
             LineCollection([], colors=colour, linewidths=1.2) for colour in ("black", "white")
         ]
-        for one in self.borders:
-            axes.add_collection(one)
+        for border in self.borders:
+            axes.add_collection(border)
         left, right, bottom, top = panel.window
         axes.set(
             xlim=(left, right), ylim=(bottom, top), aspect="equal", xlabel="x [mm]", ylabel="y [mm]"

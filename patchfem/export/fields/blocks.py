@@ -58,10 +58,10 @@ def make_block(points, cells: list, point_data: dict, cell_data: dict) -> Block:
         Node numbers of segments, triangles or quadrilaterals.
     point_data, cell_data : dict
     """
-    sizes = np.concatenate([np.full(len(one), one.shape[1]) for one in cells])
+    sizes = np.concatenate([np.full(len(cell), cell.shape[1]) for cell in cells])
     return Block(
         np.column_stack([points, np.zeros(len(points))]),
-        np.concatenate([np.ravel(one) for one in cells]).astype(np.int64),
+        np.concatenate([np.ravel(cell) for cell in cells]).astype(np.int64),
         np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
         np.array([0, 0, LINE, TRIANGLE, QUAD], np.uint8)[sizes],
         point_data,
@@ -163,8 +163,8 @@ def merge_blocks(blocks: dict) -> Block:
 
     Values that a block does not have are NaN, or -1 for codes.
     """
-    first = np.cumsum([0, *(len(one.points) for one in blocks.values())])
-    ends = np.cumsum([0, *(one.connectivity.size for one in blocks.values())])
+    first = np.cumsum([0, *(len(block.points) for block in blocks.values())])
+    ends = np.cumsum([0, *(block.connectivity.size for block in blocks.values())])
     all_of = list(blocks.values())
     part = np.repeat(
         np.array([PARTS.index(name) for name in blocks], np.int8),

@@ -65,8 +65,8 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
     path = Path(path)
     size = sum(
         values.nbytes
-        for one in blocks.values()
-        for data in (one.point_data, one.cell_data)
+        for block in blocks.values()
+        for data in (block.point_data, block.cell_data)
         for values in data.values()
     )
     large = size > MIN_FRAMEWISE_BYTES
@@ -115,7 +115,7 @@ def _write_frames(file, steps: list, later: list, count: int) -> None:
     count : int
         Number of frames.
     """
-    times = [one["Values"][:] for one in steps]
+    times = [step["Values"][:] for step in steps]
     for number in range(count):
         _set_frame_count(steps, times, number)
         for one in later:
@@ -216,7 +216,7 @@ def _create_group(parent, name: str):
 def _field_texts(blocks: dict, units: dict) -> dict:
     """Return the field arrays of text: the units of all arrays, and the meanings of their codes."""
     names = dict.fromkeys(
-        name for one in blocks.values() for name in (*one.point_data, *one.cell_data)
+        name for block in blocks.values() for name in (*block.point_data, *block.cell_data)
     )
     return {
         "units": [f"{name} [{units.get(name, '1')}]" for name in names],

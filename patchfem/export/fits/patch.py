@@ -137,8 +137,8 @@ def _csv_rows(fitted: FittedPatch) -> list:
     parts = ("force [N]", "loss [J]")
     head = ["slide [m]", *(f"{name} {part}" for name in curves for part in parts)]
     columns = [fitted.patch.slides]
-    for one in curves.values():
-        columns += [one.force, one.loss]
+    for curve in curves.values():
+        columns += [curve.force, curve.loss]
     return [head, *([*map(repr, row)] for row in np.column_stack(columns).tolist())]
 
 

@@ -71,7 +71,7 @@ class Options:
 
     def names_given(self) -> list:
         """Return the names of the options that differ from their default."""
-        return [one.name for one in fields(self) if getattr(self, one.name) != one.default]
+        return [field.name for field in fields(self) if getattr(self, field.name) != field.default]
 
 
 @dataclass(frozen=True, slots=True)

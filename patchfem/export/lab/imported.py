@@ -232,8 +232,8 @@ def _read_shapes(file: Path, asked, how: Estimate) -> tuple:
     ):
         return None, ()
     if not any(
-        one["type"] == 55 or int(one.get("func_type", 0)) == 4
-        for one in universal_files.read_datasets(file)
+        dataset["type"] == 55 or int(dataset.get("func_type", 0)) == 4
+        for dataset in universal_files.read_datasets(file)
     ):
         return None, ()
     try:

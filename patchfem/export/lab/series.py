@@ -64,7 +64,7 @@ class Histories:
 
     def loops(self) -> list:
         """Return the friction loops as pairs of columns (slide, resistance), one per interface."""
-        by = {(one.name, one.number): one for one in self.columns}
+        by = {(column.name, column.number): column for column in self.columns}
         found = {}
         for slide, force in LOOPS:
             for number in sorted(number for name, number in by if name == slide):

@@ -174,7 +174,7 @@ def _coordinate_basis(slides) -> np.ndarray:
 
 def _is_speed_only(rig) -> bool:
     """Return whether the friction depends only on the speed."""
-    return all(one.numbers.law == "tanh" for one in rig.friction.interfaces)
+    return all(interface.numbers.law == "tanh" for interface in rig.friction.interfaces)
 
 
 def _refuse_unsupported(model: Model) -> None:
@@ -207,7 +207,7 @@ def friction_elements(model: Model) -> Elements:
     if not rig.friction.interfaces:
         return Elements("elements", np.zeros((0, n)), none, none, none)
     rows = rig.modes.interfaces @ _coordinate_basis(rig.modes.interfaces)
-    laws = [one.numbers for one in rig.friction.interfaces]
+    laws = [interface.numbers for interface in rig.friction.interfaces]
     if _is_speed_only(rig):
         limit = np.array(
             [
@@ -223,9 +223,9 @@ def friction_elements(model: Model) -> Elements:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
     chosen = numerics.yield_numerics(model, numerics.choose(model))
     groups = pieces.YieldingElements(model, chosen, patch).groups
-    stiffness = np.concatenate([one.stiffness for one in groups])
-    limit = np.concatenate([one.stiffness * one.yield_displacement for one in groups])
-    direction = np.repeat(rows, [one.stiffness.size for one in groups], axis=0)
+    stiffness = np.concatenate([group.stiffness for group in groups])
+    limit = np.concatenate([group.stiffness * group.yield_displacement for group in groups])
+    direction = np.repeat(rows, [group.stiffness.size for group in groups], axis=0)
     return Elements("elements", direction, limit, stiffness, none)
 
 

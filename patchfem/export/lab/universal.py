@@ -42,10 +42,10 @@ def write_histories(path: Path, found: Histories) -> int:
     Missing
         If pyuff is not installed.
     """
-    for one in found.columns:
-        if not np.isfinite(one.values).all():  # pyuff would write these values as 0
+    for column in found.columns:
+        if not np.isfinite(column.values).all():  # pyuff would write these values as 0
             raise PatchfemError(
-                f"{path}: {one.label} has values that are not finite, which a universal file cannot "
+                f"{path}: {column.label} has values that are not finite, which a universal file cannot "
                 "contain; export .mat or .csv instead"
             )
     sets = (
@@ -53,9 +53,9 @@ def write_histories(path: Path, found: Histories) -> int:
         if found.time is None
         else [
             _function_dataset(
-                one.label, Column("time", "s", found.time, 0), one, HISTORY, found.title
+                column.label, Column("time", "s", found.time, 0), column, HISTORY, found.title
             )
-            for one in found.columns
+            for column in found.columns
         ]
     )
     sets += [

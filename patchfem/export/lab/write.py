@@ -34,7 +34,7 @@ def export_histories(folder: Path, out: Path) -> str:
         raise PatchfemError(f"{out}: histories are exported as {', '.join(ENDINGS)}")
     found = read_histories(folder)
     rows = found.columns[0].values.size
-    told = f"{out}: {rows} rows of {', '.join(one.label for one in found.columns[:8])}" + (
+    told = f"{out}: {rows} rows of {', '.join(column.label for column in found.columns[:8])}" + (
         f" and {len(found.columns) - 8} more" if len(found.columns) > 8 else ""
     )
     told += _thinning_note(found)
@@ -51,7 +51,9 @@ def export_histories(folder: Path, out: Path) -> str:
 
 def _thinning_note(found) -> str:
     """Return the note about early rows of histories that contain only reversals; else ""."""
-    place = next((one.values for one in found.columns if one.name.endswith("displacement")), None)
+    place = next(
+        (column.values for column in found.columns if column.name.endswith("displacement")), None
+    )
     if place is None or found.time is None:
         return ""
     turns = np.flatnonzero(np.diff(np.sign(np.diff(place))) != 0) + 1

@@ -65,11 +65,13 @@ def document_html(
     -------
     str
     """
-    contents = "".join(f'<a href="#{one.anchor}">{escape(one.heading)}</a>' for one in sections)
+    contents = "".join(
+        f'<a href="#{section.anchor}">{escape(section.heading)}</a>' for section in sections
+    )
     contents = f"<nav aria-label=Contents>{contents}</nav>\n" if len(sections) > 1 else ""
     body = "\n".join(
-        f'<section id="{one.anchor}"><h2>{escape(one.heading)}</h2>\n{one.html}</section>'
-        for one in sections
+        f'<section id="{section.anchor}"><h2>{escape(section.heading)}</h2>\n{section.html}</section>'
+        for section in sections
     )
     drawn = ""
     if scripts:

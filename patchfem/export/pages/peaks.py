@@ -264,7 +264,7 @@ def _find_crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) 
 def peaks_sentence(peaks: list) -> str:
     """State where the peak is, or from where to where it moves; "" if there is none."""
     known, lost = (
-        [one for one in peaks if one.swept.height.is_known() == there] for there in (True, False)
+        [peak for peak in peaks if peak.swept.height.is_known() == there] for there in (True, False)
     )
     return "; ".join(
         said
@@ -329,7 +329,7 @@ def peaks_table(peaks: list) -> str:
     """Return the peaks as an HTML table; "" if there are none."""
     if not peaks:
         return ""
-    rows = [[escape(one.held), *_peak_cells(one)] for one in peaks]
+    rows = [[escape(peak.held), *_peak_cells(peak)] for peak in peaks]
     return (
         f"<p class=soft>The largest {measure_link(measure_label(peaks[0].name), peaks[0].name)} of each curve is found "
         "from a "

@@ -342,11 +342,11 @@ def _group_overlapping(shares: list) -> list:
     The interval of each index overlaps that of the first index of its group.
     """
     out = []
-    for one in shares:
-        if out and one.high > out[-1][0].low and one.low != one.high:
-            out[-1].append(one)
+    for share in shares:
+        if out and share.high > out[-1][0].low and share.low != share.high:
+            out[-1].append(share)
         else:
-            out.append([one])
+            out.append([share])
     return out
 
 
@@ -499,13 +499,13 @@ def share_bars(ranks: dict) -> str:
     for name, shares in ranks.items():
         rows = [
             [
-                escape(one.key),
-                f"{100 * one.first:.0f} %",
-                f"{100 * one.total:.0f} %",
-                _format_range(one),
-                f"<td class=bars>{_bar_svg(one)}</td>",
+                escape(share.key),
+                f"{100 * share.first:.0f} %",
+                f"{100 * share.total:.0f} %",
+                _format_range(share),
+                f"<td class=bars>{_bar_svg(share)}</td>",
             ]
-            for one in shares
+            for share in shares
         ]
         parts.append(
             f"<h3>{measure_link(measure_label(name), name)}</h3>"
@@ -563,7 +563,7 @@ def quantile_table(found: dict, of: int) -> str:
         known = (
             ["not known"] * len(QUANTILE_LEVELS)
             if most < MIN_SETTLED_FRACTION * of
-            else [format_number(one * scale, 4) for one in values.tolist()]
+            else [format_number(value * scale, 4) for value in values.tolist()]
         )
         rows.append(
             [

@@ -409,7 +409,9 @@ def headline_sentence(
             statements += _energy_statements(summary)
         statements += _patch_statements(summary)
     parts = [
-        part for part in (_fill_statement(one, measures, number) for one in statements) if part
+        part
+        for part in (_fill_statement(statement, measures, number) for statement in statements)
+        if part
     ]
     text = "; ".join(parts)
     if text and not covers_cycle and not released:
@@ -439,7 +441,7 @@ def _wear_statements(measures: dict) -> list:
         "worn_depth_max": "{} worn off at the deepest place",
         "worn_volume": "{} worn off",
     }
-    return [Statement(*one) for one in texts_by_measure.items() if one[0] in measures][:1]
+    return [Statement(*item) for item in texts_by_measure.items() if item[0] in measures][:1]
 
 
 def _motion_statements(measures: dict, released: str) -> list:
@@ -617,7 +619,8 @@ def tolerance_sentence(result: Result) -> str:
         sentence += f"; the largest {which} is {share} of the value ({name}, {texts_of[name]})"
     if len(visible) < len(known):
         unknown = any(
-            one.value is not None and one.error is None for one in result.measures.values()
+            measure.value is not None and measure.error is None
+            for measure in result.measures.values()
         )
         sentence += f"; {SHARP_BUT_UNKNOWN if unknown else EXACT_NOTE}"
     return f"{sentence}."

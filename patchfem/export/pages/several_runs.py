@@ -116,12 +116,12 @@ def page_html(runs: list) -> str:
     ]
     sections += [
         Section(
-            one["anchor"] + "-part",
-            one["title"],
-            f'<div id="{one["anchor"]}" class=chart role=img '
-            f'aria-label="{escape(one["told"])}"></div><p class=soft>{sentence_html(one["told"])}</p>',
+            chart["anchor"] + "-part",
+            chart["title"],
+            f'<div id="{chart["anchor"]}" class=chart role=img '
+            f'aria-label="{escape(chart["told"])}"></div><p class=soft>{sentence_html(chart["told"])}</p>',
         )
-        for one in charts
+        for chart in charts
     ]
     known = dict.fromkeys(name for run in runs for name in run.summary["measures"])
     means = [

@@ -211,7 +211,7 @@ def _explorer_html(said: str, folders: list | None) -> str:
     folders : list or None
         Paths of the cases; None if nothing is stored of them.
     """
-    kept = {Path(one).name for one in folders or ()}
+    kept = {Path(folder).name for folder in folders or ()}
     opens = (
         " Click on a case to open its page."
         if kept == {PAGE}
@@ -305,8 +305,8 @@ def _cases_table(table: dict) -> str:
         *(with_line_breaks(one["name"]) for one in table["keys"]),
         "outcome",
         *(
-            f">{measure_link(one['label'], one['name'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}"
-            for one in columns
+            f">{measure_link(column['label'], column['name'])}{escape(column['unit'] and ' [' + column['unit'] + ']')}"
+            for column in columns
         ),
     ]
     rows = []
@@ -315,9 +315,9 @@ def _cases_table(table: dict) -> str:
         if table["folders"] is not None:
             said = f'<a href="{escape(table["folders"][i])}">{said}</a>'
         numbers = (
-            f"<td class=n{' data-over' * bool(one['over'][i])}>"
-            f"{_format_number(one['values'][i], one['errors'][i], one['least'])}</td>"
-            for one in columns
+            f"<td class=n{' data-over' * bool(column['over'][i])}>"
+            f"{_format_number(column['values'][i], column['errors'][i], column['least'])}</td>"
+            for column in columns
         )
         rows.append(
             (

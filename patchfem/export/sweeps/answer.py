@@ -53,7 +53,9 @@ def sweep_summary(
             "outcomes": counts,
             "over_tolerance": lead.missed,
         },
-        "ranking": {name: [one._asdict() for one in shares] for name, shares in lead.ranks.items()},
+        "ranking": {
+            name: [share._asdict() for share in shares] for name, shares in lead.ranks.items()
+        },
         "limits": limits_json(lead.limits),
         "of": dict(of),
         "sign": sign,

@@ -108,7 +108,7 @@ def _shared_facts(held: dict, columns: list) -> dict:
 
     They are those of the scene (`held`), or swept values (`columns`).
     """
-    swept = {one["name"]: one["values"] for one in columns}
+    swept = {column["name"]: column["values"] for column in columns}
     return {
         "tolerance": held.get("tolerance", swept.get("accuracy.tolerance", np.nan)),
         "ends": tuple(
@@ -127,7 +127,7 @@ def page_titles(columns: list, of: str) -> dict:
 
     The title of the scene refers to the values before the keys were changed.
     """
-    return {"title": f"Sweep of {' × '.join(one['name'] for one in columns)}", "of": of}
+    return {"title": f"Sweep of {' × '.join(column['name'] for column in columns)}", "of": of}
 
 
 def case_link(folder: Path, key: str) -> str:
@@ -137,10 +137,10 @@ def case_link(folder: Path, key: str) -> str:
 
 def axis_numbers(values) -> np.ndarray:
     """Return values along an axis: numbers unchanged, words numbered in order of occurrence."""
-    if isinstance(values, array) or all(isinstance(one, int | float) for one in values):
+    if isinstance(values, array) or all(isinstance(value, int | float) for value in values):
         return np.asarray(values, float)
     order = {one: place for place, one in enumerate(dict.fromkeys(values))}
-    return np.array([order[one] for one in values], float)
+    return np.array([order[value] for value in values], float)
 
 
 def suits_log_axis(values) -> bool:
@@ -150,7 +150,9 @@ def suits_log_axis(values) -> bool:
     value of 0 cannot be on such an axis; the page describes this case in words. If the second
     positive value is at most twice the first, as in 0, 1, 2, .., 10, the axis is linear.
     """
-    if not isinstance(values, array) and not all(isinstance(one, int | float) for one in values):
+    if not isinstance(values, array) and not all(
+        isinstance(value, int | float) for value in values
+    ):
         return False
     all_of = np.unique(np.asarray(values, float))
     above = all_of[all_of > 0]
@@ -288,8 +290,8 @@ def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
         if "case" in file.dimensions
         else [
             word
-            for one in columns
-            for word in ("--over", f"{one['name']}={','.join(dict.fromkeys(one['texts']))}")
+            for column in columns
+            for word in ("--over", f"{column['name']}={','.join(dict.fromkeys(column['texts']))}")
         ]
     )
     held = {name: float(file.attrs[name]) for name in FACTS if name in file.attrs}

@@ -137,7 +137,7 @@ def _kind(batch: Batch, model: Model) -> str:
     rig = model.rig
     if rig is None:
         return batch.name
-    laws = [one.numbers.law for one in rig.friction.interfaces]
+    laws = [interface.numbers.law for interface in rig.friction.interfaces]
     return " ".join([batch.name, rig.drive.waveform.name, *laws, str(bool(model.partial_slip))])
 
 

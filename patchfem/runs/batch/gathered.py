@@ -380,7 +380,7 @@ def _read(models: list, held: list, done: lanes.MarchedCases, steps: int, asked=
             )
             for case, one in enumerate(rings)
         ]
-        values |= {name: np.array([one[0].get(name, np.nan) for one in rings]) for name in RINGS}
+        values |= {name: np.array([ring[0].get(name, np.nan) for ring in rings]) for name in RINGS}
         beyond = peaks(np.abs(accelerations))[1]
     own = [
         {"absolute_acceleration_peak": float(above)} | errors

@@ -80,7 +80,7 @@ def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> tu
     if sum_error(model, fine.engine):
         errors = [*errors, _sum_errors(model, fine)]
         kinds = [*kinds, "bonds"]
-    runs = [fine.values, *(made[one].values for one in ladder[0].runs)]
+    runs = [fine.values, *(made[run].values for run in ladder[0].runs)]
     return errors, seconds, find_open_kinds(kinds, errors, runs)
 
 

@@ -276,10 +276,11 @@ def tolerance_of_next_mesh(asked, patches, tolerance: float) -> float | None:
         return None
     if asked.gap.profile is not None and patches[0].sharper:
         ended = not is_within_tolerance(
-            measures(*(one for one in patches if one is not None), tolerance=tolerance), tolerance
+            measures(*(patch for patch in patches if patch is not None), tolerance=tolerance),
+            tolerance,
         )
         return None if ended else tolerance / 10
-    known = [one for one in patches if one is not None]
+    known = [patch for patch in patches if patch is not None]
     for tighter in (tolerance * 10.0**-k for k in range(1, MAX_DECADES + 1)):
         enough = is_within_tolerance(measures(*known, tolerance=tighter), tighter) and _shows_slip(
             asked, known, tighter

@@ -81,12 +81,12 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
         return with_digest(ladder.meshes_of_file(asked))
     cases, every = select_distinct_patches(patches)
     swept = [
-        one.with_loading(load=share * one.loading.load)
-        for one in cases
-        if one.mesh.edge_motion == "load" and one.loading.load is not None
+        case.with_loading(load=share * case.loading.load)
+        for case in cases
+        if case.mesh.edge_motion == "load" and case.loading.load is not None
         for share in grids.SWING
     ]
-    slips = any(one.interface.partial_slip for one in patches)
+    slips = any(patch.interface.partial_slip for patch in patches)
     halvings = _halvings(cases, tolerance) if slips else {}
     # the halvings that all cases share are levels of the ladder
     common = min(halvings.values(), default=0)
@@ -112,7 +112,10 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
         )
         if missed_by <= 1 or not shares:
             found = with_digest(
-                [(one.grid, None if one.upper is one.piece else one.upper_grid) for one in pairs]
+                [
+                    (pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
+                    for pair in pairs
+                ]
             )
             keep_pairs(cases[0], found, pairs)
             return found
@@ -156,7 +159,7 @@ def select_distinct_patches(patches, most: int = MAX_CASES) -> tuple:
     most : int
         Largest number of patches.
     """
-    rows = {_contact_numbers(one): one for one in patches}
+    rows = {_contact_numbers(patch): patch for patch in patches}
     keys = sorted(rows)
     if len(keys) <= most:
         return [rows[key] for key in keys], True
@@ -270,7 +273,11 @@ def _contact_of_case(asked, pair, patch):
 
 def _merge_layouts(layouts: list, between: bool) -> Layout:
     """Return the layout whose cells are nowhere longer than those of any of `layouts`."""
-    bands = {band for one in layouts for band in (*one.bands, (*one.span, one.max_loaded_length))}
+    bands = {
+        band
+        for layout in layouts
+        for band in (*layout.bands, (*layout.span, layout.max_loaded_length))
+    }
     if between:
         bands |= set(_bands_between(layouts))
     first = layouts[0]
@@ -280,8 +287,8 @@ def _merge_layouts(layouts: list, between: bool) -> Layout:
         first.stop,
         (),
         (first.start, first.stop),
-        *2 * [min(one.max_length for one in layouts)],
-        min(one.slope for one in layouts),
+        *2 * [min(layout.max_length for layout in layouts)],
+        min(layout.slope for layout in layouts),
     )
     low, high, _ = np.array(bands).T
     places = np.linspace(low, high, 5, axis=1)
@@ -298,13 +305,13 @@ def _merge_layouts(layouts: list, between: bool) -> Layout:
 def _bands_between(layouts: list) -> list:
     """Return bands from each edge of a contact to that of the next case, with cells in between."""
     out = []
-    half = max(one.stop for one in layouts)
+    half = max(layout.stop for layout in layouts)
     for side in (-1, 1):
         ends = sorted(
             {
                 (low, least)
-                for one in layouts
-                for low, high, least in one.bands
+                for layout in layouts
+                for low, high, least in layout.bands
                 if low == high and low * side >= 0 and abs(low) < half
             }
         )

@@ -119,9 +119,9 @@ def cost(model: Model) -> Cost:
         {}
         if model.rig is None
         else {
-            store.content_key(one.patch): one.patch
-            for one in model.rig.friction.interfaces
-            if one.patch is not None
+            store.content_key(interface.patch): interface.patch
+            for interface in model.rig.friction.interfaces
+            if interface.patch is not None
         }
     )
     for patch in faces.values():
@@ -131,7 +131,7 @@ def cost(model: Model) -> Cost:
         return total
     points = total.sizes["interface_points"]
     layers = [patch.interface.strips for patch in patches]
-    strips = max(1 if one is None else one.count for one in layers)
+    strips = max(1 if layer is None else layer.count for layer in layers)
     key = "contact.mesh" if any(patch.mesh.file for patch in patches) else "contact.element_size"
     parts = (
         MemoryPart(total.bytes, f"{points} nodes of the interface", key),

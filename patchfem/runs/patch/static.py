@@ -112,7 +112,10 @@ class BatchSolution(NamedTuple):
         return (
             one_by_one.band_words(
                 asked,
-                *({name: float(column[k]) for name, column in one.items()} for one in self.planes),
+                *(
+                    {name: float(column[k]) for name, column in plane.items()}
+                    for plane in self.planes
+                ),
             )
             if self.planes
             else []
@@ -180,17 +183,17 @@ def _kind(asked) -> tuple:
 
 def collect_loads(patches: Sequence) -> PatchLoads:
     """Return the `PatchLoads` of some `PatchModel`s."""
-    loadings = [one.loading for one in patches]
+    loadings = [patch.loading for patch in patches]
     moment = None
     if loadings[0].moment is not None:
-        moment = np.array([one.moment for one in loadings], float)
+        moment = np.array([loading.moment for loading in loadings], float)
     return PatchLoads(
         patches[0],
-        np.array([one.load for one in loadings], float),
+        np.array([loading.load for loading in loadings], float),
         moment,
-        np.array([one.rotational_stiffness for one in loadings], float),
-        np.array([one.gap.angle for one in patches], float),
-        tuple(one.gap for one in patches),
+        np.array([loading.rotational_stiffness for loading in loadings], float),
+        np.array([patch.gap.angle for patch in patches], float),
+        tuple(patch.gap for patch in patches),
     )
 
 

@@ -154,10 +154,11 @@ def _behind_skin(patch, weight) -> dict:
     ]
     return {
         "contact_fraction": float(
-            sum(np.diff(one).sum() for one in stretches) / (count * np.ptp(x))
+            sum(np.diff(stretch).sum() for stretch in stretches) / (count * np.ptp(x))
         ),
         "contact_half_width": float(
-            max(one[-1, 1] for one in stretches) - min(one[0, 0] for one in stretches)
+            max(stretch[-1, 1] for stretch in stretches)
+            - min(stretch[0, 0] for stretch in stretches)
         )
         / 2,
         "normal_stiffness": strips_stiffness(pieces.normal * count, weight, state),

@@ -136,7 +136,7 @@ def count_merges(model: Model) -> int:
     The error of cells falls with the square of their width. If the error of the run is too large,
     the run is repeated with more cells (`Numerics.finer`).
     """
-    laws = [one.numbers.law for one in model.rig.friction.interfaces]
+    laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
     if (
         model.partial_slip
         or model.rig.friction.has_partial_slip
@@ -154,17 +154,17 @@ def expected_elements(model: Model) -> tuple:
     """
     count = 0
     stiff = 0.0
-    for one in model.rig.friction.interfaces:
-        load = model.nominal_load if one.load is None else one.load
-        if law_has_trait(one.numbers.law, "set-valued"):
+    for interface in model.rig.friction.interfaces:
+        load = model.nominal_load if interface.load is None else interface.load
+        if law_has_trait(interface.numbers.law, "set-valued"):
             most = inf
             mine = 1
         else:
-            element = record.make_law(one.numbers, load).element(load)
+            element = record.make_law(interface.numbers, load).element(load)
             mine = int(element.numbers[1]) >> count_merges(model)
             most = float(element.numbers[2 : 2 + int(element.numbers[1])].sum())
-        if model.partial_slip or one.partial_slip:
-            patch = one.patch or model.patch
+        if model.partial_slip or interface.partial_slip:
+            patch = interface.patch or model.patch
             most = 1 / (1 / most + 1 / patch.pieces.shear_stiffness)
             mine = patch_model.TYPICAL_N_NODES
             if not patch.mesh.is_automatic:
@@ -212,10 +212,10 @@ def _jumps(model: Model) -> float:
     They end because static friction falls to kinetic friction.
     """
     falls = [
-        (one.numbers.static - one.numbers.kinetic)
-        * (model.nominal_load if one.load is None else one.load)
-        for one in model.rig.friction.interfaces
-        if one.numbers.kinetic is not None
+        (interface.numbers.static - interface.numbers.kinetic)
+        * (model.nominal_load if interface.load is None else interface.load)
+        for interface in model.rig.friction.interfaces
+        if interface.numbers.kinetic is not None
     ]
     drive_force = model.rig.first_mode.mass * find_max_acceleration(model.rig.drive.signal)
     return sum(2 * drive_force / fall for fall in falls if fall > 0)
@@ -248,8 +248,9 @@ def expected_seconds(model: Model) -> float:
     """
     rig, (count, stiff) = model.rig, expected_elements(model)
     limit = sum(
-        one.numbers.static * (model.nominal_load if one.load is None else one.load)
-        for one in rig.friction.interfaces
+        interface.numbers.static
+        * (model.nominal_load if interface.load is None else interface.load)
+        for interface in rig.friction.interfaces
     )
     push = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
     ringing, events = ringing_and_events(model)

@@ -191,7 +191,7 @@ def mesh_error(fine, rough, read) -> np.ndarray:
     """
     best = read(fine)
     changes = (read(other) - best for other in rough)
-    by_meshes = sum(error_of_change(one, order=MAX_ORDER) for one in changes)
+    by_meshes = sum(error_of_change(change, order=MAX_ORDER) for change in changes)
     return np.fmax(SPREAD_FACTOR * np.abs(read(fine.with_elements(_spread)) - best), by_meshes)
 
 

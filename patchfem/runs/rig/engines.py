@@ -273,7 +273,9 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     if coarse is not None and model.partial_slip:
         meshes = [Variant(numerics, coarse), *meshes]
     out = [CoarserRuns((variant,), coarser_errors, of="mesh") for variant in meshes]
-    cells = any(law_has_trait(one.numbers.law, "cells") for one in model.rig.friction.interfaces)
+    cells = any(
+        law_has_trait(interface.numbers.law, "cells") for interface in model.rig.friction.interfaces
+    )
     if not cells:
         return out
     merged = tuple(Variant(replace(numerics, joined=one), patch) for one in CELL_MERGES)

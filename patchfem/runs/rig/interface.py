@@ -65,7 +65,7 @@ def make_contact(model: Model, numerics: Numerics, patch):
         ]
     if second is not None:
         found = joints.pair_plane_joints(
-            found, [bool(one.lateral) for one in rig.friction.interfaces]
+            found, [bool(interface.lateral) for interface in rig.friction.interfaces]
         )
         rows += [row for row, one in zip(second, rig.friction.interfaces) if one.lateral]
     if rig.springs.interlock is not None:
@@ -86,8 +86,8 @@ def _side_by_side(model: Model, numerics: Numerics, patch) -> list:
     if model.partial_slip:
         length = make_law(f, patch.pressure.load).element(patch.pressure.load).length
         return [
-            parallel_element(*one)
-            for one in jenkins_elements.strip_elements(patch, f.static, length)
+            parallel_element(*strip_element)
+            for strip_element in jenkins_elements.strip_elements(patch, f.static, length)
         ]
     return [
         make_element(model.rig.friction.interfaces[0], load, model.rig.speed_scale)

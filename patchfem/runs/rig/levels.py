@@ -54,7 +54,7 @@ def levels_with_errors(levels, ways, made: dict) -> tuple:
         parts = [
             way.rule(
                 level.values if way.beside is None else seen(way.beside, number),
-                *(seen(one, number) for one in way.runs),
+                *(seen(run, number) for run in way.runs),
             )
             for way in ways
         ]

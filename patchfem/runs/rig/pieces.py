@@ -225,12 +225,12 @@ class PieceReader(Reader):
         It is [] unless only a constant force acts in this part, and every interface is a single
         spring that sticks until the end.
         """
-        springs = [one.stiffness for one in self.groups]
+        springs = [group.stiffness for group in self.groups]
         held = (
             self.rubs
             and not self.rigid
-            and all(one.size == 1 for one in springs)
-            and not any(one.slip_range for one in run.loops)
+            and all(spring.size == 1 for spring in springs)
+            and not any(loop.slip_range for loop in run.loops)
             and (not run.log.time.size or run.log.time[-1] < motion.time[0])
         )
         if not held or is_periodic(drive) or not drive.segments or motion.time.size < 2:

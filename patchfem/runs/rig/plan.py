@@ -268,8 +268,8 @@ def groups(model: Model) -> dict:
     f = model.friction
     rig = model.rig
     limits = [
-        one.friction_limits(model.nominal_load if one.load is None else one.load)
-        for one in rig.friction.interfaces
+        interface.friction_limits(model.nominal_load if interface.load is None else interface.load)
+        for interface in rig.friction.interfaces
     ]
     limit, kinetic = (sum(one[k] for one in limits) for k in range(2))
     push = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
@@ -436,7 +436,11 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
         places = CURVE[finder.name == "balance"]
     soft = []
     if finder.name == "yields":
-        soft = [one for one in rig.friction.interfaces if one.partial_slip or model.partial_slip]
+        soft = [
+            interface
+            for interface in rig.friction.interfaces
+            if interface.partial_slip or model.partial_slip
+        ]
     passes = 1.0 + 0.5 * len(soft)  # the coarser mesh of each interface has half the elements
     seconds = places * passes * _steady_point(model, finder.name)
     if rig.structure.richer_rig is not None:
@@ -480,7 +484,7 @@ def _smooth_law_seconds(rig) -> float:
     Their slope changes during the whole cycle, whereas that of elements that stick and slip is
     constant for most of it.
     """
-    laws = {one.numbers.law for one in rig.friction.interfaces}
+    laws = {interface.numbers.law for interface in rig.friction.interfaces}
     flowing = any(
         "pieces" not in LAWS[law].supports.split() and not law_has_trait(law, "memoryless")
         for law in laws

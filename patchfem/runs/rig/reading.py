@@ -102,7 +102,7 @@ class Reader:
             return False
         if loops:
             return all(
-                one.slip_range / 2 <= max(self.held, slip_round_off(run.window)) for one in loops
+                loop.slip_range / 2 <= max(self.held, slip_round_off(run.window)) for loop in loops
             )
         return run_events.is_all_stuck(run.window, self.held)
 

@@ -336,7 +336,8 @@ def _solve(model, numerics, patch, coarse, seconds, say, progress, estimated) ->
             if spent:
                 seconds["error"] = spent
             halved = [
-                run.solutions[one] for one in _halved_variants(engine, model, numerics, patch)
+                run.solutions[halved_variant]
+                for halved_variant in _halved_variants(engine, model, numerics, patch)
             ]
             late = [one for one in (found.extra.get("late"),) if one]
             left_open = find_open_kinds(
@@ -422,7 +423,7 @@ def _with_level_errors(found: Solution, coarser_runs: list, solutions: dict) -> 
         Solution of each coarse run by its Variant.
     """
     # without coarse runs the levels have errors of their own
-    used = [one for one in coarser_runs if one.runs or found.errors is None]
+    used = [coarser_run for coarser_run in coarser_runs if coarser_run.runs or found.errors is None]
     pairs = [
         (solutions[one.runs[0]], one.beside and solutions[one.beside])
         for one in used
@@ -548,7 +549,7 @@ def _halved_variants(engine, model, numerics, patch) -> tuple:
 
 def errors_met(measures, tolerance: float) -> bool:
     """Return whether the errors of all measures are within the tolerance, or their floors."""
-    return all(one.error_ratio(tolerance) <= 1 for one in measures.values())
+    return all(measure.error_ratio(tolerance) <= 1 for measure in measures.values())
 
 
 def _whole_period(model, numerics, found) -> int:

@@ -145,7 +145,7 @@ def worn_model(model, patch, depth):
         )
         if model.rig is not None:
             friction = model.rig.friction
-            interfaces = tuple(replace(one, numbers=law) for one in friction.interfaces)
+            interfaces = tuple(replace(interface, numbers=law) for interface in friction.interfaces)
             new["rig"] = replace(model.rig, friction=replace(friction, interfaces=interfaces))
     return replace(model, **new) if new else model
 
@@ -466,9 +466,9 @@ def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
     """
     arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE}
     arrays |= {
-        f"moment_{name}": np.array([getattr(one, name) for one in moments]) for name in MOMENT
+        f"moment_{name}": np.array([getattr(moment, name) for moment in moments]) for name in MOMENT
     }
-    values = json.dumps([one.values for one in moments], default=float)
+    values = json.dumps([moment.values for moment in moments], default=float)
     with write_atomically(path) as partial, open(partial, "wb") as file:
         np.savez(file, key=np.array(key), values=np.array(values), **arrays)
         file.flush()

@@ -268,7 +268,7 @@ def worn_friction(model, found, motion: dict, error: float | None) -> dict:
     """
     change = model.wear.friction
     area = float(found.patch.pieces.interface.weight.sum())
-    deep = [mean_depth(found.patch, one.depth) for one in found.moments[-3:]]
+    deep = [mean_depth(found.patch, moment.depth) for moment in found.moments[-3:]]
     off = None if error is None else error / area
     depths = () if off is None else (deep[-1] - off, deep[-1] + off)
     ends = [change.compute_worn_law(model.friction, max(depth, 0.0)) for depth in depths]
@@ -299,7 +299,7 @@ def _beyond_table_sentence(model, found) -> list:
     change = model.wear.friction
     if change is None:
         return []
-    deep = [mean_depth(found.patch, one.depth) for one in found.moments]
+    deep = [mean_depth(found.patch, moment.depth) for moment in found.moments]
     out = []
     if deep[-1] > change.depth[-1]:
         out.append(
@@ -412,11 +412,13 @@ def history(found) -> dict:
     They are those that all moments have.
     """
     moments = found.moments
-    names = [name for name in moments[-1].values if all(name in one.values for one in moments)]
+    names = [
+        name for name in moments[-1].values if all(name in moment.values for moment in moments)
+    ]
     return (
-        {"cycle": np.array([one.cycle for one in moments])}
-        | {name: np.array([one.values[name] for one in moments], float) for name in names}
-        | {EDGE_PEAK: np.array([edge_peak(one.pressure) for one in moments])}
+        {"cycle": np.array([moment.cycle for moment in moments])}
+        | {name: np.array([moment.values[name] for moment in moments], float) for name in names}
+        | {EDGE_PEAK: np.array([edge_peak(moment.pressure) for moment in moments])}
     )
 
 

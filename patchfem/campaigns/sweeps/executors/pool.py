@@ -133,7 +133,7 @@ class Pool:
                 one.send_work(work)
             while True:
                 self._hand_out(workers, lambda: _start_worker(work, say is None), take)
-                busy = {one.pipe: one for one in workers if one.chunk is not None}
+                busy = {worker.pipe: worker for worker in workers if worker.chunk is not None}
                 if not busy:
                     return
                 for pipe in wait(list(busy)):
@@ -153,7 +153,7 @@ class Pool:
 
     def _hand_out(self, workers: list, start: Callable, take: Callable) -> None:
         """Give every idle process a chunk, and start processes while there are chunks and too few."""
-        for one in [one for one in workers if one.chunk is None] + [None] * (
+        for one in [worker for worker in workers if worker.chunk is None] + [None] * (
             self.workers - len(workers)
         ):
             chunk = take()

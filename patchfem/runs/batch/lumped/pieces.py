@@ -155,7 +155,7 @@ def runs_of_cases(
 
     def go(part: slice) -> None:
         """Run the cases of a slice, and store their runs in `done`."""
-        rigs = [(one.model.rig, one.groups) for one in cases[part]]
+        rigs = [(case.model.rig, case.groups) for case in cases[part]]
         done[part] = histories.simulate_batch(
             ((rig.modes, rig.drive.signal, groups, rig.start) for rig, groups in rigs),
             cycles,

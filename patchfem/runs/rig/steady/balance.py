@@ -267,7 +267,7 @@ class BalanceFinder:
             harmonics=self.harmonics,
             tolerance=self.tolerance,
         )
-        return [self._of_branch(one, first) for one in branch.points], branch.folds
+        return [self._of_branch(point, first) for point in branch.points], branch.folds
 
     def curve_distance(self, one: CurvePoint, other: CurvePoint) -> float:
         """Return the arc length along a curve between two of its points.

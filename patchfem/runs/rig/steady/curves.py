@@ -231,8 +231,8 @@ def index_of_largest(points) -> int:
 
     Only stable points count, if there are any.
     """
-    sizes = np.array([one.values.get(COLUMN_MEASURES["amplitude"], -1.0) for one in points])
-    lasting = np.array([one.stable for one in points])
+    sizes = np.array([point.values.get(COLUMN_MEASURES["amplitude"], -1.0) for point in points])
+    lasting = np.array([point.stable for point in points])
     return int(np.argmax(np.where(lasting | ~lasting.any(), sizes, -2.0)))
 
 
@@ -243,15 +243,15 @@ def curve_columns(points, folds=()) -> dict:
     folds: frequencies [Hz] at which the curve turns back.
     """
     out = {
-        "frequency": np.array([one.drive.omega / (2 * np.pi) for one in points]),
-        "level": np.array([one.drive.acceleration for one in points]),
+        "frequency": np.array([point.drive.omega / (2 * np.pi) for point in points]),
+        "level": np.array([point.drive.acceleration for point in points]),
     }
     for column, name in COLUMN_MEASURES.items():
-        out[column] = np.array([one.values.get(name, np.nan) for one in points])
-        out[f"{column}_error"] = np.array([one.errors.get(name, np.nan) for one in points])
+        out[column] = np.array([point.values.get(name, np.nan) for point in points])
+        out[f"{column}_error"] = np.array([point.errors.get(name, np.nan) for point in points])
     return out | {
-        "regime": np.array([one.regime for one in points]),
-        "multiplier": np.array([one.multiplier for one in points]),
+        "regime": np.array([point.regime for point in points]),
+        "multiplier": np.array([point.multiplier for point in points]),
         "folds": np.array(folds),
     }
 
@@ -300,6 +300,6 @@ def motion_at_levels(finder, drive):
         best[0],
         extra=best[0].extra | {"curve": curve_columns(points), "at": best[1]},
         probe=probe,
-        levels=tuple(one.level for one in points),
+        levels=tuple(point.level for point in points),
         notes=(*best[0].notes, *notes),
     )

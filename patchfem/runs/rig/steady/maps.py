@@ -237,7 +237,7 @@ class EventFinder(Maps):
     @cached_property
     def forces(self) -> np.ndarray:
         """Static and kinetic friction limits (2, i) [N]."""
-        return np.array([(one.static, one.kinetic) for one in self.groups]).T
+        return np.array([(group.static, group.kinetic) for group in self.groups]).T
 
     def repeating(self, drive, near) -> PeriodicMotion:
         """Return the PeriodicMotion under a sine.

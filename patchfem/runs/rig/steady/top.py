@@ -66,7 +66,7 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
     for left in range(MAX_ADDED_POINTS, -1, -1):
         s = np.cumsum([0.0, *(finder.curve_distance(a, b) for a, b in pairwise(points))])
         y = _heights(points)
-        lasting = np.array([one.stable for one in points])
+        lasting = np.array([point.stable for point in points])
         best, (reach, at) = index_of_largest(points), concave_bounds(s, y)
         if not y[best] > 0 or not reach.size:
             return RefinedPeak(points, best, 0.0)
@@ -134,7 +134,7 @@ def _width(y, away) -> float:
 
 def _heights(points) -> np.ndarray:
     """Return the amplitudes [m] of points; NaN without one."""
-    return np.array([one.values.get(AMPLITUDE, np.nan) for one in points])
+    return np.array([point.values.get(AMPLITUDE, np.nan) for point in points])
 
 
 def concave_bounds(s, y) -> tuple:
@@ -197,7 +197,7 @@ def solve_peak(points: list, folds, finder) -> Solution:
     # difference from the point of the curve, which is computed with fewer samples
     missed = abs(seen_by_gauge(finder.model, raw).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
-    places = np.array([one.drive.omega for one in points]) / (2 * np.pi)
+    places = np.array([point.drive.omega for point in points]) / (2 * np.pi)
     off = 0.0
     open_ones = dict.fromkeys(raw.values, 0.0)
     for way in (-1, 1):
