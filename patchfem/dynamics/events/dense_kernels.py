@@ -2,19 +2,17 @@
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .drive_kernels import expand_drive, fastest_drive_rate
+from .drive_kernels import expand_drive
 from .memory_kernels import RIGID_STIFFNESS
 from .positions_kernels import COLUMN, CONSTRAINT, N_COLUMNS, ROW, SEGMENT
 from .search_kernels import displacement_at, expand_speed
 from .series_kernels import (
-    MAX_RATE_TIME,
     bound_modal_rate,
     evaluate_polynomial,
     expand_motion,
     find_highest_power,
     find_largest_magnitude,
 )
-from .slow_kernels import expand_slow_piece, shorten_series
 from .stick_kernels import constrain_slides
 
 
@@ -57,38 +55,22 @@ def expand_row(row, h, modal_system, time_state, workspace):
     if constraint.status[CONSTRAINT.n_sticking] < 0.0:
         constrain_slides(modal_system, workspace)
     modal_rate = bound_modal_rate(modal_system, workspace)
-    rate = fastest_drive_rate(segment, time_state.period[0])
-    if modal_rate * h > MAX_RATE_TIME * (1 + 1e-9):
-        expand_slow_piece(
-            segment,
-            row[ROW.cycle],
-            row[ROW.offset],
-            time_state.period[0],
-            displacement,
-            speed,
-            workspace.polynomials[n_interfaces],
-            modal_system,
-            workspace,
-        )
-        top = find_highest_power(rate * h)
-        shorten_series(rate * h / MAX_RATE_TIME, top, n_interfaces, workspace)
-    else:
-        top = find_highest_power(max(modal_rate, segment[SEGMENT.rate]) * h)
-        expand_drive(
-            segment, row[ROW.cycle], row[ROW.offset], time_state.period[0], h, top, workspace.drive
-        )
-        expand_motion(
-            displacement,
-            speed,
-            workspace.polynomials[n_interfaces],
-            workspace.stiffness,
-            modal_system,
-            workspace.drive[0],
-            h,
-            top,
-            workspace.coefficients,
-            workspace,
-        )
+    top = find_highest_power(max(modal_rate, segment[SEGMENT.rate]) * h)
+    expand_drive(
+        segment, row[ROW.cycle], row[ROW.offset], time_state.period[0], h, top, workspace.drive
+    )
+    expand_motion(
+        displacement,
+        speed,
+        workspace.polynomials[n_interfaces],
+        workspace.stiffness,
+        modal_system,
+        workspace.drive[0],
+        h,
+        top,
+        workspace.coefficients,
+        workspace,
+    )
     for f in range(n_interfaces):
         expand_speed(
             modal_system.interfaces[f],

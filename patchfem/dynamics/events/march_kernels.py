@@ -51,7 +51,6 @@ from .series_kernels import (
     expand_motion,
     find_highest_power,
 )
-from .slow_kernels import find_slow_rate, shorten_series
 from .stick_kernels import (
     MAX_ORDER,
     choose_sticks,
@@ -165,8 +164,6 @@ def step_to_border(time_state, stop, remaining):
             segment[SEGMENT.kind] == KIND.sine
             and time_state.segments[before, SEGMENT.kind] == KIND.sine
         ) or abs(new - old) > 1e-12 * max(abs(old), abs(new))
-    if drive_changes:
-        now[TIME.n_quiet] = 0.0
     return drive_changes
 
 
@@ -462,8 +459,6 @@ def apply_event(event, modal_system, table, memory, time_state):
     """
     kind = event.kind
     interface = event.interface
-    if kind != EVENT.none and kind != EVENT.output_reversal:
-        time_state.now[TIME.n_quiet] = 0.0
     if kind == EVENT.yielding:
         release_next_element(interface, event.sign, table, memory)
     elif kind == EVENT.reversal:
@@ -478,7 +473,7 @@ def apply_event(event, modal_system, table, memory, time_state):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def expand_piece(h, rate, slow_rate, motion, force, modal_system, time_state, workspace):
+def expand_piece(h, rate, motion, force, modal_system, time_state, workspace):
     """Expand the motion over a piece.
 
     Parameters
@@ -487,8 +482,6 @@ def expand_piece(h, rate, slow_rate, motion, force, modal_system, time_state, wo
         Duration of the piece [s].
     rate : float
         Fastest rate [1/s].
-    slow_rate : float
-        See `find_slow_rate`, whose series is in the workspace where it is not 0.
     motion : ndarray
         (2, n) modal coordinates [m] and rates [m/s].
     force : ndarray
@@ -505,32 +498,27 @@ def expand_piece(h, rate, slow_rate, motion, force, modal_system, time_state, wo
     top = find_highest_power(rate * h)
     now = time_state.now
     segment = time_state.segments[int(time_state.now[TIME.segment])]
-    if slow_rate > 0.0:
-        shorten_series(
-            slow_rate * h / MAX_RATE_TIME, top, len(modal_system.inverse_mass), workspace
-        )
-    else:
-        expand_drive(
-            segment,
-            now[TIME.cycle],
-            now[TIME.offset],
-            time_state.period[0],
-            h,
-            top,
-            workspace.drive,
-        )
-        expand_motion(
-            motion[0],
-            motion[1],
-            force,
-            workspace.stiffness,
-            modal_system,
-            workspace.drive[0],
-            h,
-            top,
-            workspace.coefficients,
-            workspace,
-        )
+    expand_drive(
+        segment,
+        now[TIME.cycle],
+        now[TIME.offset],
+        time_state.period[0],
+        h,
+        top,
+        workspace.drive,
+    )
+    expand_motion(
+        motion[0],
+        motion[1],
+        force,
+        workspace.stiffness,
+        modal_system,
+        workspace.drive[0],
+        h,
+        top,
+        workspace.coefficients,
+        workspace,
+    )
     return top
 
 
@@ -622,16 +610,9 @@ def start_piece(remaining, motion, modal_system, table, memory, time_state, work
     for f in range(n_interfaces):
         workspace.stiffness[f] = find_tangent(f, table, memory).stiffness
     modal_rate = bound_modal_rate(modal_system, workspace)
-    slow_rate = 0.0
-    if modal_rate > 0.0:
-        slow_rate = find_slow_rate(motion, memory.force, modal_system, time_state, workspace)
-    rate = slow_rate
-    if slow_rate == 0.0:
-        rate = max(modal_rate, fastest_drive_rate(segment, time_state.period[0]))
+    rate = max(modal_rate, fastest_drive_rate(segment, time_state.period[0]))
     h = choose_length(rate, remaining, motion, modal_system, table, memory)
-    top = expand_piece(
-        h, rate, slow_rate, motion, memory.force, modal_system, time_state, workspace
-    )
+    top = expand_piece(h, rate, motion, memory.force, modal_system, time_state, workspace)
     for f in range(n_interfaces):
         if is_sticking(f, table, memory):
             memory.force[f] = workspace.constraint.reactions[f, 0]

@@ -9,8 +9,6 @@ from ...core import ModalBasis, PatchfemError
 from .elements import ElementTable, Memory, unstretched_memory
 from .positions_kernels import CONSTRAINT, KIND, LEDGER, LIMIT, PREVIOUS, SEGMENT, TIME
 
-# rate of the drive over the slowest rate of the modes; a slower drive is followed quasi-statically (`slow_kernels`)
-MAX_SLOW_RATE_RATIO = 0.02
 # revolutions per cycle closer to a whole number than this many times their size count as that number [1]
 WHOLE_TOL = 4e-15
 # bits of the leading part of the revolutions per cycle; its product with a number of cycles is then exact
@@ -36,8 +34,6 @@ class ModalSystem(NamedTuple):
     - max_omega_squared, damping_norm: norms of the stiffness [1/s2] and of the damping [1/s] of the
     modes
     - output_interface: number of an interface that moves as the output does, -1 where none does
-    - slow_rate: largest rate [1/s] of a drive that the modes follow quasi-statically, 0 where they
-    never do
     """
 
     omega_squared: np.ndarray
@@ -51,7 +47,6 @@ class ModalSystem(NamedTuple):
     damping_norm: float
     is_coupled: int
     output_interface: int
-    slow_rate: float
 
 
 def make_modal_system(modes: ModalBasis) -> ModalSystem:
@@ -68,10 +63,6 @@ def make_modal_system(modes: ModalBasis) -> ModalSystem:
     damping_norm = np.linalg.norm(damping, 2) if is_coupled else np.abs(damping).max()
     omega_squared = np.array(modes.omega, float) ** 2
     inverse_mass = (interfaces**2).sum(axis=1) / modes.mass
-    slow_rate = 0.0
-    if np.diag(damping).all():
-        lowest = float(omega_squared.min())
-        slow_rate = MAX_SLOW_RATE_RATIO * min(np.sqrt(lowest), lowest / max(damping_norm, 1e-300))
     if interfaces.shape == (1, 1):
         omega_squared = tuple(omega_squared.tolist())
         inverse_mass = tuple(inverse_mass.tolist())
@@ -87,7 +78,6 @@ def make_modal_system(modes: ModalBasis) -> ModalSystem:
         float(damping_norm),
         int(is_coupled),
         output_interface,
-        float(slow_rate),
     )
 
 

@@ -148,7 +148,6 @@ class TimePositions(NamedTuple):
     - cycle, offset: number of the cycle, and time since it began [s]
     - segment: number of the segment of the drive
     - begin: what begins the next row, a number of `RowBegins`
-    - n_quiet: pieces since the last event
     - is_paused: 1 where the march stopped because no row was free
     """
 
@@ -156,8 +155,7 @@ class TimePositions(NamedTuple):
     offset: int = 1
     segment: int = 2
     begin: int = 3
-    n_quiet: int = 4
-    is_paused: int = 5
+    is_paused: int = 4
 
 
 class LedgerPositions(NamedTuple):

@@ -171,7 +171,7 @@ def march_with_slopes(
         )
         remaining = time_to_border(time_state, stop)
         h = choose_length(rate, remaining, motion, modal_system, table, memory)
-        top = expand_piece(h, rate, 0.0, motion, memory.force, modal_system, time_state, workspace)
+        top = expand_piece(h, rate, motion, memory.force, modal_system, time_state, workspace)
         piece = Piece(h, rate, top, remaining)
         event = find_next_event(top, modal_system, table, memory, time_state, workspace)
         u = event.u

@@ -55,8 +55,6 @@ MOST_PAIRS, AT = (
     1e-3,
 )
 REACH = 2.0  # phase of the fastest rate in a piece [rad], as in `dynamics.events.series_kernels`
-# decay times until the ringing after an event is round-off, as in `dynamics.events.slow_kernels`
-DYING = 33.0
 MARCH_SETTINGS = (
     "steps_per_cycle",
     "tail",
@@ -196,29 +194,7 @@ def ringing_and_events(model: Model) -> tuple:
     ringing = max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / REACH
     quick = find_max_frequency_ratio(drive)
     events = 2 * max(count, faces) * quick + 2 + rows
-    if 2 * pi * quick <= made.slow_rate * drive.period:
-        dying = DYING / min(find_min_decay_rate(modes), float(modes.omega.min()) ** 2 / damping)
-        # events per cycle that start a free vibration; without an interface, the start of the run
-        times = (
-            events + _jumps(model) if model.rig.friction.interfaces else 1 / model.rig.drive.cycles
-        )
-        ringing = min(ringing, times * dying * rate / REACH + 4 * quick)
     return ringing, events
-
-
-def _jumps(model: Model) -> float:
-    """Return an upper bound of the slips per cycle that end early under a slow drive.
-
-    They end because static friction falls to kinetic friction.
-    """
-    falls = [
-        (interface.numbers.static - interface.numbers.kinetic)
-        * (model.nominal_load if interface.load is None else interface.load)
-        for interface in model.rig.friction.interfaces
-        if interface.numbers.kinetic is not None
-    ]
-    drive_force = model.rig.first_mode.mass * find_max_acceleration(model.rig.drive.signal)
-    return sum(2 * drive_force / fall for fall in falls if fall > 0)
 
 
 def seconds_of_pieces(model: Model) -> float:

@@ -357,3 +357,17 @@ def test_exact_phasor_of_free_sliding_is_its_closed_form(zeta, ratio):
     start = InitialState(np.array([size.imag]), np.array([ratio * size.real]))
     done = simulate(modes, drive, 0.0, 0.0, 50, 1, start=start)
     np.testing.assert_allclose(done.phasors, -1j * size, rtol=0, atol=1e-11 * abs(size))
+
+
+@pytest.mark.parametrize("zeta", [0.01, 1.0])
+def test_exact_the_limit_of_a_slow_drive_is_statics(zeta):
+    """Test a slow drive of a spring behind a sliding block against statics.
+
+    The slide lags by the limit over the stiffness, and each cycle loses four times the limit times
+    the amplitude.
+    """
+    slow = driven(0.3, zeta, 1e-4, 3, window=1)
+    (loop,) = slow.loops
+    assert slow.amplitudes[-1] == pytest.approx([-0.7, 0.7], abs=1e-6)
+    assert loop.work == pytest.approx(4 * 0.3 * 0.7, rel=1e-6)
+    assert energy_balance(slow.ledger) < 1e-9

@@ -225,3 +225,15 @@ def test_exact_elements_that_yield_at_one_instant_yield_in_any_order(mirrored):
     np.testing.assert_allclose([loop.work for loop in two.loops], one.loops[0].work / 2, rtol=1e-11)
     assert two.log.count == 2 * one.log.count
     assert energy_balance(two.ledger) < 1e-12
+
+
+def test_exact_the_limit_of_a_slow_drive_is_statics():
+    """Test three elements beside a spring under a slow drive against Masing's rule in statics."""
+    stiffness = np.array([0.5, 1.0, 0.4])
+    yield_slide = np.array([0.1, 0.2, 0.4])
+    modes = basis([1.0], [0.05], [1.0], [1.0], [1.0])
+    elements = make_elements(stiffness, yield_slide)
+    (loop,) = simulate(modes, SineDrive(1.0, 1e-4), [elements], 3, 1).loops
+    amplitude = 1.0 - stiffness @ yield_slide  # all elements slip at the peak
+    loss = 4 * stiffness * yield_slide * (amplitude - yield_slide)
+    assert loop.work == pytest.approx(loss.sum(), rel=1e-6)
