@@ -57,11 +57,9 @@ def cost(
         raise Refused(
             f"cost --over {over}: unknown key; use one of {', '.join(cost_curves.NUMERICAL_SETTINGS)}"
         )
-    knobs = (
-        [over]
-        if over
-        else [cost_curves.TOLERANCE, *(cost_curves.applicable_settings(found) if verbose else ())]
-    )
+    knobs = [over or cost_curves.TOLERANCE]
+    if verbose and not over:
+        knobs += cost_curves.applicable_settings(found)
     target = choose_folder(out, f"{found.source.path.stem}-cost")
     curves = {}
     answer = {}

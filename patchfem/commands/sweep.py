@@ -176,15 +176,14 @@ def sweep(
     begin = perf_counter()
     part = by.part()
     target = choose_folder(out, f"{scene.stem}-sweep")
-    tells = "json" if json_ else "faults" if quiet else "words"
+    tells = "faults" if quiet else "words"
+    if json_:
+        tells = "json"
     told = Told(target, not no_page, tells, begin)
-    signed = (
-        ""
-        if by.collect or part or keep not in (None, "none")
-        else manifest.hash_request(
-            scene, (what or Over()).words(*set_, f"page={not no_page}"), what and what.cases
-        )
-    )
+    signed = ""
+    if not (by.collect or part or keep not in (None, "none")):
+        request_words = (what or Over()).words(*set_, f"page={not no_page}")
+        signed = manifest.hash_request(scene, request_words, what and what.cases)
     if resume and (written := manifest.read_manifest(target, signed)):  # all of it is there
         _print_results(written["cases"]["count"], {}, written, told)
         return

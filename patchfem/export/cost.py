@@ -169,14 +169,17 @@ def _format_shares(one: Cost, name: str) -> str:
     Both are relative to the value.
     """
     size = abs(one.values.get(name, 0.0))
-    shares = (
-        part[name] / size if size and name in part else None for part in (one.errors, one.distances)
-    )
-    stated, away = (
-        "-" if share is None else "exact" if share < ROUND_OFF else f"{share:.1e}"
-        for share in shares
-    )
-    return f"{stated} ({away})"
+    error = _format_relative(one.errors.get(name), size)
+    distance = _format_relative(one.distances.get(name), size)
+    return f"{error} ({distance})"
+
+
+def _format_relative(difference: float | None, size: float) -> str:
+    """Format a difference relative to a size; "-" if either is missing, "exact" below round-off."""
+    if difference is None or not size:
+        return "-"
+    ratio = difference / size
+    return "exact" if ratio < ROUND_OFF else f"{ratio:.1e}"
 
 
 def detailed_measures(runs: list, tolerance: float) -> list:

@@ -138,17 +138,13 @@ def find_picture(name: str, data: RunData) -> Picture | None:
 
 def _curve_picture(data: RunData) -> Picture | None:
     """Return the picture of a curve of steady motions."""
-    found = data.evaluations.curve
-    text = data.source.driven
-    return (
-        None
-        if found is None
-        else Picture(
-            charts.curve_charts,
-            (found,),
-            charts.curve_caption(found) + (f" {text[0].upper()}{text[1:]}." if text else ""),
-        )
-    )
+    curve = data.evaluations.curve
+    if curve is None:
+        return None
+    caption = charts.curve_caption(curve)
+    if text := data.source.driven:
+        caption += f" {text[0].upper()}{text[1:]}."
+    return Picture(charts.curve_charts, (curve,), caption)
 
 
 def _spectra_picture(data: RunData) -> Picture | None:
@@ -379,13 +375,9 @@ def _loop_picture(data: RunData) -> Picture | None:
     own = motion.loop
     whole = motion.window is None or data.verdict.is_part_of_cycle()
     count = 0.0 if whole else (own["time"][-1] - own["time"][0]) / motion.period
-    span = (
-        "the whole run"
-        if whole
-        else f"the last {count:.3g} cycles"
-        if count > 1 + 1e-6
-        else "one cycle"
-    )
+    span = "the whole run"
+    if not whole:
+        span = f"the last {count:.3g} cycles" if count > 1 + 1e-6 else "one cycle"
     open_loop = data.verdict.is_part_of_cycle() or data.verdict.cycles is None
     title = "Friction force against slide" if open_loop else "Friction loop"
     name, *read = motion.recorded or ("",)
@@ -438,12 +430,11 @@ def _histories_picture(data: RunData) -> Picture | None:
     swings = bool(data.verdict.released)
     kept = int(np.sum(history["time"] < begin))
     if kept:
-        what = (
-            "reversals were kept, drawn as a band from the lowest to the highest value of each cycle."
-            if kept * period > begin
-            else f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
-        )
-        what = "turning points and stops were kept, joined by lines." if swings else what
+        what = f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
+        if swings:
+            what = "turning points and stops were kept, joined by lines."
+        elif kept * period > begin:
+            what = "reversals were kept, drawn as a band from the lowest to the highest value of each cycle."
         unit, scale = formatting.choose_axis_unit(history["time"], "s")
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
     # A decaying swing has no band per cycle: its reversals are stored, and the line through them
@@ -477,12 +468,12 @@ def _measured_picture(data: RunData) -> Picture | None:
     for name, gain in zip(
         ("absolute_acceleration_peak", "relative_displacement_amplitude"), m.factors()
     ):
-        one = found.get(name, {"value": None})
-        points.append(
-            None
-            if one["value"] is None
-            else (one["value"] * gain, None if one["error"] is None else one["error"] * gain)
-        )
+        measure = found.get(name, {"value": None})
+        if measure["value"] is None:
+            points.append(None)
+            continue
+        error = None if measure["error"] is None else measure["error"] * gain
+        points.append((measure["value"] * gain, error))
     factor = "".join(
         f" (computed {name} multiplied by the reading factor {gain:g})"
         for name, gain in zip(("acceleration", "displacement"), m.gains)

@@ -38,11 +38,8 @@ def write_report(folders: list, out: Path | None = None) -> Path:
             f"runs and sweeps cannot be compared on one page: {folders[many.index(True)]} is a sweep, "
             f"{folders[many.index(False)]} is not"
         )
-    out = (
-        out
-        if out is not None
-        else (folders[0] / PAGE if many[0] and len(folders) == 1 else Path(PAGE))
-    )
+    if out is None:
+        out = folders[0] / PAGE if many[0] and len(folders) == 1 else Path(PAGE)
     if not many[0]:
         return _write_page(
             several_runs.page_html([several_runs.read_run(folder) for folder in folders]), out

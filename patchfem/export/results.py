@@ -15,11 +15,8 @@ from ..disk.exchange import defer_signals, make_old_folder_path, replace_folder,
 from ..disk.lock import FolderLock
 
 PAGE = "report.html"
-# Folder with the fields of interfaces that have a patch, and the largest number that is written.
-INTERFACES_FOLDER, MAX_INTERFACES = (
-    "interfaces",
-    6,
-)
+INTERFACES_FOLDER = "interfaces"  # folder with the fields of interfaces that have a patch
+MAX_INTERFACES = 6  # fields of more interfaces are not written
 FILES = (
     "summary.json",
     "result.nc",
@@ -54,8 +51,9 @@ FILES = (
     "backbone.svg",
 )
 LOCK = ".writer"
-STATE, STARTS = "wear.npz", "starts.json"
 # States of an interrupted run or fit, from which it can continue.
+STATE = "wear.npz"
+STARTS = "starts.json"
 STATES = re.compile(r"wear\.npz|starts\.json|march_\d+\.npz")
 
 

@@ -138,11 +138,10 @@ def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str
             else f" or the floor of their measure, such as {format_floor(measures[some[0]], some[1])} "
             f"of {measure_label(some[0])}"
         )
-        return (
-            f"All {number} cases meet {asked}{floor}."
-            if ran == number
-            else f"{ran} of {number} cases have an answer; {'it meets' if ran == 1 else 'all of these meet'} {asked}{floor}."
-        )
+        if ran == number:
+            return f"All {number} cases meet {asked}{floor}."
+        these = "it meets" if ran == 1 else "all of these meet"
+        return f"{ran} of {number} cases have an answer; {these} {asked}{floor}."
     if first in measures and first not in lost:
         return f"In {measure_label(first)} all {number} cases meet {asked}; {_others_sentence(len(lost))}."
     beyond = {

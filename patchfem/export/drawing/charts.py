@@ -15,19 +15,17 @@ import numpy as np
 from ...core import G_N
 from ...formatting import choose_axis_unit, format_number, needs_log_scale
 
-# Points of a line; number of frames of the shear stress that are drawn faintly.
-MAX_LINE_POINTS, MAX_FRAMES = 6000, 24
-FAINT, FEWEST = 400, 200  # points of a faint frame; minimum number of points of a reduced line
+MAX_LINE_POINTS = 6000  # a line with more points is reduced to this number
+MIN_LINE_POINTS = 200  # a reduced line keeps at least this number of points
+MAX_FRAMES = 24  # number of frames of the shear stress that are drawn faintly
+FAINT_FRAME_POINTS = 400  # number of points of a frame that is drawn faintly
 GRID = 6000  # cells of a piece in a picture
 NUMBER = 13  # characters of a number in a page
 REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded": "dotted"}
 COLOURS = ("accent", "warm", "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86")
 MIL = 25.4e-6
-# Samples per cycle below which a line through them does not show the motion; cycles of an envelope.
-MIN_SAMPLES_PER_CYCLE, MAX_ENVELOPE_CYCLES = (
-    20,
-    1500,
-)
+MIN_SAMPLES_PER_CYCLE = 20  # a line through fewer samples per cycle does not show the motion
+MAX_ENVELOPE_CYCLES = 1500  # an envelope over more cycles joins neighbouring cycles
 # Measures over the cycles of wear, and their labels.
 WEAR_LABELS = {
     "pressure_peak": "peak pressure",
@@ -38,8 +36,9 @@ WEAR_LABELS = {
 }
 PROFILES = 6  # number of profiles of a patch that wears
 MIN_COHERENCE = 0.5  # coherence above which H1 is drawn as known
-# Height and largest width [px] of a frame in which both axes have the same scale.
-FRAME_HEIGHT, MAX_FRAME_WIDTH = 270, 300
+# Size [px] of a frame in which both axes have the same scale.
+FRAME_HEIGHT = 270
+MAX_FRAME_WIDTH = 300
 
 
 def make_axis(label: str, unit: str = "", log: bool = False) -> dict:
@@ -111,10 +110,10 @@ def limit_characters(made: list, room: int) -> list:
 def _reduce_mark(one: dict, share: float) -> dict:
     """Reduce a line or band to a fraction of its points."""
     rows = {"line": ("x", "y"), "band": ("x", "low", "high")}.get(one["kind"])
-    if rows is None or np.size(one["x"]) <= FEWEST:
+    if rows is None or np.size(one["x"]) <= MIN_LINE_POINTS:
         return one
     x, *_, y = (np.asarray(one[name], float) for name in rows)
-    keep = sample_indices(x, y, max(int(share * x.size), FEWEST))
+    keep = sample_indices(x, y, max(int(share * x.size), MIN_LINE_POINTS))
     return one | {name: np.asarray(one[name], float)[keep] for name in rows}
 
 
@@ -168,7 +167,9 @@ def interface_charts(x, fields: dict, name: str = "") -> list:
             np.linspace(1, len(tau) - 1, min(MAX_FRAMES, len(tau) - 1)).round().astype(int)
         )
         frames = [
-            make_line(x * size, tau[k] * scale, "soft", most=FAINT, width=0.6, alpha=0.6)
+            make_line(
+                x * size, tau[k] * scale, "soft", most=FAINT_FRAME_POINTS, width=0.6, alpha=0.6
+            )
             for k in shown
         ]
         title = f"Shear stress{f' on {name}' * bool(name)} at {len(shown)} instants"
@@ -447,17 +448,13 @@ def history_charts(
     joined : bool
         Whether earlier reversals are drawn as a line through them instead of a band per cycle.
     """
-    time, value, (name, per) = (
-        history["time"],
-        history["displacement"],
-        choose_axis_unit(history["time"], "s"),
-    )
+    time = history["time"]
+    value = history["displacement"]
+    name, per = choose_axis_unit(time, "s")
     unit, scale = choose_axis_unit(value, "m")
-    begin = (
-        first_complete_time(time, period, window["time"][0] if window else 0.0)
-        if period
-        else time[0]
-    )
+    begin = time[0]
+    if period:
+        begin = first_complete_time(time, period, window["time"][0] if window else 0.0)
     late = time >= begin
     marks = []
     if joined and not late.all():

@@ -24,12 +24,13 @@ from .panels import find_contact_window, make_panels, round_down_factor, upper_p
 FILM_EXTENSIONS = (".gif", ".mp4")
 FRAME_SIZE = (12.0, 6.8)  # width and height of a frame [inch]
 DPI = 100  # pixels per inch; with FRAME_SIZE an even number of pixels, which video formats require
-BIT_RATE = 4000  # of a video [kbit/s]
+BIT_RATE = 4000  # bit rate of a video [kbit/s]
 SLIDE_LABEL = 0.03  # largest slide as drawn / length of the pieces
 CYCLE_SECONDS = (
     2.4  # duration of a cycle [s], unless MIN_FRAME_SECONDS or MAX_FRAME_SECONDS limits it
 )
-MIN_FRAME_SECONDS, MAX_FRAME_SECONDS = 0.04, 0.3  # shortest and longest duration of a frame [s]
+MIN_FRAME_SECONDS = 0.04  # shortest duration of a frame [s]
+MAX_FRAME_SECONDS = 0.3  # longest duration of a frame [s]
 
 
 @dataclass(frozen=True, slots=True)

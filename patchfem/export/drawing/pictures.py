@@ -6,7 +6,9 @@ from functools import partial, wraps
 
 from ...formatting import format_number
 
-BLUE, ORANGE, GREY = "#1f5f99", "#c8551b", "#8a8a8a"
+BLUE = "#1f5f99"
+ORANGE = "#c8551b"
+GREY = "#8a8a8a"
 WIDTH = 9.6  # inches; the page scales a picture to the width of its text
 STYLE = {
     "svg.hashsalt": "patchfem",

@@ -4,7 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LINE, TRIANGLE, QUAD = 3, 5, 9  # VTK cell types
+# Cell types of VTK.
+LINE = 3
+TRIANGLE = 5
+QUAD = 9
 NAMES = ("lower", "upper", "interface")
 # The last part is that of a patch that wears in strips; the index of a name is its code in `part`.
 PARTS = (

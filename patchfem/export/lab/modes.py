@@ -7,10 +7,15 @@ import numpy as np
 from .series import program_name
 from .universal import SI, write_sets
 
-FORCE, ACCELERATION, FREQUENCY = 13, 12, 18  # data types of dataset 58
+# Data types of dataset 58.
+ACCELERATION = 12
+FORCE = 13
+FREQUENCY = 18
 KINDS = {"displacement": (8, "m"), "velocity": (11, "m/s"), "acceleration": (12, "m/s^2")}
 OVER = {"force": (FORCE, "N"), "base_acceleration": (ACCELERATION, "m/s^2")}
-RESPONSE, COHERENCE = 4, 6  # function types
+# Function types of dataset 58.
+RESPONSE = 4
+COHERENCE = 6
 
 
 def structure_text(found, source: str) -> str:

@@ -104,14 +104,13 @@ def _omitted_features(model: Model) -> str:
         rig.springs.travel < MAX_TRAVEL
     )
     out += ["the initial motion"] * (rig.start is not None)
-    unit = (
-        ""
-        if isinstance(rig.drive.signal, SineDrive) or rig.drive.kind == "free"
-        else (
-            f"; Fex1 is the excitation for an amplitude of {'1 N' if rig.drive.kind == 'force' else '1 m/s^2'}, not for "
-            f"waveform = '{rig.drive.waveform.name}'"
+    unit = ""
+    if not isinstance(rig.drive.signal, SineDrive) and rig.drive.kind != "free":
+        amplitude = "1 N" if rig.drive.kind == "force" else "1 m/s^2"
+        unit = (
+            f"; Fex1 is the excitation for an amplitude of {amplitude}, not for waveform = "
+            f"'{rig.drive.waveform.name}'"
         )
-    )
     return unit + ("; not in the file: " + ", ".join(out) if out else "")
 
 
@@ -134,17 +133,15 @@ def rig_matrices(model: Model) -> dict:
     mass = modes.mass
     sine = isinstance(rig.drive.signal, SineDrive)
     size = rig.drive.signal.acceleration if sine else float(rig.drive.kind != "free")
-    found = (
-        {"base": np.linalg.solve(turn, modes.base)}
-        if rig.drive.kind == "base"
-        else {"force": -modes.base @ turn}
-        if rig.drive.kind == "force"
-        else {}
-    )
-    found |= {"slide": modes.interfaces @ turn} if rig.friction.interfaces else {}
-    found |= (
-        {"Omega": 2 * np.pi * rig.drive.frequency} if sine or rig.drive.levels.amplitudes else {}
-    )
+    found = {}
+    if rig.drive.kind == "base":
+        found["base"] = np.linalg.solve(turn, modes.base)
+    elif rig.drive.kind == "force":
+        found["force"] = -modes.base @ turn
+    if rig.friction.interfaces:
+        found["slide"] = modes.interfaces @ turn
+    if sine or rig.drive.levels.amplitudes:
+        found["Omega"] = 2 * np.pi * rig.drive.frequency
     M, C, K = (
         mass * turn.T @ one @ turn
         for one in (np.eye(len(turn)), modes.damping_matrix, np.diag(modes.omega**2))

@@ -12,9 +12,13 @@ import numpy as np
 from ...core import Missing, PatchfemError
 from .series import Column, Histories, program_name
 
-TIME, DISPLACEMENT, GENERAL = 17, 8, 1  # data types
+# Data types of dataset 58.
+GENERAL = 1
+DISPLACEMENT = 8
+TIME = 17
 TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13}  # data type by unit; all others are general
-HISTORY, LOOP = 1, 0  # function types: time response, general
+HISTORY = 1  # function type: time response
+LOOP = 0  # function type: general
 LABELS = {"m s-1": "m/s", "m s-2": "m/s^2"}
 SI = {
     "type": 164,

@@ -12,13 +12,11 @@ from .document import to_json
 
 # Bytes of the data that are drawn; packed with the library, a page then stays below 1.5 MB.
 MAX_BYTES = 1_200_000
-# cases that are always drawn; cases from which the bytes per case are measured
-MIN_CASES, N_SAMPLED = 64, 32
-# Digits of a value and of an error in a page that does not draw all cases.
-VALUE_DIGITS, ERROR_DIGITS = (
-    7,
-    3,
-)
+MIN_CASES = 64  # at least this number of cases is drawn
+N_SAMPLED = 32  # number of cases from which the bytes per case are measured
+# Significant digits in a page that does not draw all cases.
+VALUE_DIGITS = 7
+ERROR_DIGITS = 3
 
 
 class DrawnCases(NamedTuple):

@@ -19,13 +19,12 @@ DRIVE_UNITS = {
 def format_resolved(text) -> str:
     """Write a quantity of a resolved scene, such as `49.03325 m/s^2`, in a usual unit: `5 g`."""
     value, _, unit = str(text).partition(" ")
-    name, scale = (
-        DRIVE_UNITS[unit]
-        if unit in DRIVE_UNITS
-        else choose_axis_unit([float(value)], unit)
-        if unit in UNIT_LADDERS
-        else (unit, 1.0)
-    )
+    name = unit
+    scale = 1.0
+    if unit in DRIVE_UNITS:
+        name, scale = DRIVE_UNITS[unit]
+    elif unit in UNIT_LADDERS:
+        name, scale = choose_axis_unit([float(value)], unit)
     return f"{float(value) * scale:.4g} {name}".strip()
 
 

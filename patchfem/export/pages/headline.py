@@ -357,14 +357,11 @@ def span_sentence(
             for part in measures[name]
         )
         low, high = format_pair(name, values.min(), values.max(), unit, 4)
-        alike = there.sum() > 1  # a single case has no range
-        ran = (
-            f"ranges from {low} to {high}"
-            if low != high
-            else f"is {high} throughout"
-            if alike
-            else f"is {high}"
-        )
+        ran = f"is {high}"
+        if low != high:
+            ran = f"ranges from {low} to {high}"
+        elif there.sum() > 1:  # a single case has no range
+            ran = f"is {high} throughout"
         # A value of 0 is known absolutely.
         known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > format_zero(name))
         known &= ~least[name][0][there] if name in least else True
@@ -375,13 +372,12 @@ def span_sentence(
         band = f", with errors of at most {' or '.join(bands)}" if bands else ""
         counts = there.sum()
         ended = (every & settled).sum()
-        whose = (
-            ""
-            if counts == every.sum()
-            else f" of the {'only settled case' if counts == 1 else 'settled cases'}"
-            if counts == ended
-            else f" in the {'only case that meets' if counts == 1 else 'cases that meet'} the tolerance in this measure"
-        )
+        whose = ""
+        if counts != every.sum() and counts == ended:
+            whose = f" of the {'only settled case' if counts == 1 else 'settled cases'}"
+        elif counts != every.sum():
+            those = "only case that meets" if counts == 1 else "cases that meet"
+            whose = f" in the {those} the tolerance in this measure"
         return f"{ranked.measure_name(name).capitalize()}{whose} {ran}{band}."
     return ""
 

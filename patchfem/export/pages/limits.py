@@ -49,7 +49,7 @@ GAP_OF_ANGLE = {"contact.tilt.angle": ("Tilt", "length"), "contact.strips.roll":
 ANGLE_UNITS = [name for name, _ in UNIT_LADDERS["rad"]]
 # A smaller number of a key is written in a smaller unit: 0.011 mrad, but 10 urad.
 MIN_NUMBER = 0.0101
-MAX_NUMBER = 1e4  # a larger number of a key is written in a larger unit
+MAX_NUMBER = 1e4  # the next larger unit is used for larger numbers of a key
 # Relative change of a measure below which it is round-off.
 ROUND_OFF_CHANGE = 1e-8
 

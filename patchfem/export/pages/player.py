@@ -19,12 +19,9 @@ from .document import Section, document_html
 from .library import read_file
 from .thinned import reduce_mesh, select_lines
 
-# Largest numbers of frames, of cells of a piece, and of positions along the interface.
-FRAMES, CELLS, PLACES = (
-    24,
-    5000,
-    400,
-)
+MAX_FRAMES = 24
+MAX_CELLS = 5000  # largest number of cells of a piece
+MAX_POSITIONS = 400  # largest number of positions along the interface
 BYTES = 520_000  # bytes of all frames before they are encoded as text
 # Quantities of a cell, and whether they have a sign.
 STRESS_COMPONENTS = (
@@ -104,17 +101,17 @@ def _read_frames(folder: Path) -> dict:
     with Series(folder) as series:
         cycle = np.array(last_consecutive_frames(series.times))
         numbers = cycle[
-            np.linspace(0, cycle.size - 1, min(FRAMES, cycle.size)).round().astype(int)
+            np.linspace(0, cycle.size - 1, min(MAX_FRAMES, cycle.size)).round().astype(int)
         ].tolist()
         x = series.points("interface")[:, 0]
-        most = min(int((BYTES / len(numbers) - 10 * min(PLACES, x.size)) / 24), CELLS)
+        most = min(int((BYTES / len(numbers) - 10 * min(MAX_POSITIONS, x.size)) / 24), MAX_CELLS)
         line = {
             name: series.stack("interface", "PointData", name, numbers)
             for name in ("displacement", *(name for name, _ in CURVES), "status")
             if name in series.names("interface", "PointData")
         }
         near = _contact_range(x, line["normal_stress"])
-        places = select_lines(x, min(PLACES, x.size) - 1, near)
+        places = select_lines(x, min(MAX_POSITIONS, x.size) - 1, near)
         lower = _read_piece(series, "lower", numbers, most, near)
         upper = _read_piece(series, "upper", numbers, most, near)
         slide = _separate_slide(upper, x, line)

@@ -120,13 +120,9 @@ def too_few(table: dict, settled: np.ndarray) -> str:
     helps = [f"raise drive.cycles so that the {Outcome.TRANSIENT.value} cases settle"] * (
         "transient" in ended
     ) + ["correct what the messages of the failed cases name"] * ("failed" in ended)
-    end = (
-        "settled"
-        if Outcome.TRANSIENT.value in ended
-        else "has a result"
-        if count == 1
-        else "have a result"
-    )
+    end = "has a result" if count == 1 else "have a result"
+    if Outcome.TRANSIENT.value in ended:
+        end = "settled"
     said = f"{f'Only {count}' if count else 'None'} of {len(outcome)} cases {end}"
     others = (
         f" ({', '.join(f'{number} {measure_label(name)}' for name, number in ended.items())})"

@@ -22,7 +22,9 @@ from ...runs.results.result import Result
 from ..summary import measure_object
 from .document import sentence_html
 
-G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
+G = 9.80665  # standard gravity [m/s^2]
+LBF = 4.4482216152605  # pound-force [N]
+INCH = 0.0254  # [m]
 DEG = ("deg", 180 / pi)
 IMPERIAL_UNITS = {  # imperial units in the form of formatting.UNIT_LADDERS
     "m": (("mil", 1e3 / INCH), ("in", 1 / INCH)),

@@ -23,19 +23,14 @@ from .headline import (
 )
 from .sentences import format_zero, is_share, measure_link
 
-# Numbers of measures, and of keys and measures together, in the table of cases: more do not fit a
-# wide screen.
-MAX_MEASURES, MAX_COLUMNS = (
-    6,
-    8,
-)
-PAGE, SUMMARY = "report.html", "summary.json"  # files of a case
-# Cases in the table, whereas sweep.csv has all of them; rows above which the table scrolls in its
-# frame.
-MAX_LISTED_CASES, MIN_SCROLLED_ROWS = (
-    400,
-    24,
-)
+# More columns of the table of cases do not fit a wide screen.
+MAX_MEASURES = 6
+MAX_COLUMNS = 8  # largest number of keys and measures together
+# Files of a case.
+PAGE = "report.html"
+SUMMARY = "summary.json"
+MAX_LISTED_CASES = 400  # the table has at most this number of cases, sweep.csv has all of them
+MIN_SCROLLED_ROWS = 24  # a table with more rows scrolls in its frame
 
 
 def page_html(table: dict, told: SweepHeadline | None = None) -> str:
@@ -170,13 +165,13 @@ def _measure_data(name: str, one: dict, cases, tolerance=np.nan) -> dict:
     cases : (m,) array or slice
     tolerance : float or (n,) array
     """
-    unit, scale = (
-        ("%", 100.0)
-        if is_share(name)
-        else choose_axis_unit(one["values"], one["unit"])
-        if one["unit"] in UNIT_LADDERS
-        else (one["unit"], 1.0)
-    )
+    unit = one["unit"]
+    scale = 1.0
+    if is_share(name):
+        unit = "%"
+        scale = 100.0
+    elif unit in UNIT_LADDERS:
+        unit, scale = choose_axis_unit(one["values"], unit)
     some = {
         part: np.asarray(one[part], float)[cases]
         for part in ("values", "errors", "floors")
@@ -212,14 +207,12 @@ def _explorer_html(said: str, folders: list | None) -> str:
         Paths of the cases; None if nothing is stored of them.
     """
     kept = {Path(folder).name for folder in folders or ()}
-    opens = (
-        " Click on a case to open its page."
-        if kept == {PAGE}
-        else f" Click on a case to open its {'page or its ' * (PAGE in kept)}{SUMMARY}; <code>--keep pages</code> keeps a "
-        "page of every case."
-        if kept
-        else ""
-    )
+    opens = ""
+    if kept == {PAGE}:
+        opens = " Click on a case to open its page."
+    elif kept:
+        stored = f"page or its {SUMMARY}" if PAGE in kept else SUMMARY
+        opens = f" Click on a case to open its {stored}; <code>--keep pages</code> keeps a page of every case."
     thinned = said and f"<p class=soft>{sentence_html(said)}</p>"
     return (
         "<div class=choices><label>Measure<select id=measure></select></label>"

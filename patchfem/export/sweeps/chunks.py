@@ -23,7 +23,8 @@ import numpy as np
 from ...disk.atomic_write import write_bytes
 from ...runs.batch.case_results import CaseResults
 
-CHUNKS, ENDING = "chunks", ".h5"
+CHUNKS = "chunks"
+ENDING = ".h5"
 MAX_CASES_PER_FILE = 4096  # maximum number of cases of a file
 PARTS = ("values", "errors", "floors")
 
@@ -141,7 +142,9 @@ def _read_column(held, kind, count: int | None = None, rows: int | None = None) 
     rows : int, optional
         Number of measures of a two-dimensional dataset.
     """
-    shape = held.shape if count is None else (count,) if rows is None else (rows, count)
+    shape = held.shape
+    if count is not None:
+        shape = (count,) if rows is None else (rows, count)
     if (
         held.dtype != kind
         or held.shape != shape

@@ -39,11 +39,9 @@ from .answer import read_answer
 from .chunks import CHUNKS
 
 KEEP = ("none", "summaries", "results", "pages")  # what is stored of each case besides its columns
-CASES, SUMMARY, TABLES = (
-    "cases",
-    "summary.json",
-    ("sweep.csv", "sweep.nc", "sweep.json", "report.html"),
-)
+CASES = "cases"
+SUMMARY = "summary.json"
+TABLES = ("sweep.csv", "sweep.nc", "sweep.json", "report.html")
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,10 +28,8 @@ from .tables import FACTS, shared_facts, sort_measures
 
 REPEAT_WORDS = "--cases", "sweep.csv"  # arguments for cases in rows whose command is not known
 # Files that a click on a case opens: its page if there is one, else its summary.
-FULL_PAGE, SHORT_SUMMARY = (
-    "report.html",
-    "summary.json",
-)
+FULL_PAGE = "report.html"
+SHORT_SUMMARY = "summary.json"
 
 
 def write_page(table: dict, lead: SweepHeadline, folder: Path) -> None:

@@ -145,7 +145,7 @@ def test_exact_numbers_and_places_are_those_of_the_fields(coarse):
 
 
 def test_always_a_page_holds_what_it_can(film):
-    assert len(film["times"]) <= player.FRAMES and film["cells"][0] <= film["cells"][1]
+    assert len(film["times"]) <= player.MAX_FRAMES and film["cells"][0] <= film["cells"][1]
     told = player.player_section(film).html
     assert "frames from" in told and "Motion and gap are magnified by one factor" in told
 
