@@ -6,7 +6,6 @@ In: a `Plan`, or a Scene or Model that is planned first. Out: a `Result`.
 import hashlib
 from contextlib import nullcontext
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
@@ -20,24 +19,18 @@ from ..model.model import Model
 from ..model.source import locate_errors
 from . import joint
 from .accuracy_warnings import Finding, tolerance_warnings
+from .bench import result as bench_result
 from .patch import faces, strength
 from .patch import result as patch_result
 from .plan import Plan, compiled_kind, plan, refuse_size
 from .results.patch_rows import unknown_measures
-from .results.result import Result, shorten_file_names, with_meanings
-from .rig import engines
+from .results.result import Result, RunInputs, shorten_file_names, with_meanings
+from .rig import engines, rig
 from .self_checks.checks import with_self_checks
 from .wear import evolve, measures
 
 __all__ = ["Plan", "Result", "StateFile", "plan", "run"]
-# "module function" of this folder that runs each kind of scene; imported and called only in `_run`
-KINDS = {
-    "patch": "patch.result static",
-    "bench": "bench.result run_prescribed",
-    "rig": "rig.rig run_coupled",
-    "linear": "rig.rig run_coupled",
-}
-
+NO_MOTION = "no friction acts and no motion was computed"
 AT_REST = "no motion was found; the measures are those of the pressed patch at rest"
 
 
@@ -52,6 +45,21 @@ class StateFile(NamedTuple):
     path: Path
     version: str
     resume: bool
+
+
+class PatchMeshes(NamedTuple):
+    """Pressed patch of [contact] on its meshes.
+
+    - patch: on the finest mesh; None without [contact].
+    - coarse: on coarser meshes, fine to coarse; None for a missing one.
+    - static: on the meshes of its static measures, fine to coarse; () if these are the same.
+    - unworn: before wear, on the meshes of its ladder, fine to coarse; () if it is not worn.
+    """
+
+    patch: object = None
+    coarse: tuple = (None, None)
+    static: tuple = ()
+    unworn: tuple = ()
 
 
 def run(
@@ -102,107 +110,174 @@ def _run(what: Plan, say, progress, estimate: bool, fresh: bool, kept: StateFile
     seconds = {}
     warnings = list(model.source.remarks)
     notes = list(model.source.notes)
-    patch = None
-    coarse = (None, None)
-    climbed = ()
-    still = ()
+    meshes = PatchMeshes()
     if model.rig is not None:
         warnings += engines.unused_settings(model, what.engine)
     if model.patch is not None:
-        patch, *coarse = patch_result.solve_all(
-            model.patch, model.accuracy.tolerance, estimate, fresh
-        )
-        if model.kind == "bench" and patch.pressure.outcome is not Outcome.NO_CONTACT:
-            still = patch_result.solve_static_ladder(
-                model.patch, model.accuracy.tolerance, estimate, fresh
-            )
+        meshes = _press(model, estimate, fresh)
         seconds["contact"] = perf_counter() - begin
         if model.rig is not None and model.rig.structure.without_joint is not None:
-            model = joint.remove_joint(model, patch)
+            model = joint.remove_joint(model, meshes.patch)
             what = replace(what, model=model)
-        warnings += patch_result.warn_of_strains(model.patch, patch)
-        if estimate and coarse[0] is None:
-            fewer = (
-                "split the elements of contact.mesh"
-                if model.patch.mesh.file
-                else "leave out contact.element_size"
-            )
-            warnings.append(
-                f"the {patch.x.size - 1} elements along the interface are too few for an estimate of the "
-                f"error; {fewer}"
-            )
-        notes += patch_result.notes_on_neglected_effects(model, patch, coarse)
+        warnings += _warn_of_patch(model, meshes, estimate)
+        notes += patch_result.notes_on_neglected_effects(model, meshes.patch, meshes.coarse)
     if model.has_interface_patches:
         if fresh:
             faces.condense_again(model)
         warnings += faces.collect_warnings(model)
         notes += faces.collect_notes(model)
         seconds["contact"] = perf_counter() - begin
-    if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and model.kind != "patch":
-        warnings.append("no friction acts and no motion was computed")
-        result = patch_result.static(what, patch, coarse, seconds, warnings)
+    inputs = RunInputs(
+        what, meshes.patch, meshes.coarse, seconds, warnings, say, progress, estimate
+    )
+    if _is_open(meshes.patch) and model.kind != "patch":
+        result = solve_static(replace(inputs, warnings=[*warnings, NO_MOTION]))
     elif _has_no_load(model):
-        warnings += [Outcome.NO_CONTACT.sentence, "no friction acts and no motion was computed"]
-        result = Result(
-            what,
-            Outcome.NO_CONTACT,
-            {"normal_load": Measure(0.0, "N", 0.0)},
-            None,
-            None,
-            None,
-            {},
-            seconds,
-            warnings,
-            {},
-        )
+        result = _result_without_load(inputs)
     else:
         evolved = None
-        here = what
-        if model.wear is not None and patch is not None:
-            key = kept and state_key(model, patch, kept.version)
-            climbed = (patch, *coarse)
-            evolved = evolve.evolved_with(kept, key, model, patch, coarse[:2], progress)
-            progress = None  # the progress of the wear has covered all cycles
-            patch = evolved.patch
-            coarse = evolved.coarse
-            if evolved.state is not None:
-                here = replace(what, model=evolve.worn_model(model, patch, evolved.state.depth))
-        module, function = KINDS[what.kind].split()
-        solve = getattr(import_module(f"patchfem.runs.{module}"), function)
+        if model.wear is not None and meshes.patch is not None:
+            evolved = _evolve(inputs, kept)
+            unworn = (meshes.patch, *meshes.coarse)
+            meshes = PatchMeshes(evolved.patch, tuple(evolved.coarse), meshes.static, unworn)
+            inputs = _worn_inputs(inputs, evolved)
         try:
-            with _saving_context(kept, what, patch):
-                result = solve(here, patch, coarse, seconds, warnings, say, progress, estimate)
+            with _saving_context(kept, what, meshes.patch):
+                result = SOLVERS[what.kind](inputs)
         except NotConverged as error:
-            if patch is not None and what.kind != "patch":
-                at_rest = patch_result.static(what, patch, coarse, seconds, [*warnings, AT_REST])
-                error.partial_result = _complete_result(
-                    replace(at_rest, outcome=Outcome.NOT_CONVERGED), notes, begin, coarse
-                )
+            if meshes.patch is not None and what.kind != "patch":
+                at_rest = solve_static(replace(inputs, plan=what, warnings=[*warnings, AT_REST]))
+                at_rest = replace(at_rest, outcome=Outcome.NOT_CONVERGED)
+                unworn = PatchMeshes(meshes.patch, meshes.coarse)
+                error.partial_result = _complete_result(at_rest, notes, begin, unworn)
             raise
-        if patch is not None and what.kind != "patch":
-            found = {name: m for name, m in result.measures.items() if name != "normal_load"}
-            at_rest = patch_result.static_measures(
-                model, *((still[0], still[1:]) if still else (patch, coarse))
-            )
-            result = replace(result, measures=at_rest | found)
-        if model.has_interface_patches:
-            own = faces.static_measures(model)
-            result = replace(
-                result,
-                extra=result.extra
-                | {"faces": faces.faces_with_frames(model, result.extra.get("shots", ()))},
-                measures=own | {name: m for name, m in result.measures.items() if name not in own},
-            )
+        result = _add_static_measures(result, model, meshes)
         if model.wear is not None:
             result = measures.add_wear_measures(replace(result, plan=what), evolved, estimate)
     if what.compile_seconds and estimate:
         compiled.record_run(compiled_kind(model, what.engine, what.unknowns))
-    return _complete_result(with_self_checks(result), notes, begin, coarse, climbed, still)
+    return _complete_result(with_self_checks(result), notes, begin, meshes)
 
 
-def _complete_result(
-    result: Result, notes: list, begin: float, coarse=(), climbed=(), still=()
-) -> Result:
+def _press(model: Model, estimate: bool, fresh: bool) -> PatchMeshes:
+    """Press the patch of [contact] on the meshes that the run and its errors need."""
+    tolerance = model.accuracy.tolerance
+    patch, *coarse = patch_result.solve_all(model.patch, tolerance, estimate, fresh)
+    static = ()
+    if model.kind == "bench" and not _is_open(patch):
+        static = patch_result.solve_static_ladder(model.patch, tolerance, estimate, fresh)
+    return PatchMeshes(patch, tuple(coarse), tuple(static))
+
+
+def _is_open(patch) -> bool:
+    """Return whether the pieces of a pressed patch do not touch."""
+    return patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT
+
+
+def _warn_of_patch(model: Model, meshes: PatchMeshes, estimate: bool) -> list:
+    """Return the warnings on large strains, and on a mesh that shows no error."""
+    patch = meshes.patch
+    warnings = list(patch_result.warn_of_strains(model.patch, patch))
+    if estimate and meshes.coarse[0] is None:
+        remedy = "leave out contact.element_size"
+        if model.patch.mesh.file:
+            remedy = "split the elements of contact.mesh"
+        warnings.append(
+            f"the {patch.x.size - 1} elements along the interface are too few for an estimate of the "
+            f"error; {remedy}"
+        )
+    return warnings
+
+
+def solve_static(inputs: RunInputs) -> Result:
+    """Return the Result of a patch that does not move."""
+    return patch_result.static(
+        inputs.plan, inputs.patch, inputs.coarse, inputs.seconds, inputs.warnings
+    )
+
+
+def _solve_bench(inputs: RunInputs) -> Result:
+    """Return the Result of a prescribed slide."""
+    return bench_result.run_prescribed(
+        inputs.plan,
+        inputs.patch,
+        inputs.coarse,
+        inputs.seconds,
+        inputs.warnings,
+        inputs.say,
+        inputs.progress,
+        inputs.estimate,
+    )
+
+
+def _solve_rig(inputs: RunInputs) -> Result:
+    """Return the Result of a rig."""
+    return rig.coupled(inputs)
+
+
+SOLVERS = {
+    "patch": solve_static,
+    "bench": _solve_bench,
+    "rig": _solve_rig,
+    "linear": _solve_rig,
+}
+
+
+def _result_without_load(inputs: RunInputs) -> Result:
+    """Return the Result of interfaces that carry no load."""
+    return Result(
+        plan=inputs.plan,
+        outcome=Outcome.NO_CONTACT,
+        measures={"normal_load": Measure(0.0, "N", 0.0)},
+        response=None,
+        window=None,
+        patch=None,
+        fields={},
+        seconds=inputs.seconds,
+        warnings=[*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_MOTION],
+        extra={},
+    )
+
+
+def _evolve(inputs: RunInputs, kept: StateFile | None):
+    """Return the patch after its wear, from a saved state if there is one."""
+    model = inputs.plan.model
+    patch = inputs.patch
+    key = kept and state_key(model, patch, kept.version)
+    return evolve.evolved_with(kept, key, model, patch, inputs.coarse[:2], inputs.progress)
+
+
+def _worn_inputs(inputs: RunInputs, evolved) -> RunInputs:
+    """Return the inputs of the run of a worn patch, whose progress its wear has reported."""
+    plan_of_run = inputs.plan
+    if evolved.state is not None:
+        worn = evolve.worn_model(plan_of_run.model, evolved.patch, evolved.state.depth)
+        plan_of_run = replace(plan_of_run, model=worn)
+    return replace(
+        inputs, plan=plan_of_run, patch=evolved.patch, coarse=tuple(evolved.coarse), progress=None
+    )
+
+
+def _add_static_measures(result: Result, model: Model, meshes: PatchMeshes) -> Result:
+    """Return the result of a motion with the measures of its pressed patches."""
+    if meshes.patch is not None and model.kind != "patch":
+        motion = {name: m for name, m in result.measures.items() if name != "normal_load"}
+        patch, *coarse = meshes.static or (meshes.patch, *meshes.coarse)
+        static = patch_result.static_measures(model, patch, tuple(coarse))
+        result = replace(result, measures=static | motion)
+    if model.has_interface_patches:
+        static = faces.static_measures(model)
+        frames = faces.faces_with_frames(model, result.extra.get("shots", ()))
+        result = replace(
+            result,
+            extra=result.extra | {"faces": frames},
+            measures=static
+            | {name: m for name, m in result.measures.items() if name not in static},
+        )
+    return result
+
+
+def _complete_result(result: Result, notes: list, begin: float, meshes: PatchMeshes) -> Result:
     """Return the result with its total time, notes, tolerance warnings and meanings.
 
     Parameters
@@ -212,33 +287,25 @@ def _complete_result(
         Notes on the scene and the patch.
     begin : float
         Time at the start [s].
-    coarse : sequence of Patch or None
-        The patch on coarser meshes.
-    climbed : sequence of Patch
-        The patch before wear on the meshes of its ladder, fine to coarse, if the result is that of
-        a worn one.
-    still : sequence of Patch
-        The patch on the meshes of its static measures, if these differ.
+    meshes : PatchMeshes
     """
-    result.seconds["total"], model = perf_counter() - begin, result.plan.model
-    apart = "strip" if model.patch is not None else "interface"
-    wide = tolerance_warnings(
-        Finding(model, result.measures, result.patch, result.extra, climbed), coarse, still
-    )
-    warned = result.warnings + wide
-    noted = [*notes, *result.extra.get("notes", [])]
-    warned, noted = (shorten_file_names(texts, model.source.path) for texts in (warned, noted))
-    faces = _yielding_faces(result)
-    noted += faces.values()
+    model = result.plan.model
+    result.seconds["total"] = perf_counter() - begin
+    finding = Finding(model, result.measures, result.patch, result.extra, meshes.unworn)
+    warnings = [*result.warnings, *tolerance_warnings(finding, meshes.coarse, meshes.static)]
+    notes = [*notes, *result.extra.get("notes", [])]
+    yielding_faces = _yielding_faces(result)
     outcome = result.outcome
     if outcome is Outcome.DONE and unknown_measures(result.measures):
         outcome = Outcome.NOT_CONVERGED
+    path = model.source.path
+    notes = [*shorten_file_names(notes, path), *yielding_faces.values()]
     return replace(
         result,
         outcome=outcome,
-        measures=with_meanings(result.measures, apart),
-        warnings=warned,
-        extra=result.extra | {"notes": noted, "yielding_faces": faces},
+        measures=with_meanings(result.measures, "interface" if model.patch is None else "strip"),
+        warnings=shorten_file_names(warnings, path),
+        extra=result.extra | {"notes": notes, "yielding_faces": yielding_faces},
     )
 
 

@@ -153,7 +153,7 @@ def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
 def _rig_steps_cause(model: Model) -> Cause | None:
     """Return the Cause if a rig has too few time steps."""
     engine = engines.choose_engine(model)
-    if not engine.coarser_in_time(model, numerics.choose(model), None) or engine is engines.SMOOTH:
+    if not engine.coarser_in_time(model, numerics.choose(model)) or engine is engines.SMOOTH:
         return None
     steps = numerics.choose(model).steps
     wanted = costs.steps_wanted(model)

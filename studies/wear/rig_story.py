@@ -30,8 +30,7 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.model.model import build
 from patchfem.runs import run as runner
 from patchfem.runs.patch.press import press_patch
-from patchfem.runs.rig import levels
-from patchfem.runs.rig.engines import ENGINES
+from patchfem.runs.rig import levels, solve
 from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 
@@ -78,7 +77,7 @@ def onset(worn, cycles: int, pair=None) -> float:
     )
     model = build(scene.loads(text, SCENE))
     patch = press_patch(model.patch, pair, worn)
-    found = ENGINES["march"].run(model, choose(model), patch)
+    found = solve.solve(model, choose(model), patch)
     return levels.onset(found.levels, found.probe, 3e-3)[0] / G_N
 
 

@@ -8,8 +8,8 @@ import pytest
 from patchfem import build
 from patchfem.core import Response, SineDrive
 from patchfem.response import spectrum
-from patchfem.runs.rig.engines import EXACT
 from patchfem.runs.rig.numerics import choose
+from patchfem.runs.rig.solve import solve
 
 OMEGA, PERIOD = 2.0, pi
 
@@ -109,7 +109,7 @@ def test_exact_friction_harmonic_is_that_of_the_force(kind, size, kinetic):
     """Two modes, sticking and sliding, by the event engine: from the motion alone and from the force's own series."""
     text = SCENE.format(kinetic=kinetic, kind=kind, size=size)
     model = build(text)
-    found = EXACT.run(model, choose(model), None)
+    found = solve(model, choose(model), None)
     w = found.window
     drive = model.rig.drive.signal
     slide = spectrum.motion_harmonic(w.time, w.slide, w.slide_rate, drive.omega)

@@ -21,7 +21,7 @@ from ...response.decay_curve import (
     find_turning_points_outside,
     half_swings_between,
 )
-from ...runs.rig import decays, numerics
+from ...runs.rig import decays, numerics, solve
 from ...runs.rig.engines import ENGINES, PIECES, SMOOTH
 from ...structure import drives
 from ...structure.drive_sizes import find_decay_rate
@@ -191,13 +191,11 @@ def _refine_release(joint: Joint, release: Release, amplitudes) -> RefinedReleas
         limit = np.maximum(tolerance * np.abs(reading.value), reading.reading_error)
         is_small = (reading.run_error <= limit).all(axis=0)
         is_met = known.any() and is_small[known].all()
-        has_steps = (
-            engine.coarser_in_time(model, how, joint.patch) and "steps_per_cycle" not in how.pinned
-        )
+        has_steps = engine.coarser_in_time(model, how) and "steps_per_cycle" not in how.pinned
         if is_met or doublings == MAX_DOUBLINGS or not has_steps:
             break
         how = how.finer()
-        found = engine.run(model, how, joint.patch, 0, None, None)
+        found = solve.solve(model, how, joint.patch)
         release = Release(model, how, found)
     return RefinedRelease(release, reading)
 
@@ -215,17 +213,17 @@ def _read_with_errors(joint: Joint, release: Release, amplitudes) -> DecayReadin
     error = ROUND_OFF_ERROR * np.abs(value)
     known: dict = {}
 
-    def curve(variant) -> np.ndarray:
+    def curve(settings) -> np.ndarray:
         """Return frequency [Hz] and damping (2, k) of another run at the same amplitudes."""
-        if variant not in known:
-            whole = replace(variant.numerics, whole=True)
-            run = engine.run(model, whole, variant.patch, 0, None, None)
+        if settings not in known:
+            patch = joint.coarse if settings.coarse_patch else joint.patch
+            run = solve.solve(model, replace(settings, whole=True), patch)
             other = _read_decay(joint, run).over(amplitudes)
-            known[variant] = np.array([other.frequency, other.damping])
-        return known[variant]
+            known[settings] = np.array([other.frequency, other.damping])
+        return known[settings]
 
     coarser = [
-        *engine.coarser_in_time(model, how, joint.patch),
+        *engine.coarser_in_time(model, how),
         *engine.coarser_in_space(model, how, joint.patch, joint.coarse, found),
     ]
     for one in coarser:
@@ -369,7 +367,7 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
         expected = COARSER_RUNS_FACTOR * seconds_per_cycle * cycles
         if progress is not None and expected > ANNOUNCED_SECONDS:
             progress(f"decay over {cycles} cycles: about {expected:.2g} s of computing time")
-        found = ENGINES[how.engine].run(model, how, joint.patch, 0, None, None)
+        found = solve.solve(model, how, joint.patch)
         release = Release(model, how, found)
         seconds_per_cycle = found.seconds / cycles
         if _is_growing(joint, found):

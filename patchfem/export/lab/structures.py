@@ -11,6 +11,7 @@ transpose, `stiffness` and `limit`. M, K, C, slide, output and force or base are
 structure.file reads. The guide has a table of all variables.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,7 +23,7 @@ from ...model.model import Model
 from ...model.rig import MAX_TRAVEL
 from ...model.source import locate_errors
 from ...runs.patch import result as patch_result
-from ...runs.rig import engines, numerics, pieces
+from ...runs.rig import costs, engines, numerics, pieces
 from ...scene.rules import methods
 
 ENDINGS = (".mat", ".npz")
@@ -218,7 +219,7 @@ def friction_elements(model: Model) -> Elements:
         patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
         if patch.pressure.outcome is Outcome.NO_CONTACT:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
-    chosen = numerics.yield_numerics(model, numerics.choose(model))
+    chosen = replace(numerics.choose(model), pairs=costs.count_merges(model))
     groups = pieces.YieldingElements(model, chosen, patch).groups
     stiffness = np.concatenate([group.stiffness for group in groups])
     limit = np.concatenate([group.stiffness * group.yield_displacement for group in groups])

@@ -19,7 +19,7 @@ from ...dynamics.harmonic import balance as point_balance
 from ...dynamics.harmonic import harmonic, point
 from ...response import measures
 from ...response.measures import measure_half_swing
-from ..rig import march, pieces
+from ..rig import march, pieces, solve
 from ..rig.engines import ENGINES, MARCH, choose_steady_method
 from ..rig.numerics import choose
 from ..rig.steady import balance as rig_balance
@@ -208,9 +208,7 @@ class MotionObserver:
         # histories from before the window are not kept
         few = replace(self.numerics, whole=False)
         if ENGINES[self.numerics.engine] is not MARCH:
-            return _last_cycles(
-                ENGINES[self.numerics.engine].run(model, few, self.patch, 0, self.say, None)
-            )
+            return _last_cycles(solve.solve(model, few, self.patch, 0, self.say))
 
         contact, done, *_ = march.march_model(model, few, self.patch, 0, self.say)
         if done.outcome in UNBOUNDED_OUTCOMES:

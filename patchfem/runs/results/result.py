@@ -24,6 +24,29 @@ _FOLDER_OF_PATH = re.compile(
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class RunInputs:
+    """Inputs of a run of any kind of scene.
+
+    - plan: Plan that is run.
+    - patch: pressed patch of [contact], or None.
+    - coarse: the patch on coarser meshes; None for a missing one.
+    - seconds: CPU seconds by part, to which the run adds its own.
+    - warnings: sentences on the scene and the patch.
+    - say, progress: callbacks for a line of text and for the completed fraction, or None.
+    - estimate: whether coarser runs estimate the errors.
+    """
+
+    plan: object
+    patch: object
+    coarse: tuple
+    seconds: dict
+    warnings: list
+    say: Callable | None
+    progress: Callable | None
+    estimate: bool
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Result:
     """Everything that a run computed.
 

@@ -9,8 +9,7 @@ in `runs.memory`.
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache, partial
-from importlib import import_module
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,7 +35,6 @@ from .costs import (
     reason_to_march_events,
     reason_to_march_smooth_law,
 )
-from .solution import seen_by_gauge
 
 FINER = 0.5  # factor of the merge width in the coarse run that shows the error of merging
 # tail over the tolerance, above which a run with a smaller tail checks it; the automatic tail is a
@@ -47,39 +45,19 @@ LESS = 0.1  # factor of the tail in that run
 MOST_PIECES = 1e5
 
 
-class Variant(NamedTuple):
-    """Coarse run of a rig: its Numerics, and the Patch that it uses (None under [normal])."""
-
-    numerics: object
-    patch: object
-
-
 # largest error of an energy balance that is accurate to round-off: a billion steps have less
 BALANCE_ROUND_OFF = 1e-8
-
-
-def import_function(where: str) -> Callable:
-    """Import and return the function that "module function" of this folder names."""
-    module, function = where.split()
-    return getattr(import_module(f"patchfem.runs.rig.{module}"), function)
 
 
 class Engine(NamedTuple):
     """Engine of a rig; `scene.rules.methods.ENGINE_SUPPORT` says what it can compute.
 
-    The fields that name a function are "module function" of this folder, or "" for none.
-
     - method: value of accuracy.method that selects it; "" if only "auto" does.
+    - coarser_in_time: function (model, numerics) -> list of `CoarserRuns`.
+    - coarser_in_space: function (model, numerics, patch, coarse, solution) -> list of `CoarserRuns`;
+      coarse is the patch of [contact] on a coarser mesh, or None.
     - why_not_cheapest: function (model) -> reason why the next engine is better for a model that names none,
       or "".
-    - solve: function (model, numerics, patch, frames, say, progress) -> Solution.
-    - choose_numerics: function (model, Numerics) -> Numerics of this engine.
-    - refuse: function (model, numerics) that raises Missing if a run would take too long.
-    - cost: function (model, numerics, points) -> Cost.
-    - plan_sentences: function (model, numerics) -> sentences of a plan.
-    - notes: function (model, numerics, patch, Solution) -> notes of a run.
-    - coarser_in_time: function (model, numerics, patch) -> list of `CoarserRuns`.
-    - coarser_in_space: function (model, numerics, patch, coarse, solution) -> list of `CoarserRuns`.
     - min_relative_error: relative error of every measure that no coarse run shows, such as round-off;
       it is added to the errors by coarse runs.
     - max_balance_error: error of the energy balance above which a run has not converged; None if the error
@@ -91,41 +69,29 @@ class Engine(NamedTuple):
 
     name: str
     method: str
-    solve: str
     coarser_in_time: Callable
     coarser_in_space: Callable
-    cost: str
     why_not_cheapest: Callable = lambda model: ""
-    choose_numerics: str = ""
-    refuse: str = ""
-    plan_sentences: str = "plan bond_sum_sentences"
-    notes: str = ""
     min_relative_error: float = 1e-9
     max_balance_error: float | None = BALANCE_ROUND_OFF
     summary_numbers: tuple = ()
     saves_state: bool = False
     finds_periodic_motion: bool = False
 
-    def richer_in_modes(self, model: Model, numerics, patch) -> list:
+    def richer_in_modes(self, model: Model, numerics) -> list:
         """Return the run with more modes of a reduced structure; [] if no mode is left out.
 
         For a march, it has a quarter of the steps.
         """
         if model.rig.structure.richer_rig is None:
             return []
-        few = _divide_steps(numerics, 4) if self.coarser_in_time is _march_in_time else numerics
-        beside = None if few is numerics else Variant(few, patch)
-        return [
-            CoarserRuns(
-                (Variant(replace(few, richer=True), patch),), finer_errors, beside, "reduced"
-            )
-        ]
-
-    @property
-    def run(self) -> Callable:
-        """Function that solves, imported on first use."""
-        solve = import_function(self.solve)
-        return lambda model, *given: seen_by_gauge(model, solve(model, *given))
+        beside = None
+        few = numerics
+        if self.coarser_in_time is _march_in_time:
+            few = _divide_steps(numerics, 4)
+            beside = few
+        richer = replace(few, richer=True)
+        return [CoarserRuns((richer,), finer_errors, beside, "reduced")]
 
     def lacks(self, model: Model, steady: bool = False) -> str:
         """Return the first property of a model that the engine cannot compute, as text; "" if none.
@@ -133,11 +99,6 @@ class Engine(NamedTuple):
         steady: whether the drive is the sine of a curve instead of its own waveform.
         """
         return methods.find_unsupported_feature(self.name, motion_properties(model, steady))
-
-    def call(self, hook: str, *given) -> Any:
-        """Call the function that a field names; None if it names none."""
-        where = getattr(self, hook)
-        return import_function(where)(*given) if where else None
 
 
 def reason_not_exact(model: Model, steady: bool = False) -> str:
@@ -178,35 +139,25 @@ class Finder(NamedTuple):
     """Method that finds a steady motion.
 
     - words: text of a plan.
-    - solve: "module class" of this folder.
     - engine: name of the engine whose code it runs and whose numerical settings apply.
     """
 
     name: str
     words: str
-    solve: str
     engine: str
 
 
 FINDERS = {
-    one.name: one
-    for one in (
-        Finder(
-            "events", "the exact solution from event to event", "steady.maps EventFinder", "exact"
-        ),
-        Finder(
-            "yields",
-            "the exact solution between yield events",
-            "steady.maps YieldFinder",
-            "piecewise",
-        ),
+    finder.name: finder
+    for finder in (
+        Finder("events", "the exact solution from event to event", "exact"),
+        Finder("yields", "the exact solution between yield events", "piecewise"),
         Finder(
             "march",
             "a time integration whose initial state is corrected until the motion repeats",
-            "steady.marched MarchFinder",
             "march",
         ),
-        Finder("balance", "harmonic balance", "steady.balance BalanceFinder", "harmonic"),
+        Finder("balance", "harmonic balance", "harmonic"),
     )
 }
 
@@ -264,29 +215,32 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
     meshed = coarse is not None and (model.rig.friction.strips_slide_apart or averaged)
     samples = [CoarserRuns((), sampling_errors)] if model.rig.friction.strips_slide_apart else []
-    return [*samples, make_coarser_space(Variant(numerics, coarse))] if meshed else samples
+    if not meshed:
+        return samples
+    return [*samples, make_coarser_space(replace(numerics, coarse_patch=True))]
 
 
 def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """Return the coarse runs of the engine of yields: with coarser meshes, with fewer cells."""
-    meshes = [Variant(one, patch) for one in _numerics_of_meshes(model, numerics)]
+    meshes = _numerics_of_meshes(model, numerics)
     if coarse is not None and model.partial_slip:
-        meshes = [Variant(numerics, coarse), *meshes]
-    out = [CoarserRuns((variant,), coarser_errors, of="mesh") for variant in meshes]
-    cells = any(
-        law_has_trait(interface.numbers.law, "cells") for interface in model.rig.friction.interfaces
-    )
-    if not cells:
-        return out
-    merged = tuple(Variant(replace(numerics, joined=one), patch) for one in CELL_MERGES)
-    return [*out, CoarserRuns(merged, merged_cell_errors, of="cells")]
+        meshes = [replace(numerics, coarse_patch=True), *meshes]
+    coarser_runs = [CoarserRuns((mesh,), coarser_errors, of="mesh") for mesh in meshes]
+    laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
+    if any(law_has_trait(law, "cells") for law in laws):
+        merged = tuple(replace(numerics, joined=cells) for cells in CELL_MERGES)
+        coarser_runs.append(CoarserRuns(merged, merged_cell_errors, of="cells"))
+    return coarser_runs
 
 
 def _numerics_of_meshes(model: Model, numerics) -> list:
     """Return one Numerics per interface patch, in which only this patch has a coarser mesh."""
     if not model.rig.friction.has_partial_slip:
         return []
-    return [replace(numerics, meshed=one) for one in faces.interfaces_with_coarse_mesh(model)]
+    return [
+        replace(numerics, meshed=interfaces)
+        for interfaces in faces.interfaces_with_coarse_mesh(model)
+    ]
 
 
 def _divide_steps(numerics, share: int):
@@ -294,18 +248,10 @@ def _divide_steps(numerics, share: int):
     return replace(numerics, steps=max(1, numerics.steps // share))
 
 
-def _march_in_time(model: Model, numerics, patch) -> list:
+def _march_in_time(model: Model, numerics) -> list:
     """Return the coarse runs of a march in time: with half and a quarter of the steps."""
-    return [
-        CoarserRuns(
-            _halves(numerics, patch), partial(step_errors, steps=numerics.steps), of="steps"
-        )
-    ]
-
-
-def _halves(numerics, patch) -> tuple:
-    """Return the Variants with half and a quarter of the steps."""
-    return tuple(Variant(_divide_steps(numerics, share), patch) for share in (2, 4))
+    runs = (_divide_steps(numerics, 2), _divide_steps(numerics, 4))
+    return [CoarserRuns(runs, partial(step_errors, steps=numerics.steps), of="steps")]
 
 
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
@@ -313,18 +259,18 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
     They have a coarser mesh, another number of shear modes, or another sum over bonds.
     """
-    few = _divide_steps(numerics, 4)
+    quarter = _divide_steps(numerics, 4)
     varies = model.rig.friction.load_varies
-    out = []
-    quarter = Variant(few, patch)
+    coarser_runs = []
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     if coarse is not None and (varies or model.partial_slip):
         # the number of shear modes is fixed, so that only the mesh changes
-        fixed = few if shape is None else replace(few, shear_modes=shape.size)
-        out.append(make_coarser_space(Variant(fixed, coarse), quarter))
-    out += [
-        make_coarser_space(Variant(one, patch), quarter) for one in _numerics_of_meshes(model, few)
-    ]
+        coarser = replace(quarter, coarse_patch=True)
+        if shape is not None:
+            coarser = replace(coarser, shear_modes=shape.size)
+        coarser_runs.append(make_coarser_space(coarser, quarter))
+    for coarser in _numerics_of_meshes(model, quarter):
+        coarser_runs.append(make_coarser_space(coarser, quarter))
     climbs = model.grooves is not None
     gathers = model.patch is not None and model.patch.mesh.can_gather_points
     # a reduction to few points states the error of its modes itself
@@ -332,13 +278,15 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     if shape is not None and (
         varies or climbs or (pointed and law_has_trait(model.friction.law, "bonds"))
     ):
-        other = replace(few, shear_modes=shear_modes.comparison_mode_count(shape.size))
-        out.append(make_coarser_space(Variant(other, patch), quarter, "modes"))
-    return [*out, *_coarse_sums(model, few, patch, solution)]
+        n_modes = shear_modes.comparison_mode_count(shape.size)
+        coarser_runs.append(
+            make_coarser_space(replace(quarter, shear_modes=n_modes), quarter, "modes")
+        )
+    return [*coarser_runs, *_coarse_sums(model, quarter, patch, solution)]
 
 
-def _coarse_sums(model: Model, few, patch, solution) -> list:
-    """Return the coarse runs of a list of bonds, at the steps of `few`.
+def _coarse_sums(model: Model, quarter, patch, solution) -> list:
+    """Return the coarse runs of a list of bonds, at the steps of the Numerics `quarter`.
 
     They are its bound on forces and energies and, if it merges bonds or its tail is large, the
     change of the motion with narrower strips and a smaller tail.
@@ -346,16 +294,17 @@ def _coarse_sums(model: Model, few, patch, solution) -> list:
     choice = solution.summed
     if choice is None or not choice.error:
         return []
-    out = [
+    coarser_runs = [
         CoarserRuns(
             (), lambda fine: _sum_errors(model, patch, choice.error, fine, solution), of="bonds"
         )
     ]
     if choice.merge > 0 or choice.tail > LOOSE * model.accuracy.tolerance:
         finer = replace(choice, merge=FINER * choice.merge, tail=LESS * choice.tail)
-        same, narrow = (Variant(replace(few, choice=one), patch) for one in (choice, finer))
-        out.append(CoarserRuns((narrow,), finer_errors, same, "bonds"))
-    return out
+        same = replace(quarter, choice=choice)
+        narrow = replace(quarter, choice=finer)
+        coarser_runs.append(CoarserRuns((narrow,), finer_errors, same, "bonds"))
+    return coarser_runs
 
 
 def _sum_errors(model: Model, patch, fraction: float, values: dict, solution) -> dict:
@@ -398,45 +347,35 @@ COARSER = 30.0  # factor of the error of a step in the coarse run
 WIDER_TOLERANCE = partial(coarser_errors, ratio=COARSER)
 
 
-def _smooth_in_time(model: Model, numerics, patch) -> list:
+def _smooth_in_time(model: Model, numerics) -> list:
     """Return the coarse run of the smooth engine, whose steps may have COARSER times the error.
 
     The error of a run is proportional to that of its steps.
     """
-    wider = Variant(replace(numerics, local=numerics.local * COARSER), patch)
+    wider = replace(numerics, local=numerics.local * COARSER)
     return [CoarserRuns((wider,), WIDER_TOLERANCE)]
 
 
 EXACT = Engine(
     "exact",
     "exact",
-    "pieces run_exact",
     _none,
     _exact_in_space,
-    "costs exact_cost",
     why_not_cheapest=reason_to_march_events,
-    refuse="costs refuse_endless",
 )
 PIECES = Engine(
     "piecewise",
     "exact",
-    "pieces run_piecewise",
     _none,
     _pieces_in_space,
-    "costs exact_cost",
     why_not_cheapest=reason_to_march_elements,
-    choose_numerics="numerics yield_numerics",
-    refuse="costs refuse_endless",
 )
 SMOOTH = Engine(
     "smooth",
     "",
-    "smooth run_smooth",
     _smooth_in_time,
     _own_errors,
-    "costs smooth_cost",
     why_not_cheapest=reason_to_march_smooth_law,
-    choose_numerics="numerics smooth_numerics",
     min_relative_error=3e-8,
     max_balance_error=None,
     summary_numbers=("iterations",),
@@ -444,25 +383,16 @@ SMOOTH = Engine(
 MARCH = Engine(
     "march",
     "march",
-    "march run_march",
     _march_in_time,
     _march_in_space,
-    "plan march_cost",
-    choose_numerics="numerics march_numerics",
-    refuse="lists refuse_long_list",
-    notes="motion_warnings marched_elements",
     summary_numbers=("steps_per_cycle", "iterations"),
     saves_state=True,
 )
 HARMONIC = Engine(
     "harmonic",
     "harmonic",
-    "steady.steady run_steady",
     _none,
     _steady_in_space,
-    "plan steady_cost",
-    plan_sentences="plan steady_words",
-    notes="motion_warnings unmoved_elements",
     max_balance_error=None,
     finds_periodic_motion=True,
 )

@@ -1,6 +1,6 @@
 """Amplitude above which friction does not limit a mode that gains energy.
 
-In: a `rig.Coupled` with a mode of negative damping. Out: `flutter_amplitude`, the amplitude of
+In: a `passes.Coupled` with a mode of negative damping. Out: `flutter_amplitude`, the amplitude of
 the largest unstable limit cycle (`dynamics.limit_cycles`), and notes.
 """
 
@@ -39,7 +39,7 @@ NO_SLIDING_NOTE = (
 
 
 def find_limit_cycles(run) -> tuple:
-    """Return the measures by name and the notes on unstable limit cycles of a `rig.Coupled`.
+    """Return the measures by name and the notes on unstable limit cycles of a `passes.Coupled`.
 
     The measure is the amplitude of the largest unstable limit cycle with its error, or the reason
     why it is not known.
@@ -50,9 +50,9 @@ def find_limit_cycles(run) -> tuple:
     found, reason, looked = _cycles(model, run.numerics, run.patch)
     far = (
         [
-            f"the run ended after {run.raw.response.time[-1]:.4g} s, when the motion exceeded {MAX_TRAVEL:g} m"
+            f"the run ended after {run.solution.response.time[-1]:.4g} s, when the motion exceeded {MAX_TRAVEL:g} m"
         ]
-        if run.raw.outcome is Outcome.EXCEEDS_TRAVEL and model.rig.springs.travel == MAX_TRAVEL
+        if run.solution.outcome is Outcome.EXCEEDS_TRAVEL and model.rig.springs.travel == MAX_TRAVEL
         else []
     )
     edges = [one for one in found if not one.is_stable]

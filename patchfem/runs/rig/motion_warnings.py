@@ -1,6 +1,6 @@
 """Warnings of a coupled run on its law, load and engine, and notes on their meaning.
 
-In: a `rig.Coupled`. Out: lists of sentences.
+In: a `passes.Coupled`. Out: lists of sentences.
 """
 
 import numpy as np
@@ -38,10 +38,10 @@ AS_ONE_POINT = (
 
 
 def collect_warnings(run) -> list:
-    """Return the warnings of a `rig.Coupled`."""
+    """Return the warnings of a `passes.Coupled`."""
     model = run.model
     patch = run.patch
-    raw = run.raw
+    raw = run.solution
     found = run.measures
     book = raw.book
     harmonics = raw.extra.get("harmonics")
@@ -55,7 +55,7 @@ def collect_warnings(run) -> list:
         *_as_one_point(model, patch, run.numerics),
         *note_on_heating(model, patch, raw.response, book["friction"]),
     ]
-    if run.rubs:
+    if run.has_friction:
         out += law_warnings(model, run.outcome, found, float(np.abs(raw.window.slide_rate).max()))
     out += created_warning(model, book, model.rig.drive.cycles)
     if (
@@ -104,7 +104,7 @@ def peak_at_an_end(run, modes) -> list:
 
     Parameters
     ----------
-    run : rig.Coupled
+    run : passes.Coupled
     modes : callable
         Returns the modes, as `plan.mode_frequencies` does.
     """
@@ -167,9 +167,9 @@ def _nearest_resonance(modes: list, at: float, upper: bool) -> list:
 
 
 def collect_notes(run) -> list:
-    """Return the notes of a `rig.Coupled` on its law, engine, fields and the end of its motion."""
+    """Return the notes of a `passes.Coupled` on its law, engine, fields and the end of its motion."""
     model = run.model
-    raw = run.raw
+    raw = run.solution
     rig = run.model.rig
     ended = [
         *_lateral_motion_sentence(run),
@@ -183,7 +183,7 @@ def collect_notes(run) -> list:
     out = [*_bond_notes(model, run.patch, raw), *climbing_as_one(model, run.patch)]
     f = model.friction
     if len(rig.friction.interfaces):
-        out += ENGINES[run.numerics.engine].call("notes", model, run.numerics, run.patch, raw) or []
+        out += _engine_notes(run)
     if raw.levels and rig.drive.levels.onset[0] == "slip" and raw.held > 0:
         out.append(
             f"onset_level: slip counts only if its amplitude is above {format_length(raw.held)}, a thousandth of the "
@@ -201,7 +201,7 @@ def collect_notes(run) -> list:
 def _release_sentence(run) -> list:
     """Return the sentence on the time span of the measures of a release that still decays."""
     rig = run.model.rig
-    window = run.raw.window
+    window = run.solution.window
     main = run.measures["relative_displacement_amplitude"]
     if (
         rig.drive.kind != "free"
@@ -227,7 +227,7 @@ def _lateral_motion_sentence(run) -> list:
         or not run.patch.strips.load
     ):
         return []
-    swing, share = strips.lateral_motion(run.patch, run.raw.window, run.drive.period)
+    swing, share = strips.lateral_motion(run.patch, run.solution.window, run.drive.period)
     return (
         [
             f"the yaw moves the ends of the patch by up to {format_length(swing)} across x, but the "
@@ -279,34 +279,37 @@ def _bond_notes(model, patch, raw) -> list:
     )
 
 
-def marched_elements(model, numerics, patch, raw) -> list:
-    """Return the note on a march of elements with too many yields for the exact engine.
-
-    The parameters are those of `Engine.notes`.
-    """
-    if (
-        PIECES.lacks(model)
-        or model.accuracy.method != "auto"
-        or "steps_per_cycle" in numerics.pinned
-    ):
+def _engine_notes(run) -> list:
+    """Return the note on a march, or on a steady motion, of elements that stick or slip."""
+    if PIECES.lacks(run.model):
         return []
-    pinned = patch is not None and not model.patch.mesh.is_automatic
+    if run.numerics.engine == "march":
+        return _note_marched_elements(run)
+    if ENGINES[run.numerics.engine].finds_periodic_motion:
+        return _note_unmoved_elements(run)
+    return []
+
+
+def _note_marched_elements(run) -> list:
+    """Return the note on a march of elements with too many yields for the exact engine."""
+    model = run.model
+    if model.accuracy.method != "auto" or "steps_per_cycle" in run.numerics.pinned:
+        return []
+    pinned = run.patch is not None and not model.patch.mesh.is_automatic
     return [
         f"the motion is computed in time steps, because {reason_to_march_elements(model)}; "
         f'{"on a coarser mesh, or " * pinned}with accuracy.method = "exact" the motion is computed exactly'
     ]
 
 
-def unmoved_elements(model, numerics, patch, raw) -> list:
-    """Return the note on a steady motion with elements that never slip.
-
-    The parameters are those of `Engine.notes`.
-    """
-    if PIECES.lacks(model) or raw.outcome not in (Outcome.STEADY, Outcome.STUCK):
+def _note_unmoved_elements(run) -> list:
+    """Return the note on a steady motion with elements that never slip."""
+    if run.solution.outcome not in (Outcome.STEADY, Outcome.STUCK):
         return []
-
-    slides = raw.window.extra.get("slides", raw.window.slide[:, None])
-    for group, slide in zip(pieces.YieldingElements(model, numerics, patch).groups, slides.T):
+    window = run.solution.window
+    slides = window.extra.get("slides", window.slide[:, None])
+    elements = pieces.YieldingElements(run.model, run.numerics, run.patch)
+    for group, slide in zip(elements.groups, slides.T):
         most = float(group.yield_displacement.max(initial=0.0))
         half = float(np.ptp(slide)) / 2
         if most > half:

@@ -11,8 +11,8 @@ import numpy as np
 from ...effects import law_has_trait
 from ...model.model import Model
 from ...structure.drive_sizes import count_repeat_cycles, find_min_decay_rate, is_sinusoidal
-from .costs import count_merges, steps_per_cycle
-from .engines import choose_engine
+from .costs import MARCH_SETTINGS, count_merges, steps_per_cycle
+from .engines import MARCH, PIECES, SMOOTH, choose_engine
 
 # fraction of a cycle by which a run may differ from whole cycles: a record of 30 periods has 30
 WHOLE_CYCLE_TOL = 1e-6
@@ -39,6 +39,7 @@ class Numerics:
       none.
     - richer: whether the run has more modes of a reduced structure.
     - meshed: indices of the interfaces whose patches are those on a coarser mesh.
+    - coarse_patch: whether the patch of [contact] is that on a coarser mesh.
     """
 
     engine: str
@@ -55,6 +56,7 @@ class Numerics:
     joined: tuple = ()
     richer: bool = False
     meshed: tuple = ()
+    coarse_patch: bool = False
 
     def finer(self):
         """Return finer settings for the next run.
@@ -64,11 +66,9 @@ class Numerics:
         """
         if self.pairs:
             return replace(self, pairs=max(0, self.pairs - 2))
-        return (
-            replace(self, local=0.01 * self.local)
-            if self.local
-            else replace(self, steps=2 * self.steps)
-        )
+        if self.local:
+            return replace(self, local=0.01 * self.local)
+        return replace(self, steps=2 * self.steps)
 
 
 def choose(model: Model) -> Numerics:
@@ -100,12 +100,8 @@ def choose(model: Model) -> Numerics:
     steps = steps_per_cycle(model)
     if not is_sinusoidal(rig.drive.signal) and accuracy.steps_per_cycle is None:
         steps = max(steps, int(np.ceil(LEAST_KEPT / rig.drive.cycles)))
-    pinned = {
-        k
-        for k in ("steps_per_cycle", "tail", "merge", "shear_modes")
-        if getattr(accuracy, k) is not None
-    }
-    found = Numerics(
+    pinned = {key for key in MARCH_SETTINGS if getattr(accuracy, key) is not None}
+    numerics = Numerics(
         engine.name,
         steps,
         rig.drive.cycles,
@@ -114,26 +110,15 @@ def choose(model: Model) -> Numerics:
         model.side == "lower",
         frozenset(pinned),
     )
-    return engine.call("choose_numerics", model, found) or found
-
-
-def march_numerics(model: Model, found: Numerics) -> Numerics:
-    """Return the settings of a march: steps with a unique solution that end where the run ends."""
-    if "steps_per_cycle" in found.pinned:
-        return found
-    return replace(
-        found, steps=ending(max(found.steps, unique_steps(model)), model.rig.drive.cycles)
-    )
-
-
-def smooth_numerics(model: Model, found: Numerics) -> Numerics:
-    """Return the settings of the smooth engine: the error of a step."""
-    return replace(found, local=step_tolerance(model.accuracy.tolerance))
-
-
-def yield_numerics(model: Model, found: Numerics) -> Numerics:
-    """Return the settings of the engine of yields: the merging of cells of a density."""
-    return replace(found, pairs=count_merges(model))
+    if engine is SMOOTH:
+        return replace(numerics, local=step_tolerance(accuracy.tolerance))
+    if engine is PIECES:
+        return replace(numerics, pairs=count_merges(model))
+    if engine is MARCH and accuracy.steps_per_cycle is None:
+        # the solution is unique, and the last step ends where the run ends
+        steps = ending(max(steps, unique_steps(model)), rig.drive.cycles)
+        return replace(numerics, steps=steps)
+    return numerics
 
 
 def step_tolerance(tolerance: float) -> float:

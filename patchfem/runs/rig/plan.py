@@ -30,10 +30,12 @@ from ..cost import (
 from . import lists
 from .costs import (
     MARCH_HISTORY,
+    exact_cost,
     exact_words,
     history_parts,
     kept_samples,
     ringing_and_events,
+    smooth_cost,
     steps_per_cycle,
 )
 from .engines import ENGINES, PIECES, choose_steady_method
@@ -158,17 +160,25 @@ def cost(model: Model, points: int) -> Cost:
     """
     rig = model.rig
     numerics = choose(model)
-    engine = ENGINES[numerics.engine]
     count = len(rig.structure.frequencies)
     rows = len(getattr(rig.drive.signal, "breaks", ())) if not rig.drive.signal.segments else 0
     rows_key = "drive.file" if "file" in rig.drive.waveform.required_keys else "drive.duration"
     structure = MemoryPart(MODE_PAIR * count**2, f"{count} modes", "structure")
     drive = MemoryPart(DRIVE_ROW * rows, f"{rows} rows of the drive", rows_key)
-    words = (
-        tuple(engine.call("plan_sentences", model, numerics)) if model.friction is not None else ()
+    words = ()
+    if model.friction is not None:
+        words = tuple(_motion_sentences(model, numerics))
+    rig_cost = Cost(
+        parts=(structure, drive), words=words, sizes={"modes": count}, engine=numerics.engine
     )
-    whole = Cost(parts=(structure, drive), words=words, sizes={"modes": count}, engine=engine.name)
-    return whole + engine.call("cost", model, numerics, points)
+    return rig_cost + COSTS[numerics.engine](model, numerics, points)
+
+
+def _motion_sentences(model: Model, numerics) -> list:
+    """Return the sentences on how the motion of a rig with friction is computed."""
+    if ENGINES[numerics.engine].finds_periodic_motion:
+        return [f"the steady motion is found by {choose_steady_method(model).words}"]
+    return bond_sum_sentences(model, numerics)
 
 
 def march_cost(model: Model, numerics, points: int) -> Cost:
@@ -372,11 +382,6 @@ def _sliding(d: float) -> str:
     return f"D = {d:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"
 
 
-def steady_words(model: Model, numerics) -> list:
-    """Return the sentence on how a steady motion is found, as a list."""
-    return [f"the steady motion is found by {choose_steady_method(model).words}"]
-
-
 def bond_sum_sentences(model: Model, numerics) -> list:
     """Return sentences on the sum over bonds of law 'nonlocal', or on the engine of elements."""
     if not law_has_trait(model.friction.law, "bonds"):
@@ -497,3 +502,13 @@ def _smooth_law_seconds(rig) -> float:
         flowing * cost_model.FLOWING_LAW_POINT_SECONDS
         + smooth * cost_model.MULTIPLIER_SECONDS[flowing] * size**3
     )
+
+
+# function of each engine: (model, numerics, points) -> Cost
+COSTS = {
+    "exact": exact_cost,
+    "piecewise": exact_cost,
+    "smooth": smooth_cost,
+    "march": march_cost,
+    "harmonic": steady_cost,
+}

@@ -15,7 +15,7 @@ from ..bench.closed import integrate_steps
 from ..bench.engine import steps_per_cycle
 from ..patch.press import areas
 from ..results.travel import outcome_on_piece
-from ..rig import engines, fields, numerics
+from ..rig import fields, numerics, solve
 
 UNBOUNDED_OUTCOMES = (
     Outcome.GROWS,
@@ -105,9 +105,7 @@ def _rig(model, patch, frames: int) -> CycleSlip:
     """Return the slip of the last cycle of a rig."""
     chosen = numerics.choose(model)
     shaped = not slips_uniformly(model, chosen.per_point and model.grooves is None)
-    found = engines.ENGINES[chosen.engine].run(
-        model, chosen, patch, frames if shaped else 0, None, None
-    )
+    found = solve.solve(model, chosen, patch, frames if shaped else 0)
     amplitude = Measure(found.values["relative_displacement_amplitude"], "m", 0.0)
     wanted = {"relative_displacement_amplitude": amplitude}
     settled, _ = judge_outcome(found, wanted, model.accuracy.tolerance, model.rig.drive.signal)

@@ -8,10 +8,19 @@ harmonic balance (`balance`).
 """
 
 from ....core import NotConverged, SineDrive
-from ..engines import FINDERS, PIECES, choose_steady_method, import_function
+from ..engines import PIECES, choose_steady_method
 from ..solution import Solution
+from . import balance, maps, marched
 from .curves import motion_at_levels
 from .top import solve_peak
+
+# finder of each method of `engines.FINDERS`; its module is loaded when it is made
+FINDERS = {
+    "events": lambda *arguments: maps.EventFinder(*arguments),
+    "yields": lambda *arguments: maps.YieldFinder(*arguments),
+    "march": lambda *arguments: marched.MarchFinder(*arguments),
+    "balance": lambda *arguments: balance.BalanceFinder(*arguments),
+}
 
 
 def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -34,18 +43,16 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
     -------
     Solution
     """
-    by = choose_steady_method(model)
+    method = choose_steady_method(model)
     try:
-        return _solve_steady(import_function(by.solve)(model, numerics, patch, frames, say), model)
+        return _solve_drive(FINDERS[method.name](model, numerics, patch, frames, say), model)
     except NotConverged:
-        if by.engine != PIECES.name or len(model.rig.friction.interfaces) > 1:
+        if method.engine != PIECES.name or len(model.rig.friction.interfaces) > 1:
             raise
-    return _solve_steady(
-        import_function(FINDERS["balance"].solve)(model, numerics, patch, frames, say), model
-    )
+    return _solve_drive(balance.BalanceFinder(model, numerics, patch, frames, say), model)
 
 
-def _solve_steady(finder, model) -> Solution:
+def _solve_drive(finder, model) -> Solution:
     """Return the Solution of a finder under the drive of a model."""
     drive = model.rig.drive.signal
     if isinstance(drive, SineDrive):

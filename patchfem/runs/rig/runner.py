@@ -1,0 +1,168 @@
+"""Runs of one rig at several numerical settings, with the fraction that is completed.
+
+In: the inputs of a run. Out: the Solution at given settings, and errors from coarser runs, each of
+which is solved once.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...core import NotConverged
+from ...response.coarser import estimate_errors
+from ...response.rows import NEEDS_RUN
+from ..patch import faces
+from ..results.result import FRAMES, RunInputs
+from . import motion_warnings
+from .engines import ENGINES
+from .numerics import Numerics
+from .solution import Solution
+from .solve import solve
+from .steady import curves
+
+# relative difference from the amplitude of a coarser run, above which it may belong to another peak
+OTHER_PEAK_RATIO = 0.1
+
+
+class Runner:
+    """Solver of one rig at several numerical settings.
+
+    Parameters
+    ----------
+    inputs : RunInputs
+    numerics : Numerics
+        Settings of the first run.
+
+    Attributes
+    ----------
+    solutions : dict
+        Solution of each coarser run by its Numerics.
+    error_seconds : float
+        CPU seconds of the coarser runs.
+    """
+
+    def __init__(self, inputs: RunInputs, numerics: Numerics):
+        self.inputs = inputs
+        self.model = inputs.plan.model
+        self.solutions: dict = {}
+        self.error_seconds = 0.0
+        self.progress = RunProgress(inputs.progress, _expected_steps(inputs, numerics))
+
+    def solve(self, numerics: Numerics) -> Solution:
+        """Return the Solution of the model with its fields."""
+        model = self.model
+        has_fields = self.inputs.patch is not None and not model.patch.mesh.can_gather_points
+        frames = FRAMES if has_fields or model.rig.friction.has_partial_slip else 0
+        return self._solve(model, numerics, frames, self.inputs.say)
+
+    def estimate(self, coarser_runs: list, solution: Solution) -> list:
+        """Return the errors of a run by measure name, one dict per entry of `coarser_runs`."""
+        errors, seconds = estimate_errors(
+            lambda numerics: self._solve_coarser(numerics, solution),
+            solution.values,
+            coarser_runs,
+            self.solutions,
+        )
+        self.error_seconds += seconds
+        return errors
+
+    def _solve_coarser(self, numerics: Numerics, fine: Solution) -> Solution:
+        """Return the Solution of a coarser run; that of a curve only around the peak of `fine`."""
+        model = self.model
+        if numerics.richer:
+            model = replace(model, rig=model.rig.structure.richer_rig)
+        # the decay curve and some measures need the histories of the whole run
+        needs_whole = self.model.rig.drive.kind == "free" or bool(NEEDS_RUN)
+        numerics = replace(numerics, whole=needs_whole)
+        return self._solve_around_peak(model, numerics, fine) or self._solve(model, numerics)
+
+    def _solve_around_peak(self, model, numerics: Numerics, fine: Solution) -> Solution | None:
+        """Return the coarser run of a curve, computed only around its largest amplitude.
+
+        It is None if there is no curve, or if the run has its largest amplitude elsewhere.
+        """
+        rig = model.rig
+        if "at_error" not in fine.extra or rig.drive.levels.amplitudes or rig.springs.is_nonlinear:
+            return None
+        drive = curves.sweep_around_peak(
+            rig.drive.signal, fine.extra["curve"], fine.extra["at"].omega / (2 * np.pi)
+        )
+        if drive is None:
+            return None
+        try:
+            solution = self._solve(replace(model, rig=rig.with_signal(drive)), numerics)
+        except NotConverged:  # the whole curve may start where a motion is found
+            return None
+        name = "relative_displacement_amplitude"
+        if "at" not in solution.extra or name not in solution.values:
+            return None
+        peak_frequency = solution.extra["at"].omega / (2 * np.pi)
+        if motion_warnings.nearest_sweep_end(peak_frequency, drive.low, drive.high) is not None:
+            return None
+        change = abs(solution.values[name] / fine.values[name] - 1)
+        return solution if change <= OTHER_PEAK_RATIO else None
+
+    def _solve(self, model, numerics: Numerics, frames: int = 0, say=None) -> Solution:
+        """Return the Solution of a model at given settings, and count its steps as completed."""
+        patch = self.inputs.coarse[0] if numerics.coarse_patch else self.inputs.patch
+        report = self.progress.make_callback(numerics.steps)
+        solution = solve(model, numerics, patch, frames, say, report)
+        self.progress.done += numerics.steps
+        return solution
+
+
+class RunProgress:
+    """Completed fraction of all runs, each weighted by its steps; it never decreases.
+
+    Parameters
+    ----------
+    callback : callable or None
+        Called with the completed fraction.
+    expected_steps : float
+        Expected steps per cycle of all runs together.
+
+    Attributes
+    ----------
+    done : float
+        Steps per cycle of the completed runs.
+    """
+
+    def __init__(self, callback, expected_steps: float):
+        self.callback = callback
+        self.expected_steps = expected_steps
+        self.done = 0.0
+        self.shown = 0.0
+
+    def make_callback(self, steps: float):
+        """Return the callback of a run with this number of steps per cycle; None without one."""
+        if self.callback is None:
+            return None
+
+        def report(fraction: float) -> None:
+            """Report the completed fraction of this run."""
+            expected = max(self.expected_steps, self.done + steps)
+            self.shown = max(self.shown, (self.done + fraction * steps) / expected)
+            self.callback(self.shown)
+
+        return report
+
+
+def _expected_steps(inputs: RunInputs, numerics: Numerics) -> float:
+    """Return the steps per cycle of a run and of its coarser runs together.
+
+    A run on a coarser mesh has the smallest number of steps.
+    """
+    if not inputs.estimate:
+        return numerics.steps
+    model = inputs.plan.model
+    engine = ENGINES[numerics.engine]
+    steps = {numerics: numerics.steps}
+    for kind in [
+        *engine.coarser_in_time(model, numerics),
+        *engine.richer_in_modes(model, numerics),
+    ]:
+        steps |= {run: run.steps for run in kind.runs}
+    n_meshes = int(inputs.coarse[0] is not None and bool(model.partial_slip))
+    if model.rig.friction.has_partial_slip:
+        n_meshes += len(faces.interfaces_with_coarse_mesh(model))
+    return sum(steps.values()) + n_meshes * min(steps.values())
