@@ -46,23 +46,23 @@ def compute_decay(raw: Solution) -> DecayCurve | None:
     evaluation plus the changes in the coarse runs at the same amplitudes; they are infinite outside
     the range of a coarse run.
     """
-    found = _read(raw)
-    if not found.time.size:
+    curve = _read(raw)
+    if not curve.time.size:
         return None
-    found = _add_coarse_changes(found, raw)
-    known = (found.frequency_error <= MAX_POINT_ERROR * found.frequency) & (
-        found.damping_error <= MAX_POINT_ERROR * np.abs(found.damping)
+    curve = _add_coarse_changes(curve, raw)
+    known = (curve.frequency_error <= MAX_POINT_ERROR * curve.frequency) & (
+        curve.damping_error <= MAX_POINT_ERROR * np.abs(curve.damping)
     )
-    return found.at(known) if known.any() else None
+    return curve.at(known) if known.any() else None
 
 
-def _add_coarse_changes(found: DecayCurve, raw: Solution) -> DecayCurve:
+def _add_coarse_changes(curve: DecayCurve, raw: Solution) -> DecayCurve:
     """Return the curve of a run with its differences from coarse runs added to the errors."""
     for run, beside in raw.coarser:
-        one = _read(run).over(found.amplitude)
-        other = found if beside is None else _read(beside).over(found.amplitude)
-        found = found.add_difference(one, other)
-    return found
+        coarse = _read(run).over(curve.amplitude)
+        reference = curve if beside is None else _read(beside).over(curve.amplitude)
+        curve = curve.add_difference(coarse, reference)
+    return curve
 
 
 def _read(run: Solution) -> DecayCurve:
@@ -73,21 +73,19 @@ def _read(run: Solution) -> DecayCurve:
     none of them.
     """
     motion = run.response
-    held = run.extra.get("tail")
-    found = compute_swing_curve(
-        half_swings_between(*find_turning_points(motion.time, motion.output, motion.output_rate))
-    )
-    if held is None:
-        return found
-    time = np.arange(held.begin, held.end, 0.5 / held.frequency)
-    rate = 2 * np.pi * held.frequency * held.damping / np.sqrt(1 - held.damping**2)
-    size = held.displacement * np.exp(-rate * (time - held.begin))
-    still = np.zeros(time.size)
-    kept = size > MIN_HALF_SWING * np.abs(motion.output).max()
-    rings = DecayCurve(time, size, still + held.frequency, still, still + held.damping, still).at(
-        kept
-    )
-    return DecayCurve(*map(np.concatenate, zip(found.at(found.time < held.begin), rings)))
+    mode = run.extra.get("tail")
+    reversals = find_turning_points(motion.time, motion.output, motion.output_rate)
+    swings = compute_swing_curve(half_swings_between(*reversals))
+    if mode is None:
+        return swings
+    time = np.arange(mode.begin, mode.end, 0.5 / mode.frequency)
+    rate = 2 * np.pi * mode.frequency * mode.damping / np.sqrt(1 - mode.damping**2)
+    amplitude = mode.displacement * np.exp(-rate * (time - mode.begin))
+    zero = np.zeros(time.size)
+    ringing = DecayCurve(time, amplitude, zero + mode.frequency, zero, zero + mode.damping, zero)
+    ringing = ringing.at(amplitude > MIN_HALF_SWING * np.abs(motion.output).max())
+    slipping = swings.at(swings.time < mode.begin)
+    return DecayCurve(*map(np.concatenate, zip(slipping, ringing)))
 
 
 def laws_on(model, patch, meshed: tuple = ()):
@@ -163,14 +161,13 @@ def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarra
     )
 
 
-def decay_rows(modes, found: list) -> np.ndarray:
+def decay_rows(modes, motions: list) -> np.ndarray:
     """Return output amplitude [m], frequency [Hz], damping and loss [J] (4, k) of `StaticMotion`s."""
-    return np.array(
-        [
-            (abs(float(modes.output @ one.z)), one.omega / (2 * np.pi), one.zeta, one.loss)
-            for one in found
-        ]
-    ).T
+    amplitude = [abs(float(modes.output @ motion.z)) for motion in motions]
+    frequency = [motion.omega / (2 * np.pi) for motion in motions]
+    damping = [motion.zeta for motion in motions]
+    loss = [motion.loss for motion in motions]
+    return np.array([amplitude, frequency, damping, loss])
 
 
 def mesh_error(fine, rough, read) -> np.ndarray:
@@ -243,12 +240,17 @@ def mesh_errors_of_decay(model, patch, coarse, amplitudes, mode) -> tuple:
     known = np.isfinite(error).all(axis=0)
     if not known.any():
         return none, NOT_STATIC
-    return np.array(
-        [np.interp(np.log(amplitudes), np.log(amplitudes[known]), one[known]) for one in error]
-    ), ""
+    return _interpolate_rows(amplitudes, amplitudes[known], error[:, known]), ""
 
 
-def left_by_mesh_on(amplitude, frequency: float, model, patch, coarse) -> tuple:
+def _interpolate_rows(amplitudes, known_amplitudes, rows) -> np.ndarray:
+    """Interpolate rows (r, k), given at known amplitudes (k,) [m], over the log of amplitudes."""
+    at = np.log(amplitudes)
+    known = np.log(known_amplitudes)
+    return np.array([np.interp(at, known, row) for row in rows])
+
+
+def mesh_errors_of_stuck_mode(amplitude, frequency: float, model, patch, coarse) -> tuple:
     """Return `mesh_errors_of_decay` at many amplitudes for the stuck mode nearest to a frequency.
 
     Parameters
@@ -263,45 +265,40 @@ def left_by_mesh_on(amplitude, frequency: float, model, patch, coarse) -> tuple:
     """
     low, high = np.log10([amplitude.min(), amplitude.max()])
     at = np.logspace(low, high, 2 + int(AMPLITUDES_PER_DECADE * (high - low)))
-    wide, why = mesh_errors_of_decay(
-        model, patch, coarse, at, lambda laws: _mode(model.rig.modes, laws, frequency)
+    errors, reason = mesh_errors_of_decay(
+        model, patch, coarse, at, lambda laws: _find_mode(model.rig.modes, laws, frequency)
     )
-    return np.array([np.interp(np.log(amplitude), np.log(at), one) for one in wide]), why
+    return _interpolate_rows(amplitude, at, errors), reason
 
 
-def slip_sentences(whys: dict, ways) -> list:
+def slip_sentences(reasons: dict, coarser_runs) -> list:
     """Return sentences on errors to which `mesh_errors_of_decay` could not be added.
 
     Parameters
     ----------
-    whys : dict
+    reasons : dict
         Reason, or "", by the name of what has these errors.
-    ways : callable
+    coarser_runs : callable
         Returns the `CoarserRuns` in space that contribute to them.
     """
-    out = []
-    for why in dict.fromkeys(filter(None, whys.values())):
-        whose = " and of ".join(name for name, one in whys.items() if one == why)
-        lacks = (
-            "the change on a coarser mesh, but not the energy that is lost in slip too small for either mesh to "
-            "resolve"
-            if any(one.of == "mesh" for one in ways())
-            else "no error of the mesh"
-        )
-        out.append(f"the errors of {whose} include {lacks}, because {why}")
-    return out
+    sentences = []
+    for reason in dict.fromkeys(filter(None, reasons.values())):
+        names = " and of ".join(name for name, cause in reasons.items() if cause == reason)
+        lacks = "no error of the mesh"
+        if any(kind.of == "mesh" for kind in coarser_runs()):
+            lacks = (
+                "the change on a coarser mesh, but not the energy that is lost in slip too small "
+                "for either mesh to resolve"
+            )
+        sentences.append(f"the errors of {names} include {lacks}, because {reason}")
+    return sentences
 
 
-def _mode(modes, laws, frequency: float) -> int:
+def _find_mode(modes, laws, frequency: float) -> int:
     """Return the index of the stuck mode that moves the output and is nearest to a frequency."""
-    held = [
-        modes.compute_stuck_mode(laws.rows, laws.stiffness(), k) for k in range(modes.omega.size)
-    ]
-    return int(
-        np.argmin(
-            [
-                abs(omega / (2 * np.pi) - frequency) if modes.output @ shape else np.inf
-                for omega, shape in held
-            ]
-        )
-    )
+    distances = np.full(modes.omega.size, np.inf)
+    for k in range(modes.omega.size):
+        omega, shape = modes.compute_stuck_mode(laws.rows, laws.stiffness(), k)
+        if modes.output @ shape:
+            distances[k] = abs(omega / (2 * np.pi) - frequency)
+    return int(np.argmin(distances))

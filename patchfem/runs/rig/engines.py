@@ -106,27 +106,25 @@ def reason_not_exact(model: Model, steady: bool = False) -> str:
 
     steady: see `Engine.lacks`.
     """
-    reasons = [one.lacks(model, steady) for one in ENGINES.values() if one.method == EXACT.method]
+    engines = [engine for engine in ENGINES.values() if engine.method == EXACT.method]
+    reasons = [engine.lacks(model, steady) for engine in engines]
     return reasons[-1] if all(reasons) else ""
 
 
 def motion_properties(model: Model, steady: bool = False) -> methods.MotionFeatures:
     """Return the properties of a model that decide which engines can compute it."""
     rig = model.rig
-    spring = (
-        "[structure.stiffening]"
-        if rig.springs.cubic is not None
-        else "structure.bonded.wavelength"
-        if rig.springs.interlock is not None
-        else f"[{model.grooves.key}]"
-        if model.grooves is not None
-        else ""
-    )
+    spring = ""
+    if rig.springs.cubic is not None:
+        spring = "[structure.stiffening]"
+    elif rig.springs.interlock is not None:
+        spring = "structure.bonded.wavelength"
+    elif model.grooves is not None:
+        spring = f"[{model.grooves.key}]"
     waveform = NO_WAVEFORM if steady else rig.drive.waveform
     laws = rig.friction.interfaces
-    whole = model.partial_slip
     return methods.MotionFeatures(
-        [methods.Joint(law.numbers, whole or law.partial_slip) for law in laws],
+        [methods.Joint(law.numbers, model.partial_slip or law.partial_slip) for law in laws],
         "under a load that changes" if rig.friction.load_varies else "",
         rig.friction.strips_slide_apart,
         spring,
@@ -173,12 +171,10 @@ def choose_steady_method(model: Model) -> Finder:
         return FINDERS["events"]
     if model.grooves is not None:
         return FINDERS["march"]
-    named = model.accuracy.harmonics is not None
-    return FINDERS[
-        "balance"
-        if named or PIECES.lacks(model) or pieces_per_cycle(model) > MOST_PIECES
-        else "yields"
-    ]
+    has_harmonics = model.accuracy.harmonics is not None
+    if has_harmonics or PIECES.lacks(model) or pieces_per_cycle(model) > MOST_PIECES:
+        return FINDERS["balance"]
+    return FINDERS["yields"]
 
 
 def _none(*_) -> list:
@@ -186,23 +182,32 @@ def _none(*_) -> list:
     return []
 
 
+# measures of the friction loop, which the trapezoidal rule computes from samples
+LOOP_MEASURES = (
+    "loop_area",
+    "equivalent_stiffness",
+    "equivalent_damping",
+    "slip_amplitude",
+    "friction_force_peak",
+)
+LOOP_SAMPLING_ERROR = 1e-4  # relative error of these measures from 400 samples per cycle
+INSTANT_SAMPLING_ERROR = (
+    0.005  # of the fraction in stick [1] and of the phase at which slip starts [rad]
+)
+MOTION_SAMPLING_ERROR = 1e-9  # relative error of all other measures
+
+
 def sampling_errors(values: dict) -> dict:
     """Return the errors of measures that are computed from 400 samples per cycle, by name."""
-    loops = (
-        "loop_area",
-        "equivalent_stiffness",
-        "equivalent_damping",
-        "slip_amplitude",
-        "friction_force_peak",
-    )
-    return {
-        name: 1e-4 * abs(value)
-        if name in loops
-        else 0.005
-        if name in ("stick_fraction", "slip_start_phase")
-        else 1e-9 * abs(value)
-        for name, value in values.items()
-    }
+    errors = {}
+    for name, value in values.items():
+        if name in LOOP_MEASURES:
+            errors[name] = LOOP_SAMPLING_ERROR * abs(value)
+        elif name in ("stick_fraction", "slip_start_phase"):
+            errors[name] = INSTANT_SAMPLING_ERROR
+        else:
+            errors[name] = MOTION_SAMPLING_ERROR * abs(value)
+    return errors
 
 
 def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
@@ -335,12 +340,10 @@ def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
 
 def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """Return the coarse runs of a steady motion on coarser meshes, and the errors it states."""
-    meshed = (
-        _pieces_in_space(model, numerics, patch, coarse, solution)
-        if choose_steady_method(model).engine == PIECES.name
-        else []
-    )
-    return [*_own_errors(model, numerics, patch, coarse, solution), *meshed]
+    coarser_runs = _own_errors(model, numerics, patch, coarse, solution)
+    if choose_steady_method(model).engine == PIECES.name:
+        coarser_runs += _pieces_in_space(model, numerics, patch, coarse, solution)
+    return coarser_runs
 
 
 COARSER = 30.0  # factor of the error of a step in the coarse run
@@ -405,19 +408,17 @@ def describe_balance_error(engine: Engine, measures: dict) -> str:
 
     measures: measures of the run by name, with their errors.
     """
-    found = measures.get("energy_balance")
-    if found is None or found.value is None:
+    balance = measures.get("energy_balance")
+    if balance is None or balance.value is None:
         return ""
-    bar = (
-        max(BALANCE_ROUND_OFF, found.error or 0.0)
-        if engine.max_balance_error is None
-        else engine.max_balance_error
-    )
-    if not found.value > bar:  # a motion that is not finite was detected before
+    limit = engine.max_balance_error
+    if limit is None:
+        limit = max(BALANCE_ROUND_OFF, balance.error or 0.0)
+    if not balance.value > limit:  # a motion that is not finite was detected before
         return ""
     return (
-        f"the energy balance of engine {engine.name} has an error of {found.value:.2g} of the energy exchanged, "
-        f"more than the limit of {bar:.2g}, so the numerical method created or lost energy"
+        f"the energy balance of engine {engine.name} has an error of {balance.value:.2g} of the energy exchanged, "
+        f"more than the limit of {limit:.2g}, so the numerical method created or lost energy"
     )
 
 
@@ -429,22 +430,30 @@ def choose_engine(model: Model) -> Engine:
     model), else the first of AUTOMATIC that can compute it and is not more expensive than the next
     one.
     """
-    named = [one for one in ENGINES.values() if one.method == model.accuracy.method]
+    named = [engine for engine in ENGINES.values() if engine.method == model.accuracy.method]
+    for engine in named[:-1]:
+        if not engine.lacks(model):
+            return engine
     if named:
-        return next((one for one in named if len(named) > 1 and not one.lacks(model)), named[-1])
-    return next(one for one in AUTOMATIC if not (one.lacks(model) or one.why_not_cheapest(model)))
+        return named[-1]
+    for engine in AUTOMATIC[:-1]:
+        if not engine.lacks(model) and not engine.why_not_cheapest(model):
+            return engine
+    return AUTOMATIC[-1]
 
 
 def unused_settings(model: Model, engine: str) -> list:
     """Return sentences on the settings in [accuracy] of a rig that its engine does not use."""
-    by = choose_steady_method(model).engine if ENGINES[engine].finds_periodic_motion else engine
-    where = {
+    used = engine
+    if ENGINES[engine].finds_periodic_motion:
+        used = choose_steady_method(model).engine
+    reasons = {
         "steps_per_cycle": f"for engine '{engine}', which has no steps,",
         "harmonics": "if the steady motion is found by the exact solution from event to event",
     }
-    plain = f"for engine '{engine}'"
-    return [
-        f"accuracy.{knob} has no meaning {where.get(knob, plain)} and is not used"
-        for knob in list_fixed_settings(model.accuracy)
-        if not has_effect(knob, model.kind, by)
-    ]
+    sentences = []
+    for key in list_fixed_settings(model.accuracy):
+        if not has_effect(key, model.kind, used):
+            reason = reasons.get(key, f"for engine '{engine}'")
+            sentences.append(f"accuracy.{key} has no meaning {reason} and is not used")
+    return sentences

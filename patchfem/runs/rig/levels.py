@@ -5,6 +5,7 @@ bisection, and the joined run.
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -31,7 +32,7 @@ def level_ends(rig) -> tuple:
     return tuple(rig.drive.levels.cycles * (k + 1) for k in range(len(rig.drive.levels.amplitudes)))
 
 
-def levels_with_errors(levels, ways, made: dict) -> tuple:
+def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
     """Return the levels with the errors from their coarse runs in addition to their own errors.
 
     The error of a measure that a coarse run does not have is its absolute value.
@@ -39,33 +40,31 @@ def levels_with_errors(levels, ways, made: dict) -> tuple:
     Parameters
     ----------
     levels : sequence of Level
-    ways : sequence of CoarserRuns
-    made : dict
-        Solution by variant of the coarse runs.
+    coarser_runs : list of CoarserRuns
+    solutions : dict
+        Solution of each coarse run by its Numerics.
     """
 
-    def seen(variant, number: int) -> dict:
-        """Return the measures of a level in a coarse run; {} if the run ended before it."""
-        found = made[variant].levels
-        return found[number].values if number < len(found) else {}
+    levels_with_errors = []
+    for number, level in enumerate(levels):
+        parts = []
+        for kind in coarser_runs:
+            reference = level.values
+            if kind.beside is not None:
+                reference = _values_at_level(solutions[kind.beside], number)
+            coarse_values = [_values_at_level(solutions[run], number) for run in kind.runs]
+            parts.append(kind.rule(reference, *coarse_values))
+        errors = {}
+        for name, value in level.values.items():
+            error = sum(part.get(name, abs(value)) for part in parts)
+            errors[name] = level.errors.get(name, 0.0) + error
+        levels_with_errors.append(replace(level, errors=errors))
+    return tuple(levels_with_errors)
 
-    def open_at(number: int, level: Level) -> dict:
-        """Return the errors of a level by measure name."""
-        parts = [
-            way.rule(
-                level.values if way.beside is None else seen(way.beside, number),
-                *(seen(run, number) for run in way.runs),
-            )
-            for way in ways
-        ]
-        return {
-            name: level.errors.get(name, 0.0) + sum(part.get(name, abs(value)) for part in parts)
-            for name, value in level.values.items()
-        }
 
-    return tuple(
-        replace(level, errors=open_at(number, level)) for number, level in enumerate(levels)
-    )
+def _values_at_level(solution, number: int) -> dict:
+    """Return the measures of a level of a run; {} if the run ended before it."""
+    return solution.levels[number].values if number < len(solution.levels) else {}
 
 
 def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
@@ -111,13 +110,22 @@ def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
 
 
 def drive_at_level(drive, number: int, level: float):
-    """Return the drive that ends with `level` [m s-2] in place of the level of this index."""
-    return replace(
-        drive, segments=(*drive.segments[:number], replace(drive.segments[number], amplitude=level))
-    )
+    """Return the drive that ends with another level in place of one of its levels.
+
+    Parameters
+    ----------
+    drive
+        Drive in levels.
+    number : int
+        Index of the level that is replaced.
+    level : float
+        [m s-2].
+    """
+    segment = replace(drive.segments[number], amplitude=level)
+    return replace(drive, segments=(*drive.segments[:number], segment))
 
 
-def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=()) -> dict:
+def level_measures(rig, levels, probe, tolerance: float, *, has_friction: bool, coarser=()) -> dict:
     """Return the measures over all levels, with a reason for those without a value.
 
     They are onset_level, jump_level and level_hysteresis.
@@ -130,27 +138,29 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
     probe : callable
         See `onset`.
     tolerance : float
-    rubs : bool
-        Whether an interface carries a load.
+    has_friction : bool
+        Whether friction acts.
     coarser : sequence
         See `Solution`; the distance between the onsets of each pair is added to the error.
     """
     unit = _unit(rig)
     size = _size(rig)
-    out = {}
+    measures = {}
     past = make_onset_test(*rig.drive.levels.onset)
-    lowest = onset(levels, probe, tolerance, past) if rubs else None
+    lowest = onset(levels, probe, tolerance, past) if has_friction else None
     if lowest is not None:
-        apart = 0.0
-        for pair in coarser:
-            ends = [
-                lowest if one is None else onset(one.levels, one.probe, tolerance, past)
-                for one in pair
-            ]
-            apart += lowest[0] if None in ends else abs(ends[0][0] - ends[1][0])
-        out["onset_level"] = Measure(size * lowest[0], unit, size * (lowest[1] + apart), 1e-9)
-    elif rubs:
-        out["onset_level"] = Measure(
+        level, half_width = lowest
+        change = 0.0
+        for run, beside in coarser:
+            found = onset(run.levels, run.probe, tolerance, past)
+            reference = lowest
+            if beside is not None:
+                reference = onset(beside.levels, beside.probe, tolerance, past)
+            is_missing = found is None or reference is None
+            change += level if is_missing else abs(found[0] - reference[0])
+        measures["onset_level"] = Measure(size * level, unit, size * (half_width + change), 1e-9)
+    elif has_friction:
+        measures["onset_level"] = Measure(
             None,
             unit,
             None,
@@ -159,9 +169,9 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
         )
     if (leap := largest_jump(levels)) is not None:
         width = size * float(leap[2])  # the jump lies between two levels
-        out["jump_level"] = Measure(size * leap[0], unit, width, width)
+        measures["jump_level"] = Measure(size * leap[0], unit, width, width)
     else:
-        out["jump_level"] = Measure(
+        measures["jump_level"] = Measure(
             None,
             unit,
             None,
@@ -170,15 +180,15 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
             f"amplitudes is always below {MIN_JUMP_FACTOR:g} times the ratio of the levels",
         )
     if (loop := largest_hysteresis(levels)) is not None:
-        out["level_hysteresis"] = Measure(float(loop[0]), "m", float(loop[1]), 1e-10)
-    return out
+        measures["level_hysteresis"] = Measure(float(loop[0]), "m", float(loop[1]), 1e-10)
+    return measures
 
 
 def in_scene_units(rig, levels) -> tuple:
     """Return the levels in the units of the scene: of a force drive with the force [N]."""
-    return tuple(
-        replace(level, drive=_size(rig) * level.drive, unit=_unit(rig)) for level in levels
-    )
+    size = _size(rig)
+    unit = _unit(rig)
+    return tuple(replace(level, drive=size * level.drive, unit=unit) for level in levels)
 
 
 def _unit(rig) -> str:
@@ -191,14 +201,14 @@ def _size(rig) -> float:
     return rig.modes.mass if rig.drive.kind == "force" else 1.0
 
 
-def run_levels(reader, go, state, end, progress=None) -> tuple:
+def run_levels(reader, integrate, state, end, progress=None) -> tuple:
     """Run all levels of a drive, each from the state at the end of the previous one.
 
     Parameters
     ----------
     reader : Reader
-    go : callable
-        Function (sine, state, watch, last) -> run.
+    integrate : callable
+        Function (sine, state, watch, is_last) -> run.
     state
         Initial state.
     end : callable
@@ -211,30 +221,38 @@ def run_levels(reader, go, state, end, progress=None) -> tuple:
         The joined run, and the fields `levels` and `probe` of its Solution.
     """
     rig = reader.model.rig
+    omega = find_drive_omega(rig.drive.signal)
+    moving = rig.drive.signal.moving
     states = [state]
-    parts = []
-    found = []
+    runs = []
+    level_results = []
 
-    def at(level, state, watch=None, last=False) -> tuple:
-        """Run one level from a state, and return the run and its Level."""
-        sine = SineDrive(level, find_drive_omega(rig.drive.signal), rig.drive.signal.moving)
-        done = go(sine, state, watch, last)
-        return done, reader.level(level, done, sine, EXACT)
+    def probe(number: int, level: float) -> Level:
+        """Run another level after the level of this index (-1: from the start)."""
+        sine = SineDrive(level, omega, moving)
+        run = integrate(sine, states[number + 1], None, False)
+        return reader.level(level, run, sine, EXACT)
 
     amplitudes = rig.drive.levels.amplitudes
-    count = len(amplitudes)
-    for k, level in enumerate(amplitudes):
-        watch = None if progress is None else (lambda part, k=k: progress((k + part) / count))
-        done, seen = at(level, states[-1], watch, k + 1 == count)
-        parts.append(done)
-        found.append(seen)
-        states.append(end(done))
-        if done.outcome is not None:
+    n_levels = len(amplitudes)
+    for k, amplitude in enumerate(amplitudes):
+        watch = None
+        if progress is not None:
+            watch = partial(_report_fraction, progress, k, n_levels)
+        sine = SineDrive(amplitude, omega, moving)
+        run = integrate(sine, states[-1], watch, k + 1 == n_levels)
+        runs.append(run)
+        level_results.append(reader.level(amplitude, run, sine, EXACT))
+        states.append(end(run))
+        if run.outcome is not None:
             break
-    return joined_runs(parts, rig.drive.levels.cycles * rig.drive.signal.period), {
-        "levels": tuple(found),
-        "probe": lambda number, level: at(level, states[number + 1])[1],
-    }
+    joined = join_runs(runs, rig.drive.levels.cycles * rig.drive.signal.period)
+    return joined, {"levels": tuple(level_results), "probe": probe}
+
+
+def _report_fraction(progress, level: int, n_levels: int, fraction: float) -> None:
+    """Report the completed fraction of all levels from that of the level of an index."""
+    progress((level + fraction) / n_levels)
 
 
 def remove_incomplete_cycle(done):
@@ -245,49 +263,51 @@ def remove_incomplete_cycle(done):
     return replace(done, amplitudes=done.amplitudes[:count], phasors=done.phasors[:count])
 
 
-def joined_runs(parts, each: float):
-    """Join successive runs of `each` [s] to a single one.
+def join_runs(runs: list, duration: float):
+    """Join successive runs of equal duration [s] to a single one.
 
     Window and loop are those of the last run.
     """
-    shift = [k * each for k in range(len(parts))]
-    # the last sample of a run is the first one of the next
-    last = parts[-1]
-    rows = [slice(None, -1)] * (len(parts) - 1) + [slice(None)]
-
-    def column(of):
-        """Return the concatenation of a history over all runs."""
-        return np.concatenate([of(p)[part] for p, part in zip(parts, rows)])
-
-    columns = {
-        name: column(lambda p, name=name: getattr(p.response, name))
-        for name in type(last.response).__dataclass_fields__
-        if name not in ("time", "extra")
-    }
-    time = np.concatenate(
-        [_shift_times(p.response.time, t)[part] for p, part, t in zip(parts, rows, shift)]
-    )
-    extra = {
-        name: column(lambda p, name=name: p.response.extra[name])
-        for name in last.response.extra
-        if name != "ledger"
-    }
-    if "ledger" in last.response.extra:
-        extra["ledger"] = column(lambda p: p.response.extra["ledger"].T).T
-    response = replace(last.response, time=time, extra=extra, **columns)
-    window = replace(last.window, time=_shift_times(last.window.time, shift[-1]))
-    ledger = {name: sum(p.ledger[name] for p in parts) for name in last.ledger}
-    ledger["peak_stored"] = max(p.ledger["peak_stored"] for p in parts)
+    shifts = [k * duration for k in range(len(runs))]
+    last = runs[-1]
+    window = replace(last.window, time=_shift_times(last.window.time, shifts[-1]))
+    ledger = {name: sum(run.ledger[name] for run in runs) for name in last.ledger}
+    ledger["peak_stored"] = max(run.ledger["peak_stored"] for run in runs)
     return replace(
         last,
-        response=response,
+        response=_join_histories([run.response for run in runs], shifts),
         window=window,
         ledger=ledger,
-        log=run_events.join_logs([p.log for p in parts], shift),
-        amplitudes=np.concatenate([p.amplitudes for p in parts]),
-        phasors=np.concatenate([p.phasors for p in parts]),
-        events=sum(p.events for p in parts),
+        log=run_events.join_logs([run.log for run in runs], shifts),
+        amplitudes=np.concatenate([run.amplitudes for run in runs]),
+        phasors=np.concatenate([run.phasors for run in runs]),
+        events=sum(run.events for run in runs),
     )
+
+
+def _join_histories(histories: list, shifts: list):
+    """Return the histories of successive runs as one; shifts: start of each run [s]."""
+    last = histories[-1]
+    # the last sample of a run is the first one of the next
+    samples = [slice(None, -1)] * (len(histories) - 1) + [slice(None)]
+
+    def join(arrays) -> np.ndarray:
+        """Return the concatenation of one history of all runs."""
+        return np.concatenate([array[part] for array, part in zip(arrays, samples)])
+
+    columns = {}
+    for name in type(last).__dataclass_fields__:
+        if name not in ("time", "extra"):
+            columns[name] = join([getattr(part, name) for part in histories])
+    columns["time"] = join([_shift_times(part.time, t) for part, t in zip(histories, shifts)])
+    extra = {}
+    for name in last.extra:
+        arrays = [part.extra[name] for part in histories]
+        if name == "ledger":
+            extra[name] = join([array.T for array in arrays]).T
+        else:
+            extra[name] = join(arrays)
+    return replace(last, extra=extra, **columns)
 
 
 def _shift_times(time, shift: float):

@@ -9,6 +9,7 @@ strip to the list, so that its cost grows with the square of the steps.
 from functools import lru_cache
 from math import ceil, inf, log2, pi, sqrt
 from time import thread_time
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,11 +44,8 @@ TURNING = 0.1
 # strips of a list, about one per step, above which steps are not halved again, at four times the
 # cost
 MOST_CROWDED = 500
-# bond lengths of slip above which a block moves; most halvings of the steps (0 to 3 were observed)
-MOVES, MOST_HALVINGS = (
-    1e-3,
-    2,
-)
+MIN_SLIP_LENGTHS = 1e-3  # bond lengths of slip above which a block moves
+MAX_HALVINGS = 2  # most halvings of the steps (0 to 3 were observed)
 # lists of a patch with shear compliance, times the passes of Newton's method over those of secants
 SHEAR_COST_FACTOR = 256.0
 MOST_SWING = 2.0  # largest phase of the vibration of the block on its bonds in a step [rad]
@@ -85,14 +83,14 @@ def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine:
     """
     law = model.bonds
     accuracy = model.accuracy
-    once = model.rig.drive.kind == "free" or model.rig.drive.waveform.is_step
-    left = STICKING_STROKE_RATIO if chatters(model) else DECAYED_FRACTION if once else 1.0
-    stroke = max(
-        4
-        * left
-        * min(model.speed_scale / find_drive_omega(model.rig.drive.signal) / law.length, stretch),
-        1e-9,
-    )
+    drive = model.rig.drive
+    ratio = 1.0
+    if chatters(model):
+        ratio = STICKING_STROKE_RATIO
+    elif drive.kind == "free" or drive.waveform.is_step:
+        ratio = DECAYED_FRACTION
+    amplitude = model.speed_scale / find_drive_omega(drive.signal) / law.length
+    stroke = max(4 * ratio * min(amplitude, stretch), 1e-9)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
     requested = engines.RequestedEngine(engine, tail, accuracy.merge)
     return engines.choose_engine(law, accuracy.tolerance, stroke, numerics.steps / 2, requested)
@@ -118,8 +116,8 @@ def halvings(model: Model) -> int:
     """Return how often automatic steps will be halved for a block that its bonds hold.
 
     Such a block vibrates on its bonds faster than its modes and its drive. The steps are halved
-    until this vibration has as many steps as those would have, MOST_HALVINGS times at most. If the
-    slip, half the square of the stretch, is below MOVES bond lengths, the motion is elastic and no
+    until this vibration has as many steps as those would have, MAX_HALVINGS times at most. If the
+    slip, half the square of the stretch, is below MIN_SLIP_LENGTHS bond lengths, the motion is elastic and no
     halving is needed.
     """
     rig = model.rig
@@ -127,13 +125,14 @@ def halvings(model: Model) -> int:
     if f is None or not law_has_trait(f.law, "bonds") or model.accuracy.steps_per_cycle is not None:
         return 0
     stretch = _stretch(model)
-    if stretch == inf or stretch**2 / 2 < MOVES:
+    if stretch == inf or stretch**2 / 2 < MIN_SLIP_LENGTHS:
         return 0
     quickest = max(
         find_max_frequency_ratio(rig.drive.signal) / rig.drive.signal.period,
         float(rig.structure.frequencies.max()),
     )
-    return min(max(0, ceil(log2(_bond_swing(model) / (2 * pi * quickest)))), MOST_HALVINGS)
+    doublings = ceil(log2(_bond_swing(model) / (2 * pi * quickest)))
+    return min(max(0, doublings), MAX_HALVINGS)
 
 
 def _bond_swing(model: Model) -> float:
@@ -162,16 +161,15 @@ def held_by_bonds(model: Model, push: float | None = None) -> float:
         return 0.0
     released = rig.drive.kind == "free"
     printed = f.reading == "report"
-    if (
-        released
-        and (not printed or rig.start is None or sum_form(model.bonds) != FORM_REPORT_GROWING)
-    ) or (not printed and model.bonds.order != 0):
+    if not printed and (released or model.bonds.order != 0):
         return 0.0
-    needed = (
-        _held_with(rig, 0.0, np.zeros(rig.modes.omega.size), rig.modes.interfaces @ rig.start.z)
-        if released
-        else force_that_holds(rig, push)
-    )
+    if released:
+        if rig.start is None or sum_form(model.bonds) != FORM_REPORT_GROWING:
+            return 0.0
+        slides = rig.modes.interfaces @ rig.start.z
+        needed = _held_with(rig, 0.0, np.zeros(rig.modes.omega.size), slides)
+    else:
+        needed = force_that_holds(rig, push)
     return f.static * model.nominal_load / needed if needed else inf
 
 
@@ -292,14 +290,12 @@ def is_list_too_long(model: Model, numerics: Numerics, book: dict) -> bool:
     strips = book.get("strips", 0.0)
     if strips <= MOST_CROWDED or model.bonds.reading != "report":
         return False
-    return (
-        lists_grow(model)
-        if sum_form(model.bonds) == FORM_REPORT_GROWING
-        else strips > TURNING * numerics.cycles * numerics.steps
-    )
+    if sum_form(model.bonds) == FORM_REPORT_GROWING:
+        return lists_grow(model)
+    return strips > TURNING * numerics.cycles * numerics.steps
 
 
-def doubling_does_not_help(book: dict, bars: list) -> bool:
+def doubling_does_not_help(book: dict, errors: list) -> bool:
     """Return whether two doublings of the steps have not reduced the error of a list of bonds.
 
     The list of a released block that reverses in almost every step is different for any step
@@ -310,13 +306,20 @@ def doubling_does_not_help(book: dict, bars: list) -> bool:
     ----------
     book : dict
         Counters of the run, with "strips".
-    bars : list
+    errors : list
         Errors of the displacement [m], one per doubling.
     """
-    return book.get("strips", 0.0) > 0 and len(bars) > 2 and bars[-1] >= bars[-3]
+    return book.get("strips", 0.0) > 0 and len(errors) > 2 and errors[-1] >= errors[-3]
 
 
-def list_cost(model: Model, numerics: Numerics) -> tuple[float, float]:
+class ListCost(NamedTuple):
+    """Expected strips of a list of bonds, and CPU seconds of a run with it."""
+
+    strips: float
+    seconds: float
+
+
+def list_cost(model: Model, numerics: Numerics) -> ListCost:
     """Return the expected strips of a list of bonds and the CPU seconds of a run with it.
 
     A list that grows with every step is expected to contain all strips; its seconds are known
@@ -325,17 +328,17 @@ def list_cost(model: Model, numerics: Numerics) -> tuple[float, float]:
     """
     steps = numerics.cycles * numerics.steps
     if lists_grow(model):
-        return steps, GROWING_STEP * steps**2 / 2
-    found = choose_quadrature(model, numerics)
-    if found.engine != "recursion" and numerics.choice is None:
-        found = _choose_for_engine(model, numerics, _stretch(model, 1.0), found.engine)
-    strips = (
-        min(found.strips, 2 * steps * max(1.0, found.strips))
-        if found.tail
-        else min(found.strips, 8 * steps)
-    )
-    lists = SHEAR_COST_FACTOR if model.partial_slip else 1.0
-    return strips, lists * steps * found.seconds * (strips / found.strips if found.strips else 1.0)
+        return ListCost(steps, GROWING_STEP * steps**2 / 2)
+    choice = choose_quadrature(model, numerics)
+    if choice.engine != "recursion" and numerics.choice is None:
+        choice = _choose_for_engine(model, numerics, _stretch(model, 1.0), choice.engine)
+    max_strips = 8 * steps
+    if choice.tail:
+        max_strips = 2 * steps * max(1.0, choice.strips)
+    strips = min(choice.strips, max_strips)
+    n_lists = SHEAR_COST_FACTOR if model.partial_slip else 1.0
+    fraction = strips / choice.strips if choice.strips else 1.0
+    return ListCost(strips, n_lists * steps * choice.seconds * fraction)
 
 
 class ListGuard:

@@ -5,6 +5,7 @@ samples, except the work of the energy balance and the harmonics of the loop.
 """
 
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,9 +29,26 @@ from . import strips
 from .interface import make_contact
 from .lists import ListGuard, choose_quadrature, has_list
 from .reading import Reader
-from .solution import Solution, normal_load, sampled_loop
+from .solution import CycleLoop, Solution, normal_load, sampled_loop
 
-LATE = 1.5  # factor on the first-order change due to an end other than the requested one
+END_ERROR_FACTOR = (
+    1.5  # factor on the first-order change due to an end that is not the requested one
+)
+
+
+class March(NamedTuple):
+    """Finished march of a rig.
+
+    - contact: contact that was moved.
+    - result: MarchResult.
+    - seconds: CPU seconds of the march.
+    - prepare: CPU seconds of its preparation by name.
+    """
+
+    contact: object
+    result: object
+    seconds: float
+    prepare: dict
 
 
 def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -46,14 +64,18 @@ def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
     """
-    contact, done, seconds, prepare = march_model(model, numerics, patch, frames, say, progress)
-    return MarchReader(model, numerics, patch, contact).solution(done, seconds, prepare)
+    march = march_model(model, numerics, patch, frames, say, progress)
+    reader = MarchReader(model, numerics, patch, march.contact)
+    return reader.solution(march.result, march.seconds, march.prepare)
 
 
-def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
-    """Return the contact, the MarchResult, and the CPU seconds of a march and its preparation.
+def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None) -> March:
+    """March with numerics.steps steps per cycle, without reading the measures.
 
-    The seconds of the preparation are a dict by name. The parameters are those of `run_march`.
+    Parameters
+    ----------
+    model, numerics, patch, frames, say, progress
+        See `run_march`.
     """
     rig = model.rig
     begin = perf_counter()
@@ -86,7 +108,7 @@ def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None
     )
     seconds = perf_counter() - begin
     done = strips.run_of_strips(done, patch) if rig.friction.strips_slide_apart else done
-    return contact, done, seconds, {"reduce": reduced, "compiled_code": loaded}
+    return March(contact, done, seconds, {"reduce": reduced, "compiled_code": loaded})
 
 
 class MarchReader(Reader):
@@ -94,11 +116,11 @@ class MarchReader(Reader):
 
     def __init__(self, model, numerics, patch, contact):
         held = 0.0
-        if model.friction is not None:
-            least = (
-                1e-15 * estimate_peak_speed(model.rig.drive.signal) * model.rig.drive.signal.period
-            )
-            held = least if contact.set_valued else 1e-3 * contact.length
+        if model.friction is not None and contact.set_valued:
+            drive = model.rig.drive.signal
+            held = 1e-15 * estimate_peak_speed(drive) * drive.period
+        elif model.friction is not None:
+            held = 1e-3 * contact.length
         super().__init__(model, numerics, patch, contact, held)
 
     def solution(self, run, seconds: float, prepare: dict | None, drive=None, **more) -> Solution:
@@ -128,7 +150,13 @@ class MarchReader(Reader):
         )
 
     def stated_errors(self, run, drive, values: dict) -> dict:
-        """Return the errors due to peaks between samples and due to the end of the run, by name."""
+        """Return the errors due to peaks between samples and due to the end of the run, by name.
+
+        Parameters
+        ----------
+        run, drive, values
+            See `Reader.stated_errors`.
+        """
         late = self.late(run.window)
         between = self.peak_excesses(run.window)
         return {name: late.get(name, 0.0) + between.get(name, 0.0) for name in late | between}
@@ -140,19 +168,16 @@ class MarchReader(Reader):
     def late(self, window) -> dict:
         """Return the errors due to an end at a sample next to the requested end, by name."""
         steps = self.numerics.cycles * self.numerics.steps
-        found = estimate_window_error(
-            window, self.model.rig.drive.signal.period, steps - round(steps)
-        )
-        return {name: LATE * error for name, error in found.items()}
+        period = self.model.rig.drive.signal.period
+        changes = estimate_window_error(window, period, steps - round(steps))
+        return {name: END_ERROR_FACTOR * change for name, change in changes.items()}
 
     def choose_bond_sum(self):
         """Return the EngineChoice of the sum over bonds; None for laws without bonds."""
-        f = self.model.friction
-        return (
-            choose_quadrature(self.model, self.numerics)
-            if f is not None and law_has_trait(f.law, "bonds")
-            else None
-        )
+        friction = self.model.friction
+        if friction is None or not law_has_trait(friction.law, "bonds"):
+            return None
+        return choose_quadrature(self.model, self.numerics)
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
         """Return the two values of the friction work, both of which a march integrates."""
@@ -161,23 +186,29 @@ class MarchReader(Reader):
         )
 
     def further_fields(self, run, drive, stuck: bool) -> dict:
-        """Return the loop and, if an interface with a set-valued law sticks, its known measures."""
+        """Return the loop and, if an interface with a set-valued law sticks, its known measures.
+
+        Parameters
+        ----------
+        run, drive, stuck
+            See `Reader.further_fields`.
+        """
         if not self.rubs:
             return {}
         rig = self.model.rig
         jumps = self.contact.set_valued
-        out = {
+        fields = {
             "loop": self._loop(run, drive),
             "still": self.held if jumps else 0.0,
             "together": rig.friction.strips_slide_apart,
             "inside": self.inside_steps,
         }
         if not (stuck and jumps):
-            return out
+            return fields
         # the energies of a stuck interface are round-off of the kinetic energy
         moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
         # the remaining motion is round-off, not slip
-        return out | {
+        return fields | {
             "book": run.ledger | {"power": run.ledger["power"] + moving},
             "known": {"slip_start_phase": None, "stick_fraction": 1.0},
         }
@@ -194,23 +225,26 @@ class MarchReader(Reader):
             Index of the interface.
         """
         model = self.model
-        one = self.model.rig.friction.interfaces[number]
+        interface = model.rig.friction.interfaces[number]
         if (
-            not law_has_trait(one.numbers.law, "overshoots")
+            not law_has_trait(interface.numbers.law, "overshoots")
             or model.grooves is not None
             or model.rig.friction.strips_slide_apart
         ):
             return window
-        load = normal_load(model, self.patch) if one.load is None else one.load
-        return motion_inside_steps(window, make_law(one.numbers, load), load)
+        load = interface.load
+        if load is None:
+            load = normal_load(model, self.patch)
+        return motion_inside_steps(window, make_law(interface.numbers, load), load)
 
-    def _loop(self, part, drive) -> tuple | None:
+    def _loop(self, part, drive) -> CycleLoop | None:
         """Return harmonics of slide and force, and work per cycle, of an interface or all strips.
 
         If no other forces act besides drive and friction, the harmonics of the force come from the
         motion (`friction_harmonic`).
         """
-        w = part.window
+        window = part.window
+        omega = find_drive_omega(drive)
         rig = self.model.rig
         work = getattr(part, "window_work", None)
         work = part.work if work is None else work
@@ -218,8 +252,8 @@ class MarchReader(Reader):
         together = self.contact.set_valued and not rig.friction.strips_slide_apart
         # work of this interface only, without the impacts at stops
         if len(rig.friction.names) > 1 or together:
-            work = float(part.step_force @ np.diff(w.slide)) + lateral_work(w, 0)
-        span = w.time[-1] - w.time[0]
+            work = float(part.step_force @ np.diff(window.slide)) + lateral_work(window, 0)
+        span = window.time[-1] - window.time[0]
         work *= drive.period / span if span > 0 else 0.0
         alone = len(rig.modes.interfaces) == 1 and not (
             rig.friction.load_varies
@@ -228,19 +262,12 @@ class MarchReader(Reader):
             or rig.modes.lateral_faces is not None
         )
         if alone and is_sinusoidal(drive) and has_full_cycle(span, drive):
-            return (
-                motion_harmonic(w.time, w.slide, w.slide_rate, find_drive_omega(drive)),
-                friction_harmonic(w, rig.modes, drive),
-                work,
-            )
-        return sampled_loop(
-            w,
-            drive,
-            work,
-            compute_step_harmonic(w.time, part.step_force, find_drive_omega(drive))
-            if span > 0
-            else 0j,
-        )
+            slide = motion_harmonic(window.time, window.slide, window.slide_rate, omega)
+            return CycleLoop(slide, friction_harmonic(window, rig.modes, drive), work)
+        force = 0j
+        if span > 0:
+            force = compute_step_harmonic(window.time, part.step_force, omega)
+        return sampled_loop(window, drive, work, force)
 
     def _levels(self, done) -> tuple:
         """Return the levels of the drive, and the probe of `levels.onset`."""
@@ -250,19 +277,16 @@ class MarchReader(Reader):
         def probe(number, level):
             """Run another level after the level of this index, and return its Level."""
             other = rig_levels.drive_at_level(rig.drive.signal, number + 1, level)
-            run = (
-                done.marks[number].after.fork(other)
-                if number >= 0
-                else engine.start_run(
+            if number >= 0:
+                run = done.marks[number].after.fork(other)
+            else:
+                run = engine.start_run(
                     rig.modes, other, self.contact, numerics.steps, rig.springs.travel, rig.start
                 )
-            )
             mark = run.march_to_mark(round(rig.drive.levels.cycles), numerics.window)
-            return self.level(
-                level,
-                strips.mark_as_one(mark, self.patch) if rig.friction.strips_slide_apart else mark,
-                other,
-            )
+            if rig.friction.strips_slide_apart:
+                mark = strips.mark_as_one(mark, self.patch)
+            return self.level(level, mark, other)
 
         amplitudes = rig.drive.levels.amplitudes
         return tuple(self.level(size, mark) for size, mark in zip(amplitudes, done.marks)), probe

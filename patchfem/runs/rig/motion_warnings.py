@@ -45,11 +45,9 @@ def collect_warnings(run) -> list:
     found = run.measures
     book = raw.book
     harmonics = raw.extra.get("harmonics")
-    steps = (
-        run.numerics.steps
-        if "steps_per_cycle" in ENGINES[run.numerics.engine].summary_numbers
-        else raw.extra.get("steps_per_cycle")
-    )
+    steps = raw.extra.get("steps_per_cycle")
+    if "steps_per_cycle" in ENGINES[run.numerics.engine].summary_numbers:
+        steps = run.numerics.steps
     out = [
         *model.rig.structure.notes,
         *_as_one_point(model, patch, run.numerics),
@@ -83,20 +81,15 @@ def collect_warnings(run) -> list:
     if raw.message and raw.outcome is not Outcome.LEAVES_GROOVES:
         out.append(raw.message)
     out += warn_of_large_slide(patch, raw.response.slide) if patch is not None else ()
-    return (
-        out
-        if not model.has_interface_patches
-        else [
-            *out,
-            *faces.merge_sentences(
-                model,
-                lambda face: [
-                    *([] if face.partial_slip else [AS_ONE_POINT]),
-                    *warn_of_large_slide(face.patch, face.slide(raw.response)),
-                ],
-            ),
-        ]
-    )
+    if model.has_interface_patches:
+        out += faces.merge_sentences(model, lambda face: _face_warnings(face, raw.response))
+    return out
+
+
+def _face_warnings(face, response) -> list:
+    """Return the warnings on the patch of an interface."""
+    warnings = [] if face.partial_slip else [AS_ONE_POINT]
+    return [*warnings, *warn_of_large_slide(face.patch, face.slide(response))]
 
 
 def peak_at_an_end(run, modes) -> list:
@@ -108,24 +101,22 @@ def peak_at_an_end(run, modes) -> list:
     modes : callable
         Returns the modes, as `plan.mode_frequencies` does.
     """
-    found = run.measures.get("peak_frequency")
+    peak = run.measures.get("peak_frequency")
     drive = run.model.rig.drive.signal
-    at = (
-        None
-        if found is None or found.value is None
-        else nearest_sweep_end(found.value, drive.low, drive.high)
-    )
+    at = None
+    if peak is not None and peak.value is not None:
+        at = nearest_sweep_end(peak.value, drive.low, drive.high)
     if at is None or not run.measures["relative_displacement_amplitude"].value > 0:
         return []
     upper = at == max(drive.low, drive.high)
     key = "drive.from" if at == drive.low else "drive.to"
     side, move = ("above", "raise") if upper else ("below", "lower")
-    known = _nearest_resonance(modes(), at, upper)
-    beyond = (
-        f"a resonance may lie {side} this frequency: {known[0]}; {move} {key} to include it"
-        if known
-        else f"no mode of the scene has its resonance {side} this frequency"
-    )
+    resonance = _nearest_resonance(modes(), at, upper=upper)
+    beyond = f"no mode of the scene has its resonance {side} this frequency"
+    if resonance:
+        beyond = (
+            f"a resonance may lie {side} this frequency: {resonance}; {move} {key} to include it"
+        )
     return [
         f"the largest response lies at {key} = {format_number(at, 6)} Hz, the {'upper' if upper else 'lower'} end of the "
         f"swept frequencies, so that it may be no resonance; {beyond}"
@@ -137,8 +128,8 @@ def nearest_sweep_end(frequency: float, *ends: float) -> float | None:
     return next((end for end in ends if abs(frequency - end) <= AT * end), None)
 
 
-def _nearest_resonance(modes: list, at: float, upper: bool) -> list:
-    """Return a list with a phrase on the mode whose resonance is nearest to a frequency.
+def _nearest_resonance(modes: list, at: float, *, upper: bool) -> str:
+    """Return a phrase on the mode whose resonance is nearest to a frequency, or "".
 
     Parameters
     ----------
@@ -155,15 +146,15 @@ def _nearest_resonance(modes: list, at: float, upper: bool) -> list:
         stuck = mode["stuck_frequency"]
         low = free
         high = free if stuck is None else max(free, stuck)
-        if high > at * (1 + AT) if upper else 0 < low < at * (1 - AT):
-            held = (
-                f" with a free interface and {format_number(high, 4)} Hz with one that sticks"
-                if high > low
-                else ""
-            )
-            said = f"{mode['name']} has its resonance at {format_number(low, 4)} Hz{held}"
-            near.append((max(low - at, at - high, 0.0), said))
-    return [min(near)[1]] if near else []
+        is_beyond = high > at * (1 + AT) if upper else 0 < low < at * (1 - AT)
+        if is_beyond:
+            phrase = f"{mode['name']} has its resonance at {format_number(low, 4)} Hz"
+            if high > low:
+                phrase += (
+                    f" with a free interface and {format_number(high, 4)} Hz with one that sticks"
+                )
+            near.append((max(low - at, at - high, 0.0), phrase))
+    return min(near)[1] if near else ""
 
 
 def collect_notes(run) -> list:
@@ -209,10 +200,8 @@ def _release_sentence(run) -> list:
         or np.ptp(window.output) / 2 <= main.value * (1 + DECAYS) + main.floor
     ):
         return []
-    span, begin = (
-        format_quantity(float(one), "s", 3)
-        for one in (window.time[-1] - window.time[0], window.time[0])
-    )
+    span = format_quantity(float(window.time[-1] - window.time[0]), "s", 3)
+    begin = format_quantity(float(window.time[0]), "s", 3)
     return [
         f"relative_displacement_amplitude is that of the last whole cycle of the motion; peaks of acceleration and "
         f"force, slip and stick are those of the last {span}, from {begin} on, in which the motion still decays"
@@ -228,16 +217,15 @@ def _lateral_motion_sentence(run) -> list:
     ):
         return []
     swing, share = strips.lateral_motion(run.patch, run.solution.window, run.drive.period)
-    return (
-        [
-            f"the yaw moves the ends of the patch by up to {format_length(swing)} across x, but the "
-            f"friction{' and the wear are' if run.model.wear is not None else ' is'} computed without this motion; "
-            f"with this motion the path of the slide in the last cycle would be {100 * share:.2g} % longer (mean over "
-            "the patch, weighted by the pressure)"
-        ]
-        if swing > 0
-        else []
-    )
+    if not swing > 0:
+        return []
+    computed = "friction is" if run.model.wear is None else "friction and the wear are"
+    return [
+        f"the yaw moves the ends of the patch by up to {format_length(swing)} across x, but the "
+        f"{computed} computed without this motion; "
+        f"with this motion the path of the slide in the last cycle would be {100 * share:.2g} % longer (mean over "
+        "the patch, weighted by the pressure)"
+    ]
 
 
 def creeping_note(friction) -> list:
@@ -347,6 +335,14 @@ def created_warning(model, book: dict, cycles: float) -> list:
     """Return a sentence, in a list, on energy that the printed law created.
 
     It creates energy in steps in which it returns more than it had stored.
+
+    Parameters
+    ----------
+    model : Model
+    book : dict
+        Energies of the run by name [J].
+    cycles : float
+        Cycles of the run.
     """
     if model.friction is None or model.friction.reading != "report":
         return []
@@ -362,7 +358,14 @@ def created_warning(model, book: dict, cycles: float) -> list:
 
 
 def modes_note(model, kept: int, nodes: int) -> list:
-    """Return the sentence on the shear modes of a patch whose normal force changes."""
+    """Return the sentence on the shear modes of a patch whose normal force changes.
+
+    Parameters
+    ----------
+    model : Model
+    kept, nodes : int
+        Number of modes, and of nodes of the patch.
+    """
     return [
         f"{model.partial_slip}: the normal load changes with the motion, so the patch cannot be replaced exactly by a set "
         f"of elements; {kept} tangential modes of the {nodes} nodes are used instead (key accuracy.shear_modes)"

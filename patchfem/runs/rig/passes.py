@@ -136,8 +136,8 @@ def add_level_measures(run: Coupled) -> Coupled:
         solution.levels,
         solution.probe,
         model.accuracy.tolerance,
-        run.has_friction,
-        solution.coarser,
+        has_friction=run.has_friction,
+        coarser=solution.coarser,
     )
     return replace(run, measures=run.measures | measures)
 
@@ -198,7 +198,7 @@ def add_decay(run: Coupled) -> Coupled:
     causes = {}
     half_swing = _half_swing_of_ringing(run)
     if half_swing > 0:
-        errors, causes["ring_frequency and ring_damping"] = decays.left_by_mesh_on(
+        errors, causes["ring_frequency and ring_damping"] = decays.mesh_errors_of_stuck_mode(
             np.array([half_swing]),
             run.measures["ring_frequency"].value,
             model,
@@ -211,7 +211,7 @@ def add_decay(run: Coupled) -> Coupled:
             measures[name] = replace(measure, error=max(measure.error, float(error)))
         run = replace(run, measures=measures)
     if run.decay is not None:
-        errors, causes["the decay curve"] = decays.left_by_mesh_on(
+        errors, causes["the decay curve"] = decays.mesh_errors_of_stuck_mode(
             run.decay.amplitude, run.decay.frequency[-1], model, run.patch, coarse
         )
         decay = run.decay._replace(

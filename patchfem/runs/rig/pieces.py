@@ -42,12 +42,9 @@ OF_MOTION = (
     "absolute_acceleration_fundamental",
     "acceleration_distortion",
 )
-CHANGES = 1e-2  # fraction of the tolerance by which a settled motion may still change
-# windows from which the change is estimated; smallest fraction of a free motion that decays in them
-WINDOWS, LEAST_LOST = (
-    3,
-    1e-6,
-)
+MAX_CHANGE_RATIO = 1e-2  # fraction of the tolerance by which a settled motion may still change
+N_CHANGE_WINDOWS = 3  # last windows from which the change of the motion is estimated
+MIN_DECAY = 1e-6  # smallest fraction of a free motion that is assumed to decay in these windows
 
 
 def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -68,9 +65,8 @@ def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     -------
     Solution
     """
-    return _run(
-        PieceReader(model, numerics, patch, RigidElements(model, numerics, patch)), 0, say, progress
-    )
+    elements_of_model = RigidElements(model, numerics, patch)
+    return _run(PieceReader(model, numerics, patch, elements_of_model), 0, say, progress)
 
 
 def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -90,12 +86,8 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
     -------
     Solution
     """
-    return _run(
-        PieceReader(model, numerics, patch, YieldingElements(model, numerics, patch)),
-        frames,
-        say,
-        progress,
-    )
+    elements_of_model = YieldingElements(model, numerics, patch)
+    return _run(PieceReader(model, numerics, patch, elements_of_model), frames, say, progress)
 
 
 def _run(reader, frames: int, say, progress) -> Solution:
@@ -108,8 +100,20 @@ def _run(reader, frames: int, say, progress) -> Solution:
     prepare = {"reduce": reader.reduced, "compiled_code": perf_counter() - begin}
     begin = perf_counter()
 
-    def go(drive, state, watch, last: bool, cycles: float = rig.drive.levels.cycles):
-        """Integrate a drive from a state, and return the run of the whole patch."""
+    def integrate(drive, state, watch, is_last, cycles: float = rig.drive.levels.cycles):
+        """Integrate a drive from a state, and return the run of the whole patch.
+
+        Parameters
+        ----------
+        drive
+        state : tuple
+            State of the rig and memory of the elements at the start.
+        watch : callable or None
+            Callback for the completed fraction.
+        is_last : bool
+            Whether the run has snapshots of the interface.
+        cycles : float
+        """
         done = histories.simulate(
             rig.modes,
             drive,
@@ -117,7 +121,7 @@ def _run(reader, frames: int, say, progress) -> Solution:
             cycles,
             numerics.window,
             rig.springs.travel,
-            frames * last,
+            frames * is_last,
             watch,
             *state,
             even=bool(NEEDS_RUN),
@@ -125,11 +129,10 @@ def _run(reader, frames: int, say, progress) -> Solution:
         return reader.over_strips(done)
 
     if rig.drive.levels.amplitudes:
-        done, more = run_levels(reader, go, (rig.start, None), lambda run: run.end, progress)
+        done, more = run_levels(reader, integrate, (rig.start, None), lambda run: run.end, progress)
     else:
-        done = remove_incomplete_cycle(
-            go(rig.drive.signal, (rig.start, None), progress, True, numerics.cycles)
-        )
+        done = integrate(rig.drive.signal, (rig.start, None), progress, True, numerics.cycles)
+        done = remove_incomplete_cycle(done)
     more |= {} if reader.rigid else {"prepare": prepare}
     return reader.solution(done, perf_counter() - begin, **more)
 
@@ -152,18 +155,17 @@ class PieceReader(Reader):
             return run
         loads = strips.strip_loads(self.patch)
         offsets = self.patch.strips.offsets
-        response, window = (
-            strips.average_strips(one, loads, offsets) for one in (run.response, run.window)
+        return replace(
+            run,
+            response=strips.average_strips(run.response, loads, offsets),
+            window=strips.average_strips(run.window, loads, offsets),
         )
-        return replace(run, response=response, window=window)
 
     def sticks(self, run) -> bool:
         """Return whether the interface sticks, or all of its strips if they slide independently."""
-        return (
-            run_events.is_all_stuck(run.window, self.held)
-            if self.apart and self.rubs
-            else super().sticks(run)
-        )
+        if self.apart and self.rubs:
+            return run_events.is_all_stuck(run.window, self.held)
+        return super().sticks(run)
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
         """Return the friction loops of the interfaces.
@@ -177,16 +179,21 @@ class PieceReader(Reader):
         """Return the measures that the engine computes between events, as fields of `LastCycles`.
 
         Rigid elements dissipate all work of friction, so that their ledger is known.
+
+        Parameters
+        ----------
+        run, drive, stuck
+            See `Reader.further_fields`.
         """
-        found = measures_from_reading(
+        values = measures_from_reading(
             run.reading,
             run.ledger,
-            is_sinusoidal(drive),
-            bool(has_full_cycle(run.reading.span, drive)),
-            mode_stiffness(self.model, run.window),
-            find_max_acceleration(drive),
+            sine=is_sinusoidal(drive),
+            whole=bool(has_full_cycle(run.reading.span, drive)),
+            stiffness=mode_stiffness(self.model, run.window),
+            size=find_max_acceleration(drive),
         )
-        known = {name: None if np.isnan(value) else float(value) for name, value in found.items()}
+        known = {name: None if np.isnan(value) else float(value) for name, value in values.items()}
         if not self.rubs:
             return {"known": {name: known[name] for name in (*OF_MOTION, "drift_per_cycle")}}
         if not self.rigid:
@@ -211,10 +218,9 @@ class PieceReader(Reader):
         if run.ring is not None:
             return make_ring(*run.ring, run.acceleration), {}
         if held := self.held_modes(run, run.window, drive):
-            one = select_strongest(held, "acceleration")
-            return make_ring(
-                one.acceleration, 2 * np.pi * one.frequency, one.damping, run.acceleration
-            ), {}
+            mode = select_strongest(held, "acceleration")
+            omega = 2 * np.pi * mode.frequency
+            return make_ring(mode.acceleration, omega, mode.damping, run.acceleration), {}
         return run_events.measure_rings(
             run.window, self.model.rig.modes, drive, run.log, repeats=run.repeats
         )
@@ -224,6 +230,14 @@ class PieceReader(Reader):
 
         It is [] unless only a constant force acts in this part, and every interface is a single
         spring that sticks until the end.
+
+        Parameters
+        ----------
+        run : PieceRun
+        motion : Response
+            Part of its histories.
+        drive
+            Drive of the run.
         """
         springs = [group.stiffness for group in self.groups]
         held = (
@@ -259,6 +273,11 @@ class PieceReader(Reader):
         derivative: 2e-14 of the range compared with 8000 samples per cycle, because both cycles
         have nearly the same error. The vibration that jumps excite in a mode r times as fast as the
         drive falls with 1/r^2, and its fourth derivative grows with r^2.
+
+        Parameters
+        ----------
+        run, drive, values
+            See `Reader.stated_errors`.
         """
         window = run.window
         modes = self.model.rig.modes
@@ -271,7 +290,14 @@ class PieceReader(Reader):
         return left | {"drift_per_cycle": 1e-13 * faster * float(np.ptp(window.slide))}
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
-        """Return the Solution of a PieceRun, with its steady motion if its windows still change."""
+        """Return the Solution of a PieceRun, with its steady motion if its windows still change.
+
+        Parameters
+        ----------
+        run : PieceRun
+        seconds, drive, more
+            See `Reader.solution`.
+        """
         drive = drive or self.model.rig.drive.signal
         numerics = self.numerics
         more |= {"extra": more.get("extra", {}) | tail} if (tail := self.tail(run, drive)) else {}
@@ -306,24 +332,21 @@ def _strips_loop(run, drive) -> InterfaceLoop:
     held = ~window.extra["slide_rates"].any(axis=1)
     power = (window.extra["forces"] * window.extra["slide_rates"]).sum(axis=1)
     slide = window.slide - weight @ window.slide / weight.sum()
-    first, pull = (
-        complex(compute_harmonic(window.time, weight, one, omega)) for one in (slide, window.force)
-    )
     return InterfaceLoop(
-        first,
-        pull,
-        float(weight @ power),
-        float(np.ptp(window.slip)),
-        float(weight[held].sum()),
-        float(np.abs(window.force).max()),
+        displacement_harmonic=complex(compute_harmonic(window.time, weight, slide, omega)),
+        force_harmonic=complex(compute_harmonic(window.time, weight, window.force, omega)),
+        work=float(weight @ power),
+        slip_range=float(np.ptp(window.slip)),
+        stuck_time=float(weight[held].sum()),
+        max_force=float(np.abs(window.force).max()),
     )
 
 
 def still_changes(extremes, window: int, tolerance: float, decay: float) -> bool:
-    """Return whether a motion may still change by more than CHANGES times the tolerance.
+    """Return whether a motion may still change by more than MAX_CHANGE_RATIO times the tolerance.
 
     It may if the run is too short, or if the extremes of its cycles have moved too much in the last
-    WINDOWS windows, divided by the fraction of the slowest free motion that decays in this time.
+    N_CHANGE_WINDOWS windows, divided by the fraction of the slowest free motion that decays in this time.
     The extremes of a slow beat hardly move while it is largest.
 
     Parameters
@@ -336,12 +359,12 @@ def still_changes(extremes, window: int, tolerance: float, decay: float) -> bool
     decay : float
         Decay of the slowest free motion over a cycle [1].
     """
-    last = np.asarray(extremes, float)[-WINDOWS * window :]
-    lost = max(-np.expm1(-decay * len(last)), LEAST_LOST)
-    return (
-        len(last) < WINDOWS * window
-        or np.ptp(last, axis=0).max() > CHANGES * tolerance * lost * np.ptp(last[-window:]) / 2
-    )
+    last = np.asarray(extremes, float)[-N_CHANGE_WINDOWS * window :]
+    if len(last) < N_CHANGE_WINDOWS * window:
+        return True
+    decayed = max(-np.expm1(-decay * len(last)), MIN_DECAY)
+    limit = MAX_CHANGE_RATIO * tolerance * decayed * np.ptp(last[-window:]) / 2
+    return np.ptp(last, axis=0).max() > limit
 
 
 def find_steady_motion(modes, drive, groups, done) -> tuple | None:
@@ -374,10 +397,10 @@ def find_steady_motion(modes, drive, groups, done) -> tuple | None:
         return None
     sine = SineDrive(last.amplitude, last.omega, drive.moving)
     try:
-        one = steady_events.find_steady_state_from(modes, sine, groups, *done.end)
+        motion = steady_events.find_steady_state_from(modes, sine, groups, *done.end)
     except NotConverged:
         return None
-    amplitude, error = find_stable_amplitude(one.amplitude, one.residual, one.multipliers)
+    amplitude, error = find_stable_amplitude(motion.amplitude, motion.residual, motion.multipliers)
     return None if np.isnan(amplitude) else (amplitude, error)
 
 
@@ -420,17 +443,17 @@ class YieldingElements:
         else:
             self.contact = interface.contact_model(model, numerics, patch)
             parts = [self.contact.element]
-        self.held = 1e-3 * min((one.length for one in parts if one.limit > 0), default=0.0)
-        self.groups = tuple(elements_of_law(one) for one in parts)
+        lengths = [element.length for element in parts if element.limit > 0]
+        self.held = 1e-3 * min(lengths, default=0.0)
+        self.groups = tuple(elements_of_law(element) for element in parts)
         for _ in range(numerics.pairs):
             self.groups = tuple(map(elements.merge_elements, self.groups))
         if numerics.joined:
-            self.groups = tuple(
-                elements.merge_elements(one, *numerics.joined)
-                if law_has_trait(law.numbers.law, "cells")
-                else one
-                for one, law in zip(self.groups, rig.friction.interfaces)
-            )
+            groups = list(self.groups)
+            for number, law in enumerate(rig.friction.interfaces):
+                if law_has_trait(law.numbers.law, "cells"):
+                    groups[number] = elements.merge_elements(groups[number], *numerics.joined)
+            self.groups = tuple(groups)
         self.seconds = perf_counter() - begin
 
 
@@ -443,32 +466,28 @@ class RigidElements:
     seconds = 0.0
 
     def __init__(self, model, numerics, patch):
-        self.groups = tuple(
-            elements.make_coulomb_elements(*pair) for pair in coulomb_limits(model, patch)
-        )
+        limits = coulomb_limits(model, patch)
+        self.groups = tuple(elements.make_coulomb_elements(*pair) for pair in limits)
 
 
 def coulomb_limits(model, patch) -> list:
     """Return the static and kinetic friction limits [N] of every interface; 0 without friction."""
     rig = model.rig
-    share = 1.0
+    friction = model.friction
     if rig.friction.strips_slide_apart:
-        return [
-            tuple(map(float, model.friction_limits(load))) for load in strips.strip_loads(patch)
-        ]
-    if model.friction is None:
+        loads = strips.strip_loads(patch)
+        return [tuple(map(float, model.friction_limits(load))) for load in loads]
+    if friction is None:
         return [(0.0, 0.0)] * len(rig.modes.interfaces)
     if rig.friction.names:
-        return [tuple(map(float, one.friction_limits(one.load))) for one in rig.friction.interfaces]
-    if law_has_trait(model.friction.law, "averaged"):
-        share = averaged.limit_share(model, patch)
+        laws = rig.friction.interfaces
+        return [tuple(map(float, law.friction_limits(law.load))) for law in laws]
     static, kinetic = model.friction_limits(normal_load(model, patch))
-    return [
-        (
-            float(static * share),
-            float(kinetic if model.friction.kinetic is not None else static * share),
-        )
-    ]
+    if law_has_trait(friction.law, "averaged"):
+        static = static * averaged.limit_share(model, patch)
+    if friction.kinetic is None:
+        kinetic = static
+    return [(float(static), float(kinetic))]
 
 
 def elements_of_law(element) -> elements.Elements:
@@ -480,7 +499,7 @@ def elements_of_law(element) -> elements.Elements:
 
 
 def measures_from_reading(
-    reading: Reading, book: dict, sine: bool, whole: bool, stiffness, size
+    reading: Reading, book: dict, *, sine: bool, whole: bool, stiffness, size
 ) -> dict:
     """Return measures of the first interface and the motion by name, of one run or (n,) of many.
 
@@ -503,38 +522,39 @@ def measures_from_reading(
     dict
         NaN for a measure that a run does not have.
     """
-    none, (first, third) = np.full(np.shape(reading.swing), np.nan)[()], reading.waves
-    out = {
+    none = np.full(np.shape(reading.swing), np.nan)[()]
+    has_waves = sine and whole
+    first, third = reading.waves
+    loop = reading.loop()
+    values = {
         "relative_displacement_amplitude": reading.swing,
         "absolute_acceleration_peak": reading.acceleration,
-        "absolute_acceleration_fundamental": first if sine and whole else none,
-        "acceleration_distortion": distortion_ratio(first, third, size) if sine and whole else none,
+        "absolute_acceleration_fundamental": first if has_waves else none,
+        "acceleration_distortion": distortion_ratio(first, third, size) if has_waves else none,
         "drift_per_cycle": reading.drift,
         "slip_start_phase": reading.start if sine else none,
         "work_check": _work_check(reading, book),
+        "slip_amplitude": loop.slip_range / 2,
+        "friction_force_peak": loop.max_force,
+        "stick_fraction": stick_fraction(loop.stuck_time, reading.span),
     }
-    one = reading.loop()
-    out |= {
-        "slip_amplitude": one.slip_range / 2,
-        "friction_force_peak": one.max_force,
-        "stick_fraction": stick_fraction(one.stuck_time, reading.span),
-    }
-    return out | (_loop(reading, sine, stiffness) if whole else {})
+    return values | _loop_measures(reading, stiffness, sine=sine) if whole else values
 
 
-def _loop(reading: Reading, sine: bool, stiffness) -> dict:
+def _loop_measures(reading: Reading, stiffness, *, sine: bool) -> dict:
     """Return the measures of the loop of the first interface by name."""
-    one = reading.loop()
+    loop = reading.loop()
     moves = (
         reading.interface_value(INTERFACE.max_slide) - reading.interface_value(INTERFACE.min_slide)
         > MIN_SLIDE_RANGE
     ) & sine
     half = np.where(moves, reading.interface_value(INTERFACE.mean_range) / 2, 0.0)[()]
-    work = one.work * reading.period / reading.span
+    work = loop.work * reading.period / reading.span
     secant = np.where(moves, reading.interface_value(INTERFACE.secant), np.nan)[()]
-    return interface_loops(half, one.displacement_harmonic, one.force_harmonic, work, stiffness) | {
-        "secant_stiffness": secant
-    }
+    measures = interface_loops(
+        half, loop.displacement_harmonic, loop.force_harmonic, work, stiffness
+    )
+    return measures | {"secant_stiffness": secant}
 
 
 def _work_check(reading: Reading, book: dict):
@@ -542,8 +562,7 @@ def _work_check(reading: Reading, book: dict):
 
     The samples are the ends of the pieces, with the trapezoidal rule.
     """
-    turned, booked, passed = (
-        reading.faces[..., place].sum(axis=-1)
-        for place in (INTERFACE.end_work, INTERFACE.work, INTERFACE.path_work)
-    )
-    return relative_gap(turned, booked, passed, book["power"] + book["peak_stored"])
+    sampled = reading.faces[..., INTERFACE.end_work].sum(axis=-1)
+    booked = reading.faces[..., INTERFACE.work].sum(axis=-1)
+    exchanged = reading.faces[..., INTERFACE.path_work].sum(axis=-1)
+    return relative_gap(sampled, booked, exchanged, book["power"] + book["peak_stored"])

@@ -5,6 +5,7 @@ that they know better than their samples.
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,9 +18,9 @@ from ...response.levels import LEVEL_MEASURES, Level
 from ...response.loops import reversal_evaluation
 from ...response.measures import slip_round_off, window_amplitudes, window_end_values
 from ...response.outcome import estimate_steady
-from ...response.rows import NEEDS_RUN, compute_measures, find_row
-from ...structure.drive_sizes import choose_samples_per_cycle
-from .solution import Solution, last_cycle_amplitude, last_cycles
+from ...response.rows import NEEDS_RUN, LastCycles, compute_measures, find_row
+from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
+from .solution import Solution, last_cycle_amplitude, mode_stiffness, normal_load
 
 
 class Reader:
@@ -49,9 +50,8 @@ class Reader:
         self.contact = contact
         self.steps = steps or numerics.steps
         self.rubs = model.friction is not None
-        self.creeps = self.rubs and law_has_trait(
-            model.friction.law, "creeps"
-        )  # such a law never sticks
+        # such a law never sticks
+        self.creeps = self.rubs and law_has_trait(model.friction.law, "creeps")
         self.held = 0.0 if self.creeps else held
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
@@ -59,7 +59,17 @@ class Reader:
         return IntegratedMeasures()
 
     def further_fields(self, run, drive, stuck: bool) -> dict:
-        """Return further fields of `response.rows.LastCycles` that the engine knows, by name."""
+        """Return further fields of `response.rows.LastCycles` that the engine knows, by name.
+
+        Parameters
+        ----------
+        run
+            Run or mark.
+        drive
+            Drive of the run.
+        stuck : bool
+            Whether the interface sticks.
+        """
         return {}
 
     def values(self, run, drive=None, stuck: bool = False, ledger=None) -> dict:
@@ -76,24 +86,32 @@ class Reader:
         ledger : (4, k), optional
             See `LastCycles`.
         """
-        drive = drive or self.model.rig.drive.signal
-        given = {
+        model = self.model
+        drive = drive or model.rig.drive.signal
+        fields = {
+            "window": run.window,
+            "book": run.ledger,
             "integrated": self.integrated_measures(run, drive),
             "run": self.whole_run(run, drive),
-        } | self.further_fields(run, drive, stuck)
+        }
         if self.rubs:
-            given = {"by": reversal_evaluation(self.model), "ledger": ledger} | given
-        window = given.pop("window", run.window)
-        book = given.pop("book", run.ledger)
-        last = run.amplitudes[-min(self.numerics.window, len(run.amplitudes)) :]
-        found = compute_measures(
-            last_cycles(self.model, self.patch, window, last, book, drive=drive, **given)
+            fields |= {"by": reversal_evaluation(model), "ledger": ledger}
+        fields |= self.further_fields(run, drive, stuck)
+        window = fields["window"]
+        n_cycles = min(self.numerics.window, len(run.amplitudes))
+        last_cycles = LastCycles(
+            drive=drive,
+            extremes=run.amplitudes[-n_cycles:],
+            load=normal_load(model, self.patch),
+            stiffness=mode_stiffness(model, window),
+            sine=is_sinusoidal(drive),
+            **fields,
         )
-        if self.model.rig.drive.kind == "free":
-            found["relative_displacement_amplitude"] = last_cycle_amplitude(
-                window, drive.period, found["relative_displacement_amplitude"]
-            )
-        return found
+        values = compute_measures(last_cycles)
+        if model.rig.drive.kind == "free":
+            name = "relative_displacement_amplitude"
+            values[name] = last_cycle_amplitude(window, drive.period, values[name])
+        return values
 
     def sticks(self, run) -> bool:
         """Return whether no interface slips in the last cycles by more than `held` or round-off."""
@@ -101,9 +119,8 @@ class Reader:
         if not self.rubs or self.creeps:
             return False
         if loops:
-            return all(
-                loop.slip_range / 2 <= max(self.held, slip_round_off(run.window)) for loop in loops
-            )
+            limit = max(self.held, slip_round_off(run.window))
+            return all(loop.slip_range / 2 <= limit for loop in loops)
         return run_events.is_all_stuck(run.window, self.held)
 
     def rings(self, run, drive) -> tuple:
@@ -115,7 +132,17 @@ class Reader:
         )
 
     def stated_errors(self, run, drive, values: dict) -> dict:
-        """Return the errors that the run itself states, by name, except those of its ringing."""
+        """Return the errors that the run itself states, by name, except those of its ringing.
+
+        Parameters
+        ----------
+        run
+            Run of the engine.
+        drive
+            Drive of the run.
+        values : dict
+            Measures by name.
+        """
         return {}
 
     def with_half_the_samples(self, run):
@@ -127,25 +154,27 @@ class Reader:
 
         They follow from the change with every second sample. Measures that the engine integrated
         have no such error.
+
+        Parameters
+        ----------
+        run
+            Run of the engine.
+        drive
+            Drive of the run.
+        values : dict
+            Measures by name.
         """
-        fewer = self.values(
-            self.with_half_the_samples(run), drive, ledger=run.response.extra.get("ledger")
-        )
-        integrated = self.integrated_measures(run, drive)
-        apart = {
-            name: gap
-            for name, gap in absolute_change(values, fewer).items()
-            if gap > 0 and name not in ERROR_MEASURES
-        }
-        return (
-            {
-                name: error_of_change(gap, order=find_row(name).order)
-                + find_row(name).sample_error / self.steps
-                for name, gap in apart.items()
-            }
-            if integrated.loops or hasattr(drive, "band")
-            else {}
-        )
+        if not self.integrated_measures(run, drive).loops and not hasattr(drive, "band"):
+            return {}
+        ledger = run.response.extra.get("ledger")
+        coarse_values = self.values(self.with_half_the_samples(run), drive, ledger=ledger)
+        errors = {}
+        for name, change in absolute_change(values, coarse_values).items():
+            if change > 0 and name not in ERROR_MEASURES:
+                row = find_row(name)
+                error = error_of_change(change, order=row.order)
+                errors[name] = error + row.sample_error / self.steps
+        return errors
 
     def whole_run(self, run, drive):
         """Return the histories of a run, or of a mark of it, from t = 0 on.
@@ -165,20 +194,27 @@ class Reader:
 
         The changes without the even and without the odd samples are added, because each reversal
         has neighbours of one kind.
+
+        Parameters
+        ----------
+        run
+            Run of the engine.
+        drive
+            Drive of the run.
+        values : dict
+            Measures by name.
         """
         rows = [row for row in NEEDS_RUN if row.name in values]
         if not rows:
             return {}
-        out = dict.fromkeys([row.name for row in rows], 0.0)
+        errors = dict.fromkeys([row.name for row in rows], 0.0)
         for parity in (0, 1):
-            fewer = self.values(
-                replace(run, response=_between_reversals(run.response, parity)), drive
-            )
+            thinned = replace(run, response=_between_reversals(run.response, parity))
+            coarse_values = self.values(thinned, drive)
             for row in rows:
-                out[row.name] += error_of_change(
-                    values[row.name] - fewer[row.name], order=row.order
-                )
-        return out
+                change = values[row.name] - coarse_values[row.name]
+                errors[row.name] += error_of_change(change, order=row.order)
+        return errors
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """Return the Solution of a run.
@@ -195,24 +231,22 @@ class Reader:
             Other fields of the Solution.
         """
         drive = drive or self.model.rig.drive.signal
-        window = self.numerics.window
-        stuck, (rings, ring_errors) = self.sticks(run), self.rings(run, drive)
+        n_cycles = self.numerics.window
+        stuck = self.sticks(run)
+        rings, ring_errors = self.rings(run, drive)
         values = self.values(run, drive, stuck, run.response.extra.get("ledger")) | rings
-        kept = {"message": "", "log": None, "snapshots": []}
-        more = (
-            {name: getattr(run, name, none) for name, none in kept.items()}
-            | {
-                "steady": estimate_steady(
-                    drive, *window_end_values(run.amplitudes, run.phasors, window)
-                )
-            }
-            | more
-        )
+        ends = window_end_values(run.amplitudes, run.phasors, n_cycles)
+        fields = {
+            "message": getattr(run, "message", ""),
+            "log": getattr(run, "log", None),
+            "snapshots": getattr(run, "snapshots", []),
+            "steady": estimate_steady(drive, *ends),
+        }
         return Solution(
             values=values,
             response=run.response,
             window=run.window,
-            amplitudes=window_amplitudes(run.amplitudes, window),
+            amplitudes=window_amplitudes(run.amplitudes, n_cycles),
             outcome=run.outcome or (Outcome.STUCK if stuck else None),
             book=run.ledger,
             seconds=seconds,
@@ -222,10 +256,10 @@ class Reader:
             | self.stated_errors(run, drive, values)
             | self.between_samples(run, drive, values),
             extremes=run.amplitudes,
-            **more,
+            **(fields | more),
         )
 
-    def level(self, size: float, run, drive=None, left: float = 0.0) -> Level:
+    def level(self, size: float, run, drive=None, relative_error: float = 0.0) -> Level:
         """Return the Level of a run, or of a mark of it.
 
         Parameters
@@ -236,17 +270,15 @@ class Reader:
             Run or mark.
         drive : optional
             Drive, if it is not that of the model.
-        left : float
+        relative_error : float
             Relative error of the measures.
         """
-        found = self.values(run, drive)
-        kept = {name: found[name] for name in LEVEL_MEASURES if name in found}
-        return Level(
-            size,
-            self.sticks(run),
-            kept,
-            {name: left * abs(v) for name, v in kept.items()} if left else {},
-        )
+        values = self.values(run, drive)
+        values = {name: values[name] for name in LEVEL_MEASURES if name in values}
+        errors = {}
+        if relative_error:
+            errors = {name: relative_error * abs(value) for name, value in values.items()}
+        return Level(size, self.sticks(run), values, errors)
 
 
 def _between_reversals(histories, parity: int):
@@ -273,22 +305,31 @@ def thin_samples(window):
     return window.select(kept)
 
 
-def friction_works(response, work: float, passed: float | None = None) -> tuple:
-    """Return the friction work [J] from samples and from a ledger, and the exchanged work [J].
+class FrictionWorks(NamedTuple):
+    """Friction work of a run, from two computations.
+
+    - sampled: from samples by the trapezoidal rule [J].
+    - booked: from the ledger of the energy balance [J].
+    - exchanged: sum of |work| [J].
+    """
+
+    sampled: float
+    booked: float
+    exchanged: float
+
+
+def friction_works(response, work: float) -> FrictionWorks:
+    """Return the friction work from samples and from a ledger, and the exchanged work.
 
     Parameters
     ----------
     response : Response
     work : float
         Friction work of the ledger [J].
-    passed : float, optional
-        Sum of |work| [J], if it is known better than from samples.
     """
-    extra = response.extra
-    slides, forces = (
-        extra.get(name, one[:, None])
-        for name, one in (("slides", response.slide), ("forces", response.force))
-    )
+    slides = response.extra.get("slides", response.slide[:, None])
+    forces = response.extra.get("forces", response.force[:, None])
     parts = [path_work.sampled_work(slide, force) for slide, force in zip(slides.T, forces.T)]
-    to_and_fro = sum(float(abs(one).sum()) for one in parts)
-    return sum(float(one.sum()) for one in parts), work, to_and_fro if passed is None else passed
+    sampled = sum(float(part.sum()) for part in parts)
+    exchanged = sum(float(abs(part).sum()) for part in parts)
+    return FrictionWorks(sampled, work, exchanged)

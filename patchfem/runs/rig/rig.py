@@ -212,7 +212,7 @@ def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -
             pairs.append((solutions[kind.runs[0]], kind.beside and solutions[kind.beside]))
     level_results = ()
     if solution.levels:
-        level_results = levels.levels_with_errors(solution.levels, used, solutions)
+        level_results = levels.add_level_errors(solution.levels, used, solutions)
     return replace(solution, levels=level_results, coarser=tuple(pairs))
 
 

@@ -12,11 +12,11 @@ from ...dynamics.smooth import run as engine
 from ...response.measures import slip_round_off
 from ...response.rows import NEEDS_RUN, find_row
 from .interface import make_contact
-from .reading import Reader, thin_samples
+from .reading import FrictionWorks, Reader, thin_samples
 from .solution import Solution
 
 # factor on the round-off of the slip, above which the fraction of slip is known inside a step
-CLEAR = 1e3
+MIN_SLIP_OVER_ROUND_OFF = 1e3
 # error of the instant at which this fraction crosses a limit: the extension of a step is less
 # accurate than its end
 CROSSING_FRACTION_ERROR = 1e-7
@@ -34,15 +34,6 @@ def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None)
         Number of snapshots of the interface in the last cycle.
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
-    """
-    found, done, reader = smooth_run(model, numerics, patch, frames, say, progress)
-    return replace(found, errors=reader.left_open(done, found.values))
-
-
-def smooth_run(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
-    """Return the Solution without its own errors, the SmoothResult, and its SmoothReader.
-
-    The parameters are those of `run_smooth`.
     """
     rig = model.rig
     begin = perf_counter()
@@ -64,16 +55,13 @@ def smooth_run(model, numerics, patch, frames: int = 0, say=None, progress=None)
         even=bool(NEEDS_RUN),
     )
     reader = SmoothReader(model, numerics, patch, contact)
-    return (
-        reader.solution(
-            done,
-            perf_counter() - begin,
-            prepare={"compiled_code": loaded},
-            extra={"step_tolerance": numerics.local, "steps_taken": int(done.ledger["steps"])},
-        ),
+    solution = reader.solution(
         done,
-        reader,
+        perf_counter() - begin,
+        prepare={"compiled_code": loaded},
+        extra={"step_tolerance": numerics.local, "steps_taken": int(done.ledger["steps"])},
     )
+    return replace(solution, errors=reader.integration_errors(done, solution.values))
 
 
 class SmoothReader(Reader):
@@ -87,45 +75,51 @@ class SmoothReader(Reader):
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
         """Return the measures from the polynomials of the steps."""
         book = run.ledger
-        fine = run.integrated
-        if not _clear(run):
-            fine = replace(
-                fine, loops=(fine.loops[0]._replace(stuck_time=None),), slip_start_phases=None
-            )
-        return replace(fine, friction_works=(book["sampled"], book["booked"], book["passed"]))
+        integrated = run.integrated
+        if not _has_clear_slip(run):
+            loop = integrated.loops[0]._replace(stuck_time=None)
+            integrated = replace(integrated, loops=(loop,), slip_start_phases=None)
+        works = FrictionWorks(book["sampled"], book["booked"], book["passed"])
+        return replace(integrated, friction_works=works)
 
     def further_fields(self, run, drive, stuck: bool) -> dict:
-        """Return the samples including the reversals, and the equally spaced ones."""
+        """Return the samples including the reversals, and the equally spaced ones.
+
+        Parameters
+        ----------
+        run, drive, stuck
+            See `Reader.further_fields`.
+        """
         return {"window": run.with_reversals, "even": run.window, "by": "rate"}
 
     def with_half_the_samples(self, run):
         """Return the run with every second one of its samples."""
-        return replace(
-            super().with_half_the_samples(run), with_reversals=thin_samples(run.with_reversals)
-        )
+        thinned = super().with_half_the_samples(run)
+        return replace(thinned, with_reversals=thin_samples(run.with_reversals))
 
-    def left_open(self, run, values: dict) -> dict:
+    def integration_errors(self, run, values: dict) -> dict:
         """Return the errors of measures by name that a SmoothResult states itself.
 
         They are those of samples, of peaks, and of cycles that were skipped. values: measures by
         name.
         """
-        found = self.sampling_errors(run, self.model.rig.drive.signal, values)
-        size = values.get("relative_displacement_amplitude", 0.0)
+        sampling = self.sampling_errors(run, self.model.rig.drive.signal, values)
         for name in ("stick_fraction", "slip_start_phase"):
-            found[name] = (
-                CROSSING_FRACTION_ERROR
-                if _clear(run)
-                else found.get(name, find_row(name).sample_error / self.steps)
-            )
-        return {
-            name: found.get(name, 0.0)
-            + run.peak_errors.get(name, 0.0)
-            + run.repeat_change * (size if name == "drift_per_cycle" else abs(value))
-            for name, value in values.items()
-        }
+            if _has_clear_slip(run):
+                sampling[name] = CROSSING_FRACTION_ERROR
+            elif name not in sampling:
+                sampling[name] = find_row(name).sample_error / self.steps
+        errors = {}
+        for name, value in values.items():
+            size = abs(value)
+            if name == "drift_per_cycle":
+                size = values.get("relative_displacement_amplitude", 0.0)
+            error = sampling.get(name, 0.0) + run.peak_errors.get(name, 0.0)
+            errors[name] = error + run.repeat_change * size
+        return errors
 
 
-def _clear(run) -> bool:
+def _has_clear_slip(run) -> bool:
     """Return whether the slip of a SmoothResult exceeds round-off."""
-    return run.integrated.loops[0].slip_range > CLEAR * slip_round_off(run.window)
+    slip_range = run.integrated.loops[0].slip_range
+    return slip_range > MIN_SLIP_OVER_ROUND_OFF * slip_round_off(run.window)

@@ -1,9 +1,10 @@
-"""Solution that an engine returns, and the last cycles as input of the measures.
+"""Solution that an engine returns, and parts of it that several engines compute alike.
 
-In: a run of an engine. Out: `Solution`, and `LastCycles` for the rows of `response.rows`.
+In: a run of an engine. Out: `Solution`, and the loop, load and stiffness of its last cycles.
 """
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,11 +12,10 @@ from ...core import Measure, Outcome, Response
 from ...response.decay_curve import measure_last_swing
 from ...response.measures import compute_harmonic, measure_half_swing
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
-from ...response.rows import LastCycles
-from ...structure.drive_sizes import find_drive_omega, has_full_cycle, is_sinusoidal
+from ...structure.drive_sizes import find_drive_omega, has_full_cycle
 
 NO_PEAK = "the output does not move at any of the swept frequencies, so there is no peak"
-OF_OTHERS = 3.0  # factor on the shift of a peak by a coarser mesh or fewer modes
+PEAK_SHIFT_FACTOR = 3.0  # factor on the shift of a peak by a coarser mesh or fewer modes
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -73,6 +73,18 @@ class Solution:
     extra: dict = field(default_factory=dict)
 
 
+class CycleLoop(NamedTuple):
+    """Friction loop of one cycle.
+
+    - slide, force: first harmonics of the slide [m] and of the friction force [N].
+    - work: friction work per cycle [J].
+    """
+
+    slide: complex
+    force: complex
+    work: float
+
+
 def seen_by_gauge(model, raw: Solution) -> Solution:
     """Return the Solution as seen by a gauge that is not at the accelerometer.
 
@@ -83,40 +95,47 @@ def seen_by_gauge(model, raw: Solution) -> Solution:
     if gauge is None:
         return raw
     name = "relative_displacement_amplitude"
-    moved = []
-    for one in (raw.response, raw.window):
-        felt = {"sensor": one.output, "sensor_rate": one.output_rate}
-        moved.append(
-            replace(
-                one,
-                output=one.modal @ gauge,
-                output_rate=one.modal_rate @ gauge,
-                extra=one.extra | felt,
-            )
-        )
-    seen = measure_half_swing(raw.window.time, moved[1].output, moved[1].output_rate)
+    window = _histories_at_gauge(raw.window, gauge)
+    amplitude = measure_half_swing(window.time, window.output, window.output_rate)
     if model.rig.drive.kind == "free":
-        seen = last_cycle_amplitude(moved[1], model.rig.drive.signal.period, seen)
-    share = max(1.0, seen / max(raw.values[name], 1e-300))
-    errors = raw.errors and raw.errors | {name: share * raw.errors.get(name, 0.0)}
+        amplitude = last_cycle_amplitude(window, model.rig.drive.signal.period, amplitude)
+    ratio = max(1.0, amplitude / max(raw.values[name], 1e-300))
+    errors = raw.errors and raw.errors | {name: ratio * raw.errors.get(name, 0.0)}
     values = {key: value for key, value in raw.values.items() if key != f"{name}_steady"}
     return replace(
         raw,
-        values=values | {name: seen},
-        response=moved[0],
-        window=moved[1],
+        values=values | {name: amplitude},
+        response=_histories_at_gauge(raw.response, gauge),
+        window=window,
         steady=(None, None),
         errors=errors,
     )
 
 
-def last_cycle_amplitude(window, period: float, whole: float) -> float:
+def _histories_at_gauge(histories: Response, gauge) -> Response:
+    """Return histories whose output is that of a gauge; gauge: its participation (n,)."""
+    sensor = {"sensor": histories.output, "sensor_rate": histories.output_rate}
+    return replace(
+        histories,
+        output=histories.modal @ gauge,
+        output_rate=histories.modal_rate @ gauge,
+        extra=histories.extra | sensor,
+    )
+
+
+def last_cycle_amplitude(window, period: float, window_amplitude: float) -> float:
     """Return the amplitude [m] of a release in its last whole cycle.
 
-    `whole` is the amplitude of the window, returned if it contains no whole cycle.
+    Parameters
+    ----------
+    window : Response
+    period : float
+        Period of the drive [s].
+    window_amplitude : float
+        Amplitude of the window [m], returned if it contains no whole cycle.
     """
-    found = measure_last_swing(window.time, window.output, window.output_rate, period)
-    return whole if found is None else found
+    swing = measure_last_swing(window.time, window.output, window.output_rate, period)
+    return window_amplitude if swing is None else swing
 
 
 def normal_load(model, patch) -> float | None:
@@ -124,34 +143,6 @@ def normal_load(model, patch) -> float | None:
     if model.friction is None:
         return None
     return patch.pressure.load if patch is not None else model.point.load
-
-
-def last_cycles(model, patch, window, extremes, book: dict, **more) -> LastCycles:
-    """Return the last cycles of a run as input of the measures (`response.rows.LastCycles`).
-
-    Parameters
-    ----------
-    model : Model
-    patch : Patch or None
-    window : Response
-    extremes : (c, 2)
-        Smallest and largest output of each cycle [m].
-    book : dict
-        Energies by name [J].
-    more
-        Other fields of LastCycles, with `drive` if it is not that of the model.
-    """
-    drive = more.pop("drive", model.rig.drive.signal)
-    return LastCycles(
-        window,
-        drive,
-        extremes,
-        book,
-        normal_load(model, patch),
-        mode_stiffness(model, window),
-        is_sinusoidal(drive),
-        **more,
-    )
 
 
 def mode_stiffness(model, window) -> float:
@@ -165,8 +156,8 @@ def mode_stiffness(model, window) -> float:
     return first_mode.stiffness
 
 
-def sampled_loop(window, drive, work: float, force: complex | None = None) -> tuple | None:
-    """Return the loop of equally spaced samples by the trapezoidal rule (`LastCycles.loop`).
+def sampled_loop(window, drive, work: float, force: complex | None = None) -> CycleLoop | None:
+    """Return the loop of equally spaced samples by the trapezoidal rule.
 
     Parameters
     ----------
@@ -179,7 +170,7 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
 
     Returns
     -------
-    tuple or None
+    CycleLoop or None
         None if the window contains no whole cycle.
     """
     if not has_full_cycle(window.time[-1] - window.time[0], drive):
@@ -188,8 +179,9 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
     omega = find_drive_omega(drive)
     weight[[0, -1]] = 0.5
     slide = compute_harmonic(window.time, weight, window.slide - window.slide.mean(), omega)
-    pull = compute_harmonic(window.time, weight, window.force, omega) if force is None else force
-    return slide, pull, work
+    if force is None:
+        force = compute_harmonic(window.time, weight, window.force, omega)
+    return CycleLoop(slide, force, work)
 
 
 def curve_measures(extra: dict, coarser=()) -> dict:
@@ -211,11 +203,10 @@ def curve_measures(extra: dict, coarser=()) -> dict:
     """
     if "at_error" not in extra:
         return {}
-    at, others = (
-        np.array([one["at"].omega for one in every]) / (2 * np.pi)
-        for every in ([extra], [one.extra for one in coarser if "at" in one.extra])
-    )
     if extra["at_error"] is None:
         return {"peak_frequency": Measure(None, "Hz", None, 0.0, reason=NO_PEAK)}
-    error = extra["at_error"] + OF_OTHERS * float(np.abs(others - at).max(initial=0.0))
-    return {"peak_frequency": Measure(float(at[0]), "Hz", error, 0.0)}
+    peak_frequency = float(extra["at"].omega / (2 * np.pi))
+    peaks = [run.extra["at"].omega / (2 * np.pi) for run in coarser if "at" in run.extra]
+    shift = float(np.abs(np.array(peaks) - peak_frequency).max(initial=0.0))
+    error = extra["at_error"] + PEAK_SHIFT_FACTOR * shift
+    return {"peak_frequency": Measure(peak_frequency, "Hz", error, 0.0)}

@@ -36,9 +36,8 @@ def solve(model, numerics, patch, frames: int = 0, say=None, progress=None) -> S
     -------
     Solution
     """
-    return seen_by_gauge(
-        model, SOLVERS[numerics.engine](model, numerics, patch, frames, say, progress)
-    )
+    solution = SOLVERS[numerics.engine](model, numerics, patch, frames, say, progress)
+    return seen_by_gauge(model, solution)
 
 
 def refuse_long_run(model, numerics) -> None:
