@@ -16,8 +16,6 @@ from friction_forms import (
     weight_across,
     weight_along,
 )
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 from scipy.special import gamma
@@ -81,21 +79,6 @@ def test_exact_combined_modulus_is_two_compliances_in_series():
 
 
 # ---- bonds
-
-
-@pytest.mark.slow
-def test_exact_steady_length_is_where_growth_stops():
-    args = {"length": 2e-6, "ratio": 0.7, "rest_growth": 10.0, "slip_growth": 0.2e-6}
-    for v in (5e-4, 5e-3, -5e-2):
-        rate = solve_ivp(
-            lambda _, e, v=v: 10.0 / abs(v) * (2e-6 - e) + abs(v) / 0.2e-6 * (1.4e-6 - e),
-            (0, 300 / (10.0 / abs(v) + abs(v) / 0.2e-6)),
-            [0.0],
-            rtol=1e-12,
-            atol=1e-20,
-            method="Radau",
-        )
-        assert steady_bond_length(v, **args) == pytest.approx(rate.y[0, -1], rel=1e-9)
 
 
 def test_exact_steady_friction_of_2_18_and_2_11():
@@ -325,28 +308,6 @@ def test_exact_rest_of_3_11_with_the_count_rounded_up(start, friction, omega, ti
     assert decay(np.array([time, time + 50]), start, friction, omega) == pytest.approx(
         [place, place], abs=1e-12
     )
-
-
-@given(st.floats(-20, 20), st.floats(0.01, 2), st.floats(0.1, 10))
-def test_always_a_decay_rests_inside_the_friction_band_and_is_continuous(start, friction, omega):
-    stop, place = decay_rest(start, friction, omega)
-    assert abs(place) <= friction * (1 + 1e-9) or (stop == 0 and place == start)
-    near = decay(np.array([max(stop - 1e-7 / omega, 0), stop]), start, friction, omega)
-    assert abs(near[1] - near[0]) <= 1e-9 * (abs(start) + friction)
-
-
-@pytest.mark.parametrize(
-    "hertz, input_g, bare, damped",
-    [(135, 6, 5.22698, 4.83011), (150, 7, 6.66151, 6.21040), (155, 8, 4.29575, 4.15965)],
-)
-def test_exact_sliding_amplitude_is_den_hartog(hertz, input_g, bare, damped):
-    r = hertz / 143
-    friction = 4 / input_g
-    u = np.sin(np.pi / r) / (r * (1 + np.cos(np.pi / r)))
-    got = sliding_amplitude(r, friction)
-    assert got == pytest.approx(np.sqrt(1 / (1 - r * r) ** 2 - (u * friction) ** 2), rel=1e-12)
-    assert got == pytest.approx(bare, abs=6e-6)
-    assert sliding_amplitude(r, friction, 0.003) == pytest.approx(damped, abs=6e-6)
 
 
 @pytest.mark.parametrize(

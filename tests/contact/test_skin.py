@@ -335,19 +335,6 @@ def test_exact_going_down_the_dual_alone_leads_to_the_same_answer(monkeypatch):
 
 
 # ------------------------------------------------------------------------------------------------------------- refusals
-@each_skin
-def test_exact_zero_load_and_an_open_skin_carry_nothing(skin):
-    c, x, weight = bodies(40)
-    state = solve(skin, c, x, weight, 1e-6 + 1e-5 * np.abs(x), 0.0)
-    assert (
-        state.outcome is Outcome.NO_CONTACT and not state.force.any() and not state.stiffness.any()
-    )
-    away = solve(skin, c, x, weight, 0 * x, approach=-1e-3)
-    assert (
-        away.outcome is Outcome.NO_CONTACT
-        and away.load == 0
-        and tangent(c, weight, away.stiffness) == 0
-    )
 
 
 def test_refuses_controls_without_an_answer():

@@ -283,21 +283,6 @@ def test_exact_equal_heights_share_as_their_compliance_says(moment):
     assert state.approach == pytest.approx(LOAD / share.sum(), rel=1e-12)
 
 
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    levels=st.integers(1, 4),
-    line=st.sampled_from([None, 0.0, 1e-3]),
-)
-def test_always_steps_of_equal_height_are_solved(seed, levels, line):
-    """Duplicated values are mirrored exactly with their gap."""
-    pair = coated_pair(100)
-    gap = 1e-7 * np.random.default_rng(seed).integers(0, levels, 101)
-    state = press(pair, gap, LOAD, None if line is None else LOAD * line)
-    back = press(pair, gap[::-1].copy(), LOAD, None if line is None else -LOAD * line)
-    assert max(state.residuals.values()) <= RESIDUAL_TOL
-    assert np.abs(state.sigma_n - back.sigma_n[::-1]).max() <= 1e-8 * state.sigma_n.max()
-
-
 # ---- what stands behind the active set
 
 # from all and from the overlap

@@ -306,19 +306,6 @@ def check(state, skin, c, x, weight, gap, roll, load, moment=None, spring=0.0, f
     assert not state.force.flags.writeable and not state.pressure.flags.writeable
 
 
-@each_skin
-@each_control
-def test_exact_balances_of_a_rolled_pair(skin, control):
-    c, x, weight, y = real(8)
-    gap = 2e-5 * x + rough(np.random.default_rng(5), x, 2e-7)
-    state = press_strips(
-        c, x, weight, y, gap, 1e-4, LOAD, rotation=0.25, asperities=skin, **control
-    )
-    free = state.theta - 0.25
-    assert state.outcome is Outcome.DONE and (control or free == 0)
-    check(state, skin, c, x, weight, gap, 1e-4, LOAD, free=free, **control)
-
-
 @given(
     count=st.integers(1, 8),
     size=st.floats(-9, -5),

@@ -5,16 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pieces import COATED, COATING, LENGTH, LOAD, TILTS, WIDTH, coated_pair, pair_of, rough
-from scipy.optimize import nnls
 
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.unilateral import press, press_to_approach, solve_forces
 from patchfem.core import Outcome
 from patchfem.mesh.tensor import graded_grid
-
-
-def forces(pair, state):
-    return state.sigma_n * pair.interface.weight
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e-3, 3e-3])
@@ -53,27 +48,6 @@ def test_always_the_start_of_the_active_set_does_not_change_the_answer():
                     pair.normal, x, gap, target, rng.random(x.size) < rng.random()
                 )
                 assert np.abs(warm - cold).max() <= 1e-8 * load
-
-
-def quadratic_program(pair, gap, load):
-    """min f.C f/2 + f.g with f >= 0 and sum f = N as a nonnegative least-squares problem: on the simplex the linear
-    term joins the square, and the row of ones only sets the length of the answer."""
-    root = np.linalg.cholesky(pair.normal).T
-    bent = np.linalg.solve(root.T, gap - gap.min())
-    square = root + np.outer(bent, np.ones(gap.size)) / load
-    size = np.linalg.norm(square, 2)
-    answer, _ = nnls(
-        np.vstack([square / size, np.ones(gap.size)]),
-        np.concatenate([np.zeros(gap.size), [1.0]]),
-        maxiter=50 * gap.size,
-    )
-    return answer * load / answer.sum()
-
-
-def test_exact_pressure_is_the_answer_of_a_quadratic_program():
-    for pair, gap, load, _ in random_cases(30):
-        state = press(pair, gap, load)
-        assert np.abs(quadratic_program(pair, gap, load) - forces(pair, state)).max() <= 1e-7 * load
 
 
 @pytest.mark.parametrize("moment", [None, 0.0])

@@ -124,23 +124,6 @@ def test_refuses_counts_the_file_cannot_hold_and_keeps_stdout_clean(tmp_path, ca
     assert time.process_time() - start < 1.0
 
 
-def test_refuses_cells_without_a_tag_at_the_interface(tmp_path):
-    pair = pair_mesh(SMALL)
-    tags = np.where(
-        np.isin(pair["tags"], [CELL_TAGS["upper_coating"], CELL_TAGS["lower_coating"]]),
-        99,
-        pair["tags"],
-    )
-    with pytest.raises(PatchfemError, match=r"unknown tag \(tag 99\)"):
-        read_grid(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
-
-
-def test_refuses_triangles_over_quads(tmp_path):
-    pair = pair_mesh(SMALL)
-    with pytest.raises(PatchfemError, match="the two pieces share"):
-        read_grid(store(tmp_path / "pair.msh", pair, extra=[("triangle", pair["quads"][:, :3])]))
-
-
 def test_always_a_coating_that_is_no_layer_leaves_no_tensor_grid(tmp_path):
     pair = pair_mesh(SMALL)
     tags = pair["tags"].copy()

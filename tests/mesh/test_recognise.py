@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from any_mesh_cases import FORMATS, GRID, drawn, of_grid
 
-from patchfem.core import PatchfemError
 from patchfem.mesh.anymesh import PieceMesh
 from patchfem.mesh.files import EDGE_TAGS, read_bodies
 from patchfem.mesh.recognise import find_holes, measure_fixed_length, recognise_grid
@@ -49,27 +48,6 @@ def test_exact_a_far_face_held_in_part_is_no_grid_in_any_format(form, tmp_path):
         (5e-4, 2e-3), rel=1e-12
     )  # 2 edges of 0.25 mm on 2 mm
     assert measure_fixed_length(high) == pytest.approx((2e-3, 2e-3), rel=1e-12)
-
-
-@pytest.mark.parametrize("form", ["gmsh 2.2 binary", "vtu", "inp lines", "med"])
-def test_refuses_twin_nodes_and_tags_of_the_wrong_piece_or_inside_it_in_every_format(
-    form, tmp_path
-):
-    m = drawn("quads")
-    m.edges[far_edges(m)[3]] = m.edges[far_edges(m, "upper")[3]]
-    with pytest.raises(
-        PatchfemError, match="lower_far contains 2 nodes that belong to no cell of the lower piece"
-    ):
-        bodies(m, tmp_path, form)
-    m = drawn("quads")
-    m.edges[far_edges(m)[3]] -= 1  # one row above the far face
-    with pytest.raises(PatchfemError, match="lower_far contains 2 nodes inside the lower piece"):
-        bodies(m, tmp_path, form)
-    m = drawn("quads")
-    m.points = np.append(m.points, m.points[m.quads[3, 2]][None], axis=0)
-    m.quads[3, 2] = len(m.points) - 1
-    with pytest.raises(PatchfemError, match=r"overlap|coincide"):
-        bodies(m, tmp_path, form)
 
 
 def test_exact_the_fixed_length_follows_a_far_face_up_to_its_corners():
@@ -121,3 +99,16 @@ def test_exact_holes_are_the_area_of_the_cells_left_out_inside_and_a_notch_is_no
     area = (x[3] - x[2]) * (depth[3] - depth[2]) + (x[6] - x[5]) * (depth[2] - depth[1])
     assert find_holes(left_out(gone)) == (2, pytest.approx(area, rel=1e-12))
     assert find_holes(left_out(gone | inside(0, 2))) == (2, pytest.approx(area, rel=1e-12))
+
+
+@pytest.mark.parametrize(("turn", "right_half"), [(28.0, 1e-3), (32.0, 0.0)])
+def test_exact_a_far_face_ends_where_its_border_turns_by_thirty_degrees(turn, right_half):
+    """The left half of a far face is inclined and fixed; the right half is free, and part of it or another face."""
+    piece = of_grid(GRID, 0.5, 3)
+    is_fixed = (piece.points[:, 1] == 1e-3) & (piece.points[:, 0] <= 0)
+    slope = np.tan(np.radians(turn))
+    points = piece.points.copy()
+    points[:, 1] *= 1 + slope * np.maximum(-points[:, 0], 0) / 1e-3
+    inclined = replace(piece, points=points, far=np.flatnonzero(is_fixed))
+    fixed = 1e-3 * np.hypot(1, slope)
+    assert measure_fixed_length(inclined) == pytest.approx((fixed, fixed + right_half), rel=1e-12)

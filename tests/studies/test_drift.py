@@ -111,26 +111,6 @@ def test_exact_an_elastic_range_narrows_the_loop(table):
     assert np.max(curve + np.expm1(-x)) == pytest.approx(table.virgin_gap(0.3), abs=1e-12)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.1])
-def test_exact_the_elastic_range_in_the_virgin_curve(table, share):
-    law = FirstOrderBonds(table.ladder.bonds(breakaway=share))
-    one = np.ones(1)
-    force = law.traction(law.step(law.start(one), 0.8 * table.LENGTH, one, one, 1.0).state)[0]
-    assert force == pytest.approx(1 - (1 - share) * np.exp(share - 0.8), abs=1e-14)
-
-
-@pytest.mark.slow
-def test_always_the_picture_of_the_drift(tmp_path):
-    text = study("drift/picture.py").main(tmp_path / "x.svg", (0.1,)).read_text()
-    for word in (
-        "drift per cycle [bond lengths]",
-        "b = 0.3",
-        "loop area / 4 A μs N",
-        "elastic range",
-    ):
-        assert word in text
-
-
 @pytest.mark.slow
 def test_always_the_table_of_drift(table, capsys):
     found = table.main()

@@ -4,7 +4,6 @@ import friction_forms
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 from study_module import study
 
 from patchfem.friction.bonds.recursion import FirstOrderBonds
@@ -33,17 +32,6 @@ def test_exact_areas_without_growth(ladder, amplitude):
     assert sharp.area == pytest.approx(friction_forms.jenkins_loop(amplitude, 1.0)[0], abs=1e-12)
     miss = ladder.error(ladder.coulomb(dahl), dahl)[0]
     assert miss == pytest.approx(np.tanh(amplitude) / amplitude, rel=2e-6)
-
-
-def test_exact_amplitudes_where_a_rung_is_within_a_hundredth():
-    def sharp(a):
-        return (friction_forms.jenkins_loop(a, 1.0)[0] - friction_forms.stretch_loop(a, 1.0)[0]) / (
-            4 * a
-        ) + 0.01
-
-    assert brentq(lambda a: np.tanh(a) / a - 0.01, 1, 1e3) == pytest.approx(100, rel=1e-3)
-    assert brentq(sharp, 1.2, 9) == pytest.approx(2.24, abs=0.005)
-    assert brentq(sharp, 0.05, 0.5) == pytest.approx(0.17, abs=0.005)
 
 
 def test_exact_rms_of_coulomb_falls_as_the_fourth_root(ladder):
@@ -87,20 +75,6 @@ def test_exact_bouc_wen_of_the_first_power_is_the_constant_length(ladder, today)
         state = law.step(state, dq * ladder.LENGTH, one, one, 1.0).state
         force.append(law.traction(state)[0])
     assert today.bouc_wen(path[:, None], 1, 1.0)[:, 0] == pytest.approx(force, abs=1e-14)
-
-
-def test_exact_bouc_wen_along_known_branches(today):
-    path = np.linspace(0, 3, 301)[:, None]
-    assert today.bouc_wen(path, 2) == pytest.approx(np.tanh(path), abs=1e-9)
-    back = np.concatenate([path, 3 - path])
-    for n in (1, 2, 5):
-        z = today.bouc_wen(back, n)
-        unloaded = z[301:401][z[301:401] >= 0]
-        assert z[301 + np.arange(unloaded.size), 0] == pytest.approx(
-            z[300, 0] - path[: unloaded.size, 0], abs=1e-12
-        )
-    fine = today._runge_kutta(np.array([-0.9]), np.array([2.0]), 1, 0.3)
-    assert today._exact(np.array([-0.9]), np.array([2.0]), 1, 0.3) == pytest.approx(fine, abs=2e-3)
 
 
 @pytest.mark.parametrize("count", [5, 20, 100])

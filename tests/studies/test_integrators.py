@@ -65,16 +65,6 @@ def test_exact_the_sentences_on_the_report_s_failure(failure, capsys):
     assert "Newmark" in capsys.readouterr().out
 
 
-@pytest.mark.slow
-def test_exact_the_picture_of_the_failure(failure, tmp_path):
-    rows = [failure.solve(*case) for case in failure.CASES if case[0] in failure.DRAWN]
-    path = failure.picture(
-        rows, {(1e-3, False): [0.1, 0.2], (1e-3, True): [0.1, 0.01]}, tmp_path / "one.svg"
-    )
-    text = path.read_text()
-    assert all(title in text for title in failure.DRAWN.values()) and "Newmark, stick speed" in text
-
-
 @pytest.fixture(scope="module")
 def work():
     return study("integrators/work_precision.py")
@@ -172,31 +162,6 @@ def test_exact_sentences_of_the_saved_table(work, table):
     error, seconds = of("block", "exact, one mode")
     assert error[0] == work.FLOOR and of("block", "SUNDIALS CVODE")[1].min() > 100 * seconds[0]
     assert of("block", "DOP853 + events")[1].min() > 300 * seconds[0]
-
-
-def test_exact_ratios_of_power_laws(work):
-    """Times c e^-1/2 and 10 c e^-1/2 are ten apart at every error that both reach."""
-    errors = 10.0 ** -np.arange(1, 8)
-    rows = [
-        {"problem": "p", "engine": name, "error": e, "seconds": c * e**-0.5, "knob": 0}
-        for name, c in (("a", 1.0), ("b", 10.0))
-        for e in errors
-    ]
-    # no front
-    rows.append({"problem": "p", "engine": "b", "error": 0.5, "seconds": 1e9, "knob": 1})
-    rows.append({"problem": "p", "engine": "c", "error": 1e-2, "seconds": 30.0, "knob": 0})
-    found = work.ratios(rows, "p", "a")
-    assert found["b"] == {error: "10" for error in work.EQUAL}
-    assert found["c"][1e-2] == "3" and found["c"][1e-3] == "-"
-
-
-@pytest.mark.slow
-def test_exact_the_picture_of_the_saved_table(work, table, tmp_path):
-    text = work.picture(table, tmp_path / "one.svg").read_text()
-    assert all(work.TITLES[where] in text for where in work.SHOWN)
-    assert all(
-        name in text for name in {r["engine"] for r in table["rows"] if r["problem"] != "decay"}
-    )
 
 
 def test_refuses_absent_peers_by_name_and_goes_on(work, engines, monkeypatch, capsys, tmp_path):

@@ -72,18 +72,6 @@ def test_exact_the_docstring_of_fixtures_holds_what_it_prints(tilted, fixtures, 
         assert abs(value - float(cell)) <= 0.5001 * last, (name, value, cell)
 
 
-def test_always_the_table_of_the_rigid_fixture(tilted, fixtures):
-    for tilt, fraction, peak, centre in (
-        (1e-5, 0.936, 1.923, -2.072),
-        (1e-4, 0.219, 8.32, -5.324),
-        (1e-2, 0.00168, 790, -6.342),
-    ):
-        found = coarse(tilted, fixtures.held(tilt, None))
-        assert found["contact_fraction"] == pytest.approx(fraction, rel=0.03)
-        assert found["pressure_peak"] == pytest.approx(1e6 * peak, rel=0.02)
-        assert found["pressure_centre"] == pytest.approx(1e-3 * centre, rel=2e-3)
-
-
 def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
     from patchfem.runs.patch.measures import measures
 
@@ -239,18 +227,6 @@ def test_exact_equal_ridges_and_equal_peaks(asperities):
     assert found == pytest.approx(2.74e13, rel=2e-3)
 
 
-def test_exact_every_second_peak_is_a_lattice_of_twice_the_step(asperities):
-    """One material, so that the closed forms of the wider lattice hold: 2 ln 2 P/(pi E*) more for ridges (Westergaard
-    at twice the wave and the same crest), and the lattice sum of 1/r for peaks."""
-    modulus = exact.combined_modulus(*asperities.TITANIUM)
-    more = asperities.between_ridges(16, asperities.TITANIUM)[::2].sum()
-    assert more == pytest.approx(2 * np.log(2) / (np.pi * modulus), rel=1e-4)
-    sunk = asperities.between_peaks(8, asperities.TITANIUM)[::2, ::2].sum()
-    assert sunk == pytest.approx(
-        asperities.LATTICE / (np.pi * modulus * 2 * asperities.WAVE), rel=2e-4
-    )
-
-
 @pytest.mark.parametrize("scatter", [1e-6, 5e-6])
 def test_exact_one_force_per_ridge_is_the_resolved_ridge(asperities, scatter):
     depth = asperities.depths(32, scatter, "uniform")
@@ -272,26 +248,6 @@ def test_always_scatter_that_makes_1e13(rough, asperities):
     assert found["separate"] == pytest.approx(7.2e12, rel=2e-3)
     assert found["peaks"] == pytest.approx(found["separate"], rel=0.02)
     assert found["touching"] == pytest.approx(0.18, abs=0.01)
-
-
-def test_exact_separate_peaks_of_uniform_heights(asperities):
-    """Greenwood and Williamson's integral over uniform heights, here by quadrature of the single peaks."""
-    for shape in ("uniform", "gaussian"):
-        assert asperities.separate(1e-10, shape) == pytest.approx(
-            asperities.separate(0.0, shape), rel=1e-3
-        )
-    for scatter, share in ((0.2e-6, 0.50), (1e-6, 0.36), (5e-6, 0.29)):
-        decay = asperities.MEAN / asperities.separate(scatter, "gaussian")
-        assert decay / scatter == pytest.approx(share, abs=0.006)
-    heights = 1e-6 * (np.arange(20000) + 0.5) / 20000
-    modulus = exact.combined_modulus(*asperities.CARBIDE)
-    rate = 4 / 3 * modulus * asperities.RADIUS**0.5 / asperities.WAVE**2
-    depth = np.linspace(0, 0.4e-6, 4001)
-    carried = np.array([rate * (np.maximum(d - heights, 0) ** 1.5).mean() for d in depth[::40]])
-    slope = np.gradient(carried, depth[::40])
-    assert asperities.separate(1e-6, "uniform") == pytest.approx(
-        np.interp(asperities.MEAN, carried, slope), rel=2e-3
-    )
 
 
 def test_always_opening_tilt_is_that_of_the_pieces_and_of_the_skin(rough):

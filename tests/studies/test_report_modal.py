@@ -2,14 +2,7 @@
 
 import numpy as np
 import pytest
-from study_module import study
-
-
-def inside(text, *parts):
-    """Every part stands in the text."""
-    text = " ".join(text.split())
-    missing = [part for part in parts if part not in text]
-    assert not missing, f"{missing} not in: {text}"
+from study_module import assert_contains, study
 
 
 def test_exact_a_block_that_friction_holds_transmits_the_base():
@@ -50,8 +43,8 @@ def test_figure_26_the_steady_curve():
     w = 2 * np.pi * free.f[:, None]
     exact = 1 + np.sum(share * w**2 / (own**2 - w**2 + 0.006j * own * w), axis=1)
     np.testing.assert_allclose(free.h, exact, rtol=1e-12)
-    inside(figure.ANSWER, f"at {free.peak[0]:.2f} Hz, with {free.peak[1]:.0f} times")
-    inside(
+    assert_contains(figure.ANSWER, f"at {free.peak[0]:.2f} Hz, with {free.peak[1]:.0f} times")
+    assert_contains(
         figure.__doc__,
         f"{free.f.size} points",
         f"transmits {np.abs(free.h[free.f < 80]).max():.1f} times",
@@ -68,7 +61,7 @@ def test_figure_26_the_random_test(tmp_path, capsys):
     figure = study("report/figure_26.py")
     free, seen, (frequency, damping, _) = figure.main(tmp_path / "x.svg")
     low = 1 - np.abs(seen.h).max() / free.peak[1]
-    inside(
+    assert_contains(
         figure.ANSWER,
         f"finds this peak at {frequency:.2f} Hz",
         f"ratio of {damping:.5f} (true value 0.003)",
@@ -95,14 +88,14 @@ def test_figure_27_the_sentence(tmp_path, capsys):
         f"{min(r.frequency for r in more[case]):.0f} to {max(r.frequency for r in more[case]):.0f} Hz"
         for case in more
     ]
-    inside(
+    assert_contains(
         figure.ANSWER,
         f"{min(slides):.1f} to {max(slides):.1f} mil rms",
         f"at {rigid.frequency:.0f} Hz for a rigid",
         f"{several[1]} for a block that climbs",
         f"{second.frequency:.0f} Hz with",
     )
-    inside(
+    assert_contains(
         figure.__doc__,
         several[0],
         f"{rows['rigid block', 6.0].frequency:.0f} Hz at 6 g rms",
@@ -112,11 +105,11 @@ def test_figure_27_the_sentence(tmp_path, capsys):
     assert {f"{r.damping:.1f}" for r in more["grooves", 4.5]} == {"1.3"}
     assert figure.row("second path", 3.0).frequency == pytest.approx(260, rel=0.02)
     spring = (148 / 143) ** 2 - 1
-    inside(
+    assert_contains(
         figure.__doc__,
         f"{spring:.3f} of the flexures'",
         f"by {4 * 0.47825 / spring:.0f} mil",
         f"{4 * 0.47825 / spring / 0.08:.0f} times what was",
     )
-    inside(figure.REPRODUCED, "in part", "148 Hz", "1.3", "yaw")
+    assert_contains(figure.REPRODUCED, "in part", "148 Hz", "1.3", "yaw")
     assert "148 Hz" in (tmp_path / "x.svg").read_text() and figure.ANSWER in capsys.readouterr().out

@@ -2,16 +2,9 @@
 
 import numpy as np
 import pytest
-from study_module import study
+from study_module import assert_contains, study
 
 import patchfem as pf
-
-
-def inside(text, *parts):
-    """Every part stands in the text."""
-    text = " ".join(text.split())
-    missing = [part for part in parts if part not in text]
-    assert not missing, f"{missing} not in: {text}"
 
 
 def test_figure_8_the_piece_swings_as_its_closed_form():
@@ -21,7 +14,7 @@ def test_figure_8_the_piece_swings_as_its_closed_form():
         one = figure.loop(frequency)
         assert one.peak == pytest.approx(figure.ring(frequency), rel=2e-3)
         assert np.abs(one.friction).max() == pytest.approx(figure.LIMIT, rel=1e-12)
-        inside(
+        assert_contains(
             figure.ANSWER,
             *[f"{one.peak:.2f} times the friction force at 10 Hz"] * (frequency == 10),
         )
@@ -40,14 +33,16 @@ def test_figure_8_work_in_the_load_cell_is_the_work_of_the_friction():
 def test_figure_8_the_sentence(tmp_path, capsys):
     figure = study("report/figure_8.py")
     loops = {one.frequency: one for one in figure.main(tmp_path / "x.svg")}
-    inside(figure.ANSWER, f"{loops[10].peak:.2f} times the", f"{loops[20].peak:.2f} times at 20 Hz")
+    assert_contains(
+        figure.ANSWER, f"{loops[10].peak:.2f} times the", f"{loops[20].peak:.2f} times at 20 Hz"
+    )
     read = {f: figure.read_as_rigid(loops[f]) for f in (2.0, 10.0)}
     assert all(
         f"{static:.3f}" == "0.300" and abs(length * 1e6 - 3.5) < 0.06
         for static, length in read.values()
     )
     assert figure.LIMIT / figure.STIFFNESS == pytest.approx(3.5e-6, rel=0.01)
-    inside(
+    assert_contains(
         figure.__doc__,
         f"{figure.ring(10):.3f} at 10 Hz, {figure.ring(40):.3f} at 40",
         f"{loops[40].peak:.3f})",
@@ -55,7 +50,7 @@ def test_figure_8_the_sentence(tmp_path, capsys):
         f"is {loops[10].work:.2f} of that",
     )
     falls = figure.loop(2.0, 0.33)
-    inside(figure.__doc__, f"the cell shows {falls.peak:.2f}")
+    assert_contains(figure.__doc__, f"the cell shows {falls.peak:.2f}")
     assert falls.sticks > 50 > 10 > figure.loop(2.0).sticks
     assert (
         figure.ANSWER in capsys.readouterr().out and "load cell" in (tmp_path / "x.svg").read_text()
@@ -83,13 +78,13 @@ def test_sweeps_the_sentence(tmp_path, capsys):
         words = "{:.2f} to {:.2f} g " + words
         mine = [one for one in found if one.model == model]
         level = sweeps.critical(mine)[mine[0].frequency > least]
-        inside(sweeps.ANSWER, words.format(level.min(), level.max()))
+        assert_contains(sweeps.ANSWER, words.format(level.min(), level.max()))
         top = mine[-1].acceleration[mine[-1].frequency > 131] / 4.75
         if model != "second path":
-            inside(sweeps.__doc__, f"{top.min():.2f} to {top.max():.2f}")
+            assert_contains(sweeps.__doc__, f"{top.min():.2f} to {top.max():.2f}")
             assert mine[-1].level == 4.75
     still = next(one for one in found if one.model == "grooves" and one.level == 3.0)
-    inside(
+    assert_contains(
         sweeps.__doc__,
         f"reads {still.displacement[still.frequency < 135].max():.2f} mil at 3 g where it reads "
         f"{still.displacement[still.frequency > 140].max():.2f} at most",
@@ -119,9 +114,9 @@ def test_steps_the_sentence(tmp_path, capsys):
     found, fits = steps.main(tmp_path / "x.svg")
     every = [one for row in found.values() for one in row]
     stable = [np.log(one.read[1] / one.gauge) for one in every if one.read[1] and not one.unstable]
-    inside(steps.ANSWER, f"are {np.exp(np.mean(stable)):.2f} times")
+    assert_contains(steps.ANSWER, f"are {np.exp(np.mean(stable)):.2f} times")
     gain, (low, high) = fits[True].fit.values[3], fits[True].fit.intervals.ends[3]
-    inside(steps.ANSWER, f"{gain:.2f} ({low:.2f} to {high:.2f})")
+    assert_contains(steps.ANSWER, f"{gain:.2f} ({low:.2f} to {high:.2f})")
     for part, words in (
         ("fitted", "143 Hz ({:.3f} instead of {:.3f})"),
         ("held_out", "other frequencies ({:.3f} instead of {:.3f})"),
@@ -130,10 +125,10 @@ def test_steps_the_sentence(tmp_path, capsys):
             fits[free].scored(fits[free].logs, fits[free].left)[part]["all"]
             for free in (True, False)
         ]
-        inside(steps.ANSWER, words.format(*scores))
+        assert_contains(steps.ANSWER, words.format(*scores))
     for row in found.values():
         *first, last = [f"{one.gauge:.3f}" for one in row]
-        inside(steps.__doc__, f"{', '.join(first)} and {last} V")
+        assert_contains(steps.__doc__, f"{', '.join(first)} and {last} V")
     assert steps.ANSWER in capsys.readouterr().out
 
 
@@ -158,14 +153,14 @@ def test_runaways_the_sentence(tmp_path, capsys):
     rows = {one.name: one for one in ways.main(tmp_path / "x.svg")}
     near = rows["grooves, yaw 0.25"]
     far = rows["grooves, yaw 0.30"]
-    inside(
+    assert_contains(
         ways.ANSWER,
         f"{near.levels[0]:.1f} to {far.levels[0]:.1f} g at 135",
         f"{far.levels[1]} to {near.levels[1]} g at 143",
         f"moves by {near.before[1]:.1f} to {far.before[1]:.1f} mil",
     )
     assert near.levels[2:] == far.levels[2:] == (8.0, 8.0)
-    inside(
+    assert_contains(
         ways.__doc__,
         "Grooves leave at " + ", ".join(f"{level}" for level in rows["grooves"].levels),
     )
@@ -228,12 +223,12 @@ def test_engaged_the_sentence(tmp_path, capsys):
     }
     one = left["yaw", "a patch of 12.7 mm", 5.0]
     two = left["yaw", "two patches 20 mm apart", 5.0]
-    inside(
+    assert_contains(
         engaged.ANSWER,
         f"{one:.2f} with a patch of 12.7 mm",
         f"{two:.2f} with two patches 20 mm apart",
     )
-    inside(
+    assert_contains(
         engaged.__doc__,
         f"leaves {left['yaw', 'one point off it', 5.0]:.2f} of yaw",
         f"to {left['rocking', 'a patch of 12.7 mm', 5.0]:.5f} of its peak",
@@ -247,12 +242,12 @@ def test_engaged_the_sentence(tmp_path, capsys):
         ]
         for touch in ("a patch of 12.7 mm", "two patches 20 mm apart")
     ]
-    inside(
+    assert_contains(
         engaged.__doc__,
         *[f"{min(found):.2f} to {max(found):.2f}" for found in ([one, *more[0]], [two, *more[1]])],
     )
     coherent = {model: seen.coherence.mean() for model, (_, _, seen) in tests.items()}
-    inside(
+    assert_contains(
         engaged.ANSWER,
         f"mean is {coherent['grooves']:.2f} to {coherent['rigid block']:.2f} if friction",
     )
@@ -265,7 +260,7 @@ def test_engaged_the_sentence(tmp_path, capsys):
         ),
     ]
     f, damping = ([one[k] for one in springs] for k in (0, 1))
-    inside(
+    assert_contains(
         engaged.__doc__,
         f"{min(f):.0f} to {max(f):.0f} Hz and {min(damping):.2f} to {max(damping):.2f} of critical",
         f"a coherence of {coherent[engaged.SPRING]:.2f}",
@@ -276,5 +271,5 @@ def test_engaged_the_sentence(tmp_path, capsys):
         7, abs=0.2
     ) and engaged.SHARE / 0.0711 == pytest.approx(10, abs=0.6)
     f, damping, _ = tests[engaged.DAMPER]
-    inside(engaged.__doc__, f"has {damping:.1f} of critical damping at {f:.0f} Hz")
+    assert_contains(engaged.__doc__, f"has {damping:.1f} of critical damping at {f:.0f} Hz")
     assert engaged.ANSWER in capsys.readouterr().out

@@ -76,14 +76,6 @@ def test_exact_a_sweep_jumps_beyond_the_fold(fold):
     assert np.isnan(fold.sweep(steady, False, 0.8, 100, 147.5, 148.8).jump)  # ends before the fold
 
 
-def test_exact_jumps_are_drawn_back_to_no_rate(fold):
-    sweep = study("steady/fold_sweeps.py").Sweep
-    made = [
-        sweep(rate, True, None, None, 100 + 3 * rate ** (2 / 3), 0.0) for rate in (0.1, 0.4, 1.6)
-    ]
-    assert fold.at_rest(made) == pytest.approx(100, abs=1e-9)
-
-
 @pytest.mark.slow
 def test_exact_jumps_bracket_the_folds(fold, tmp_path):
     steady, sweeps = fold.main((0.4, 0.1), path=tmp_path / "x.svg")

@@ -31,14 +31,6 @@ def test_always_every_rung_can_be_asked_under_every_reading(fitting):
             assert not any(ends.get(f"structure.bonded.{key}") for key in ("stiffness", "damping"))
 
 
-def test_always_the_grooves_of_a_placebo_bend_as_those_of_the_report(fitting):
-    ends = [
-        fitting.RUNGS["grooves"].question("peak", *sets).wanted[1]
-        for sets in ((), ("normal.grooves.wavelength=40 um",))
-    ]
-    assert (ends[1].low, ends[1].high) == pytest.approx((ends[0].low / 4, ends[0].high / 4))
-
-
 def test_exact_what_a_protocol_fits_and_what_it_predicts(fitting):
     """Table 1 counted by hand: 27 accelerations and 8 displacements, 13 readings at 143 Hz, 12 at 135, 5 at 150 and
     155 Hz each; those left out in turn are all of them, once."""
@@ -131,79 +123,6 @@ def test_exact_friction_that_wear_does_not_change_gives_the_rung_beside_it(fitti
         worn([*values, 2.0], few)[0][1] == pytest.approx(thicker[0][1], rel=1e-9) and depth > 1e-8
     )
     assert np.array_equal(rows.row, rows.condition) and len(rows.conditions) == 28
-
-
-def test_exact_the_bootstrap_is_that_of_rows_drawn_one_by_one(fitting):
-    """Ten draws by hand: whole rows with their acceleration and displacement, and the score of what came up."""
-    cells = read_readings(fitting.TABLE)
-    logs = np.sin(1.0 + np.arange(cells.row.size))
-    among = ~fitting.training(cells, "143")
-    often = fitting.drawn(cells, among)
-    rows = np.unique(cells.row[among])
-    draws = np.random.default_rng(0).integers(0, rows.size, (fitting.DRAWS, rows.size))
-    whole = fitting.resampled(cells, logs, often, "all")
-    felt = fitting.resampled(cells, logs, often, "acceleration")
-    for k in range(10):
-        picked = [j for row in rows[draws[k]] for j in np.flatnonzero(cells.row == row)]
-        assert whole[k] == pytest.approx(np.sqrt(np.mean(logs[picked] ** 2)), rel=1e-12)
-        accelerations = [j for j in picked if cells.felt[j]]
-        assert felt[k] == pytest.approx(np.sqrt(np.mean(logs[accelerations] ** 2)), rel=1e-12)
-    assert fitting.better(cells, logs, 2 * logs, among) == {kind: 1.0 for kind in fitting.KIND}
-
-
-def test_always_starts_double_until_the_best_valley_is_found_twice(fitting, monkeypatch):
-    """A made model with valleys at 0.1 and 0.8, the second 2 % deeper: it wins, and the first is told beside it. One
-    start alone has found its valley once."""
-    number = study("table_1/derived.py").Number("x", 0.0, 1.0)
-    cells = read_readings(fitting.TABLE)
-
-    class Made:
-        asked = type("Asked", (), {"wanted": [number]})
-
-        def forget(self):
-            """It remembers nothing."""
-
-        def __call__(self, values, conditions):
-            return np.full((2, 20), 10.0)
-
-    def residual(values):
-        return np.array(
-            [min(abs(values[0] - 0.1), abs(values[0] - 0.8)), 0.0102 if values[0] < 0.45 else 0.01]
-        )
-
-    seen = fitting.training(cells, "143")
-    monkeypatch.setattr(fitting, "make_residual", lambda *given: residual)
-    monkeypatch.setattr(fitting, "APART", 1e-4)
-    values, ends, valleys = fitting.best_of(cells, Made(), seen, 8, 32)
-    assert (
-        values == pytest.approx([0.8], abs=1e-6)
-        and valleys["best"] > 1
-        and len(ends) == valleys["starts"]
-    )
-    ((score, *others),) = valleys["tied"]
-    assert score == pytest.approx(0.0102 / np.sqrt(2), rel=1e-3) and len(others) == 3
-    alone = fitting.best_of(cells, Made(), seen, 1, 1)[2]
-    # the random one, and x = 0, which ends in the other valley
-    assert alone["starts"] == 2 and alone["best"] == 1
-    given = fitting.best_of(cells, Made(), seen, 1, 1, [[0.79]])[2]
-    assert given["starts"] == 3 and given["best"] == 2
-
-
-def test_always_a_fit_starts_from_what_it_contains(fitting):
-    """ "spring and yaw" under the same reading and rows stands in "second path" with no damper."""
-    row = {
-        "keys": ["friction.static", "structure.bonded.stiffness", "structure.mode.yaw.slide"],
-        "values": [0.4, 5e6, 0.1],
-        "gain": None,
-    }
-    rows = {("spring and yaw", ROOT2, "143", ""): row}
-    wanted = fitting.RUNGS["second path"].question(ROOT2).wanted
-    assert fitting.contained("second path", ROOT2, "143", wanted, rows) == [[0.4, 5e6, 0.0, 0.1]]
-    assert fitting.contained("second path", ROOT2, "all", wanted, rows) == []
-    wanted = fitting.RUNGS["spring and yaw"].question("fundamental x gain").wanted
-    assert fitting.contained("spring and yaw", "fundamental x gain", "143", wanted, rows) == [
-        [0.4, 5e6, 0.1, 2**0.5]
-    ]
 
 
 @pytest.mark.slow

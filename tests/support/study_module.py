@@ -1,4 +1,4 @@
-"""A study as a module."""
+"""A study as a module, and what its docstring contains."""
 
 import importlib.util
 from pathlib import Path
@@ -13,3 +13,10 @@ def study(name):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def assert_contains(text, *parts):
+    """Require that a text, whose line breaks do not count, contains all parts."""
+    text = " ".join(text.split())
+    missing = [part for part in parts if part not in text]
+    assert not missing, f"{missing} not in: {text}"

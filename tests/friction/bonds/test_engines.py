@@ -47,7 +47,6 @@ initial_bonds = 0.0
 quadrature = "{engine}"
 """
 )
-GROWS = 'rest_growth = "10 m/s^2"\nslip_growth = "0.1 um"\nkinetic = 0.2'
 
 
 def rig(tmp_path, engine="auto", reading="report", order=1, growth=""):
@@ -158,17 +157,6 @@ def test_always_the_stretch_reading_creates_next_to_nothing(order, initial, size
         bond_list_model(Bonds(1.0, 1.0, order, initial=initial), 1.0, np.inf, 0.0), path, 1.0
     )
     assert bad == 0 and contact.status[6] <= 1e-7 * contact.status[7]
-
-
-@pytest.mark.parametrize("order", [-0.5, -0.9])
-def test_order_of_negative_orders_converges(order):
-    """Means of the printed law with p < 0 against the NumPy law on a path four times as fine."""
-    law = Bonds(0.4, 1.0, order, "report", initial=0.0)
-    path = random_walk(2, 20, 0.6)
-    fine = np.interp(np.linspace(0, 20, 81), np.arange(21), path)
-    got = follow(bond_list_model(law, 1.2, np.inf, 0.0), fine)[0]
-    run = pulled(Quadrature(law, tail=0.0), path, upper_pressure([3.0]), 0.3)
-    assert got[4::4, 0] == pytest.approx(run.traction[:, 0], abs=1e-7)
 
 
 # ---- marches

@@ -6,16 +6,12 @@ from friction_paths import pulled, random_walk, sum_by_hand, triangle, upper_pre
 from list_paths import STATUS, energy_by_hand, follow_list
 from scipy.special import gammainc
 
-from patchfem.friction.bonds.engines import RequestedEngine, choose_engine
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.recursion import FirstOrderBonds
 
 ONE = upper_pressure([1.0])
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
-
-
-# ---- functions of one number
 
 
 # ---- direct: every bond
@@ -247,37 +243,3 @@ def test_order_of_the_merge_width_is_two(reading, order, growth):
     # the age of growing bonds caps wide merges
     assert np.log10(errors[1] / errors[0]) > (1.4 if growth else 1.7)
     assert held[1] < held[0] < 500 < whole.status[STATUS.max_strips]
-
-
-@pytest.mark.share(1, 2, 3, 6, 7, 10, 11)
-@pytest.mark.parametrize("amplitude", [0.01, 0.1, 1.0, 50.0])
-@pytest.mark.parametrize(
-    "reading, order, growth", [("stretch", 0.0, {}), ("stretch", 2.0, {}), ("report", 1.0, GROWTH)]
-)
-def test_always_merging_stays_short_and_close_at_any_amplitude(amplitude, reading, order, growth):
-    """Strokes far below the width join across reversals: as long a list as at large strokes, however long the run."""
-    law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
-    cycles = int(np.clip(6 / amplitude, 4, 150))
-    path = amplitude * np.sin(2 * np.pi * np.arange(40 * cycles + 1) / 40)
-    got = follow_list(law, path, 0.05, 0.05)
-    whole = follow_list(law, path, 0.05)
-    assert got.status[STATUS.max_strips] <= 250
-    assert np.abs(got.after - whole.after).max() <= (1e-3 if order == 2 else 2.5e-3)
-
-
-@pytest.mark.share(0, 1, 2, 3, 4, 5)
-@pytest.mark.parametrize("order", [0.0, 0.5, 2.0])
-@pytest.mark.parametrize(
-    "steps, rest, slip", [(400, 0.003, 0.5), (400, 0.03, 3.0), (1600, 0.03, 3.0)]
-)
-def test_always_merging_of_growing_bonds_keeps_its_bound_at_small_strokes(order, steps, rest, slip):
-    """Bonds that ripen over many strokes of a tenth of a bond length: strips joined by width alone, however much their
-    bonds differed in length, were 4e-3 off where 1e-4 was claimed."""
-    law = Bonds(1.0, 1.0, order, "report", 0.5, 0.05 * rest, slip, 5e-5, 0.0)
-    chosen = choose_engine(law, 1e-3, 0.1, steps / 2, RequestedEngine("merged"))
-    path = 0.05 * np.sin(2 * np.pi * np.arange(2 * steps + 1) / steps)
-    dt = 2 * np.pi / steps
-    got = follow_list(law, path, dt, chosen.merge)
-    whole = follow_list(law, path, dt)
-    assert np.abs(got.after - whole.after).max() <= chosen.error
-    assert got.status[STATUS.max_strips] < 0.5 * whole.status[STATUS.max_strips]

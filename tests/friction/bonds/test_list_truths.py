@@ -3,7 +3,6 @@ forms (checks C5, C6, C8), bounded memory, and trials that leave no trace."""
 
 import numpy as np
 import pytest
-from friction_paths import triangle
 from list_paths import STATUS, follow_list
 from march_paths import OMEGA, one_mode
 
@@ -20,25 +19,6 @@ way = pytest.mark.parametrize("knobs", WAYS.values(), ids=WAYS)
 
 def printed(order, growth=None):
     return Bonds(1.0, 1.0, float(order), "report", initial=0.0, **(growth or {}))
-
-
-@way
-@pytest.mark.parametrize(
-    "amplitude, area", [(0.1, 2.659583e-2), (1.0, 2.149259), (5.0, 18.0), (10.0, 38.0)]
-)
-def test_exact_c5_triangle_loops_of_order_zero(amplitude, area, knobs):
-    path = triangle(amplitude, int(np.ceil(6 / amplitude)) + 2, max(20, int(40 * amplitude)))
-    mean = follow_list(printed(0), path, **knobs).mean
-    last = 2 * max(20, int(40 * amplitude))
-    assert mean[-last:] @ np.diff(path)[-last:] == pytest.approx(area, rel=3e-5)
-
-
-@way
-def test_exact_c6_reversal(knobs):
-    """p = 0 after a long slide: 2 exp(-2 d) - 1 a way d back."""
-    path = np.concatenate([np.linspace(0, 40, 801), 40 - np.linspace(0, 3, 121)[1:]])
-    got = follow_list(printed(0), path, **knobs).after[800:]
-    assert got == pytest.approx(2 * np.exp(-2 * np.linspace(0, 3, 121)[1:]) - 1, abs=1e-8)
 
 
 @pytest.mark.share(0, 2, 5)

@@ -6,13 +6,10 @@ printed, closed forms, or an integrated equation; none of them calls the code un
 
 from itertools import pairwise
 
-import friction_forms
 import mpmath
 import numpy as np
 import pytest
 from friction_paths import drift, lower_pressure, pulled, upper_pressure, walk
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 from scipy.special import gammainc
 from vibration_forms import sliding_amplitude
 
@@ -20,7 +17,7 @@ from patchfem import build
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
-from patchfem.friction.bonds.parameters import Bonds, grow
+from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff_age
 from patchfem.friction.bonds.recursion import BondState, FirstOrderBonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
@@ -29,44 +26,6 @@ from patchfem.scene import scene
 
 ONE = upper_pressure([1.0])
 OMEGA = 2 * np.pi * 143
-
-
-# ---- C1, C2: steady sliding
-
-
-def settled_at(law, speed, ell):
-    """Force of a growing law after 180 um at a constant speed."""
-    unit = law.length
-    young = np.concatenate(
-        [np.linspace(0, 4 * ell / unit, 40), np.geomspace(4 * ell / unit, 6, 120)[1:]]
-    )
-    back = np.concatenate([young, np.linspace(6, 90, 600)[1:]])[::-1]
-    engine = Quadrature(law, tail=0.0)
-    one = np.ones(1)
-    state = engine.start(one)
-    for dq in np.diff(unit * (back[0] - back)):
-        # the means of the steps are not asked for
-        state = engine.advance(state, dq, one, one, dq / speed)
-    return float(engine.traction(state)[0])
-
-
-@pytest.mark.parametrize(
-    "a, p, want",
-    [
-        (1, 1, 1),
-        (2, 2, 1),
-        (3.5, 3.5, 1),
-        (0.1, 0, 0.98606707),
-        (0.5, 1, 1.07542363),
-        (1, 2, 1.14354323),
-    ],
-)
-def test_exact_c2_growth_factor(a, p, want):
-    """Bonds that grow from zero to eps_0 over the path a eps_0 carry G(a; p) of the full friction; G(p; p) = 1."""
-    truth = friction_forms.growth_factor(a, p)
-    assert truth == pytest.approx(want, abs=1e-8)
-    law = Bonds(1.0, 1.0, float(p), "report", 1.0, 1e-300, float(a), 1e-3, 0.0)
-    assert settled_at(law, 1.0, a) == pytest.approx(truth, abs=1e-12)
 
 
 # ---- C8: dwell
@@ -131,27 +90,6 @@ def test_exact_c9_resultant_of_a_pad_that_bonds_enter_at_its_edge(order, engine,
 
 
 @pytest.mark.parametrize(
-    "order, want", [(0.0, (0.606503, 0.367863, 0.049785)), (1.0, (0.909479, 0.735558, 0.199117))]
-)
-def test_exact_c9_behind_the_pad_old_bonds_hold_under_a_trace_of_pressure_only(order, want):
-    """X = 10: shear P(s, X + x) - P(s, x) behind the edge where a trace of pressure remains, none where it is bare."""
-    for x, number in zip((0.5, 1.0, 3.0), want):
-        truth = gammainc(order + 1, 10 + x) - gammainc(order + 1, x)
-        assert truth == pytest.approx(number, abs=1e-6)
-        laws = [Quadrature(Bonds(1.0, 1.0, order, "report"), tail=0.0)]
-        laws += (
-            [FirstOrderBonds(Bonds(1.0, 1.0)), Quadrature(Bonds(1.0, 1.0), tail=0.0)]
-            if order == 1
-            else []
-        )
-        for law in laws:
-            assert over_a_pad(law, np.array([10.0]), 10, 1e-250, x)[0] == pytest.approx(
-                truth, abs=1e-8
-            )
-            assert over_a_pad(law, np.array([10.0]), 10, 0.0, x)[0] == 0
-
-
-@pytest.mark.parametrize(
     "order, eps, size, lag",
     [
         (0.0, 2.0, 0.9878867, -8.92705),
@@ -185,49 +123,6 @@ def test_exact_c10_pressure_wave_is_smoothed_and_delayed(order, eps, size, lag):
 def mode(omega=OMEGA, zeta=0.0):
     one = np.ones(1)
     return ModalBasis(("axial",), omega * one, zeta * one, one, one, one, 1.0)
-
-
-# ---- C16: fast breakaway
-
-
-@pytest.mark.share(1)
-@pytest.mark.parametrize(
-    "slip_growth, peak, place, late",
-    [
-        (1.0, 0.600263, 1.607, 0.5),
-        (5.0, 0.799602, 2.561, 0.500003),
-        (50.0, 0.955895, 4.617, 0.652589),
-    ],
-)
-def test_exact_c16_breakaway_peak_its_place_and_the_force_far_on(slip_growth, peak, place, late):
-    run = solve_ivp(
-        lambda s, z: 1 - z / (0.5 + 0.5 * np.exp(-s / slip_growth)),
-        (0, 60),
-        [0.0],
-        method="DOP853",
-        rtol=1e-12,
-        atol=1e-13,
-        dense_output=True,
-    )
-    top = brentq(lambda s: 1 - run.sol(s)[0] / (0.5 + 0.5 * np.exp(-s / slip_growth)), 0.3, 20)
-    assert (run.sol(top)[0], run.y[0, -1]) == pytest.approx((peak, late), abs=1e-6)
-    assert top == pytest.approx(place, abs=1e-3)
-    law = FirstOrderBonds(
-        Bonds(1.0, 1.0, ratio=0.5, rest_growth=1e-30, slip_growth=slip_growth, rest_speed=1e-3)
-    )
-    path = np.concatenate(
-        [
-            np.linspace(0, top - 0.05, 1500),
-            top + np.linspace(-0.05, 0.05, 101)[1:],
-            np.linspace(top + 0.05, 60, 3000)[1:],
-        ]
-    )
-    force = np.append(0.0, walk(law, path, ONE, np.diff(path)).traction[:, 0])
-    near = slice(1499, 1600)
-    bend = np.polynomial.Polynomial.fit(path[near] - top, force[near], 4)
-    found = [r.real for r in bend.deriv().roots() if abs(r.imag) < 1e-9 and abs(r.real) < 0.05]
-    assert len(found) == 1 and found[0] == pytest.approx(0, abs=1e-3)
-    assert (force.max(), force[-1]) == pytest.approx((run.sol(top)[0], run.y[0, -1]), abs=1e-5)
 
 
 # ---- C17: contraction
@@ -358,59 +253,6 @@ def test_exact_extreme_orders_of_the_printed_law(order):
     ) == pytest.approx(1e-9, rel=1e-6)
 
 
-@pytest.mark.share(0, 2, 5, 7)
-@pytest.mark.parametrize("speed", [0.0, 1e-300, -1e-300, 5e-324])
-@pytest.mark.parametrize("growth", [{}, GROWTH])
-def test_exact_speeds_of_nothing_are_a_dwell(speed, growth):
-    """A second at speed 0 or 1e-300 after a slide: the force stays, the length heals as at rest, nothing is nan."""
-    for order, reading in ((1.0, "stretch"), (2.0, "stretch"), (0.0, "report"), (1.0, "report")):
-        law = Bonds(0.4, 1.0, order, reading, **growth)
-        for maker in (
-            (Quadrature, FirstOrderBonds) if (order, reading) == (1.0, "stretch") else (Quadrature,)
-        ):
-            engine = maker(law)
-            one = np.ones(1)
-            state = engine.start(one)
-            for dq in (0.4, 0.7, -0.2):
-                state = engine.step(state, dq, one, one, 0.3).state
-            still = engine.step(state, 0.0, one, one, 1.0)
-            slow = engine.step(state, speed, one, one, 1.0)
-            assert np.isfinite(
-                [slow.mean[0], slow.dissipated[0], engine.traction(slow.state)[0]]
-            ).all()
-            assert engine.traction(slow.state)[0] == pytest.approx(
-                engine.traction(still.state)[0], abs=1e-14
-            )
-            if reading == "stretch":
-                assert abs(slow.dissipated[0]) <= 1e-15
-            else:  # what heals under load gains energy
-                assert slow.dissipated[0] == pytest.approx(still.dissipated[0], abs=1e-14)
-                assert slow.dissipated[0] < -1e-3 if growth else abs(slow.dissipated[0]) <= 1e-15
-            if reading == "stretch":
-                assert engine.traction(slow.state) == pytest.approx(
-                    engine.traction(state), abs=1e-14
-                )
-    if growth:
-        law = Bonds(0.4, 1.0, **growth)
-        assert grow(law, 0.5, speed, speed, speed, 1.0) == pytest.approx(
-            1 - 0.5 * np.exp(-0.4 / 1e-2), rel=1e-14
-        )
-
-
-@pytest.mark.share(0, 1)
-@pytest.mark.parametrize("reading, order", [("stretch", 1.0), ("stretch", 0.0), ("stretch", 2.0)])
-def test_exact_static_equal_to_kinetic_never_changes_the_length(reading, order):
-    path = np.concatenate([[0], np.cumsum(np.random.default_rng(6).normal(0, 1, 60))])
-    same = {**GROWTH, "ratio": 1.0}
-    for maker in (Quadrature, FirstOrderBonds) if order == 1 else (Quadrature,):
-        grown = walk(maker(Bonds(0.4, 1.0, order, reading, **same)), path, ONE, 0.2)
-        plain = walk(maker(Bonds(0.4, 1.0, order, reading)), path, ONE, 0.2)
-        assert grown.traction == pytest.approx(plain.traction, abs=1e-13)
-        assert grown.mean == pytest.approx(plain.mean, abs=1e-13)
-    law = Bonds(0.4, 1.0, **same)
-    assert grow(law, 1.0, 0.3, -0.7, 0.4, 2.0) == 1.0
-
-
 def test_order_of_the_march_with_bonds_of_a_nanometre_is_half_towards_coulomb():
     """135 Hz at 6 g, damping 0.05, f = 4 g: steady amplitude against Den Hartog's; short by the root of eps_0.
 
@@ -429,19 +271,6 @@ def test_order_of_the_march_with_bonds_of_a_nanometre_is_half_towards_coulomb():
         short.append(1 - np.ptp(got.window.slide) / 2 / coulomb)
     assert np.log10(short[0] / short[1]) == pytest.approx(0.5, abs=0.03)
     assert np.log10(short[1] / short[2]) == pytest.approx(0.5, abs=0.03) and 0 < short[2] < 4e-3
-
-
-def test_exact_march_with_bonds_of_a_metre_is_a_linear_spring():
-    """k = mu_s N/eps_0 in parallel: the steady amplitude of a damped linear mode at 5 g."""
-    model = points_model(Bonds(0.4, 1.0), [1e-4], [98.0665e4])
-    drive = 5 * 9.80665
-    hertz = 100.0
-    stiff = OMEGA**2 + 39.2266
-    w = 2 * np.pi * hertz
-    want = drive / np.hypot(stiff - w**2, 2 * 0.05 * OMEGA * w)
-    got = march(mode(zeta=0.05), SineDrive(drive, w), model, 60, 400, window=2)
-    # bonds of 1 m: loss z/eps of 1e-4
-    assert np.ptp(got.window.slide) / 2 == pytest.approx(want, rel=2e-4)
 
 
 # ---- drift under a biased dither

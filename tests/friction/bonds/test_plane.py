@@ -69,23 +69,6 @@ def test_exact_c14_circle(radius, size, lag):
 
 # ---- one direction is the scalar law
 
-STEPS = st.lists(st.floats(-2, 2), min_size=1, max_size=12)
-
-
-@given(STEPS, st.sampled_from([0, 1]), st.floats(0.05, 3))
-def test_always_one_direction_is_the_scalar_state(steps, axis, dt):
-    knots = np.cumsum([0.0, *steps])
-    sigma = np.array([1.0, 0.3])
-    path = np.zeros((len(knots), 2))
-    path[:, axis] = knots
-    one = walk(FirstOrderBonds(GROWING), knots, lambda q: sigma, dt)
-    found = along(FirstOrderBonds(GROWING), path, sigma, dt)
-    assert found[0][:, axis] == pytest.approx(one.mean, rel=1e-14, abs=1e-14)
-    assert found[1][:, axis] == pytest.approx(one.traction, rel=1e-14, abs=1e-14)
-    assert found[2] == pytest.approx(one.dissipated, rel=1e-13, abs=1e-14)
-    assert found[3] == pytest.approx(one.stored, rel=1e-14, abs=1e-14)
-    assert not found[1][:, 1 - axis].any() and found[4].eps == one.state.eps
-
 
 @pytest.mark.share(0, 3, 4)
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from friction_forms import virgin_force
 from friction_paths import lower_pressure, pulled, sum_by_hand, triangle, upper_pressure, walk
 
 from patchfem.friction.bonds.parameters import Bonds
@@ -68,27 +67,6 @@ def test_exact_bare_places_hold_only_the_bonds_formed_since(reading):
     tau = engine.traction(state)
     assert tau[0] == pytest.approx(sum_by_hand(law, path, upper_pressure([1.0]))[0], abs=1e-13)
     assert tau[1:] == pytest.approx(np.full(2, after + strip / 2), abs=1e-13) and first < 0
-
-
-# ---- both readings
-
-
-@pytest.mark.share(1, 3, 6)
-@pytest.mark.parametrize("order", [0.0, 0.5, 1.0, 2.0])
-@pytest.mark.parametrize("sign", [1, -1])
-def test_exact_readings_agree_without_a_reversal(order, sign):
-    path = sign * np.concatenate([[0], np.cumsum(np.random.default_rng(1).uniform(0.01, 0.6, 40))])
-    runs = [
-        walk(Quadrature(Bonds(1.0, 1.0, order, reading, initial=0.7), tail=0.0), path, ONE)
-        for reading in ("stretch", "report")
-    ]
-    # p = 0.5: Gauss strips on a root
-    within = {0.0: 1e-12, 0.5: 4e-4, 1.0: 1e-13, 2.0: 1e-9}[order]
-    assert runs[0].traction == pytest.approx(runs[1].traction, abs=within)
-    assert runs[0].mean == pytest.approx(runs[1].mean, abs=within)
-    assert runs[1].traction[:, 0] == pytest.approx(
-        sign * virgin_force(abs(path[1:]), 1.0, order, 0.7), abs=1e-12
-    )
 
 
 # ---- Gauss strips

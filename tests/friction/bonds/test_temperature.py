@@ -6,8 +6,6 @@ import friction_forms
 import numpy as np
 import pytest
 from command_line import FROM_PYTHON, loaded
-from hypothesis import given
-from hypothesis import strategies as st
 from scene_texts import BENCH, GROWING, POINT, SHORT, SMALL_PATCH, TRIANGLE
 from scipy.special import erfc
 
@@ -45,25 +43,6 @@ def test_exact_c13_rates_of_a_warm_surface(surface, want):
     assert growth_at_temperature(*cold, surface, 293.15, 2500.0, 1500.0) == pytest.approx(
         want[:2], rel=1e-8
     )
-
-
-@given(
-    st.floats(1e-3, 1e3),
-    st.floats(1e-9, 1e-3),
-    st.floats(1.0, 3000.0),
-    st.floats(0, 1e5),
-    st.floats(0, 1e5),
-)
-def test_always_the_reference_changes_no_bit(
-    rest, slip, reference, rest_activation, slip_activation
-):
-    assert growth_at_temperature(
-        rest, slip, reference, reference, rest_activation, slip_activation
-    ) == (
-        rest,
-        slip,
-    )
-    assert growth_at_temperature(rest, slip, 400.0, reference, None, None) == (rest, slip)
 
 
 @pytest.mark.parametrize(
@@ -176,20 +155,6 @@ def test_exact_a_warm_rig_is_a_rig_with_the_rates_of_the_warm_surface():
     one, two = (run(plan(scene), estimate=False).measures for scene in (warm, same))
     assert {k: m.value for k, m in one.items()} == {k: m.value for k, m in two.items()}
     assert one != run(plan(loads(POINT + GROWING + SHORT)), estimate=False).measures
-
-
-def test_exact_the_plan_names_the_temperature():
-    warm = plan(loads(POINT + GROWING + WARM + SLIDE))
-    plain = plan(loads(POINT + GROWING + SLIDE))
-    assert (
-        "friction.temperature" in warm.effects and "friction.temperature" not in warm.not_in_scene
-    )
-    assert "friction.temperature" in plain.not_in_scene
-    assert (
-        warm.model.heat is not None
-        and warm.model.friction.temperature is None
-        and plain.model.heat is None
-    )
 
 
 @pytest.mark.parametrize(

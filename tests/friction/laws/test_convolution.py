@@ -98,9 +98,6 @@ def test_always_an_average_lies_between_nothing_and_the_largest_pressure(order, 
     ) == pytest.approx(found[::-1])
 
 
-# ---- C9, C10: edges and waves
-
-
 # ---- the steady limit of 2.17
 
 
@@ -281,16 +278,6 @@ def test_exact_a_block_of_one_point_on_a_rig_is_coulomb():
     )
     assert {k: m.value for k, m in one.items()} == {k: m.value for k, m in two.items()}
     assert "bonds" in plan(loads(POINT + AVERAGED + SHORT)).chain
-
-
-def test_exact_the_plan_names_the_law():
-    what = plan(loads(SMALL_PATCH + AVERAGED + SLIDE))
-    assert (
-        "friction.law=convolution" in what.effects
-        and "friction.law=convolution" not in what.not_in_scene
-    )
-    assert not any("reading" in name for name in what.effects)
-    assert "friction.law=convolution" in plan(loads(SMALL_PATCH + COULOMB + SLIDE)).not_in_scene
 
 
 def test_refuses_an_uneven_pressure_on_a_rig():
