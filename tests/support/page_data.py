@@ -6,6 +6,8 @@ import re
 from base64 import b64decode
 from html.parser import HTMLParser
 
+import numpy as np
+
 
 def data_of(text: str) -> dict:
     """The data of a page, {} where it draws nothing."""
@@ -69,3 +71,24 @@ def unheard(text: str) -> list:
         if high > low + 1
     ]
     return heard.lacks + skips
+
+
+def swept_key(name: str, values, unit="1", texts=None, **more) -> dict:
+    """Return a key of a sweep as its page takes it; texts: its values as they were written."""
+    values = np.asarray(values, float)
+    texts = texts or [f"{value:g} {unit}" for value in values]
+    key = {"name": name, "unit": unit, "values": values, "log": False, "words": False}
+    return key | {"texts": texts} | more
+
+
+def swept_measure(values, errors=0.0, unit="1", **more) -> dict:
+    """Return a measure of a sweep as its page takes it, with one error or one for each case."""
+    values = np.asarray(values, float)
+    return {"unit": unit, "means": "m", "values": values, "errors": 0 * values + errors} | more
+
+
+def swept_table(keys: list, measures: dict, **more) -> dict:
+    """Return a sweep as its page takes it: every case is steady, unless `more` says otherwise."""
+    table = {"title": "t", "version": "0", "command": "c", "scene": "s", "grid": True}
+    table |= {"keys": keys, "measures": measures, "messages": {}, "folders": None}
+    return table | {"tolerance": 0.01, "outcome": ["steady"] * len(keys[0]["values"])} | more

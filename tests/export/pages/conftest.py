@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from chromium import Chromium, program
+from page_data import swept_key, swept_measure, swept_table
 
 
 @pytest.fixture
@@ -13,56 +14,29 @@ def table() -> dict:
         for grid in np.meshgrid([1e-6, 1e-5, 1e-4, 1e-3], [10.0, 20.0, 40.0], indexing="ij")
     )
     amplitude = 1e-5 * (1 + load / 10) * np.log10(tilt / 1e-7)
-    outcome = ["steady"] * 12
-    outcome[7] = "failed"
-    outcome[11] = "grows"
     amplitude[7] = np.nan
-    return {
-        "title": "Tilt </script><b>&amp;",
-        "version": "1.2.3",
-        "command": "patchfem sweep a.toml --over x=1,2",
-        "scene": "# <i>a scene</i>",
-        "grid": True,
-        "keys": [
-            {
-                "name": "contact.tilt.angle",
-                "unit": "rad",
-                "values": tilt,
-                "log": True,
-                "texts": [f"{value * 1e3:g} mrad" for value in tilt],
-            },
-            {
-                "name": "normal.load",
-                "unit": "N",
-                "values": load,
-                "log": False,
-                "texts": [f"{value:g} N" for value in load],
-            },
+    texts = [f"{value * 1e3:g} mrad" for value in tilt]
+    return swept_table(
+        [
+            swept_key("contact.tilt.angle", tilt, "rad", texts, log=True),
+            swept_key("normal.load", load, "N"),
         ],
-        "measures": {
-            "relative_displacement_amplitude": {
-                "unit": "m",
-                "means": "half <i>peak-to-peak</i>",
-                "values": amplitude,
-                "errors": amplitude * 0.01,
-            },
-            "contact_fraction": {
-                "unit": "1",
-                "means": "share",
-                "values": np.full(12, 0.5),
-                "errors": np.zeros(12),
-            },
-            "loop_area": {
-                "unit": "J",
-                "means": "work",
-                "values": np.full(12, np.nan),
-                "errors": np.full(12, np.nan),
-            },
+        {
+            "relative_displacement_amplitude": swept_measure(
+                amplitude, amplitude * 0.01, "m", means="half <i>peak-to-peak</i>"
+            ),
+            "contact_fraction": swept_measure(np.full(12, 0.5)),
+            "loop_area": swept_measure(np.full(12, np.nan), unit="J"),
         },
-        "outcome": outcome,
-        "messages": {7: "normal.load: <refused>"},
-        "folders": [f"cases/{number:04x}/summary.json" for number in range(12)],
-    }
+        title="Tilt </script><b>&amp;",
+        version="1.2.3",
+        command="patchfem sweep a.toml --over x=1,2",
+        scene="# <i>a scene</i>",
+        outcome=[{7: "failed", 11: "grows"}.get(case, "steady") for case in range(12)],
+        messages={7: "normal.load: <refused>"},
+        tolerance=np.nan,
+        folders=[f"cases/{number:04x}/summary.json" for number in range(12)],
+    )
 
 
 @pytest.fixture(scope="session")

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from command_line import cli
+from page_data import swept_key, swept_measure, swept_table
 from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.campaigns.sweeps.ranking import SobolIndex
@@ -17,15 +18,11 @@ from patchfem.scene.starting import read_template
 RIG = POINT + COULOMB + SHORT
 
 
+AMPLITUDE = "relative_displacement_amplitude"
+
+
 def key(name, values, texts=None):
-    return {
-        "name": name,
-        "values": np.asarray(values, float),
-        "unit": "Hz",
-        "log": False,
-        "words": False,
-        "texts": texts or [f"{one:.12g} Hz" for one in values],
-    }
+    return swept_key(name, values, "Hz", texts or [f"{value:.12g} Hz" for value in values])
 
 
 def curve(x, centre, damping):
@@ -41,68 +38,51 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
         key("drive.frequency", np.tile(x, 2)),
         key("drive.acceleration", np.repeat([1.0, 2.0], 161), ["1 g"] * 161 + ["2 g"] * 161),
     ]
-    name = "relative_displacement_amplitude"
-    found = peaks.find_peaks(keys, {name: (both, 0 * both, "m")}, {name: np.ones(322, bool)}, True)
-    for one, centre in zip(found, (100, 95)):
-        # of f over the centre
+    found = find_peaks(keys, both)
+    for peak, centre in zip(found, (100, 95)):
+        # squares of the half-power frequencies over the centre
         square = 1 - 2 * damping**2 + 2 * damping * np.sqrt(1 - damping**2) * np.array([1, -1])
         truth = (
             centre * np.sqrt(1 - 2 * damping**2),
             1e-6 / (2 * damping * np.sqrt(1 - damping**2)),
             -np.diff(centre * np.sqrt(square))[0],
         )
+        swept = peak.swept
         for (value, error), true in zip(
-            (one.swept.frequency, one.swept.height, one.swept.half_power_width), truth
+            (swept.frequency, swept.height, swept.half_power_width), truth
         ):
             assert abs(value - true) <= error + 1e-9 * true and error < 1e-6 * true
-    said = peaks.peaks_sentence(found)
-    assert "with drive.acceleration 1 g" in said and "with drive.acceleration 2 g" in said
-    assert "(cases lie 0.25 Hz apart)" in said
-    some = np.where(np.abs(np.tile(x, 2) - 99.6) < 0.4, np.nan, both)  # beside the first peak alone
-    found = peaks.find_peaks(keys, {name: (some, 0 * both, "m")}, {name: np.ones(322, bool)}, True)
-    assert np.isnan(found[0].swept.height.value)
-    assert found[1].swept.frequency.value == pytest.approx(
-        95 * np.sqrt(1 - 2 * damping**2), abs=1e-3
-    )
-    assert "; where it peaks with drive.acceleration 1 g is not known" in peaks.peaks_sentence(
-        found
-    )
-    assert "not known" in peaks.peaks_table(found) and peaks.peaks_sentence(found[:1]).startswith(
-        "Where relative displacement am"
-    )
+    sentence = peaks.peaks_sentence(found)
+    assert "with drive.acceleration 1 g" in sentence and "with drive.acceleration 2 g" in sentence
+    assert "(cases lie 0.25 Hz apart)" in sentence
+    found = find_peaks(keys, np.where(np.abs(np.tile(x, 2) - 99.6) < 0.4, np.nan, both))
+    first, second = (peak.swept for peak in found)
+    assert np.isnan(first.height.value)  # no value beside this peak
+    assert second.frequency.value == pytest.approx(95 * np.sqrt(1 - 2 * damping**2), abs=1e-3)
+    sentence = peaks.peaks_sentence(found)
+    assert "; where it peaks with drive.acceleration 1 g is not known" in sentence
+    assert "not known" in peaks.peaks_table(found)
+    assert peaks.peaks_sentence(found[:1]).startswith("Where relative displacement am")
 
 
 def test_always_a_peak_at_an_end_is_none_and_a_side_that_stays_up_has_no_width():
-    name = "relative_displacement_amplitude"
     x = np.linspace(80, 120, 41)
+    keys = [key("drive.frequency", x)]
     for values in (x, -x + 200, np.where(x < 99, np.nan, curve(x, 98, 0.05))):
-        assert (
-            peaks.find_peaks(
-                [key("drive.frequency", x)],
-                {name: (values, 0 * x, "m")},
-                {name: np.ones(41, bool)},
-                True,
-            )
-            == []
-        )
+        assert find_peaks(keys, values) == []
+    assert peaks.find_peaks(keys, {}, {}, True) == []
     narrow = x[(x > 97) & (x < 130)]
-    (found,) = peaks.find_peaks(
-        [key("drive.frequency", narrow)],
-        {name: (curve(narrow, 100, 0.05), 0 * narrow, "m")},
-        {name: np.ones(narrow.size, bool)},
-        True,
-    )
-    assert np.isnan(found.swept.half_power_width.value) and "width" not in peaks.peaks_sentence(
-        [found]
-    )
-    assert peaks.find_peaks([key("drive.frequency", x)], {}, {}, True) == []
-    unsettled = {name: x < 90, f"{name}_steady": np.ones(41, bool)}  # by its steady estimate
-    steady = {
-        name: (np.where(x < 90, curve(x, 100, 0.05), 1.0), 0 * x, "m"),
-        f"{name}_steady": (np.where(x < 90, np.nan, curve(x, 100, 0.05)), 0 * x, "m"),
+    (peak,) = find_peaks([key("drive.frequency", narrow)], curve(narrow, 100, 0.05))
+    assert np.isnan(peak.swept.half_power_width.value)
+    assert "width" not in peaks.peaks_sentence([peak])
+    # cases that have not settled count by their estimate of the steady amplitude
+    settled = {AMPLITUDE: x < 90, f"{AMPLITUDE}_steady": np.ones(41, bool)}
+    measures = {
+        AMPLITUDE: (np.where(x < 90, curve(x, 100, 0.05), 1.0), 0 * x, "m"),
+        f"{AMPLITUDE}_steady": (np.where(x < 90, np.nan, curve(x, 100, 0.05)), 0 * x, "m"),
     }
-    (found,) = peaks.find_peaks([key("drive.frequency", x)], steady, unsettled, True)
-    assert found.swept.frequency.value == pytest.approx(99.75, abs=0.02)
+    (peak,) = peaks.find_peaks(keys, measures, settled, True)
+    assert peak.swept.frequency.value == pytest.approx(99.75, abs=0.02)
 
 
 @pytest.fixture(scope="module")
@@ -153,8 +133,6 @@ def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
         and "Scatter of the answers" in page
         and "<svg viewBox" in page
     )
-    from patchfem.export.sweeps.page import read_table
-
     again = summarise_sweep(read_table(out)).said  # what `patchfem report` draws from the files
     head, count, *_ = answer.out.splitlines()
     assert (
@@ -169,8 +147,9 @@ def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
 def test_exact_quantiles_are_those_of_all_cases_that_have_a_value():
     """Without the 12 smallest of 40, whose bars are wide, the 5 % quantile was 2.3 times as large."""
     values = np.append(np.arange(1.0, 41), np.nan)
-    one = {"values": values, "errors": np.where(values < 13, 0.5 * values, 0.0), "unit": "J"}
-    table = {"outcome": ["steady"] * 40 + ["failed"], "drawn": True, "measures": {"loop_area": one}}
+    loop = swept_measure(values, np.where(values < 13, 0.5 * values, 0.0), "J")
+    outcome = ["steady"] * 40 + ["failed"]
+    table = drawn_table([key("normal.load", values)], {"loop_area": loop}, outcome=outcome)
     found = ranked.measure_quantiles(table, {"loop_area": np.append(values[:-1] > 12, True)})
     unit, ends, count, misses = found["loop_area"]
     assert (unit, count, misses) == ("J", 40, 12)
@@ -198,37 +177,29 @@ def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
     assert summarise_sweep(table | {"outcome": ["failed"] * count}).said.left == ""
 
 
-def test_static_cases_are_not_said_to_move():
-    """Of patches that only miss the tolerance nothing has to settle."""
+@pytest.mark.parametrize(
+    "count, has_motion, ending",
+    [
+        (3, False, "; 3 cases that miss the tolerance are included."),
+        (1, False, "; 1 case that misses the tolerance is included."),
+        (1, True, "; 1 case that has not settled is included with its last value."),
+        (3, True, "; 3 cases that have not settled are included with their last values."),
+    ],
+)
+def test_exact_cases_that_do_not_count_are_named_by_their_reason(count, has_motion, ending):
+    """Patches only miss the tolerance: nothing of them has to settle."""
     ranks = {"pressure_peak": [SobolIndex("contact.load", 0.8, 0.9, 0.8, 1.0)]}
-    assert ranked.ranking_sentence(ranks, 3, False).endswith(
-        "; 3 cases that miss the tolerance are included."
-    )
-    assert ranked.ranking_sentence(ranks, 1, False).endswith(
-        "; 1 case that misses the tolerance is included."
-    )
-    assert ranked.ranking_sentence(ranks, 1).endswith(
-        "; 1 case that has not settled is included with its last value."
-    )
-    assert ranked.ranking_sentence(ranks, 3).endswith(
-        "; 3 cases that have not settled are included with their last values."
-    )
+    assert ranked.ranking_sentence(ranks, count, has_motion).endswith(ending)
 
 
-def one(values, errors=0.0, unit="1"):
-    values = np.asarray(values, float)
-    return {"values": values, "errors": 0 * values + errors, "unit": unit}
+def find_peaks(keys: list, values):
+    """Return the peaks of the amplitude over the cases of a grid, all settled and without errors."""
+    measures = {AMPLITUDE: (values, 0 * values, "m")}
+    return peaks.find_peaks(keys, measures, {AMPLITUDE: np.ones(values.size, bool)}, True)
 
 
 def drawn_table(keys, measures, **more):
-    return {
-        "keys": keys,
-        "measures": measures,
-        "grid": False,
-        "drawn": True,
-        "tolerance": 0.01,
-        "outcome": ["steady"] * len(keys[0]["values"]),
-    } | more
+    return swept_table(keys, measures, grid=False, drawn=True, **more)
 
 
 def test_exact_of_drawn_cases_the_answer_is_the_measure_that_is_asked_for_and_where_it_is_largest():
@@ -237,8 +208,8 @@ def test_exact_of_drawn_cases_the_answer_is_the_measure_that_is_asked_for_and_wh
     mu = np.random.default_rng(1).permutation(np.append(np.linspace(0.1, 0.6, 60), 0.475))
     damping = 30 - 400 * (mu - 0.475) ** 2
     columns = {
-        "equivalent_damping": one(damping),
-        "relative_displacement_amplitude": one(1 - mu / 4, unit="m"),
+        "equivalent_damping": swept_measure(damping),
+        AMPLITUDE: swept_measure(1 - mu / 4, unit="m"),
     }
     table = drawn_table(
         [key("friction.static", mu, [f"{value:.6g}" for value in mu])],
@@ -255,13 +226,13 @@ def test_exact_of_drawn_cases_the_answer_is_the_measure_that_is_asked_for_and_wh
         f"equivalent damping ratio from {low:.3g} to {high:.3g}, "
     )
     for slope, says in ((1, "grows with"), (-1, "falls with growing")):
-        columns["equivalent_damping"] = one(2 + slope * mu)
+        columns["equivalent_damping"] = swept_measure(2 + slope * mu)
         assert (
             summarise_sweep(table)
             .answer()
             .startswith(f"Equivalent damping ratio {says} friction.static; 90 % of")
         )
-    columns["equivalent_damping"] = one(np.abs(mu - 0.3) + 1)
+    columns["equivalent_damping"] = swept_measure(np.abs(mu - 0.3) + 1)
     assert "is least, 1" in summarise_sweep(table).answer()
 
 
@@ -282,9 +253,9 @@ def test_exact_of_several_keys_the_strongest_has_a_direction_that_chance_does_no
         (b - 4 * a, "Loop area falls with growing a.a."),
         (noise, ""),
     ):
-        table = drawn_table(keys, {"loop_area": one(values, unit="J")})
+        table = drawn_table(keys, {"loop_area": swept_measure(values, unit="J")})
         assert ranked.describe_trend(table, shares, settled) == says
-    table = drawn_table(keys, {"loop_area": one(b - 9 * (a - 0.5) ** 2, unit="J")})
+    table = drawn_table(keys, {"loop_area": swept_measure(b - 9 * (a - 0.5) ** 2, unit="J")})
     low, high = map(
         float,
         ranked.describe_trend(table, shares, settled)
@@ -302,9 +273,8 @@ def test_exact_too_few_settled_cases_are_no_ranking():
     values = np.append(np.full(32, np.nan), rng.random(32))
     table = drawn_table(
         keys,
-        {"relative_displacement_amplitude": one(values, unit="m")},
+        {AMPLITUDE: swept_measure(values, unit="m")},
         outcome=["failed"] * 32 + ["transient"] * 31 + ["steady"],
-        messages={},
     )
     lead = summarise_sweep(table)
     assert lead.answer() == (
@@ -330,35 +300,15 @@ def test_exact_curves_that_are_largest_at_an_end_are_counted():
     """Of five curves two are largest at 372 Hz, one at 300 Hz, one inside; a motionless one is not counted."""
     height = np.array([4.0, 3, 0.2, 0.1, 0.0]) * 1e-3
     place = np.array([364.0, 372, 372 * (1 + 1e-13), 300, 300])
-    loads = {
-        **key("normal.load", [1, 2, 3, 4, 5], [f"{one} N" for one in range(1, 6)]),
-        "unit": "N",
-    }
+    columns = ((AMPLITUDE, "m", height), ("peak_frequency", "Hz", place))
     measures = {
-        name: {
-            "unit": unit,
-            "means": "",
-            "values": values,
-            "errors": 1e-9 * values,
-            "floors": np.zeros(5),
-        }
-        for name, unit, values in (
-            ("relative_displacement_amplitude", "m", height),
-            ("peak_frequency", "Hz", place),
-        )
+        name: swept_measure(values, 1e-9 * values, unit, floors=np.zeros(5))
+        for name, unit, values in columns
     }
-    table = {
-        "keys": [loads],
-        "measures": measures,
-        "outcome": ["steady"] * 5,
-        "tolerance": 1e-2,
-        "grid": True,
-    }
-    said = "n 3 of 5 cases the largest response lies at an end of the swept frequencies, so that it may be no resonance"
-    assert said in summarise_sweep(table | {"ends": (300.0, 372.0)}).answer()
-    assert (
-        said in summarise_sweep(table | {"ends": (np.full(5, 372.0), np.full(5, 300.0))}).answer()
-    )
+    table = swept_table([swept_key("normal.load", [1, 2, 3, 4, 5], "N")], measures)
+    sentence = "n 3 of 5 cases the largest response lies at an end of the swept frequencies, so that it may be no resonance"
+    for ends in ((300.0, 372.0), (np.full(5, 372.0), np.full(5, 300.0))):
+        assert sentence in summarise_sweep(table | {"ends": ends}).answer()
     for ends in ({}, {"ends": (200.0, 500.0)}, {"ends": (np.nan, np.nan)}):
         assert "end of the swept" not in summarise_sweep(table | ends).answer()
 
@@ -404,55 +354,28 @@ def test_always_motions_that_run_away_are_told_before_those_that_settle(tmp_path
     assert "limit the amplitude" not in cli("run", scene, "-o", tmp_path / "below").out
 
 
-def test_exact_unsettled_cases_that_are_no_end_of_the_key_are_counted():
-    name = "relative_displacement_amplitude"
-    size = np.array([1.0, 2.0, 3.0, 4.0])
-    keys = [key("normal.load", size, [f"{one:g} N" for one in size]) | {"unit": "N"}]
-
-    def said(outcome, values):
-        table = {
-            "keys": keys,
-            "grid": True,
-            "outcome": outcome,
-            "messages": {},
-            "folders": None,
-            "tolerance": 0.01,
-            "measures": {
-                name: {"unit": "m", "means": "", "values": np.array(values), "errors": np.zeros(4)}
-            },
-        }
-        return summarise_sweep(table).answer()
-
-    assert said(
-        ["transient", "steady", "transient", "steady"], [2e-3, 1e-6, 3e-3, 2e-6]
-    ).startswith(
-        "2 of 4 cases did not settle; their relative displacement amplitude at the end of the run is 2 mm to 3 mm; "
-    )
-    assert "did not settle" not in said(
-        ["transient", "steady", "transient", "steady"], [1e-6, 2e-6, 1e-6, 3e-6]
-    )
+@pytest.mark.parametrize(
+    "values, is_counted", [([2e-3, 1e-6, 3e-3, 2e-6], True), ([1e-6, 2e-6, 1e-6, 3e-6], False)]
+)
+def test_exact_unsettled_cases_that_are_no_end_of_the_key_are_counted(values, is_counted):
+    measures = {AMPLITUDE: swept_measure(values, unit="m")}
+    outcome = ["transient", "steady"] * 2
+    table = swept_table([swept_key("normal.load", [1, 2, 3, 4], "N")], measures, outcome=outcome)
+    start = "2 of 4 cases did not settle; their relative displacement amplitude at the end of the run is 2 mm to 3 mm; "
+    answer = summarise_sweep(table).answer()
+    assert answer.startswith(start) == ("did not settle" in answer) == is_counted
 
 
 def test_exact_a_width_that_the_cases_do_not_tell_has_its_reason():
     """A peak of 1 Hz between cases 5 Hz apart, and a curve whose cases end above peak/sqrt2. Both stood as a dash."""
     x = np.linspace(80, 120, 9)
-    name = "relative_displacement_amplitude"
-    wide = np.linspace(98, 102, 9)
-
-    def table(at, centre, damping):
-        keys = [key("drive.frequency", at)]
-        found = peaks.find_peaks(
-            keys, {name: (curve(at, centre, damping), 0 * at, "m")}, {name: np.ones(9, bool)}, True
-        )
-        return peaks.peaks_sentence(found), peaks.peaks_table(found)
-
-    said, rows = table(x, 102.4, 0.005)
-    assert (
-        "half-power width not resolved by these cases" in said
-        and "; add cases near 102.4 Hz" in rows
-    )
-    said, rows = table(wide, 100.2, 0.05)
-    assert "half-power" not in said and "reaches beyond the swept frequencies" in rows
+    found = find_peaks([key("drive.frequency", x)], curve(x, 102.4, 0.005))
+    assert "half-power width not resolved by these cases" in peaks.peaks_sentence(found)
+    assert "; add cases near 102.4 Hz" in peaks.peaks_table(found)
+    x = np.linspace(98, 102, 9)
+    found = find_peaks([key("drive.frequency", x)], curve(x, 100.2, 0.05))
+    assert "half-power" not in peaks.peaks_sentence(found)
+    assert "reaches beyond the swept frequencies" in peaks.peaks_table(found)
 
 
 def test_exact_the_scatter_of_the_cases_that_settled_is_not_told_where_many_have_not():
@@ -460,40 +383,25 @@ def test_exact_the_scatter_of_the_cases_that_settled_is_not_told_where_many_have
     table as those of all, above a curve that the page did not have."""
     rng = np.random.default_rng(7)
     keys = [key(name, rng.random(100)) for name in ("a.a", "b.b")]
-    values = 1e-6 * (1 + rng.random(100))
-    name = "relative_displacement_amplitude"
     late = np.arange(100) % 3 == 0
-    values[late] *= 1e3
-    outcome = np.where(late, "transient", "steady").tolist()
+    values = 1e-6 * (1 + rng.random(100)) * np.where(late, 1e3, 1)
+    table = drawn_table(keys, {AMPLITUDE: swept_measure(values, unit="m")})
 
-    def scatter(outcome):
-        table = drawn_table(
-            keys,
-            {name: one(values, unit="m")},
-            outcome=outcome,
-            messages={},
-            title="t",
-            version="0",
-            command="c",
-            scene="s",
-            folders=None,
+    def scatter(table) -> str:
+        return (
+            page_html(table).partition("Scatter of the answers</h2>")[2].partition("</section>")[0]
         )
-        text = page_html(table)
-        part = text[text.index("Scatter of the answers</h2>") :]
-        return summarise_sweep(table), part[: part.index("</section>")]
 
-    lead, text = scatter(outcome)
-    assert (
-        text.count("not known") == 4
-        and "34 of 100 cases do not count" in text
-        and "curve" not in text
-    )
+    text = scatter(table)
+    assert "not known" not in text and "do not count" not in text
+    table["outcome"] = np.where(late, "transient", "steady").tolist()
+    text = scatter(table)
+    assert text.count("not known") == 4 and "34 of 100 cases do not count" in text
+    assert "curve" not in text
     assert (
         "34 of 100 cases did not settle; their relative displacement amplitude at the end of"
-        in lead.said.span
+        in summarise_sweep(table).said.span
     )
-    lead, text = scatter(["steady"] * 100)
-    assert "not known" not in text and "do not count" not in text
 
 
 def test_exact_keys_whose_intervals_overlap_stand_in_no_order():

@@ -6,7 +6,7 @@ from math import log
 
 import numpy as np
 import pytest
-from page_data import own_part
+from page_data import own_part, swept_key, swept_measure, swept_table
 
 from patchfem.export.pages.headline import summarise_sweep
 from patchfem.export.pages.limits import find_limits, limits_json, limits_sentence, limits_table
@@ -14,26 +14,24 @@ from patchfem.export.pages.sweep import page_html
 from patchfem.export.sweeps.answer import sweep_summary
 
 TILT = np.array([0.05, 0.1, 0.2, 0.5, 1.0])
+LINE = 1 + 0.25 * (TILT - 0.05)
 
 
-def key(values=TILT, name="contact.tilt.angle", unit="mrad", words=False) -> dict:
-    return {
-        "name": name,
-        "values": np.array(values, float),
-        "texts": [f"{one:g} {unit}" for one in values],
-        "words": words,
-    }
+def key(values=TILT, name="contact.tilt.angle", unit="mrad", **more) -> dict:
+    """Return a key whose values are written in mrad, or in another unit of 1/1000 of its own."""
+    texts = [f"{value:g} {unit}" for value in values]
+    return swept_key(name, np.array(values) * 1e-3, "rad", texts, **more)
 
 
 def limits(measures: dict, errors=0.0, tilt=TILT, factors=False, trusted=None, **more):
-    """Limits of {measure: values} over the tilt."""
-    one = key(tilt, **more) | {"unit": "rad", "log": factors, "values": np.array(tilt) * 1e-3}
+    """Return the limits of {measure: values} over the tilt."""
     columns = {
         name: (np.array(values, float), np.zeros(len(values)) + errors)
         for name, values in measures.items()
     }
     good = np.ones(len(tilt), bool) if trusted is None else np.array(trusted, bool)
-    return find_limits([one], columns, dict.fromkeys(columns, good), True, {"length": 12.7e-3})
+    keys = [key(tilt, log=factors, **more)]
+    return find_limits(keys, columns, dict.fromkeys(columns, good), True, {"length": 12.7e-3})
 
 
 def one_of(values, errors=0.0, **more):
@@ -44,10 +42,10 @@ def one_of(values, errors=0.0, **more):
 
 def test_exact_a_straight_line_leaves_where_it_is_a_twentieth_off():
     """E = 1 + 0.25 t - 0.0125 of a tilt t [mrad] from 0.05 on: 5 % are reached at t = 0.25, 3.175 um over 12.7 mm."""
-    one = one_of(1 + 0.25 * (TILT - 0.05))
+    one = one_of(LINE)
     assert (one.inside, one.beyond) == (2, 3) and one.value == pytest.approx(0.25e-3)
     assert one.last_change == pytest.approx(0.25 * 0.95) and one.change == 0.05
-    assert limits_sentence(limits({"loop_area": 1 + 0.25 * (TILT - 0.05)})) == (
+    assert limits_sentence(limits({"loop_area": LINE})) == (
         "Tilt may reach 0.25 mrad (3.2 um over the patch; interpolated between the cases at 0.2 and 0.5 mrad) before "
         "loop area changes by 5 % (first to change: loop area)."
     )
@@ -55,8 +53,8 @@ def test_exact_a_straight_line_leaves_where_it_is_a_twentieth_off():
 
 @pytest.mark.parametrize("unit, size", [("rad", 1e3), ("mrad", 1.0), ("urad", 1e-3)])
 def test_exact_a_limit_has_the_same_words_in_whatever_unit_its_cases_were_written(unit, size):
-    one = key(TILT / size, unit=unit) | {"unit": "rad", "log": False, "values": TILT * 1e-3}
-    values = 1 + 0.25 * (TILT - 0.05)
+    one = key(TILT / size, unit=unit) | {"values": TILT * 1e-3}
+    values = LINE
     found = find_limits([one], {"loop_area": (values, 0 * values)}, {"loop_area": np.ones(5, bool)})
     assert limits_sentence(found).startswith(
         "Tilt may reach 0.25 mrad (interpolated between the cases at 0.2 and 0.5 mrad) before"
@@ -174,11 +172,10 @@ def test_exact_a_limit_that_errors_leave_open_is_told_with_the_case_that_is_sure
 
 
 def test_exact_a_measure_that_cannot_be_told_is_not_among_what_moves():
-    line = 1 + 0.25 * (TILT - 0.05)
-    said = limits_sentence(limits({"loop_area": line, "slip_amplitude": [0, 1, 1, 1, 1]}))
+    said = limits_sentence(limits({"loop_area": LINE, "slip_amplitude": [0, 1, 1, 1, 1]}))
     assert "before loop area changes by 5 %" in said
     line = {
-        "loop_area": line,
+        "loop_area": LINE,
         "slip_amplitude": 1 + 0 * TILT,
         "stick_fraction": [0.06, 0.07, 0.08, 0.09, 0.1],
     }
@@ -190,13 +187,12 @@ def test_exact_a_measure_that_cannot_be_told_is_not_among_what_moves():
 
 def test_exact_what_is_round_off_in_every_case_does_not_move():
     """Loops of 1e-12 J that change their sign once kept a stuck rig from having any limit."""
-    line = 1 + 0.25 * (TILT - 0.05)
     said = limits_sentence(
         limits(
             {
                 "loop_area": [1e-12, -3e-12, 2e-12, -1e-12, 1e-12],
                 "slip_amplitude": 0 * TILT,
-                "relative_displacement_amplitude": line,
+                "relative_displacement_amplitude": LINE,
             }
         )
     )
@@ -209,48 +205,29 @@ def test_exact_what_is_round_off_in_every_case_does_not_move():
 def test_exact_of_several_lines_the_one_that_allows_least():
     """E = 1 + s (t - 0.05) leaves at 0.05 + 0.05/s: 0.25 and 0.15 for slopes of 0.25 and 0.5."""
     tilt, slope = (grid.ravel() for grid in np.meshgrid(TILT, [0.25, 0.5], indexing="ij"))
-    keys = [
-        key(tilt) | {"unit": "rad", "log": False},
-        key(slope, "normal.load", "N") | {"unit": "N", "log": False},
-    ]
+    keys = [key(tilt), swept_key("normal.load", slope, "N")]
     values = 1 + slope * (tilt - 0.05)
     good = {"loop_area": np.ones(10, bool)}
-    (one,) = find_limits(keys, {"loop_area": (values, 0 * values)}, good).found
-    assert one.value == pytest.approx(0.15)
+    (limit,) = find_limits(keys, {"loop_area": (values, 0 * values)}, good).found
+    assert limit.value == pytest.approx(0.15e-3)
     assert find_limits(keys, {"loop_area": (values, 0 * values)}, good, grid=False).key is None
 
 
 def swept() -> dict:
-    """A sweep over the tilt: straight lines, a pressure in proportion, two cases that miss the tolerance."""
-    line = 1 + 0.25 * (TILT - 0.05)
-    tilt = key() | {"unit": "rad", "log": False, "values": TILT * 1e-3}
-    known = {
-        "loop_area": ("J", line),
-        "relative_displacement_amplitude": ("m", 1e-5 * line**0.5),
-        "pressure_peak": ("Pa", 1e6 + 2e7 * TILT),
-        "moment": ("N m", np.ones(5)),
-        "normal_stiffness": ("N m-1", 1 - 0.1 * TILT),
-        "contact_fraction": ("1", np.ones(5)),
+    """Return a sweep over the tilt: straight lines, a pressure in proportion, two cases that miss the tolerance."""
+    columns = {
+        "loop_area": ("J", LINE, 0.0),
+        "relative_displacement_amplitude": ("m", 1e-5 * LINE**0.5, 0.0),
+        "pressure_peak": ("Pa", 1e6 + 2e7 * TILT, 0.0),
+        "moment": ("N m", np.ones(5), np.array([0, 0, 0, 0.2, 0.4])),
+        "normal_stiffness": ("N m-1", 1 - 0.1 * TILT, 0.0),
+        "contact_fraction": ("1", np.ones(5), 0.0),
     }
     measures = {
-        name: {"unit": unit, "means": "m", "values": values, "errors": np.zeros(5)}
-        for name, (unit, values) in known.items()
+        name: swept_measure(values, errors, unit)
+        for name, (unit, values, errors) in columns.items()
     }
-    measures["moment"]["errors"] = np.array([0, 0, 0, 0.2, 0.4])
-    return {
-        "title": "t",
-        "version": "0",
-        "command": "c",
-        "scene": "s",
-        "grid": True,
-        "keys": [tilt],
-        "measures": measures,
-        "outcome": ["steady"] * 5,
-        "messages": {},
-        "folders": None,
-        "tolerance": 0.01,
-        "patch": {"length": 12.7e-3},
-    }
+    return swept_table([key()], measures, patch={"length": 12.7e-3})
 
 
 def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
@@ -300,15 +277,11 @@ def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
     json.dumps(found, allow_nan=False)
 
 
-def test_always_the_sentence_of_a_sweep_without_numbers_is_empty():
-    table = swept() | {
-        "keys": [key(words=True) | {"unit": "1", "log": False, "texts": list("abcde")}]
-    }
+def test_always_a_sweep_over_words_has_no_limit():
+    table = swept() | {"keys": [swept_key("friction.law", TILT, texts=list("abcde"), words=True)]}
     found = sweep_summary(summarise_sweep(table), table["outcome"])
-    assert (
-        found["limits"] == []
-        and "moment; the largest error, at contact.tilt.angle e" in found["answer"]
-    )
+    assert found["limits"] == []
+    assert "moment; the largest error, at friction.law e" in found["answer"]
 
 
 def test_exact_the_last_digits_of_a_value_are_no_change():
@@ -363,29 +336,13 @@ def test_always_the_limit_lies_between_the_cases_that_are_named(curve, error, ti
 def test_exact_one_sentence_has_one_unit():
     """Limits of 0.16 mrad and of 10 to 32 urad once stood in one sentence."""
     tilt = np.geomspace(1e-3, 1, 7)
-    table = swept() | {
-        "keys": [
-            key(tilt)
-            | {
-                "unit": "rad",
-                "log": True,
-                "values": tilt * 1e-3,
-                "texts": [f"{1e3 * one!r} urad" for one in tilt.tolist()],
-            }
-        ],
-        "outcome": ["steady"] * 7,
+    texts = [f"{1e3 * value!r} urad" for value in tilt.tolist()]
+    measures = {
+        "loop_area": swept_measure(1 - 0.1 * tilt**0.4),
+        "normal_stiffness": swept_measure(1 - np.minimum(1e3 * tilt / 300, 0.9)),
+        "moment": swept_measure(np.ones(7), np.array([0, 0, 0, 0, 0, 0.4, 0.2])),
     }
-    lines = {
-        "loop_area": 1 - 0.1 * tilt**0.4,
-        "normal_stiffness": 1 - np.minimum(1e3 * tilt / 300, 0.9),
-        "moment": np.array([1, 1, 1, 1, 1, 1, 1.0]),
-    }
-    table["measures"] = {
-        name: {"unit": "J", "means": "m", "values": values, "errors": 0 * values}
-        for name, values in lines.items()
-    }
-    table["measures"]["moment"]["errors"] = np.array([0, 0, 0, 0, 0, 0.4, 0.2])
-    said = summarise_sweep(table).sentences()
-    assert "0.316228 mrad, is 40 %" in said[0] and all(
-        ("mrad" in one) + ("urad" in one) < 2 for one in said
-    )
+    table = swept_table([key(tilt, log=True) | {"texts": texts}], measures)
+    sentences = summarise_sweep(table | {"patch": {"length": 12.7e-3}}).sentences()
+    assert "0.316228 mrad, is 40 %" in sentences[0]
+    assert all(("mrad" in text) + ("urad" in text) < 2 for text in sentences)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from page_data import swept_key, swept_table
 from scene_texts import PIECE
 
 import patchfem as pf
@@ -142,23 +143,9 @@ def test_exact_a_tolerance_that_only_the_floor_meets_is_told_with_the_floor():
         "All 2 cases meet the tolerance of 0.1 % or the floor of their "
         "measure, such as 0.1 nJ of loop area."
     )
-    table = {
-        "keys": [
-            {
-                "name": "slide.amplitude",
-                "unit": "m",
-                "values": np.array([1e-7, 1e-6]),
-                "log": True,
-                "texts": ["0.1 um", "1 um"],
-            }
-        ],
-        "grid": True,
-        "outcome": ["done"] * 2,
-        "messages": {},
-        "folders": None,
-        "tolerance": 1e-3,
-        "measures": {"loop_area": loop | {"means": ""}},
-    }
+    keys = [swept_key("slide.amplitude", [1e-7, 1e-6], "m", ["0.1 um", "1 um"], log=True)]
+    table = swept_table(keys, {"loop_area": loop | {"means": ""}}, outcome=["done"] * 2)
+    table["tolerance"] = 1e-3
     assert summarise_sweep(table).said.span == (
         "Loop area ranges from 0.16 nJ to 1 mJ, with errors of at most 0.01 % or 0.1 nJ, the floor of this measure."
     )

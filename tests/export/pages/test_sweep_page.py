@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 from chromium import LATER
-from page_data import data_of, own_part, unheard
+from page_data import data_of, own_part, swept_key, swept_measure, swept_table, unheard
 
 from patchfem.export.pages import library
 from patchfem.export.pages.document import Section, document_html, figure_html, to_json
@@ -16,6 +16,9 @@ from patchfem.export.pages.sweep import page_html
 from patchfem.export.sweeps.page import join_tables, suits_log_axis
 from patchfem.export.written import shorten_number
 
+NAN = np.nan
+AMPLITUDE = "relative_displacement_amplitude"
+
 
 def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table):
     data = data_of(page_html(table))
@@ -23,9 +26,7 @@ def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table)
     np.testing.assert_allclose(
         data["keys"][0]["values"], table["keys"][0]["values"] * 1e3, rtol=1e-9
     )
-    shown = next(
-        one for one in data["measures"] if one["name"] == "relative_displacement_amplitude"
-    )
+    shown = next(one for one in data["measures"] if one["name"] == AMPLITUDE)
     assert shown["unit"] == "um" and shown["values"][7] is None
     rest = np.arange(12) != 7
     np.testing.assert_allclose(
@@ -38,9 +39,7 @@ def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table)
         0.01,
         rtol=1e-8,
     )
-    assert (
-        data["along"] == "contact.tilt.angle" and data["first"] == "relative_displacement_amplitude"
-    )
+    assert data["along"] == "contact.tilt.angle" and data["first"] == AMPLITUDE
 
 
 def test_exact_a_key_of_words_carries_the_word_of_each_of_its_numbers(table):
@@ -88,7 +87,7 @@ def test_always_texts_from_outside_are_shown_as_texts(table):
     ],
 )
 def test_exact_a_case_shows_its_error_where_its_digits_do_not(table, value, error, shown):
-    one = table["measures"]["relative_displacement_amplitude"]
+    one = table["measures"][AMPLITUDE]
     one |= {"unit": "1", "values": np.full(12, value), "errors": np.full(12, error)}
     one["values"][3] = 7.25  # so that the measure changes from case to case
     assert page_html(table).count(f"<td class=n>{shown}</td>") >= 11
@@ -120,73 +119,47 @@ def test_always_a_sweep_without_a_value_has_a_page_without_pictures(table):
     assert "No case has a value to draw" in text and "<script" not in text
 
 
-def test_always_many_cases_are_thinned_to_a_page_below_three_megabytes_with_all_extremes(table):
-    many = 200_000
-    r = np.random.default_rng(3)
-    for one in table["keys"]:
-        one["values"] = r.uniform(1, 2, many)
-        one["texts"] = [f"{value} N" for value in one["values"].tolist()]
-    table["measures"] = {
-        f"loop_area{k}": {
-            "unit": "J",
-            "means": "work",
-            "values": r.normal(size=many),
-            "errors": r.uniform(0, 1e-4, many),
-        }
+def test_always_many_cases_are_thinned_to_a_page_below_three_megabytes_with_all_extremes():
+    n_cases = 200_000
+    random = np.random.default_rng(3)
+    keys = [
+        swept_key(name, random.uniform(1, 2, n_cases), "N")
+        for name in ("normal.load", "drive.force")
+    ]
+    measures = {
+        f"loop_area{k}": swept_measure(
+            random.normal(size=n_cases), random.uniform(0, 1e-4, n_cases), "J"
+        )
         for k in range(30)
     }
-    table |= {
-        "outcome": [
-            "stuck" if case == 777 else "steady" if case % 3 else "grows" for case in range(many)
-        ],
-        "messages": {},
-        "grid": False,
-        "folders": [f"cases/{case}" for case in range(many)],
-    }
-    text = page_html(table)
+    outcome = ["steady" if case % 3 else "grows" for case in range(n_cases)]
+    outcome[777] = "stuck"
+    folders = [f"cases/{case}" for case in range(n_cases)]
+    text = page_html(swept_table(keys, measures, outcome=outcome, folders=folders, grid=False))
     data = data_of(text)
-    assert len(text.encode()) < 3e6 and f"{len(data['outcome'])} of {many} cases are drawn" in text
-    cases = [int(one.removeprefix("cases/")) for one in data["links"]]
     assert (
-        len(cases) > 1000
-        and len(set(cases)) == len(cases)
-        and (cases[0], cases[-1]) == (0, many - 1)
+        len(text.encode()) < 3e6 and f"{len(data['outcome'])} of {n_cases} cases are drawn" in text
     )
-    assert data["outcome"] == [table["outcome"][case] for case in cases] and not data["whole"]
-    for shown, one in zip(data["measures"], table["measures"].values()):
-        assert {np.argmin(one["values"]), np.argmax(one["values"])} <= set(cases)
-        np.testing.assert_allclose(shown["values"], one["values"][cases], rtol=1e-6)
-        np.testing.assert_allclose(shown["errors"], one["errors"][cases], rtol=5e-3)
-    for one in table["keys"]:
-        assert {np.argmin(one["values"]), np.argmax(one["values"])} <= set(cases)
+    cases = [int(link.removeprefix("cases/")) for link in data["links"]]
+    assert len(set(cases)) == len(cases) > 1000 and (cases[0], cases[-1]) == (0, n_cases - 1)
+    assert data["outcome"] == [outcome[case] for case in cases] and not data["whole"]
+    for shown, measure in zip(data["measures"], measures.values()):
+        np.testing.assert_allclose(shown["values"], measure["values"][cases], rtol=1e-6)
+        np.testing.assert_allclose(shown["errors"], measure["errors"][cases], rtol=5e-3)
+    for column in (*keys, *measures.values()):
+        assert {np.argmin(column["values"]), np.argmax(column["values"])} <= set(cases)
 
 
-def test_always_a_grid_that_is_too_large_is_thinned_to_points_with_its_extremes(table):
-    places = [one.ravel() for one in np.meshgrid(np.arange(500), np.arange(100), indexing="ij")]
-    many = places[0].size
-    r = np.random.default_rng(4)
-    table["keys"] = [
-        {
-            "name": f"key{k}",
-            "unit": "1",
-            "values": 1.0 * one,
-            "log": False,
-            "texts": list(map(str, one)),
-        }
-        for k, one in enumerate(places)
-    ]
-    for one in table["measures"].values():
-        one["values"], one["errors"] = r.normal(size=many), np.full(many, 1e-3)
-    table |= {"outcome": ["steady"] * many, "messages": {}, "folders": None}
-    text = page_html(table)
+def test_always_a_grid_that_is_too_large_is_thinned_to_points_with_its_extremes():
+    places = [grid.ravel() for grid in np.meshgrid(np.arange(500), np.arange(100), indexing="ij")]
+    n_cases = places[0].size
+    values = np.random.default_rng(4).normal(size=n_cases)
+    keys = [swept_key(f"key{k}", place) for k, place in enumerate(places)]
+    text = page_html(swept_table(keys, {"loop_area": swept_measure(values, 1e-3)}))
     data = data_of(text)
-    values = table["measures"]["relative_displacement_amplitude"]["values"]
-    shown = np.array([one["values"] for one in data["keys"]])
-    assert len(text.encode()) < 3e6 and 400 < shown.shape[1] < many
-    assert (
-        not data["grid"]
-        and f"{shown.shape[1]} of {many} cases are drawn: evenly spaced cases" in text
-    )
+    shown = np.array([key["values"] for key in data["keys"]])
+    assert len(text.encode()) < 3e6 and 400 < shown.shape[1] < n_cases and not data["grid"]
+    assert f"{shown.shape[1]} of {n_cases} cases are drawn: evenly spaced cases" in text
     cases = np.ravel_multi_index(shown.astype(int), (500, 100))
     assert {int(np.argmax(values)), int(np.argmin(values))} <= set(cases.tolist())
 
@@ -268,7 +241,7 @@ def test_exact_labels_of_a_logarithmic_axis_are_numbers_that_people_read(chromiu
 def test_exact_values_over_two_decades_have_a_logarithmic_axis_and_what_misses_the_tolerance_is_hollow(
     chromium, table
 ):
-    amplitude = table["measures"]["relative_displacement_amplitude"]
+    amplitude = table["measures"][AMPLITUDE]
     amplitude["values"] = 1e-9 * 4.0 ** np.arange(12)
     # the bars go below 0
     amplitude["errors"] = amplitude["values"] * np.where(np.arange(12) < 3, 2.0, 1e-3)
@@ -326,90 +299,110 @@ def test_always_a_browser_draws_it(table, browser, shown):
     assert re.search(r'<div id="?chart"?[^>]*>\s*<div', seen), "no picture in its place"
 
 
-def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_relative_error():
-    """5 kPa of 2 MPa is a quarter of a percent, and 9e-9 of 9e-3 more than 8e-8 of 8: the relative error counts."""
-    lost = np.nan
-    settled = np.array([True, True, False])
-    measures = {
-        "loop_area": ([lost] * 3, [lost] * 3, "J"),
-        "pressure_peak": ([2e6, 3.1415926e6, 9e9], [5e3, lost, 1e9], "Pa"),
-    }
-    trusted = dict.fromkeys(
-        ("loop_area", "pressure_peak", "relative_displacement_amplitude"), settled
+SPANS = {  # measures, cases that count, the sentence
+    "the first measure that has values, with its largest relative error": (
+        {
+            "loop_area": ([NAN] * 3, [NAN] * 3, "J"),
+            "pressure_peak": ([2e6, 3.1415926e6, 9e9], [5e3, NAN, 1e9], "Pa"),
+        },
+        [True, True, False],
+        "Pressure peak of the settled cases ranges from 2 MPa to 3.142 MPa, with errors of at most 0.2 %.",
+    ),
+    "a single value": (
+        {"loop_area": ([1e-3, NAN, NAN], [NAN] * 3, "J")},
+        [True, True, False],
+        "Loop area is 1 mJ.",
+    ),
+    "the relative error counts: 9e-9 of 9e-3 is less than 1e-9 of 3e-8": (
+        {AMPLITUDE: ([2.939e-8, 8.2614e-3], [1e-9, 8e-8], "m")},
+        [True, True],
+        "Relative displacement amplitude ranges from 29.39 nm to 8.261 mm, with errors of at most 3 %.",
+    ),
+    "zero within its error": (
+        {AMPLITUDE: ([0.0, 1.963e-5], [1e-13, 2e-14], "m")},
+        [True, True],
+        "Relative displacement amplitude ranges from 0 to 19.63 um.",
+    ),
+    "round-off is 0 and known absolutely": (
+        {
+            "loop_area": (
+                np.array([4.2e-21, -1.4e-19, 3.7e-2]),
+                np.array([1e-11, 1e-11, 7.4e-5]),
+                "J",
+            )
+        },
+        [True] * 3,
+        "Loop area ranges from 0 to 37 mJ, with errors of at most 0.2 %.",
+    ),
+    "no value of interest": (
+        {"loop_area": ([NAN], [NAN], "J"), "heat": ([1.0], [0.0], "J")},
+        [True],
+        "",
+    ),
+}
+
+
+@pytest.mark.parametrize("measures, settled, sentence", SPANS.values(), ids=SPANS)
+def test_exact_the_span_of_the_settled_cases(measures, settled, sentence):
+    settled = np.array(settled)
+    assert span_sentence(measures, dict.fromkeys(measures, settled), settled) == sentence
+
+
+def test_exact_the_span_of_the_only_case_that_meets_the_tolerance_says_so():
+    measures = {AMPLITUDE: ([2.939e-8, 8.2614e-3], [1e-9, 8e-8], "m")}
+    within = {AMPLITUDE: np.array([False, True])}
+    assert span_sentence(measures, within, np.ones(2, bool)) == (
+        "Relative displacement amplitude in the only case that meets the tolerance in this measure is 8.261 mm, "
+        "with errors of at most 0.001 %."
     )
+
+
+def test_exact_a_fraction_has_percent_in_sentence_table_and_picture():
+    values = np.array([1.0, 0.2193, 0.1231])
+    measures = {"contact_fraction": (values, np.zeros(3), "1")}
+    every = np.ones(3, bool)
     assert (
-        span_sentence(measures, trusted, settled)
-        == "Pressure peak of the settled cases ranges from 2 MPa to 3.142 MPa, "
-        "with errors of at most 0.2 %."
+        span_sentence(measures, {"contact_fraction": every}, every, ("contact_fraction",))
+        == "Contact fraction ranges from 12.31 % to 100 %."
     )
-    measures["loop_area"] = ([1e-3, lost, lost], [lost] * 3, "J")
-    assert span_sentence(measures, trusted, settled) == "Loop area is 1 mJ."
-    both = np.ones(2, bool)
-    amplitude = {"relative_displacement_amplitude": ([2.939e-8, 8.2614e-3], [1e-9, 8e-8], "m")}
-    start = "Relative displacement amplitude"
-    assert (
-        span_sentence(amplitude, {"relative_displacement_amplitude": both}, both)
-        == f"{start} ranges from 29.39 nm to 8.261 mm, with errors of at most 3 %."
-    )
-    assert span_sentence(
-        amplitude, {"relative_displacement_amplitude": np.array([False, True])}, both
-    ) == (
-        f"{start} in the only case that meets the tolerance in this measure is 8.261 mm, with errors of at most "
-        "0.001 %."
-    )
-    amplitude["relative_displacement_amplitude"] = ([0.0, 1.963e-5], [1e-13, 2e-14], "m")
-    assert (
-        span_sentence(amplitude, {"relative_displacement_amplitude": both}, both)
-        == f"{start} ranges from 0 to 19.63 um."
-    )
-    assert (
-        span_sentence(
-            {"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}, {}, both[:1]
-        )
-        == ""
-    )
+    tilt = swept_key("contact.tilt.angle", [0, 1e-4, 2e-4], "rad")
+    text = page_html(swept_table([tilt], {"contact_fraction": swept_measure(values)}))
+    (shown,) = data_of(text)["measures"]
+    assert shown["unit"] == "%" and shown["values"] == pytest.approx([100, 21.93, 12.31])
+    assert "contact fraction</a> [%]" in text and "<td class=n>21.93</td>" in text
 
 
 def test_exact_sweeps_side_by_side_keep_the_numbers_of_their_cases(table):
-    own = {"contact_fraction": table["measures"]["contact_fraction"]}
     other = table | {
-        "measures": own,
+        "measures": {"contact_fraction": table["measures"]["contact_fraction"]},
         "outcome": ["steady"] * 12,
         "messages": {0: "another"},
         "keys": table["keys"][::-1],
     }
-    found = join_tables([table, other], ["one", "other"])
-    assert found["messages"] == {7: "normal.load: <refused>", 12: "another"}
-    assert found["outcome"] == table["outcome"] + other["outcome"]
-    amplitude = table["measures"]["relative_displacement_amplitude"]["values"]
+    joined = join_tables([table, other], ["one", "other"])
+    assert joined["messages"] == {7: "normal.load: <refused>", 12: "another"}
+    assert joined["outcome"] == table["outcome"] + other["outcome"]
     np.testing.assert_array_equal(
-        found["measures"]["relative_displacement_amplitude"]["values"],
-        np.concatenate([amplitude, np.full(12, np.nan)]),
+        joined["measures"][AMPLITUDE]["values"],
+        np.append(table["measures"][AMPLITUDE]["values"], np.full(12, np.nan)),
     )
-    for name in ("contact.tilt.angle", "normal.load"):
-        own, both = (
-            next(one for one in some["keys"] if one["name"] == name) for some in (table, found)
-        )
-        np.testing.assert_array_equal(both["values"], np.tile(own["values"], 2))
-        assert list(both["texts"]) == list(own["texts"]) * 2
+    keys = {key["name"]: key for key in joined["keys"]}
+    for key in table["keys"]:
+        both = keys[key["name"]]
+        np.testing.assert_array_equal(both["values"], np.tile(key["values"], 2))
+        assert list(both["texts"]) == key["texts"] * 2
 
 
 def test_exact_a_word_has_one_number_on_the_page_of_several_sweeps(table):
     """Each sweep numbers its words as they come: with coulomb first in one and tanh in the other both were 0."""
     laws = [
-        {
-            "name": "friction.law",
-            "unit": "1",
-            "log": False,
-            "texts": list(words),
-            "values": np.arange(12) % 2.0,
-        }
+        swept_key("friction.law", np.arange(12) % 2, texts=list(words))
         for words in (("coulomb", "tanh") * 6, ("tanh", "iwan") * 6)
     ]
-    found = join_tables([table | {"keys": [one]} for one in laws], ["one", "other"])
-    values = dict(zip(found["keys"][1]["texts"], found["keys"][1]["values"]))
-    assert values == {"coulomb": 0, "tanh": 1, "iwan": 2}
-    assert [values[text] for text in found["keys"][1]["texts"]] == list(found["keys"][1]["values"])
+    joined = join_tables([table | {"keys": [law]} for law in laws], ["one", "other"])["keys"][1]
+    numbers = dict(zip(joined["texts"], joined["values"]))
+    assert numbers == {"coulomb": 0, "tanh": 1, "iwan": 2}
+    assert [numbers[text] for text in joined["texts"]] == list(joined["values"])
 
 
 @pytest.mark.parametrize(
@@ -430,13 +423,6 @@ def test_exact_a_word_has_one_number_on_the_page_of_several_sweeps(table):
 )
 def test_exact_an_axis_of_a_decade_or_more_is_logarithmic(values, log):
     assert suits_log_axis(values) is log
-
-
-def test_exact_round_off_is_zero_in_the_span_and_known_absolutely():
-    """A joint that holds in its first cases: -1.4e-19 J ± 1e-11 J was known to 2e11 % of its value."""
-    loop = np.array([4.2e-21, -1.4e-19, 3.7e-2]), np.array([1e-11, 1e-11, 7.4e-5]), "J"
-    text = span_sentence({"loop_area": loop}, {"loop_area": np.ones(3, bool)}, np.ones(3, bool))
-    assert text == "Loop area ranges from 0 to 37 mJ, with errors of at most 0.2 %."
 
 
 def test_always_a_browser_that_cannot_unpack_says_so(chromium, table):
@@ -481,48 +467,6 @@ def test_always_a_picture_is_one_stop_of_the_tab_key_and_obeys_keys(chromium, ta
     seen.pressed("0")
     assert seen.js(ends) == pytest.approx([low, high])
     assert seen.faults == []
-
-
-def test_exact_a_fraction_is_told_in_percent_as_a_run_tells_it():
-    """0.2193 of the length is 21.93 % in sentence, table and picture alike."""
-    values = np.array([1.0, 0.2193, 0.1231])
-    none = np.zeros(3)
-    assert (
-        span_sentence(
-            {"contact_fraction": (values, none, "1")},
-            {"contact_fraction": np.ones(3, bool)},
-            np.ones(3, bool),
-            ("contact_fraction",),
-        )
-        == "Contact fraction ranges from 12.31 % to 100 %."
-    )
-    tilt = {
-        "name": "contact.tilt.angle",
-        "unit": "rad",
-        "values": np.array([0, 1e-4, 2e-4]),
-        "log": False,
-        "texts": ["0 mrad", "0.1 mrad", "0.2 mrad"],
-    }
-    text = page_html(
-        {
-            "title": "t",
-            "version": "0",
-            "command": "c",
-            "scene": "s",
-            "grid": True,
-            "keys": [tilt],
-            "measures": {
-                "contact_fraction": {"unit": "1", "means": "m", "values": values, "errors": none}
-            },
-            "outcome": ["done"] * 3,
-            "messages": {},
-            "folders": None,
-            "tolerance": 0.01,
-        }
-    )
-    (shown,) = data_of(text)["measures"]
-    assert shown["unit"] == "%" and shown["values"] == pytest.approx([100, 21.93, 12.31])
-    assert "contact fraction</a> [%]" in text and "<td class=n>21.93</td>" in text
 
 
 HIDDEN = """[...document.querySelectorAll('.across,.wide,figure')].filter(
@@ -580,7 +524,7 @@ def test_always_tables_and_pictures_are_whole_on_a_wide_and_on_a_narrow_page(chr
 
 
 @pytest.mark.parametrize(
-    "links, said",
+    "links, sentence",
     [
         (["cases/a/report.html", "cases/b/report.html"], "Click on a case to open its page."),
         (
@@ -594,82 +538,26 @@ def test_always_tables_and_pictures_are_whole_on_a_wide_and_on_a_narrow_page(chr
         (None, ""),
     ],
 )
-def test_exact_the_page_says_what_a_click_on_a_case_opens(links, said):
+def test_exact_the_page_says_what_a_click_on_a_case_opens(links, sentence):
     """It promised to open cases of which nothing was kept, and opened raw JSON as if it were a page."""
-    values = np.array([1.0, 2.0])
-    table = {
-        "title": "t",
-        "version": "0",
-        "command": "c",
-        "scene": "s",
-        "grid": True,
-        "outcome": ["steady"] * 2,
-        "messages": {},
-        "folders": links,
-        "tolerance": 0.01,
-        "keys": [
-            {
-                "name": "normal.load",
-                "unit": "N",
-                "values": values,
-                "texts": ["1 N", "2 N"],
-                "log": False,
-            }
-        ],
-        "measures": {
-            "loop_area": {"unit": "J", "means": "m", "values": values, "errors": 0 * values}
-        },
-    }
-    text = page_html(table)
-    assert said in text and ("Click on a case" in text) == bool(said)
+    keys = [swept_key("normal.load", [1, 2], "N")]
+    text = page_html(
+        swept_table(keys, {"loop_area": swept_measure([1, 2], unit="J")}, folders=links)
+    )
+    assert sentence in text and ("Click on a case" in text) == bool(sentence)
 
 
 def test_exact_names_of_keys_break_behind_dots_and_the_table_of_cases_fits():
     """structure.mode.axial.dampi/ng broke between its letters on a phone, and four keys with six measures did not fit a
     screen of 1400 pixels; a column of round-off, 0 in every row, was among them."""
-    values = np.array([1.0, 2.0])
     names = ["friction.static", "normal.load", "drive.acceleration", "structure.mode.axial.damping"]
-    keys = [
-        {"name": name, "unit": "N", "values": values, "texts": ["1 N", "2 N"], "log": False}
-        for name in names
-    ]
-    shown = [
-        "relative_displacement_amplitude",
-        "loop_area",
-        "absolute_acceleration_peak",
-        "friction_force_peak",
-        "slip_amplitude",
-        "friction_work",
-    ]
-    measures = {
-        name: {"unit": "J", "means": "m", "values": values, "errors": 0 * values} for name in shown
-    }
-    measures["energy_balance"] = {
-        "unit": "1",
-        "means": "m",
-        "values": 1e-16 * values,
-        "errors": 0 * values,
-    }
-    text = page_html(
-        {
-            "title": "Sweep of " + " × ".join(names),
-            "version": "0",
-            "command": "c",
-            "scene": "s",
-            "grid": False,
-            "keys": keys,
-            "measures": measures,
-            "outcome": ["steady"] * 2,
-            "messages": {},
-            "folders": None,
-            "tolerance": 0.01,
-        }
-    )
+    shown = "absolute_acceleration_peak friction_force_peak slip_amplitude friction_work loop_area"
+    measures = {name: swept_measure([1, 2]) for name in (AMPLITUDE, *shown.split())}
+    measures["energy_balance"] = swept_measure([1e-16, 2e-16])
+    keys = [swept_key(name, [1, 2], "N") for name in names]
+    text = page_html(swept_table(keys, measures, title="Sweep of " + " × ".join(names), grid=False))
     assert "structure.<wbr>mode.<wbr>axial.<wbr>damping × " not in text.partition("</h1>")[2]
     assert "× structure.<wbr>mode.<wbr>axial.<wbr>damping</h1>" in text
     cases = text[text.index('<section id="cases">') : text.index('<section id="measures">')]
-    assert (
-        cases.count("<th scope=col") == 4 + 1 + 4
-        and "energy balance" not in cases
-        and "1&nbsp;N" in cases
-    )
+    assert cases.count("<th scope=col") == 4 + 1 + 4
+    assert "energy balance" not in cases and "1&nbsp;N" in cases
