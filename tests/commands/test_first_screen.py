@@ -35,6 +35,16 @@ from patchfem.scene.starting import read_template
 UNIT = {"g": 9.80665, "%": 0.01, "deg": UNIT_FACTORS["angle"]["deg"]}
 
 
+def entry(value, error=None, unit="1", **more) -> dict:
+    """Return a measure as the summary of a run has it."""
+    return {"value": value, "error": error, "unit": unit, **more}
+
+
+def summary_of(kind="bench", outcome="done", measures=(), **more) -> dict:
+    """Return the parts of a summary that a verdict speaks of."""
+    return {"kind": kind, "outcome": outcome, "measures": dict(measures), **more}
+
+
 def run(tmp_path, kind, *words, **keys):
     path = tmp_path / f"{kind}.toml"
     path.write_text(read_template(kind), "utf-8")
@@ -91,21 +101,18 @@ def test_exact_the_numbers_are_those_of_the_summary(tmp_path):
 
 def test_always_every_measure_has_its_group():
     assert {row.group for row in (*MOTION, *STATIC)} == set(GROUPS)
-    assert (
-        measure_group("normal_load") == "patch"
-        and measure_group("normal_load", pressed=False) == "friction"
-    )
-    assert (
-        measure_group("pressure_peak") == "patch"
-        and measure_group("slip_amplitude_2") == "friction"
-    )
-    assert (
-        measure_group("worn_volume") == "wear"
-        and measure_group("loop_area") == "energy"
-        and measure_group("level_9") == "motion"
-    )
-    found = {"value": 1.0, "unit": "1", "error": None}
-    assert format_measures({"loop_area": found | {"reason": "stuck"}, "pressure_peak": found}) == [
+    groups = {
+        "normal_load": "patch",
+        "pressure_peak": "patch",
+        "slip_amplitude_2": "friction",
+        "worn_volume": "wear",
+        "loop_area": "energy",
+        "level_9": "motion",
+    }
+    assert {name: measure_group(name) for name in groups} == groups
+    assert measure_group("normal_load", pressed=False) == "friction"
+    measures = {"loop_area": entry(1.0, reason="stuck"), "pressure_peak": entry(1.0)}
+    assert format_measures(measures) == [
         "energy",
         "  loop_area      - (stuck)",
         "patch",
@@ -175,52 +182,52 @@ def test_always_a_plan_says_what_does_not_run_where_it_is_asked(tmp_path):
     assert "N/mm -> " in short and "the largest force of the drive" in short and "e+0" not in short
 
 
-@pytest.mark.parametrize(
-    "cycles, text",
-    [
-        (None, "Friction ratio peaks at 0.3; 2.00 ± 0.10 mJ dissipated per cycle."),
-        (0.4, "In 0.4 of a cycle friction ratio peaks at 0.3."),
-    ],
-)
-def test_exact_a_headline(cycles, text):
-    measures = {
-        "friction_ratio_peak": {"value": 0.3, "unit": "1", "error": None},
-        "loop_area": {"value": 2e-3, "unit": "J", "error": 1e-4},
-    }
-    assert (
-        headline_sentence({"kind": "bench", "outcome": "done", "measures": measures}, cycles)
-        == text
-    )
+LOOP = {"loop_area": entry(2e-3, 1e-4, "J")}
+RATIO = {"friction_ratio_peak": entry(0.3)}
+DEPTH = {"worn_depth_max": entry(2.58e-7, 1e-9, "m"), "worn_volume": entry(1e-12, 1e-14, "m3")}
+HEADLINES = [  # summary, cycles, headline
+    (
+        summary_of(measures=RATIO | LOOP),
+        None,
+        "Friction ratio peaks at 0.3; 2.00 ± 0.10 mJ dissipated per cycle.",
+    ),
+    (summary_of(measures=RATIO | LOOP), 0.4, "In 0.4 of a cycle friction ratio peaks at 0.3."),
+    (
+        summary_of(measures=LOOP | DEPTH),
+        2.0,
+        "258.0 ± 1.0 nm worn off at the deepest place; 2.00 ± 0.10 mJ dissipated per cycle.",
+    ),
+    (
+        summary_of(measures=LOOP | {"worn_volume": entry(2.0, 0.1, "kg")}),
+        2.0,
+        "2.00 ± 0.10 kg worn off; 2.00 ± 0.10 mJ dissipated per cycle.",
+    ),
+    (summary_of("rig", "steady", LOOP), 10.0, "2.00 ± 0.10 mJ dissipated per cycle."),
+    (
+        summary_of("rig", "transient", LOOP),
+        10.0,
+        "2.00 ± 0.10 mJ dissipated per cycle (mean of the last cycles).",
+    ),
+    (
+        summary_of(measures=LOOP, warnings=[f"{OPEN_LOOP}: it misses"]),
+        10.0,
+        "Friction work of the last cycle 2.00 ± 0.10 mJ.",
+    ),
+]
 
 
-@pytest.mark.parametrize(
-    "worn, text",
-    [
-        (
-            {"worn_depth_max": (2.58e-7, 1e-9, "m"), "worn_volume": (1e-12, 1e-14, "m3")},
-            "258.0 ± 1.0 nm worn off at the deepest place; 2.00 ± 0.10 mJ dissipated per cycle.",
-        ),
-        (
-            {"worn_volume": (2.0, 0.1, "kg")},
-            "2.00 ± 0.10 kg worn off; 2.00 ± 0.10 mJ dissipated per cycle.",
-        ),
-    ],
-)
-def test_exact_a_worn_run_answers_with_what_was_worn(worn, text):
-    found = {"loop_area": (2e-3, 1e-4, "J"), **worn}
-    measures = {
-        name: {"value": value, "unit": unit, "error": error}
-        for name, (value, error, unit) in found.items()
-    }
-    assert (
-        headline_sentence({"kind": "bench", "outcome": "done", "measures": measures}, 2.0) == text
-    )
+@pytest.mark.parametrize("summary, cycles, headline", HEADLINES)
+def test_exact_a_headline(summary, cycles, headline):
+    assert headline_sentence({"warnings": [], "effects": []} | summary, cycles) == headline
 
 
-def tolerance_said(tolerance=1e-2, **measures):
-    """The sentence of a run with these measures."""
+def tolerance_said(tolerance=1e-2, outcome=Outcome.STEADY, **measures):
+    """Return the sentence of a run of 2 s with these measures."""
     plan = SimpleNamespace(model=SimpleNamespace(accuracy=SimpleNamespace(tolerance=tolerance)))
-    return tolerance_sentence(SimpleNamespace(plan=plan, measures=measures, outcome=Outcome.STEADY))
+    response = SimpleNamespace(time=[0.0, 2.0])
+    return tolerance_sentence(
+        SimpleNamespace(plan=plan, measures=measures, outcome=outcome, response=response)
+    )
 
 
 def test_exact_a_level_between_two_others_does_not_claim_the_tolerance():
@@ -279,51 +286,40 @@ def test_exact_the_largest_error_is_that_of_a_value_that_a_reader_sees():
 
 
 @pytest.mark.parametrize(
-    "more, part",
-    [({}, "part of it slips"), ({"contact_fraction": (1.0, 0.0, "1")}, "part of the patch slips")],
+    "more, part, limit",
+    [
+        ({}, "it", "."),
+        (
+            {"contact_fraction": entry(1.0, 0.0)},
+            "the patch",
+            " beyond the error of this mesh; a slip zone smaller than an element cannot be detected.",
+        ),
+    ],
 )
-def test_always_what_slips_while_the_interface_holds_is_said(more, part):
-    """By its work per cycle beyond what the run leaves open and beyond round-off, else by its slip."""
-
-    def said(loop, slip):
-        found = {
-            "loop_area": (*loop, "J"),
-            "slip_amplitude": (*slip, "m"),
-            "friction_force_peak": (100.0, 0.0, "N"),
-            "relative_displacement_amplitude": (4e-7, 0.0, "m"),
-            **more,
-        }
-        return verdict_sentence(
-            {
-                "outcome": "stuck",
-                "kind": "rig",
-                "measures": {
-                    name: {"value": value, "error": error, "unit": unit, "floor": 1e-10}
-                    for name, (value, error, unit) in found.items()
-                },
-            }
-        )
-
-    holds = "The interface sticks: no slip in the last cycles" + (
-        " beyond the error of this mesh; a slip zone smaller than an element cannot be detected."
-        if more
-        else "."
-    )
-    assert (
-        said((1.6583e-6, 1.6e-9), (1e-9, 1e-12))
-        == f"The interface as a whole sticks, but {part} (1.6583 ± 0.0016 uJ per cycle)."
-    )
-    assert (
-        said((1e-9, 2e-9), (1e-9, 1e-12))
-        == f"The interface as a whole sticks, but {part} (by 1.0000 ± 0.0010 nm)."
-    )
-    assert said((1e-9, 2e-9), (1e-9, 2e-9)) == holds
-    assert said((1e-18, 0.0), (0.0, 0.0)) == holds  # round-off of 100 N over 400 nm
-    assert said((-3e-12, 1e-12), (None, None)) == holds
-    assert (
-        said((1e-9, None), (0.0, None))
-        == f"The interface as a whole sticks, but {part} (1 nJ per cycle)."
-    )
+@pytest.mark.parametrize(
+    "loop, slip, said",
+    [
+        ((1.6583e-6, 1.6e-9), (1e-9, 1e-12), "1.6583 ± 0.0016 uJ per cycle"),
+        ((1e-9, 2e-9), (1e-9, 1e-12), "by 1.0000 ± 0.0010 nm"),
+        ((1e-9, None), (0.0, None), "1 nJ per cycle"),
+        ((1e-9, 2e-9), (1e-9, 2e-9), ""),
+        ((1e-18, 0.0), (0.0, 0.0), ""),  # round-off of 100 N over 400 nm
+        ((-3e-12, 1e-12), (None, None), ""),
+    ],
+)
+def test_always_slip_while_the_interface_sticks_is_said(loop, slip, said, more, part, limit):
+    """By its work per cycle beyond its error and beyond round-off, else by its slip."""
+    measures = {
+        "loop_area": entry(*loop, "J", floor=1e-10),
+        "slip_amplitude": entry(*slip, "m", floor=1e-10),
+        "friction_force_peak": entry(100.0, 0.0, "N", floor=1e-10),
+        "relative_displacement_amplitude": entry(4e-7, 0.0, "m", floor=1e-10),
+        **more,
+    }
+    sentence = f"The interface as a whole sticks, but part of {part} slips ({said})."
+    if not said:
+        sentence = f"The interface sticks: no slip in the last cycles{limit}"
+    assert verdict_sentence(summary_of("rig", "stuck", measures)) == sentence
 
 
 def test_always_a_joint_that_slips_in_part_does_not_say_that_it_holds(tmp_path):
@@ -346,49 +342,43 @@ def test_always_a_joint_that_slips_in_part_does_not_say_that_it_holds(tmp_path):
     assert "the whole interface sticks" in shown["slip_start_phase"]
 
 
-def test_always_a_bench_says_whether_it_slipped():
-    """By its mean slip, beyond what the run leaves open and the last digits of a slide."""
+STIFFNESS = {"equivalent_stiffness": entry(2e6, 2e3, "N m-1", floor=1.0)}
+STICKS = f"{Outcome.DONE.sentence} The interface sticks: no slip in the last cycle."
 
-    def said(value, error):
-        return verdict_sentence(
-            {
-                "outcome": "done",
-                "kind": "bench",
-                "measures": {
-                    "slip_amplitude": {"value": value, "error": error, "unit": "m", "floor": 1e-10}
-                },
-            }
-        )
 
-    done = Outcome.DONE.sentence
-    stiffness = {
-        "equivalent_stiffness": {"value": 2e6, "error": 2e3, "unit": "N m-1", "floor": 1.0}
-    }
+@pytest.mark.parametrize(
+    "slip, sentence",
+    [
+        (
+            (1.5e-6, 1e-9),
+            f"{Outcome.DONE.sentence} Slip amplitude (half the peak-to-peak slip, averaged over the interface): "
+            "1.5000 ± 0.0010 um.",
+        ),
+        ((1e-12, 2e-12), STICKS),
+        ((1e-23, 1e-33), STICKS),
+        ((1e-11, None), STICKS),
+        (None, Outcome.DONE.sentence),
+    ],
+)
+def test_always_a_bench_says_whether_it_slipped(slip, sentence):
+    """By its mean slip, beyond its error and the last digits of a slide."""
+    measures = {"slip_amplitude": entry(*slip, "m", floor=1e-10)} if slip else {}
+    assert verdict_sentence(summary_of(measures=measures)) == sentence
 
-    def looped(factor, error):
-        return verdict_sentence(
-            {
-                "outcome": "done",
-                "kind": "bench",
-                "measures": stiffness,
-                "loop": {"slide_amplitude": 2e-6, "loss_factor": factor, "error": error},
-            }
-        )
 
-    assert looped(0.5, 0.01) == (
+@pytest.mark.parametrize(
+    "factor, error, said",
+    [
+        (0.5, 0.01, "of 0.500 ± 0.010 (equivalent damping ratio 0.2500 ± 0.0050)."),
+        (0.01, 0.02, "of at most 0.03 (equivalent damping ratio at most 0.015)."),
+    ],
+)
+def test_exact_a_bench_with_a_stiffness_says_its_loss_factor(factor, error, said):
+    loop = {"slide_amplitude": 2e-6, "loss_factor": factor, "error": error}
+    assert verdict_sentence(summary_of(measures=STIFFNESS, loop=loop)) == (
         "At a slide amplitude of 2 um the interface has an equivalent stiffness of 2.0000 ± 0.0020 N/um and a loss "
-        "factor of 0.500 ± 0.010 (equivalent damping ratio 0.2500 ± 0.0050)."
+        f"factor {said}"
     )
-    assert "a loss factor of at most 0.03 (equivalent damping ratio at most 0.015)." in looped(
-        0.01, 0.02
-    )
-    assert (
-        said(1.5e-6, 1e-9)
-        == f"{done} Slip amplitude (half the peak-to-peak slip, averaged over the interface): 1.5000 ± 0.0010 um."
-    )
-    for holds in ((1e-12, 2e-12), (1e-23, 1e-33), (1e-11, None)):
-        assert said(*holds) == f"{done} The interface sticks: no slip in the last cycle."
-    assert verdict_sentence({"outcome": "done", "kind": "bench", "measures": {}}) == done
 
 
 def test_exact_the_loss_factor_of_an_elastic_plastic_bench():
@@ -432,69 +422,18 @@ def test_always_a_ratio_written_as_per_cent_is_remarked(tmp_path):
 
 
 def test_exact_a_second_interface_reads_in_the_units_of_the_first():
-    one = {"value": 1.0, "error": 0.0, "unit": "1"}
-    assert (
-        format_with_error("stick_fraction_2", one)
-        == format_with_error("stick_fraction", one)
-        == "100 %"
-    )
+    for name in ("stick_fraction", "stick_fraction_2"):
+        assert format_with_error(name, entry(1.0, 0.0)) == "100 %"
 
 
-@pytest.mark.parametrize(
-    "kind, outcome, warnings, text",
-    [
-        ("rig", "steady", [], "2.00 ± 0.10 mJ dissipated per cycle."),
-        ("rig", "transient", [], "2.00 ± 0.10 mJ dissipated per cycle (mean of the last cycles)."),
-        (
-            "bench",
-            "done",
-            [f"{OPEN_LOOP}: it misses"],
-            "Friction work of the last cycle 2.00 ± 0.10 mJ.",
-        ),
-    ],
-)
-def test_exact_the_work_of_a_loop_that_changes_is_told_with_its_cycles(
-    kind, outcome, warnings, text
-):
-    measures = {"loop_area": {"value": 2e-3, "unit": "J", "error": 1e-4}}
-    summary = {
-        "kind": kind,
-        "outcome": outcome,
-        "measures": measures,
-        "warnings": warnings,
-        "effects": [],
-    }
-    assert headline_sentence(summary, 10.0) == text
-
-
-@pytest.mark.parametrize(
-    "outcome, there",
-    [
-        (Outcome.GROWS, "after 2 s: the measures describe its last cycles"),
-        (Outcome.STEADY, "meets the tolerance"),
-    ],
-)
-def test_exact_a_motion_that_grows_claims_no_tolerance(outcome, there):
-    plan = SimpleNamespace(model=SimpleNamespace(accuracy=SimpleNamespace(tolerance=1e-2)))
+def test_exact_a_motion_that_grows_claims_no_tolerance():
     load = Measure(1.0, "N", 0.0, 0.0)
-    said = tolerance_sentence(
-        SimpleNamespace(
-            plan=plan,
-            measures={"normal_load": load},
-            outcome=outcome,
-            response=SimpleNamespace(time=[0.0, 2.0]),
-        )
-    )
-    assert there in said and ("tolerance" in said) == (outcome is Outcome.STEADY)
+    assert "meets the tolerance" in tolerance_said(normal_load=load)
+    grows = tolerance_said(outcome=Outcome.GROWS, normal_load=load)
+    assert "after 2 s: the measures describe its last cycles" in grows and "tolerance" not in grows
 
 
 def test_exact_a_release_is_not_told_of_a_drive():
-    summary = {
-        "kind": "rig",
-        "outcome": "transient",
-        "measures": {},
-        "effects": [{"effect": "drive.kind=free"}],
-    }
-    assert "drive is periodic" not in verdict_sentence(
-        summary
-    ) and "came to rest" in verdict_sentence(summary)
+    summary = summary_of("rig", "transient", effects=[{"effect": "drive.kind=free"}])
+    verdict = verdict_sentence(summary)
+    assert "drive is periodic" not in verdict and "came to rest" in verdict

@@ -18,6 +18,7 @@ from patchfem.surface.profile import Profile
 Z = write.scan()
 HOLES = np.where(np.arange(24).reshape(4, 6) % 5 == 2, np.nan, Z)
 STEPS = (0.5e-6, 0.75e-6)
+UM = ("um", "um")
 
 
 def read(tmp_path, data: bytes, name="scan.x3p", units=None):
@@ -33,152 +34,194 @@ def same(found, z, near=0.0, steps=STEPS) -> None:
     assert not found.z.flags.writeable
 
 
-@pytest.mark.parametrize(
-    "kind, increment, near",
-    [("D", 1.0, 0), ("F", 1.0, 1e-12), ("I", 2e-10, 1.01e-10), ("L", 1e-14, 0.51e-14)],
+AXES = (
+    write.axis("CX", increment=STEPS[0])
+    + write.axis("CY", increment=STEPS[1])
+    + write.axis("CZ", "A")
 )
-@pytest.mark.parametrize("z", [Z, HOLES])
-def test_exact_x3p_of_every_data_type(tmp_path, kind, increment, near, z):
-    """Sixteen bits are signed: half of these heights are below zero. Missing: NaN, or what valid.bin leaves out."""
-    same(read(tmp_path, write.x3p_of(z, kind, increment)), z, near)
+MATRIX = write.matrix(6, 4)
+RAW = Z.tobytes()
+TRACE = np.column_stack([np.arange(24) * 0.5, Z.ravel() * 1e6])
+POINTS = np.array([(x * 0.5, y * 0.75, Z[y, x] * 1e6) for y in range(4) for x in range(6)])
 
 
-@pytest.mark.parametrize("kind, near", [("D", 0), ("F", 1e-12)])
-@pytest.mark.parametrize("sign", [-1, 1])
-def test_exact_x3p_whose_missing_heights_are_infinite(tmp_path, kind, near, sign):
-    data = write.x3p_of(np.where(np.isnan(HOLES), sign * np.inf, HOLES), kind)
-    same(read(tmp_path, data), HOLES, near)
+def x3p(record=None, axes=AXES, raw=RAW, feature="SUR", **more) -> bytes:
+    """Return an X3P file of a third record, by default a matrix with its heights in a binary file."""
+    record = MATRIX + write.link(raw) if record is None else record
+    return write.x3p(write.main_xml(axes, record, feature), raw, **more)
 
 
-def test_exact_x3p_with_an_offset_of_its_axes(tmp_path):
-    data = write.x3p_of(Z, "I", 2e-10, 3e-6)
-    same(read(tmp_path, data), Z, 1.01e-10)
-
-
-@pytest.mark.parametrize(
-    "more", [{"prefix": ""}, {"revision": "ISO5436 – 2000"}, {"feature": "SUR"}]
-)
-def test_exact_x3p_of_other_writers(tmp_path, more):
-    same(read(tmp_path, write.x3p_of(Z, **more)), Z)
-
-
-def test_exact_x3p_in_a_folder_and_in_gzip(tmp_path):
-    raw = Z.tobytes()
-    xml = write.main_xml(
-        write.axis("CX", increment=STEPS[0])
-        + write.axis("CY", increment=STEPS[1])
-        + write.axis("CZ", "A"),
-        write.matrix(6, 4) + write.link(raw),
-    )
-    data = write.x3p(xml, raw, folder="sample/")
-    same(read(tmp_path, data), Z)
-    same(read(tmp_path, gzip.compress(data), "scan.x3p.gz"), Z)
-
-
-@pytest.mark.parametrize("z", [Z, HOLES])
-def test_exact_x3p_with_heights_in_the_xml(tmp_path, z):
-    datums = "".join(
-        "<Datum/>" if np.isnan(v) else f"<Datum>{float(v)!r}</Datum>" for v in z.ravel()
-    )
-    axes = (
-        write.axis("CX", increment=STEPS[0])
-        + write.axis("CY", increment=STEPS[1])
-        + write.axis("CZ", "A")
-    )
-    xml = write.main_xml(axes, write.matrix(6, 4) + f"<DataList>{datums}</DataList>")
-    same(read(tmp_path, write.x3p(xml)), z)
-
-
-def test_exact_x3p_with_absolute_places(tmp_path):
-    """x and y stored with each point, as a matrix and as a list of points in any order."""
-    points = np.array([(x * STEPS[0], y * STEPS[1], Z[y, x]) for y in range(4) for x in range(6)])
-    axes = "".join(write.axis(name, "A") for name in ("CX", "CY", "CZ"))
-    for rows, record in (
-        (points, write.matrix(6, 4)),
-        (np.random.default_rng(0).permutation(points), "<ListDimension>24</ListDimension>"),
-    ):
-        raw = rows.tobytes()
-        found = read(
-            tmp_path, write.x3p(write.main_xml(axes, record + write.link(raw), "PCL"), raw)
+def listed(rows) -> str:
+    """Return the list of the third record whose entries are joined rows of numbers; NaN is an empty entry."""
+    entries = [";".join(repr(float(value)) for value in np.atleast_1d(row)) for row in rows]
+    return (
+        f"<DataList>{''.join(f'<Datum>{entry}</Datum>' for entry in entries)}</DataList>".replace(
+            "<Datum>nan</Datum>", "<Datum/>"
         )
-        same(found, Z)
-        listed = "".join(f"<Datum>{a!r};{b!r};{c!r}</Datum>" for a, b, c in rows.tolist())
-        same(
-            read(
-                tmp_path, write.x3p(write.main_xml(axes, record + f"<DataList>{listed}</DataList>"))
-            ),
-            Z,
-        )
+    )
+
+
+def columns(head: str, separator=",", order="xyz", z=Z) -> bytes:
+    """Return a text of three columns without the missing heights."""
+    rows = ["".join(head)]
+    for (x, y, _), height in zip(POINTS, z.ravel()):
+        words = {"x": f"{x:.2f}", "y": f"{y:.2f}", "z": repr(float(height * 1e6))}
+        if np.isfinite(height):
+            rows.append(separator.join(words[name] for name in order))
+    return "\n".join(rows).encode()
+
+
+PLACES = POINTS * [1e-6, 1e-6, 1e-6]
+PLACES[:, 2] = Z.ravel()
+SHUFFLED = np.random.default_rng(0).permutation(PLACES)
+ABSOLUTE = "".join(write.axis(name, "A") for name in ("CX", "CY", "CZ"))
+LIST = "<ListDimension>24</ListDimension>"
+COLUMNS = dict(zip("XYZ", (POINTS[:, k].reshape(4, 6) for k in range(3))))
+EXACT = [("D", 1.0, 0), ("F", 1.0, 1e-12), ("I", 2e-10, 1.01e-10), ("L", 1e-14, 0.51e-14)]
+# Variants of a format: bytes, name of the file, units that are given, heights, largest error of a height.
+# Sixteen bits are signed: half of these heights are below zero. Missing are NaN, or what valid.bin leaves out.
+SCANS = {
+    **{
+        f"x3p of type {kind}, {name}": (write.x3p_of(z, kind, increment), "a.x3p", None, z, near)
+        for kind, increment, near in EXACT
+        for name, z in (("whole", Z), ("with holes", HOLES))
+    },
+    **{
+        f"x3p with {value} of type {kind}": (
+            write.x3p_of(np.where(np.isnan(HOLES), value, HOLES), kind), "a.x3p", None, HOLES, near)
+        for kind, _, near in EXACT[:2]
+        for value in (np.inf, -np.inf)
+    },
+    "x3p with an offset": (write.x3p_of(Z, "I", 2e-10, 3e-6), "a.x3p", None, Z, 1.01e-10),
+    "x3p without a prefix": (write.x3p_of(Z, prefix=""), "a.x3p", None, Z, 0),
+    "x3p with a long dash": (write.x3p_of(Z, revision="ISO5436 – 2000"), "a.x3p", None, Z, 0),
+    "x3p in a folder": (x3p(folder="sample/"), "a.x3p", None, Z, 0),
+    "x3p in gzip": (gzip.compress(x3p()), "a.x3p.gz", None, Z, 0),
+    "x3p with heights in the xml": (x3p(MATRIX + listed(Z.ravel())), "a.x3p", None, Z, 0),
+    "x3p with holes in the xml": (x3p(MATRIX + listed(HOLES.ravel())), "a.x3p", None, HOLES, 0),
+    "x3p with absolute places": (
+        x3p(MATRIX + write.link(PLACES.tobytes()), ABSOLUTE, PLACES.tobytes(), "PCL"), "a.x3p", None, Z, 0),
+    "x3p with points in any order": (
+        x3p(LIST + write.link(SHUFFLED.tobytes()), ABSOLUTE, SHUFFLED.tobytes(), "PCL"), "a.x3p", None, Z, 0),
+    "x3p with absolute places in the xml": (x3p(MATRIX + listed(PLACES), ABSOLUTE), "a.x3p", None, Z, 0),
+    "x3p with points in the xml": (x3p(LIST + listed(SHUFFLED), ABSOLUTE), "a.x3p", None, Z, 0),
+    "npy": (write.npy(POINTS), "a.npy", UM, Z, 1e-20),
+    "npy from the far end": (write.npy(POINTS[::-1]), "a.npy", UM, Z, 1e-20),
+    "mat beside a row": (write.mat(points=POINTS, note=np.arange(9.0)[None]), "a.mat", UM, Z, 1e-20),
+    "mat unpacked": (write.mat(False, points=POINTS, size=24.0), "a.mat", UM, Z, 1e-20),
+    "mat with axes": (
+        write.mat(x=np.arange(6) * 0.5, y=np.arange(4) * 0.75, z=Z * 1e6), "a.mat", UM, Z, 1e-20),
+    "mat of three columns": (
+        write.mat(x=POINTS[:, 0], y=POINTS[:, 1], gap=POINTS[:, 2]), "a.mat", UM, Z, 1e-20),
+    "mat of three matrices": (write.mat(**COLUMNS, text="scan"), "a.mat", UM, Z, 1e-20),
+    "text": (columns("x [um],y [um],z [um]"), "a.txt", None, Z, 1e-20),
+    "text with a comment": (columns("# x_um,y_um,z_um"), "a.txt", None, Z, 1e-20),
+    "text without a header": (columns("")[1:], "a.txt", UM, Z, 1e-20),
+    "text without units": (columns("x,y,z"), "a.txt", UM, Z, 1e-20),
+    "text with decimal commas": (
+        columns("y (um);z (um);x (um)", ";", "yzx").replace(b".", b","), "a.txt", None, Z, 1e-20),
+    "text with holes": (columns("x [um],y [um],z [um]", z=HOLES), "a.txt", None, HOLES, 1e-20),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("data, name, units, z, near", SCANS.values(), ids=SCANS)
+def test_exact_a_scan_of_every_format(tmp_path, data, name, units, z, near):
+    same(read(tmp_path, data, name, units), z, near)
 
 
 def test_exact_x3p_of_a_profile(tmp_path):
-    z = Z.ravel()[None]
-    xml = write.main_xml(
-        write.axis("CX", increment=STEPS[0]) + write.axis("CZ", "A"),
-        write.matrix(24, 1) + write.link(z.tobytes()),
-        "PRF",
-    )
-    found = read(tmp_path, write.x3p(xml, z.tobytes()))
-    assert isinstance(found, Profile) and found.x == pytest.approx(
-        np.arange(24) * STEPS[0], abs=1e-20
-    )
-    assert np.array_equal(found.z, z[0])
+    axes = write.axis("CX", increment=STEPS[0]) + write.axis("CZ", "A")
+    found = read(tmp_path, x3p(write.matrix(24, 1) + write.link(Z.tobytes()), axes, feature="PRF"))
+    assert isinstance(found, Profile) and np.array_equal(found.z, Z.ravel())
+    assert found.x == pytest.approx(np.arange(24) * STEPS[0], abs=1e-20)
 
 
 def test_always_a_changed_description_is_told(tmp_path):
-    data = write.x3p_of(Z)
-    raw = Z.tobytes()
-    xml = write.main_xml(
-        write.axis("CX", increment=STEPS[0])
-        + write.axis("CY", increment=STEPS[1])
-        + write.axis("CZ", "A"),
-        write.matrix(6, 4) + write.link(raw),
-    )
-    assert read(tmp_path, data).notes == ()
-    found = read(tmp_path, write.x3p(xml, raw, checksum="0" * 32))
-    assert found.notes == (
+    assert read(tmp_path, x3p()).notes == ()
+    assert read(tmp_path, x3p(checksum="0" * 32)).notes == (
         f"{tmp_path / 'scan.x3p'}: main.xml does not match its checksum in md5checksum.hex: "
         "main.xml was changed after it was written",
     )
 
 
-X3P_FAULTS = {
-    "wrong checksum": (lambda: write.x3p(write.main_xml(write.axis("CX", increment=1e-6) + write.axis(
-        "CY", increment=1e-6) + write.axis("CZ", "A"), write.matrix(6, 4) + write.link(Z.tobytes())),
-        HOLES.tobytes()), "the checksum of bindata/data.bin is wrong: the heights were changed"),
-    "two layers": (lambda: write.x3p(write.main_xml(write.axis("CX") + write.axis("CY") + write.axis("CZ", "A"),
-                                                    write.matrix(6, 2, 2) + write.link(Z.tobytes())), Z.tobytes()),
+def plain(kind="A", data="D") -> str:
+    """Return axes without increments, and heights of a kind and a type."""
+    return write.axis("CX") + write.axis("CY") + write.axis("CZ", kind, data)
+
+
+REFUSED = {  # bytes, name of the file, units that are given, the sentence
+    "wrong checksum": (
+        x3p(MATRIX + write.link(Z.tobytes()), raw=HOLES.tobytes()), "a.x3p", None,
+        "the checksum of bindata/data.bin is wrong: the heights were changed"),
+    "two layers": (x3p(write.matrix(6, 2, 2), plain()), "a.x3p", None,
                    "SizeZ is 2; a surface must have one layer"),
-    "too few bytes": (lambda: write.x3p(write.main_xml(write.axis("CX") + write.axis("CY") + write.axis("CZ", "A"),
-                                                       write.matrix(7, 4) + write.link(Z.tobytes())), Z.tobytes()),
+    "too few bytes": (x3p(write.matrix(7, 4) + write.link(Z.tobytes()), plain()), "a.x3p", None,
                       "192 bytes of heights, but 28 heights of type D are needed"),
-    "sixteen bits called 64": (lambda: write.x3p(write.main_xml(
-        write.axis("CX") + write.axis("CY") + write.axis("CZ", "A", "D"),
-        write.matrix(6, 4) + write.link(bytes(48))), bytes(48)), "48 bytes of heights, but 24 heights of type D are "
-                                                                 "needed"),
-    "an unknown type": (lambda: write.x3p(write.main_xml(write.axis("CX") + write.axis("CY") + write.axis(
-        "CZ", "A", "Q"), write.matrix(6, 4))), "DataType of CZ is 'Q'; one of I, L, F, D is needed"),
-    "sizes of a bomb": (lambda: write.x3p(write.main_xml(write.axis("CX") + write.axis("CY") + write.axis("CZ", "A"),
-                                                         write.matrix(2 * 10**9, 1))),
+    "sixteen bits called 64": (
+        x3p(MATRIX + write.link(bytes(48)), plain(), bytes(48)), "a.x3p", None,
+        "48 bytes of heights, but 24 heights of type D are needed"),
+    "an unknown type": (x3p(MATRIX, plain(data="Q")), "a.x3p", None,
+                        "DataType of CZ is 'Q'; one of I, L, F, D is needed"),
+    "sizes of a bomb": (x3p(write.matrix(2 * 10**9, 1), plain()), "a.x3p", None,
                         r"SizeX is '2000000000'; a whole number from 1 to 5e\+07 is needed"),
-    "heights that climb": (lambda: write.x3p(write.main_xml(write.axis("CX") + write.axis("CY") + write.axis("CZ", "I"),
-                                                            write.matrix(6, 4) + "<DataList/>")),
+    "heights that climb": (x3p(MATRIX + "<DataList/>", plain("I")), "a.x3p", None,
                            r"the heights \(CZ\) are incremental; export the surface anew"),
-    "no axes": (lambda: write.x3p(write.main_xml("", write.matrix(6, 4))), "main.xml lacks Record1/Axes/CX"),
-    "no heights": (lambda: write.x3p(write.main_xml(write.axis("CX") + write.axis("CY") + write.axis("CZ", "A"),
-                                                    write.matrix(6, 4) + write.link(b"", name="other.bin"))),
+    "no axes": (x3p(MATRIX, ""), "a.x3p", None, "main.xml lacks Record1/Axes/CX"),
+    "no heights": (x3p(MATRIX + write.link(b"", name="other.bin"), plain()), "a.x3p", None,
                    "no other.bin inside it"),
-    "broken xml": (lambda: write.x3p(b"<a><b></a>"), "main.xml is damaged"),
-    "a number that is none": (lambda: write.x3p(write.main_xml(write.axis("CX", increment="1_0") + write.axis("CY")
-                                                               + write.axis("CZ", "A"), write.matrix(6, 4))),
-                              "Increment of CX is '1_0'; a number is needed"),
+    "broken xml": (write.x3p(b"<a><b></a>"), "a.x3p", None, "main.xml is damaged"),
+    "a number that is none": (
+        x3p(MATRIX, write.axis("CX", increment="1_0") + write.axis("CY") + write.axis("CZ", "A")), "a.x3p", None,
+        "Increment of CX is '1_0'; a number is needed"),
+    "no raster": (b"x [um],y [um],z [um]\n0,0,1\n1,1,1\n2,3,1\n3,2,1\n4,5,1\n9,8,1\n7,7,1\n", "a.txt", None,
+                  "7 different x and 7 different y do"),
+    "a place twice": (b"x [um],y [um],z [um]\n0,0,1\n1,0,1\n0,1,1\n1,1,1\n1,0,2\n", "a.txt", None,
+                      ":6: a second height at x = 1 um, y = 0 um"),
+    "two numbers": (b"x [um],y [um],z [um]\n0,0,1\n1,0,1\n0,1\n", "a.txt", None,
+                    ":4: '0,1': three numbers are needed"),
+    "an unknown column": (b"x [um],y [um],w [um]\n0,0,1\n", "a.txt", None,
+                          "column 'w' is not known; the columns x, y and z are needed"),
+    "too steep": (b"x [um],y [um],z [mm]\n0,0,1\n1,0,1\n0,1,1\n1,1,9\n", "a.txt", None,
+                  "heights span 8 mm over a length of 1 um; is the unit"),
+    **{
+        f"{what} of {name}": (data, name, units, sentence)
+        for data, name in ((write.npy(TRACE), "a.npy"), (write.mat(points=POINTS), "a.mat"))
+        for what, units, sentence in (
+            ("no units", None, r'names no units.*units=\("mm", "um"\)\), or write it as text'),
+            ("an unknown unit", ("um", "furlong"), "unknown unit 'furlong'; use one of m, km"))
+    },
+    "an unknown unit of a text": (b"x,z\n0,1\n5,2\n", "a.csv", ("um", "furlong"),
+                                  "unknown unit 'furlong'; use one of m, km"),
+    "one unit": (b"x [um],z [um]\n0,1\n5,2\n", "a.csv", "um",
+                 r'give two units, of x and of z, such as \("mm", "um"\), not'),
+    "npy of no columns": (write.npy(np.zeros((4, 6))), "a.npy", UM,
+                          r"an array of shape \(4, 6\); columns x, z or x, y, z are needed"),
+    "npy of complex numbers": (write.npy(TRACE.astype(complex)), "a.npy", UM,
+                               "contains '<c16'; save plain numbers"),
+    "npy cut off": (write.npy(TRACE)[:-8], "a.npy", UM,
+                    "376 bytes of data are not the 48 numbers of type float64"),
+    "npy of a negative size": (write.npy(TRACE).replace(b"(24, 2)", b"(24,-2)"), "a.npy", UM,
+                               "header of the .npy file is damaged"),
+    "mat of two traces": (write.mat(a=TRACE, b=TRACE), "a.mat", UM,
+                          r"holds a \(24, 2\), b \(24, 2\); variables x, z or x, y"),
+    "mat of other sizes": (write.mat(x=np.arange(6.0), y=np.arange(3.0), z=Z), "a.mat", UM,
+                           r"of shapes .* do not fit"),
+    "mat of version 7.3": (b"MATLAB 7.3 MAT-file, HDF5" + bytes(600), "a.mat", UM,
+                           "version 7.3 is damaged .*; save it anew"),
+    "mat cut off": (write.mat(points=POINTS)[:-9], "a.mat", UM, "cut off or damaged; save it anew"),
+    "dektak without its columns": (
+        write.dektak(Z.ravel()).replace(b"Lateral", b"Time"), "a.csv", None,
+        "without the columns `Lateral um,Raw Micrometer`"),
+    "dektak in volts": (
+        write.dektak(Z.ravel()).replace(b"Raw Micrometer", b"Raw Volt"), "a.csv", None,
+        r":13: unknown unit 'Volt'; export the scan in Micrometer or Angstrom"),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("made, said", X3P_FAULTS.values(), ids=X3P_FAULTS)
-def test_refuses_a_faulty_x3p_by_name(tmp_path, made, said):
-    with pytest.raises(PatchfemError, match=said):
-        read(tmp_path, made())
+@pytest.mark.parametrize("data, name, units, sentence", REFUSED.values(), ids=REFUSED)
+def test_refuses_a_faulty_file_by_name(tmp_path, data, name, units, sentence):
+    with pytest.raises(PatchfemError, match=sentence):
+        read(tmp_path, data, name, units)
 
 
 @pytest.mark.parametrize("data", [write.sdf_binary(Z), write.sdf_ascii(Z)], ids=["binary", "text"])
@@ -199,142 +242,13 @@ def test_always_steep_heights_in_a_file_that_says_metres_are_told(tmp_path):
     )
 
 
-TRACE = np.column_stack([np.arange(24) * 0.5, Z.ravel() * 1e6])
-POINTS = np.array([(x * 0.5, y * 0.75, Z[y, x] * 1e6) for y in range(4) for x in range(6)])
-
-
 @pytest.mark.parametrize(
     "table", [TRACE, TRACE.T, TRACE.astype("f4"), TRACE.astype(">f8"), np.asfortranarray(TRACE)]
 )
 def test_exact_npy_columns_are_a_trace(tmp_path, table):
-    found = read(tmp_path, write.npy(table), "scan.npy", ("um", "um"))
+    found = read(tmp_path, write.npy(table), "scan.npy", UM)
     assert isinstance(found, Profile) and found.x == pytest.approx(TRACE[:, 0] * 1e-6)
     assert found.z == pytest.approx(Z.ravel(), rel=1e-6 if table.dtype == "f4" else 1e-14)
-
-
-@pytest.mark.parametrize(
-    "data, name",
-    [
-        (lambda: write.npy(POINTS), "scan.npy"),
-        (lambda: write.npy(POINTS[::-1]), "scan.npy"),
-        (lambda: write.mat(points=POINTS, note=np.arange(9.0)[None]), "scan.mat"),
-        (lambda: write.mat(False, points=POINTS, size=24.0), "scan.mat"),
-        (lambda: write.mat(x=np.arange(6) * 0.5, y=np.arange(4) * 0.75, z=Z * 1e6), "scan.mat"),
-        (lambda: write.mat(x=POINTS[:, 0], y=POINTS[:, 1], gap=POINTS[:, 2]), "scan.mat"),
-        (
-            lambda: write.mat(
-                **dict(zip("XYZ", (POINTS[:, k].reshape(4, 6) for k in range(3)))), text="scan"
-            ),
-            "scan.mat",
-        ),
-    ],
-)
-def test_exact_arrays_of_a_raster_are_a_scan(tmp_path, data, name):
-    same(read(tmp_path, data(), name, ("um", "um")), Z, 1e-20)
-
-
-def test_exact_text_of_three_columns_is_a_scan(tmp_path):
-    rows = [f"{x:.2f},{y:.2f},{float(z)!r}" for x, y, z in POINTS]
-    for header, units in (
-        ("x [um],y [um],z [um]\n", None),
-        ("# x_um,y_um,z_um\n", None),
-        ("", ("um", "um")),
-        ("x,y,z\n", ("um", "um")),
-    ):
-        same(read(tmp_path, (header + "\n".join(rows)).encode(), "scan.txt", units), Z, 1e-20)
-    turned = "y (um);z (um);x (um)\n" + "\n".join(
-        f"{y:.2f};{float(z)!r};{x:.2f}".replace(".", ",") for x, y, z in POINTS
-    )
-    same(read(tmp_path, turned.encode(), "scan.txt"), Z, 1e-20)
-    lost = "x [um],y [um],z [um]\n" + "\n".join(
-        row for k, row in enumerate(rows) if np.isfinite(HOLES.ravel()[k])
-    )
-    same(read(tmp_path, lost.encode(), "scan.txt"), HOLES, 1e-20)
-
-
-@pytest.mark.parametrize(
-    "content, said",
-    [
-        (
-            "x [um],y [um],z [um]\n0,0,1\n1,1,1\n2,3,1\n3,2,1\n4,5,1\n9,8,1\n7,7,1\n",
-            "7 different x and 7 different y do",
-        ),
-        (
-            "x [um],y [um],z [um]\n0,0,1\n1,0,1\n0,1,1\n1,1,1\n1,0,2\n",
-            ":6: a second height at x = 1 um, y = 0 um",
-        ),
-        ("x [um],y [um],z [um]\n0,0,1\n1,0,1\n0,1\n", ":4: '0,1': three numbers are needed"),
-        (
-            "x [um],y [um],w [um]\n0,0,1\n",
-            "column 'w' is not known; the columns x, y and z are needed",
-        ),
-        (
-            "x [um],y [um],z [mm]\n0,0,1\n1,0,1\n0,1,1\n1,1,9\n",
-            "heights span 8 mm over a length of 1 um; is the unit",
-        ),
-    ],
-)
-def test_refuses_points_that_are_no_scan(tmp_path, content, said):
-    with pytest.raises(PatchfemError, match=said):
-        read(tmp_path, content.encode(), "scan.txt")
-
-
-def test_refuses_units_that_are_absent_or_unknown(tmp_path):
-    for data, name in ((write.npy(TRACE), "a.npy"), (write.mat(points=POINTS), "a.mat")):
-        with pytest.raises(
-            PatchfemError, match=r'names no units.*units=\("mm", "um"\)\), or write it as text'
-        ):
-            read(tmp_path, data, name)
-        with pytest.raises(PatchfemError, match="unknown unit 'furlong'; use one of m, km"):
-            read(tmp_path, data, name, ("um", "furlong"))
-    with pytest.raises(PatchfemError, match="unknown unit 'furlong'; use one of m, km"):
-        read(tmp_path, b"x,z\n0,1\n5,2\n", "a.csv", ("um", "furlong"))
-    with pytest.raises(
-        PatchfemError, match=r'give two units, of x and of z, such as \("mm", "um"\), not'
-    ):
-        read(tmp_path, b"x [um],z [um]\n0,1\n5,2\n", "a.csv", "um")
-
-
-@pytest.mark.parametrize(
-    "data, name, said",
-    [
-        (
-            lambda: write.npy(np.zeros((4, 6))),
-            "a.npy",
-            r"an array of shape \(4, 6\); columns x, z or x, y, z are needed",
-        ),
-        (lambda: write.npy(TRACE.astype(complex)), "a.npy", "contains '<c16'; save plain numbers"),
-        (
-            lambda: write.npy(TRACE)[:-8],
-            "a.npy",
-            "376 bytes of data are not the 48 numbers of type float64",
-        ),
-        (
-            lambda: write.npy(TRACE).replace(b"(24, 2)", b"(24,-2)"),
-            "a.npy",
-            "header of the .npy file is damaged",
-        ),
-        (
-            lambda: write.mat(a=TRACE, b=TRACE),
-            "a.mat",
-            r"holds a \(24, 2\), b \(24, 2\); variables x, z or x, y",
-        ),
-        (
-            lambda: write.mat(x=np.arange(6.0), y=np.arange(3.0), z=Z),
-            "a.mat",
-            r"of shapes .* do not fit",
-        ),
-        (
-            lambda: b"MATLAB 7.3 MAT-file, HDF5" + bytes(600),
-            "a.mat",
-            "version 7.3 is damaged .*; save it anew",
-        ),
-        (lambda: write.mat(points=POINTS)[:-9], "a.mat", "cut off or damaged; save it anew"),
-    ],
-)
-def test_refuses_arrays_that_are_no_surface(tmp_path, data, name, said):
-    with pytest.raises(PatchfemError, match=said):
-        read(tmp_path, data(), name, ("um", "um"))
 
 
 def test_exact_a_dektak_export(tmp_path):
@@ -353,12 +267,6 @@ def test_always_a_dektak_export_that_was_cut_keeps_its_printed_places(tmp_path):
     found = read(tmp_path, b"\n".join(write.dektak(z).split(b"\n")[:200]), "scan.csv")
     assert "the length of 50 um in the header does not fit" in found.notes[0]
     assert found.x == pytest.approx(np.arange(found.x.size) * 0.15625e-6, abs=0.06e-6)
-    with pytest.raises(PatchfemError, match="without the columns `Lateral um,Raw Micrometer`"):
-        read(tmp_path, write.dektak(z).replace(b"Lateral", b"Time"), "scan.csv")
-    with pytest.raises(
-        PatchfemError, match=r":13: unknown unit 'Volt'; export the scan in Micrometer or Angstrom"
-    ):
-        read(tmp_path, write.dektak(z).replace(b"Raw Micrometer", b"Raw Volt"), "scan.csv")
 
 
 def test_exact_one_trace_of_any_format_and_no_scan(tmp_path):
@@ -514,7 +422,7 @@ def test_exact_mat_files_of_scipy_give_what_scipy_wrote(tmp_path):
             },
             do_compression=kind != "f8",
         )
-        found = read_surface(tmp_path / "a.mat", ("um", "um"))
+        found = read_surface(tmp_path / "a.mat", UM)
         assert found.x == pytest.approx(np.arange(20) * 1e-6) and found.z == pytest.approx(
             np.arange(20) % 3 * 1e-6
         )
