@@ -11,10 +11,13 @@ The rules were built on seeds below 7000; `HELD_OUT` was named before their scor
 """
 
 import sys
+from functools import cache
 
 import numpy as np
 
 from patchfem.core import frozen_array
+from patchfem.surface.compare.compare import compare_traces
+from patchfem.surface.compare.verdict import compose_verdict
 from patchfem.surface.profile import Profile
 
 UM, LENGTH, HELD_OUT = 1e-6, 6000.0, 8200
@@ -93,39 +96,36 @@ def _drift(kind: str, x, random):
     return np.zeros(x.size)
 
 
-def score(kind: str, seeds) -> tuple:
-    """(headlines with how many, name -> (intervals that contain the truth, intervals given, median half width [SI]),
-    how many say "worn") of a kind."""
-    from patchfem.surface.compare.compare import compare_traces
-    from patchfem.surface.compare.verdict import compose_verdict
+@cache
+def compared(kind: str, seed: int) -> tuple:
+    """Return the comparison of a pair and the true values of what it states; several tests ask about it."""
+    traces, true = pair(kind, seed)
+    return compare_traces(*traces), true
 
+
+def score(kind: str, seeds) -> tuple:
+    """Return how a kind is judged: headlines with their counts, intervals by name, and how many say "worn".
+
+    The intervals are (how many hold the truth, how many are given, median of their half widths [SI]).
+    """
     heads = {}
     held = {}
     false = 0
     for seed in seeds:
-        traces, true = pair(kind, seed)
-        found = compare_traces(*traces)
-        headline = compose_verdict([found])[0]
+        comparison, true = compared(kind, seed)
+        headline = compose_verdict([comparison])[0]
         heads[headline] = heads.get(headline, 0) + 1
         false += headline.startswith("worn")
         for name, value in true.items():
-            one = found.values.get(name)
-            if one is not None and one.value is not None and one.high is not None:
-                held.setdefault(name, []).append(
-                    (one.low <= value <= one.high, (one.high - one.low) / 2)
-                )
-    return (
-        heads,
-        {
-            name: (
-                sum(good for good, _ in each),
-                len(each),
-                float(np.median([half for _, half in each])),
-            )
-            for name, each in held.items()
-        },
-        false,
-    )
+            stated = comparison.values.get(name)
+            if stated is not None and stated.value is not None and stated.high is not None:
+                is_held = stated.low <= value <= stated.high
+                held.setdefault(name, []).append((is_held, (stated.high - stated.low) / 2))
+    intervals = {}
+    for name, rows in held.items():
+        half_width = float(np.median([half for _, half in rows]))
+        intervals[name] = (sum(is_held for is_held, _ in rows), len(rows), half_width)
+    return heads, intervals, false
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scars import HELD_OUT, KINDS, UM, pair, rough, score
+from scars import HELD_OUT, KINDS, UM, compared, rough, score
 
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compare_traces
@@ -47,7 +47,7 @@ def test_always_a_wide_scar_has_both_readings_or_an_interval_near_the_truth(coun
 
 def test_always_a_reading_never_has_a_largest_depth_below_its_mean():
     for kind in KINDS:
-        worn = compare_traces(*pair(kind, HELD_OUT)[0]).worn
+        worn = compared(kind, HELD_OUT)[0].worn
         assert worn.mean.value is None or worn.largest.value >= worn.mean.value
 
 
