@@ -3,6 +3,10 @@
 Every folder of the package imports its modules in this way: after ``from ..contact import half_space`` the module is
 loaded when one of its attributes is read. A name that is imported from a module (``from ..contact.half_space import
 pressure``) loads the module at once, and so does the import of a kernel module, whose source numba reads.
+
+The `__init__` of a folder lists in PUBLIC the names that the folder offers to other folders. Tests and scripts import
+these names from the folder (``from patchfem.contact import pressure``), so that a function can move between the
+modules of a folder. The package itself imports from the module, which shows the reader where a function is.
 """
 
 import sys
@@ -64,8 +68,20 @@ class LazyFolderLoader(SourceFileLoader):
     """Loader of the `__init__` of a folder whose modules are lazy."""
 
     def exec_module(self, module: ModuleType) -> None:
-        module.__getattr__ = make_getattr(module.__name__, module.__path__)
+        get_module = make_getattr(module.__name__, module.__path__)
+        module_by_name = {}
+
+        def get_attribute(name: str):
+            """Return a name that the folder lists in PUBLIC, or a module of the folder."""
+            if name in module_by_name:
+                owner = import_module(f"{module.__name__}.{module_by_name[name]}")
+                return getattr(owner, name)
+            return get_module(name)
+
+        module.__getattr__ = get_attribute
         super().exec_module(module)
+        for owner, names in vars(module).get("PUBLIC", {}).items():
+            module_by_name.update(dict.fromkeys(names, owner))
 
 
 class LazyFolderFinder:

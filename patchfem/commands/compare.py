@@ -101,7 +101,7 @@ def compare(
         "keep_spikes": keep_spikes,
         "datum": datum,
     }
-    files = [one for one in (before, after, *other) if one is not None]
+    files = [path for path in (before, after, *other) if path is not None]
     if pairs is not None:
         if files or scene is not None:
             raise Refused(
@@ -129,7 +129,7 @@ def compare(
             }
         )
         return _compare_runs(before, after, out, json_)
-    parts, found, directions = verdict.judge_files(tuple(files), direction, **how)
+    parts, comparison, directions = verdict.judge_files(tuple(files), direction, **how)
     target = choose_folder(out, f"{before.stem}-{after.stem}")
     with results.Folder(target) as folder:
         pressing = (
@@ -137,16 +137,16 @@ def compare(
             if scene is not None
             else None
         )
-        data = paper.comparison_data(parts, found, directions, pressing)
+        data = paper.comparison_data(parts, comparison, directions, pressing)
         summary.write_json(data, folder.path / "compare.json")
-        paper.write_page(folder.path / "report.html", parts, found, directions, pressing)
+        paper.write_page(folder.path / "report.html", parts, comparison, directions, pressing)
         paper.write_difference(folder.path, parts[0])
     for text in data["notes"]:
         note(text)
     if json_:
         print(json.dumps(data, ensure_ascii=False, allow_nan=False))
     else:
-        print("\n".join(paper.format_comparison(parts, found, pressing)))
+        print("\n".join(paper.format_comparison(parts, comparison, pressing)))
         print(f"results: {target}")
 
 
@@ -167,10 +167,10 @@ def _compare_table(
         Folder of the results.
     json_, quiet : bool
     """
-    asked = tables.read_pairs(path)
+    requests = tables.read_pairs(path)
     with results.Folder(target) as folder:
-        with progress_bar(quiet) as done:
-            rows = pairs_paper.compare_pairs(asked, direction, done, **how)
+        with progress_bar(quiet) as report_progress:
+            rows = pairs_paper.compare_pairs(requests, direction, report_progress, **how)
         data = pairs_paper.pairs_data(rows)
         summary.write_json(data, folder.path / "pairs.json")
         pairs_paper.write_csv(rows, folder.path / "pairs.csv")
@@ -191,9 +191,9 @@ def _compare_table(
         raise NotReached
 
 
-def _refuse_surface_options(asked: dict):
+def _refuse_surface_options(options: dict):
     """Refuse options for measured surfaces if results folders are compared."""
-    for name, value in asked.items():
+    for name, value in options.items():
         if value:
             raise Refused(
                 f"compare: {name} can only be used for measured surfaces, not for results folders; "
@@ -203,19 +203,19 @@ def _refuse_surface_options(asked: dict):
 
 def _compare_runs(before: Path, after: Path, out, json_: bool):
     """Compare the wear between the runs in two results folders."""
-    lost = worn_runs.compare_runs(before, after)
-    found = worn.wear_verdict(lost)
-    data = worn.wear_data(lost, found)
+    wear = worn_runs.compare_runs(before, after)
+    wear_verdict = worn.wear_verdict(wear)
+    data = worn.wear_data(wear, wear_verdict)
     target = choose_folder(out, f"{before.resolve().name}-{after.resolve().name}")
     with results.Folder(target) as folder:
         summary.write_json(data, folder.path / "compare.json")
-        worn.write_page(folder.path / "report.html", lost, found)
+        worn.write_page(folder.path / "report.html", wear, wear_verdict)
     for text in data["notes"]:
         note(text)
     print(
         json.dumps(data, ensure_ascii=False, allow_nan=False)
         if json_
-        else "\n".join([*worn.format_wear(lost, found), f"results: {target}"])
+        else "\n".join([*worn.format_wear(wear, wear_verdict), f"results: {target}"])
     )
 
 

@@ -64,9 +64,12 @@ def _packages() -> Iterator[Finding]:
     yield Finding("python", sys.version_info >= (3, 11), sys.version.split()[0], "")
     yield Finding("patchfem", True, __version__, "")
     for name in REQUIRED_PACKAGES:
-        found = _version(name)
+        version = _version(name)
         yield Finding(
-            name, bool(found), found or "not installed", "" if found else f"pip install {name}"
+            name,
+            bool(version),
+            version or "not installed",
+            "" if version else f"pip install {name}",
         )
 
 
@@ -81,13 +84,13 @@ def _version(name: str) -> str:
 def _cache() -> Finding:
     """Check the cache of compiled code; without it every command compiles again."""
     folder = compiled.cache_folder()
-    why = compiled.explain_cache_folder()
-    sizes = [one.stat().st_size for one in folder.rglob("*") if one.is_file()]
+    reason = compiled.explain_cache_folder()
+    sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]
     return Finding(
         "compiled code",
-        not why,
+        not reason,
         f"{len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}",
-        why and f"{why}; set PATCHFEM_CACHE to another folder",
+        reason and f"{reason}; set PATCHFEM_CACHE to another folder",
     )
 
 
@@ -108,54 +111,56 @@ def _threads() -> Finding:
 def _window() -> Finding:
     """Check whether the window of patchfem view can be drawn."""
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-P", "-c", PICTURE],
             capture_output=True,
             text=True,
             timeout=MAX_PICTURE_SECONDS,
         )
-        said = (done.stderr.strip().splitlines() or ["it crashed"])[-1]
-        why = re.sub(r"^.*\b(?:WARN|ERR)\| ", "", said)[:100]  # VTK begins the line with its time
-        fine = done.returncode == 0
+        last_line = (process.stderr.strip().splitlines() or ["it crashed"])[-1]
+        reason = re.sub(r"^.*\b(?:WARN|ERR)\| ", "", last_line)[
+            :100
+        ]  # VTK begins the line with its time
+        is_drawn = process.returncode == 0
     except (OSError, subprocess.TimeoutExpired) as error:
-        fine = False
-        why = str(error)[:100]
-    cure = (
+        is_drawn = False
+        reason = str(error)[:100]
+    remedy = (
         ""
-        if fine
+        if is_drawn
         else (
             "run apt-get install libgl1 libxcursor1 on a machine with a screen, or write a picture "
             "(view -o FILE.png), which needs neither package"
         )
     )
-    return Finding("the window by OpenGL", fine, "drawn" if fine else why, cure)
+    return Finding("the window by OpenGL", is_drawn, "drawn" if is_drawn else reason, remedy)
 
 
 def _film() -> Finding:
     """Check whether a film of the last cycle can be written as .mp4 (patchfem view)."""
     program = which("ffmpeg")
-    found = (
+    writer = (
         "by ffmpeg"
         if program
         else _version("imageio-ffmpeg") and f"imageio-ffmpeg {_version('imageio-ffmpeg')}"
     )
     return Finding(
         "films (.mp4)",
-        bool(found),
-        found or "neither ffmpeg nor imageio-ffmpeg, optional",
+        bool(writer),
+        writer or "neither ffmpeg nor imageio-ffmpeg, optional",
         ""
-        if found
+        if writer
         else "run pip install imageio-ffmpeg, or write .gif or .html, which need no ffmpeg",
     )
 
 
 def _extras() -> Iterator[Finding]:
     """Check the optional packages."""
-    for name, (extra, what) in OPTIONAL_PACKAGES.items():
-        found = _version(name)
+    for name, (extra, purpose) in OPTIONAL_PACKAGES.items():
+        version = _version(name)
         yield Finding(
-            f"{name} ({what})",
-            bool(found),
-            found or "not installed, optional",
-            "" if found else f'pip install "patchfem[{extra}]"',
+            f"{name} ({purpose})",
+            bool(version),
+            version or "not installed, optional",
+            "" if version else f'pip install "patchfem[{extra}]"',
         )

@@ -64,11 +64,11 @@ def import_(
 
     Example: patchfem import bench.uff --map "force=Load cell [lbf]" --map displacement=12:+x -o loop.csv
     """
-    answer = imported.convert_file(file, out, map_, zero, imported.Estimate(**vars(modes)))
-    told = answer.pop("told")
+    conversion = imported.convert_file(file, out, map_, zero, imported.Estimate(**vars(modes)))
+    summary = conversion.pop("told")
     if json_:
-        print(json.dumps({"file": str(out), **answer}, ensure_ascii=False))
+        print(json.dumps({"file": str(out), **conversion}, ensure_ascii=False))
         return
-    for text in answer["notes"]:
+    for text in conversion["notes"]:
         note(text)
-    print(f"{out}: {told}")
+    print(f"{out}: {summary}")

@@ -42,14 +42,14 @@ def profile(
 
     Example: patchfem profile trace.csv --cutoff "0.25 mm"
     """
-    asked = {"window": _window(window) if window else None}
+    options = {"window": _window(window) if window else None}
     for key, name, text in (("cutoff", "cutoff", cutoff), ("short", "s-filter", s_filter)):
-        asked[key] = quantity(text, "length", f"profile --{name}")
-        if asked[key] is not None and asked[key] <= 0:
+        options[key] = quantity(text, "length", f"profile --{name}")
+        if options[key] is not None and options[key] <= 0:
             raise Refused(f"profile --{name} {text}: a length above zero is needed")
-    asked["form"] = forms.parse_form(form)
+    options["form"] = forms.parse_form(form)
     reports = [
-        roughness_report.make_report(read.read_surface(path, pair(units)), **asked)
+        roughness_report.make_report(read.read_surface(path, pair(units)), **options)
         for path in (file, *more)
     ]
     for report in reports:
@@ -59,7 +59,7 @@ def profile(
             note(text)
     if not json_ and len(reports) > 1:
         print("\n".join(roughness.means_lines(reports)))
-    answer = {
+    data = {
         "patchfem": __version__,
         "profiles": [roughness.roughness_data(one) for one in reports],
         "means": roughness.means_data(reports),
@@ -67,21 +67,21 @@ def profile(
     if out is not None:
         with results.Folder(out) as folder:
             roughness.write_page(folder.path / "report.html", reports)
-            summary.write_json(answer, folder.path / "profile.json")
+            summary.write_json(data, folder.path / "profile.json")
             roughness.write_csv(folder.path / "profile.csv", reports)
             roughness.write_surfaces(folder.path, reports)
     if json_:
-        print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
+        print(json.dumps(data, ensure_ascii=False, allow_nan=False))
     elif out is not None:
         print(f"results: {out}")
 
 
 def _window(text: str) -> tuple:
     """Read the positions of a window [m]; Refused unless there are two or four."""
-    words = text.split(",")
-    if len(words) not in (2, 4) or not all(map(str.strip, words)):
+    positions = text.split(",")
+    if len(positions) not in (2, 4) or not all(map(str.strip, positions)):
         raise Refused(
             f"profile --window '{text}': "
             "two positions are needed, such as '468 um,733 um'; a scan needs four"
         )
-    return tuple(quantity(word, "length", "profile --window") for word in words)
+    return tuple(quantity(word, "length", "profile --window") for word in positions)

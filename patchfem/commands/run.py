@@ -51,36 +51,36 @@ def run(
     Example: patchfem run rig.toml --set "drive.acceleration=6 g" -o out/six
     """
     talk = (lambda text: None) if quiet else print_message
-    what = plan.plan(load_scene(scene, set_))
-    if resume and not folder.saves_state(what):
+    run_plan = plan.plan(load_scene(scene, set_))
+    if resume and not folder.saves_state(run_plan):
         raise Refused(
             "run --resume: only a run with [wear] on a patch or a run that is integrated in time saves its "
             "state; run the scene again without --resume"
         )
     if verbose:
-        compiles = plan.compile_words(what.compile_seconds)
+        compiles = plan.compile_words(run_plan.compile_seconds)
         talk(
-            f"about {what.seconds:.1f} s of computing time{compiles}, {what.steps} steps, engine {what.engine}"
+            f"about {run_plan.seconds:.1f} s of computing time{compiles}, {run_plan.steps} steps, engine {run_plan.engine}"
         )
-    target = choose_folder(out, what.model.source.path.stem)
-    if resume and folder.is_complete(what, target):
+    target = choose_folder(out, run_plan.model.source.path.stem)
+    if resume and folder.is_complete(run_plan, target):
         talk(
             f"{target}: this run is already complete, nothing is left to resume; to run it again, leave out --resume"
         )
-        answer = summary.read_summary(target / "summary.json")
+        run_summary = summary.read_summary(target / "summary.json")
         if json_:
-            print(json.dumps(answer, ensure_ascii=False), flush=True)
-        if answer["outcome"] == "not_converged":
+            print(json.dumps(run_summary, ensure_ascii=False), flush=True)
+        if run_summary["outcome"] == "not_converged":
             raise NotReached
         return
     with progress_bar(quiet or json_) as progress:
-        written = folder.run_into(what, target, talk, progress, fresh, resume)
-    answer = written.summary
+        written = folder.run_into(run_plan, target, talk, progress, fresh, resume)
+    run_summary = written.summary
     try:
         if quiet and not json_:
             pass
         elif json_:
-            print(json.dumps(answer, ensure_ascii=False), flush=True)
+            print(json.dumps(run_summary, ensure_ascii=False), flush=True)
         else:
             _print_answer(
                 written, target, verbose, " (without report.html: --no-page)" if no_page else ""
@@ -92,8 +92,10 @@ def run(
             f"interrupted while the page was drawn; the results in {target} are complete except for report.html"
         )
         raise Ended(130) from None
-    if answer["outcome"] == "not_converged":
-        for text in answer["warnings"] if quiet else ():  # a quiet run prints only these warnings
+    if run_summary["outcome"] == "not_converged":
+        for text in (
+            run_summary["warnings"] if quiet else ()
+        ):  # a quiet run prints only these warnings
             print_message(f"warning: {text}")
         raise NotReached
 
@@ -103,24 +105,26 @@ def _draw(written, target: Path) -> None:
     try:
         folder.write_run_page(written, target)
     except (OSError, MemoryError, atomic_write.WriteError) as error:
-        why = (
+        reason = (
             str(error)
             if isinstance(error, atomic_write.WriteError)
             else f"{target / 'report.html'}: {getattr(error, 'strerror', None) or 'out of memory'}"
         )
-        print_message(f"{why}; the results are complete except for the page")
+        print_message(f"{reason}; the results are complete except for the page")
         raise Ended(4) from None
 
 
 def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     """Print the verdict, then the tolerance, all measures in groups, notes, and the paths."""
-    answer = written.summary
-    if answer["title"]:
+    run_summary = written.summary
+    if run_summary["title"]:
         sets = written.result.plan.model.source.sets
-        print(f"{answer['title']}{f'; changed: {driven.list_changed_keys(sets)}' if sets else ''}")
-    print(f"{answer['outcome']}: {sentences.verdict_sentence(answer)}")
+        print(
+            f"{run_summary['title']}{f'; changed: {driven.list_changed_keys(sets)}' if sets else ''}"
+        )
+    print(f"{run_summary['outcome']}: {sentences.verdict_sentence(run_summary)}")
     if text := sentences.headline_sentence(
-        answer,
+        run_summary,
         summary.count_cycles(written.result),
         released=released.describe_release(written.result),
     ):
@@ -128,19 +132,22 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     sys.stdout.flush()
     if text := sentences.tolerance_sentence(written.result):
         print(text, flush=True)
-    for text in answer["warnings"]:
+    for text in run_summary["warnings"]:
         print_message(f"warning: {text}")
     print(
         "\n".join(
-            sentences.format_measures(answer["measures"], answer["numerics"].get("engine", ""))
+            sentences.format_measures(
+                run_summary["measures"], run_summary["numerics"].get("engine", "")
+            )
         ),
         flush=True,
     )
-    for text in answer["notes"]:
+    for text in run_summary["notes"]:
         note(text)
     if verbose:
         print_message(
-            "wall-clock seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in answer["seconds"].items())
+            "wall-clock seconds: "
+            + ", ".join(f"{k} {v:.3f}" for k, v in run_summary["seconds"].items())
         )
     print(f"results: {target}{page}")
     if (target / "fields.vtkhdf").is_file():

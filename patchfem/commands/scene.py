@@ -28,12 +28,12 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
     Example: patchfem check rig.toml
     """
     notes = []
-    found = load_scene(
+    checked_scene = load_scene(
         scene, set_, lambda tables, folder, whole: _find_file_mistakes(tables, folder, whole, notes)
     )
-    notes = [rewrite_powers_of_ten(text) for text in dict.fromkeys([*found.notes, *notes])]
-    cases = len(_read_sweep(scene, set_, Over())[1]) if found.sweep else None
-    for remark in found.remarks:
+    notes = [rewrite_powers_of_ten(text) for text in dict.fromkeys([*checked_scene.notes, *notes])]
+    cases = len(_read_sweep(scene, set_, Over())[1]) if checked_scene.sweep else None
+    for remark in checked_scene.remarks:
         print_message(f"{scene}: {remark}")
     for text in notes:
         note(text)
@@ -41,9 +41,9 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
         print(
             json.dumps(
                 {
-                    "kind": found.kind,
-                    "effects": found.effect_names(),
-                    "remarks": found.remarks,
+                    "kind": checked_scene.kind,
+                    "effects": checked_scene.effect_names(),
+                    "remarks": checked_scene.remarks,
                     "notes": notes,
                 }
                 | ({"cases": cases} if cases else {})
@@ -51,7 +51,7 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
         )
     else:
         print(
-            f"{scene}: a {found.kind} scene without mistakes"
+            f"{scene}: a {checked_scene.kind} scene without mistakes"
             + (f", {cases} cases" if cases else "")
         )
 
@@ -98,94 +98,96 @@ def plan(
             )
         _plan_sweep(scene, set_, over or Over(), json_, verbose)
         return
-    found = plans.plan(read)
-    answer = found.as_json()
+    run_plan = plans.plan(read)
+    plan_data = run_plan.as_json()
     if probe:
-        answer["seconds"] = round(answer["seconds"] * cost_model.measure_machine_time_ratio(), 2)
-    if probe and (solved := faces.static_measures_without_errors(found.model)):
-        chain = answer["stiffness_chain"]
+        plan_data["seconds"] = round(
+            plan_data["seconds"] * cost_model.measure_machine_time_ratio(), 2
+        )
+    if probe and (solved := faces.static_measures_without_errors(run_plan.model)):
+        chain = plan_data["stiffness_chain"]
         chain |= {
             name: solved[name.replace("pieces_shear", "tangential_stiffness")]
             for name, link in chain.items()
             if name.startswith("pieces_shear") and link != "rigid"
         }
-        answer["probe"], answer["modes"] = solved, found.modes(chain)
+        plan_data["probe"], plan_data["modes"] = solved, run_plan.modes(chain)
     if json_:
-        print(json.dumps(answer))
+        print(json.dumps(plan_data))
         return
-    _print_plan(answer, probe, verbose)
+    _print_plan(plan_data, probe, verbose)
 
 
 def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> None:
     """Print the plan of a sweep."""
-    asked, cases = _read_sweep(scene, sets, what)
-    answer = estimate.estimate_sweep(asked, cases)
-    if wrong := parse_request.contradictions(asked, cases):
+    sweep_scene, cases = _read_sweep(scene, sets, what)
+    plan_data = estimate.estimate_sweep(sweep_scene, cases)
+    if wrong := parse_request.contradictions(sweep_scene, cases):
         note(wrong)
     if json_:
-        print(json.dumps(answer))
+        print(json.dumps(plan_data))
         return
     print(
         "case     "
-        + ", ".join(f"{key} {shorten_number(text)}" for key, text in answer["case"].items())
+        + ", ".join(f"{key} {shorten_number(text)}" for key, text in plan_data["case"].items())
         + " (the first case); the lines below describe this case, except that `cost` and `sweep` are for the whole "
         "sweep"
     )
-    _print_plan(answer, False, verbose)
+    _print_plan(plan_data, False, verbose)
     print(
-        f"sweep    {answer['cases']} cases of "
-        + ", ".join(f"{n} {key}" for key, n in answer["values"].items())
-        + f"; about {answer['seconds_per_case']:.2g} s for each case on one core, {answer['disk_bytes'] / 1e6:.2g} "
+        f"sweep    {plan_data['cases']} cases of "
+        + ", ".join(f"{n} {key}" for key, n in plan_data["values"].items())
+        + f"; about {plan_data['seconds_per_case']:.2g} s for each case on one core, {plan_data['disk_bytes'] / 1e6:.2g} "
         f"MB on disk for all cases"
     )
 
 
-def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
+def _print_plan(plan_data: dict, probe: bool, verbose: bool) -> None:
     """Print a plan: effects, cost, sentences, stiffnesses and groups.
 
     verbose: whether to list the effects that the scene does not have.
     """
-    print(f"kind     {answer['kind']}, engine {answer['engine']}")
-    compiles = plans.compile_words(answer["compile_seconds"])
+    print(f"kind     {plan_data['kind']}, engine {plan_data['engine']}")
+    compiles = plans.compile_words(plan_data["compile_seconds"])
     print(
-        f"cost     about {answer['seconds']:.1f} s of computing time{compiles}, "
-        f"{answer['bytes'] / 1e6:.0f} MB of memory"
+        f"cost     about {plan_data['seconds']:.1f} s of computing time{compiles}, "
+        f"{plan_data['bytes'] / 1e6:.0f} MB of memory"
     )
-    sizes = [f"{count} {_format_size_name(name)}" for name, count in answer["unknowns"].items()]
-    print("sizes    " + ", ".join([*sizes, f"{answer['steps']} steps in all"]))
-    for effect in answer["effects"]:
+    sizes = [f"{count} {_format_size_name(name)}" for name, count in plan_data["unknowns"].items()]
+    print("sizes    " + ", ".join([*sizes, f"{plan_data['steps']} steps in all"]))
+    for effect in plan_data["effects"]:
         print(f"  runs   {effect['effect']:<28} {effect['equations']}")
-    for sentence in answer["verdict"]:
+    for sentence in plan_data["verdict"]:
         print(f"says     {rewrite_powers_of_ten(sentence)}")
     bonded = any(
-        law_has_trait(one["effect"].partition("law=")[2], "bonds") for one in answer["effects"]
+        law_has_trait(one["effect"].partition("law=")[2], "bonds") for one in plan_data["effects"]
     )
     links = [
         f"{_format_link(name, bonded)} {link if isinstance(link, str) else format_quantity(link, 'N m-1', 4)}"
-        for name, link in answer["stiffness_chain"].items()
+        for name, link in plan_data["stiffness_chain"].items()
     ]
     print("chain    " + " -> ".join(links))
-    above = not probe and any(
+    is_upper_estimate = not probe and any(
         not isinstance(link, str)
-        for name, link in answer["stiffness_chain"].items()
+        for name, link in plan_data["stiffness_chain"].items()
         if rows.remove_interface_number(name) == "pieces_shear"
     )
-    if above:
+    if is_upper_estimate:
         print(
             "         the shear stiffness of the pieces is an upper estimate; use --probe to compute it"
         )
-    for one in answer.get("modes", ()):
-        held = (
+    for one in plan_data.get("modes", ()):
+        stuck_text = (
             ""
             if one["stuck_frequency"] is None
-            else f", {'at most ' * above}{one['stuck_frequency']:.5g} Hz while the contact sticks"
+            else f", {'at most ' * is_upper_estimate}{one['stuck_frequency']:.5g} Hz while the contact sticks"
         )
-        print(f"mode     {one['name']} {one['free_frequency']:.5g} Hz without contact{held}")
-    for name, value in answer["groups"].items():
+        print(f"mode     {one['name']} {one['free_frequency']:.5g} Hz without contact{stuck_text}")
+    for name, value in plan_data["groups"].items():
         print(f"group    {_format_group(value, name)}")
     if verbose:
         print(
-            f"absent   {', '.join(list_displayed_absent_effects(answer['not_in_scene'], answer['engine']))}"
+            f"absent   {', '.join(list_displayed_absent_effects(plan_data['not_in_scene'], plan_data['engine']))}"
         )
 
 
@@ -223,13 +225,13 @@ def mesh(
 
     Example: patchfem mesh rig.toml -o pieces.vtu
     """
-    found = load_model(scene, set_)
-    if found.patch is None:
+    scene_model = load_model(scene, set_)
+    if scene_model.patch is None:
         raise Refused(
             f"{scene}: missing [contact]: only a scene with a patch has a mesh; write the patch of an "
             "interface as the [contact] of a separate scene"
         )
-    low, high = result.bodies(found)
+    low, high = result.bodies(scene_model)
     mesh_files.write_mesh(low, out, high)
     for name, body in (("lower", low), ("upper", high or low)):
         print(

@@ -139,13 +139,13 @@ def load_model(path: Path, sets):
 
 def load_model_without_sweep(path: Path, sets):
     """Build the model of a scene without its table [sweep], which a note states."""
-    found = load_scene(path, sets)
-    if found.sweep:
+    scene = load_scene(path, sets)
+    if scene.sweep:
         note(
-            f"[sweep] is left out: {', '.join(axis.key for axis in found.sweep)} as the scene gives "
-            f"{'it' if len(found.sweep) == 1 else 'them'} (a key that only [sweep] has: its first value)"
+            f"[sweep] is left out: {', '.join(axis.key for axis in scene.sweep)} as the scene gives "
+            f"{'it' if len(scene.sweep) == 1 else 'them'} (a key that only [sweep] has: its first value)"
         )
-    return model.build_without_sweep(found)
+    return model.build_without_sweep(scene)
 
 
 class progress_bar:
@@ -170,7 +170,7 @@ class progress_bar:
         if self.bar is None:
             return Lines()
         self.bar.start()
-        return lambda share: self.bar.update(self.task, completed=share)
+        return lambda fraction: self.bar.update(self.task, completed=fraction)
 
     def __exit__(self, *_):
         if self.bar is not None:
@@ -189,16 +189,16 @@ class Lines:
     def __init__(self, clock=monotonic):
         self.clock, self.first, self.next = clock, None, clock() + self.SECONDS
 
-    def __call__(self, share: float) -> None:
+    def __call__(self, fraction: float) -> None:
         now = self.clock()
-        self.first = self.first or (now, share)
+        self.first = self.first or (now, fraction)
         if now < self.next:
             return
         self.next = now + self.SECONDS
-        begin, before = self.first
-        left = (
-            f", about {(now - begin) * (1 - share) / (share - before):.0f} s left"
-            if share > before
+        first_time, first_fraction = self.first
+        time_left = (
+            f", about {(now - first_time) * (1 - fraction) / (fraction - first_fraction):.0f} s left"
+            if fraction > first_fraction
             else ""
         )
-        print_message(f"{share:.0%} done{left}")
+        print_message(f"{fraction:.0%} done{time_left}")

@@ -182,13 +182,13 @@ SOURCES = (
 )
 
 
-def bibtex(named: Iterable[str] = ()) -> str:
+def bibtex(effect_names: Iterable[str] = ()) -> str:
     """Return BibTeX of the report, of this program and of the sources of some effects."""
-    there = {name.replace("structure.interface.", "friction.") for name in named}
+    names = {name.replace("structure.interface.", "friction.") for name in effect_names}
     entries = [
         REPORT,
         PROGRAM,
-        *(entry for effects, entry in SOURCES if there.intersection(effects)),
+        *(entry for effects, entry in SOURCES if names.intersection(effects)),
     ]
     return "\n".join(_entry(*one) for one in entries)
 

@@ -71,15 +71,15 @@ def doctor(*, json_: Json = False):
 
     Example: patchfem doctor
     """
-    found = examine.check_installation()
+    findings = examine.check_installation()
     if json_:
-        print(json.dumps([one._asdict() for one in found]))
+        print(json.dumps([finding._asdict() for finding in findings]))
         return
-    width = max(len(one.name) for one in found)
-    for one in found:
+    width = max(len(finding.name) for finding in findings)
+    for finding in findings:
         print(
-            f"{'ok' if one.fine else '--'}  {one.name:<{width}}  {one.found}"
-            + (f"; {one.cure}" if one.cure else "")
+            f"{'ok' if finding.fine else '--'}  {finding.name:<{width}}  {finding.found}"
+            + (f"; {finding.cure}" if finding.cure else "")
         )
 
 

@@ -41,7 +41,7 @@ def make_printable(text: str) -> str:
     Characters that cannot be printed become question marks; of a word with more than 400 characters
     only the first and last ones are shown.
     """
-    shown = LONG.sub(
-        lambda found: f"{found[0][:60]}...{found[0][-20:]} ({len(found[0])} letters)", text
+    shortened = LONG.sub(
+        lambda match: f"{match[0][:60]}...{match[0][-20:]} ({len(match[0])} letters)", text
     )
-    return "".join(sign if sign.isprintable() else "?" for sign in shown)
+    return "".join(character if character.isprintable() else "?" for character in shortened)

@@ -52,31 +52,31 @@ def cost(
 
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
-    found = load_model(scene, set_)
+    scene_model = load_model(scene, set_)
     if over and over not in cost_curves.NUMERICAL_SETTINGS:
         raise Refused(
             f"cost --over {over}: unknown key; use one of {', '.join(cost_curves.NUMERICAL_SETTINGS)}"
         )
     knobs = [over or cost_curves.TOLERANCE]
     if verbose and not over:
-        knobs += cost_curves.applicable_settings(found)
-    target = choose_folder(out, f"{found.source.path.stem}-cost")
+        knobs += cost_curves.applicable_settings(scene_model)
+    target = choose_folder(out, f"{scene_model.source.path.stem}-cost")
     curves = {}
-    answer = {}
+    data = {}
     for knob in knobs:
         runs = curves[knob] = cost_curves.setting_curve(
-            found, knob, None if quiet else print_message
+            scene_model, knob, None if quiet else print_message
         )
         table = cost_files.write(target, curves)
-        picture = cost_files.write_picture(target, knob, runs, found.accuracy.tolerance)
-        answer[knob] = cost_files.cost_data(knob, runs, found.accuracy.tolerance)
+        picture = cost_files.write_picture(target, knob, runs, scene_model.accuracy.tolerance)
+        data[knob] = cost_files.cost_data(knob, runs, scene_model.accuracy.tolerance)
         if not json_:
             tabled = verbose and knob != cost_curves.TOLERANCE
             lines = cost_files.format_details if tabled else cost_files.format_cost
-            print("\n".join(lines(knob, runs, found.accuracy.tolerance)))
+            print("\n".join(lines(knob, runs, scene_model.accuracy.tolerance)))
             print(f"results: {table} {picture}")
     if json_:
-        print(json.dumps(answer))
+        print(json.dumps(data))
 
 
 ALL = "all"  # name of all methods of a backbone
@@ -111,29 +111,33 @@ def backbone(
 
     Example: patchfem backbone rig.toml --mode axial --amplitudes "0.1 um..1 mm:25"
     """
-    found = joint.remove_joint(load_model(scene, set_))
-    ways = backbones.METHODS if method == ALL else (method,)
+    free_model = joint.remove_joint(load_model(scene, set_))
+    methods = backbones.METHODS if method == ALL else (method,)
     lengths = axes.read_lengths(amplitudes, "--amplitudes") if amplitudes else None
-    target = choose_folder(out, f"{found.source.path.stem}-backbone")
+    target = choose_folder(out, f"{free_model.source.path.stem}-backbone")
     with results.Folder(target) as folder:
-        one = backbones.backbone(
-            found,
+        backbone_result = backbones.backbone(
+            free_model,
             mode,
             lengths,
-            ways,
-            None if quiet or json_ else lambda way: print_message(f"{way} ..."),
+            methods,
+            None if quiet or json_ else lambda method_name: print_message(f"{method_name} ..."),
         )
-        answer = backbone_files.write_backbone(
-            one, found.source.title, found.source.resolved, folder, not no_page
+        data = backbone_files.write_backbone(
+            backbone_result,
+            free_model.source.title,
+            free_model.source.resolved,
+            folder,
+            not no_page,
         )
     if json_:
-        print(json.dumps(answer, ensure_ascii=False))
+        print(json.dumps(data, ensure_ascii=False))
     else:
-        print("\n".join(backbone_files.format_backbone(one)))
-        for text in one.notes:
+        print("\n".join(backbone_files.format_backbone(backbone_result)))
+        for text in backbone_result.notes:
             print(f"note: {text}")
         print(f"results: {target}")
-    if not one.curves:
+    if not backbone_result.curves:
         raise NotReached
 
 
@@ -213,18 +217,18 @@ def fit(
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
-    found = load_scene(scene, set_)
+    loaded_scene = load_scene(scene, set_)
     target = choose_folder(out, f"{scene.stem}-fit")
     options = fits.Options(
         hold, offset, warm_up, from_patch=from_patch, amplitudes=amplitudes, **vars(rows)
     )
     with progress_bar(
-        quiet or json_ or from_patch or fits.choose_kind(found, to) in ("loop", "curve")
+        quiet or json_ or from_patch or fits.choose_kind(loaded_scene, to) in ("loop", "curve")
     ) as progress:
         listener = fits.Listener(
             None if quiet else print_message, progress, lambda name: f"--{name.replace('_', '-')}"
         )
-        files = fits.fit_into(found, to, free, options, target, listener)
+        files = fits.fit_into(loaded_scene, to, free, options, target, listener)
     if json_:
         print(json.dumps(files.answer, ensure_ascii=False))
     else:

@@ -85,11 +85,11 @@ class Over:
 
     def words(self, *more: str) -> tuple:
         """Return the options that select the cases, as words that identify them."""
-        drawn = f"draw={self.random},{self.sobol},{self.seed}"
+        random_options = f"draw={self.random},{self.sobol},{self.seed}"
         return (
             *self.over,
             "" if self.cases is None else str(self.cases),
-            drawn,
+            random_options,
             f"of={self.of}",
             *more,
         )
@@ -173,33 +173,33 @@ def sweep(
             "only one of these options"
         )
     by = by or By()
-    begin = perf_counter()
+    start_time = perf_counter()
     part = by.part()
     target = choose_folder(out, f"{scene.stem}-sweep")
-    tells = "faults" if quiet else "words"
+    printed = "faults" if quiet else "words"
     if json_:
-        tells = "json"
-    told = Told(target, not no_page, tells, begin)
-    signed = ""
+        printed = "json"
+    output = Told(target, not no_page, printed, start_time)
+    request_hash = ""
     if not (by.collect or part or keep not in (None, "none")):
         request_words = (what or Over()).words(*set_, f"page={not no_page}")
-        signed = manifest.hash_request(scene, request_words, what and what.cases)
-    if resume and (written := manifest.read_manifest(target, signed)):  # all of it is there
-        _print_results(written["cases"]["count"], {}, written, told)
+        request_hash = manifest.hash_request(scene, request_words, what and what.cases)
+    if resume and (answer := manifest.read_manifest(target, request_hash)):  # all of it is there
+        _print_results(answer["cases"]["count"], {}, answer, output)
         return
-    asked, cases = parse_request.read_sweep(scene, set_, (what or Over()).request())
+    sweep_scene, cases = parse_request.read_sweep(scene, set_, (what or Over()).request())
     if by.collect:
-        _print_stored_results(run.collect_shards(asked, cases, target, not no_page), told)
+        _print_stored_results(run.collect_shards(sweep_scene, cases, target, not no_page), output)
         return
     for text in () if quiet else axes.describe_ranges(what.over if what else ()):
         note(text)
-    if not quiet and (wrong := parse_request.contradictions(asked, cases)):
+    if not quiet and (wrong := parse_request.contradictions(sweep_scene, cases)):
         note(wrong)
     line = Progress(quiet)
     try:
         place = run.SweepTarget(target, resume, keep or "", part, not no_page)
-        found = run.sweep_into(
-            asked,
+        results = run.sweep_into(
+            sweep_scene,
             cases,
             place,
             executors.make_executor(by.executor, by.jobs),
@@ -226,9 +226,9 @@ def sweep(
                 "--collect"
             )
         return
-    if signed and not found.messages and place.kept_files(len(cases)) == "none":
-        manifest.write_manifest(target, signed)
-    _print_stored_results(found, told)
+    if request_hash and not results.messages and place.kept_files(len(cases)) == "none":
+        manifest.write_manifest(target, request_hash)
+    _print_stored_results(results, output)
 
 
 class Told(NamedTuple):
@@ -263,15 +263,15 @@ class Progress:
         self.said = self.begin
         self.open = sys.stderr.isatty()
 
-    def __call__(self, done: int, total: int, left: float | None) -> None:
+    def __call__(self, done: int, total: int, seconds_left: float | None) -> None:
         if not self.text and not self.silent:
             Thread(target=self._show_waiting_time, daemon=True).start()
         self.text = f"{done}/{total} cases"
         self.done = done
         if not self.silent and perf_counter() - self.said >= (0.2 if self.open else self.WAIT):
             self._show(
-                f"{self.text}, {sweeping.format_duration(left)} left"
-                if left is not None
+                f"{self.text}, {sweeping.format_duration(seconds_left)} left"
+                if seconds_left is not None
                 else self.text
             )
 
@@ -302,14 +302,17 @@ class Progress:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
-def _print_stored_results(found, told: Told) -> None:
+def _print_stored_results(results, output: Told) -> None:
     """Print the results of a sweep from its folder."""
     _print_results(
-        len(found), found.messages, json.loads((told.target / "sweep.json").read_bytes()), told
+        len(results),
+        results.messages,
+        json.loads((output.target / "sweep.json").read_bytes()),
+        output,
     )
 
 
-def _print_results(number: int, messages: dict, written: dict, told: Told) -> None:
+def _print_results(number: int, messages: dict, answer: dict, output: Told) -> None:
     """Print the results of a sweep, with its answer first.
 
     Parameters
@@ -318,35 +321,35 @@ def _print_results(number: int, messages: dict, written: dict, told: Told) -> No
         Number of cases.
     messages : dict
         Messages of failed cases.
-    written : dict
+    answer : dict
         Content of sweep.json.
-    told : Told
+    output : Told
     """
-    target = told.target
+    target = output.target
     failed = sorted(messages)
-    counts = written["cases"]["outcomes"]
-    if told.tells == "json":
+    counts = answer["cases"]["outcomes"]
+    if output.tells == "json":
         print(
             json.dumps(
                 {
                     "cases": number,
                     "outcomes": counts,
                     "failed": len(failed),
-                    "answer": written["answer"],
-                    "over_tolerance": written["cases"]["over_tolerance"],
+                    "answer": answer["answer"],
+                    "over_tolerance": answer["cases"]["over_tolerance"],
                     "folder": str(target),
-                    "seconds": round(perf_counter() - told.begin, 3),
+                    "seconds": round(perf_counter() - output.begin, 3),
                 },
                 ensure_ascii=False,
             )
         )
-    elif told.tells == "words":
-        ended = ", ".join(f"{count} {name}" for name, count in counts.items())
-        first, *others = written["sentences"] or [""]
-        for said in (first, f"{number} case{'s' * (number != 1)}: {ended}", *others):
-            if said:
-                print(said)
-        if told.page:
+    elif output.tells == "words":
+        outcome_counts = ", ".join(f"{count} {name}" for name, count in counts.items())
+        first, *others = answer["sentences"] or [""]
+        for sentence in (first, f"{number} case{'s' * (number != 1)}: {outcome_counts}", *others):
+            if sentence:
+                print(sentence)
+        if output.page:
             print(f"page: {target / 'report.html'}")
         tables = [target / name for name in ("sweep.csv", "sweep.nc")]
         if tables[0].is_file():
@@ -357,14 +360,14 @@ def _print_results(number: int, messages: dict, written: dict, told: Told) -> No
                 f"about {1e-6 * TABLE * number:.0f} MB; to write them, run the same command with --collect"
             )
     sys.stdout.flush()
-    alike = {}
+    cases_by_message = {}
     for case in failed:
-        alike.setdefault(messages[case], []).append(case + 1)
-    for text, numbers in list(alike.items())[:FIRST]:
+        cases_by_message.setdefault(messages[case], []).append(case + 1)
+    for text, numbers in list(cases_by_message.items())[:FIRST]:
         print_message(
             f"case {numbers[0]}{f' and {len(numbers) - 1} more' * (len(numbers) > 1)}: {text}"
         )
-    if len(alike) > FIRST:
+    if len(cases_by_message) > FIRST:
         print_message("the messages of all failed cases are in sweep.csv")
     if len(failed) == number:
         raise Refused("sweep: no case could be run")

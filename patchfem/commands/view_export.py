@@ -75,8 +75,8 @@ def view(
 
     Example: patchfem view out/rig -o cycle.gif
     """
-    if told := convert.view_results(folder, out, frame, magnify):
-        print(told)
+    if message := convert.view_results(folder, out, frame, magnify):
+        print(message)
 
 
 def report(

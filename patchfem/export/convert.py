@@ -111,15 +111,15 @@ def _create_parent_folder(out: Path | None) -> Iterator[None]:
 
     Missing if it cannot be created.
     """
-    places = [] if out is None else [parent for parent in out.parents if not parent.exists()]
+    new_folders = [] if out is None else [parent for parent in out.parents if not parent.exists()]
     try:
-        if places:
-            _make_folder(places[0], out)
+        if new_folders:
+            _make_folder(new_folders[0], out)
         yield
     finally:
         with suppress(OSError):  # the folder contains what was written
-            for one in places:
-                one.rmdir()
+            for folder in new_folders:
+                folder.rmdir()
 
 
 def _make_folder(place: Path, out: Path) -> None:

@@ -83,8 +83,8 @@ def format_cost(knob: str, runs: list, tolerance: float) -> list[str]:
     width = max(len(knob), *(len(one.label) for one, *_ in rows))
     out = [f"{knob:<{width}}  {'CPU s':>6}  {'error':>8}  worst measure"]
     for one, worst, comment in rows:
-        share = format_number(worst.share, 2) if worst.share > ROUND_OFF else "exact"
-        text = f"{one.label:<{width}}  {format_number(one.seconds, 2):>6}  {share:>8}  {worst.name}"
+        error = format_number(worst.share, 2) if worst.share > ROUND_OFF else "exact"
+        text = f"{one.label:<{width}}  {format_number(one.seconds, 2):>6}  {error:>8}  {worst.name}"
         out.append(f"{text.rstrip()}{comment}")
     return [*out, *last]
 
@@ -134,26 +134,26 @@ def format_details(knob: str, runs: list, tolerance: float) -> list[str]:
     list of str
     """
     names = detailed_measures(runs, tolerance)
-    waited = any(run.has_waited() for run in runs)
+    has_wall_times = any(run.has_waited() for run in runs)
     width = max(len(knob), *(len(run.label) for run in runs))
     head = [
         f"{knob:<{width}}",
         f"{'CPU s':>7}",
-        *[f"{'clock s':>7}"] * waited,
-        *(f"{one:>17}" for one in names),
+        *[f"{'clock s':>7}"] * has_wall_times,
+        *(f"{text:>17}" for text in names),
     ]
     out = ["  ".join(head)]
     out.append(
         "  ".join(
-            [" " * len(one) for one in head[: 2 + waited]]
-            + ["stated (distance)".rjust(max(17, len(one))) for one in names]
+            [" " * len(text) for text in head[: 2 + has_wall_times]]
+            + ["stated (distance)".rjust(max(17, len(text))) for text in names]
         )
     )
     for run in runs:
         cells = [
             f"{run.label:<{width}}",
             f"{run.seconds:7.3f}",
-            *[f"{run.wall_seconds:7.3f}"] * waited,
+            *[f"{run.wall_seconds:7.3f}"] * has_wall_times,
         ]
         out.append(
             "  ".join(
@@ -163,14 +163,14 @@ def format_details(knob: str, runs: list, tolerance: float) -> list[str]:
     return [*out, cost_sentence(runs, tolerance)]
 
 
-def _format_shares(one: Cost, name: str) -> str:
+def _format_shares(run: Cost, name: str) -> str:
     """Format the stated error of a measure and, in brackets, its distance to the best run.
 
     Both are relative to the value.
     """
-    size = abs(one.values.get(name, 0.0))
-    error = _format_relative(one.errors.get(name), size)
-    distance = _format_relative(one.distances.get(name), size)
+    size = abs(run.values.get(name, 0.0))
+    error = _format_relative(run.errors.get(name), size)
+    distance = _format_relative(run.distances.get(name), size)
     return f"{error} ({distance})"
 
 
@@ -188,10 +188,10 @@ def detailed_measures(runs: list, tolerance: float) -> list:
     They are those of MAIN that the setting changes, and the worst measure of each run; if there are
     none of these, all measures that it changes.
     """
-    turned = changed_measures(runs) or measures_with_error(runs)
+    changed = changed_measures(runs) or measures_with_error(runs)
     names = measures_with_error(runs)
     worst = {worst_error(run, names, tolerance).name for run in runs if run.errors or run.distances}
-    return [name for name in (*MAIN, *sorted(worst.difference(MAIN))) if name in turned] or turned
+    return [name for name in (*MAIN, *sorted(worst.difference(MAIN))) if name in changed] or changed
 
 
 def write(folder: Path, curves: dict) -> Path:
@@ -315,24 +315,24 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
         for run in runs
     ]
     points = [
-        Point(one, found.share)
-        for one, found in zip(runs, worst, strict=True)
-        if found.share > ROUND_OFF
+        Point(one, measure_error.share)
+        for one, measure_error in zip(runs, worst, strict=True)
+        if measure_error.share > ROUND_OFF
     ]
     marks = [
         charts.make_line(
-            [one.seconds for one, _ in points], [share for _, share in points], "accent", width=1.0
+            [one.seconds for one, _ in points], [error for _, error in points], "accent", width=1.0
         )
     ]
     for text, is_met in (("meets its tolerance", True), ("misses its tolerance", False)):
-        alike = [
+        same_points = [
             point
             for point in points
             if (point.share <= (point.run.tolerance or tolerance)) == is_met
         ]
-        if alike:
-            x = [one.run.seconds for one in alike]
-            y = [one.share for one in alike]
+        if same_points:
+            x = [one.run.seconds for one in same_points]
+            y = [one.share for one in same_points]
             marks.append(charts.make_dots(x, y, "accent", text, size=6, hollow=not is_met))
     ends = _axis_range([run.seconds for run in runs], MIN_SECONDS_RATIO)
     limit = f"tolerance of the scene, {tolerance:g}"
@@ -366,21 +366,21 @@ def _place_labels(points: list, x_range: list, y_range: list) -> list:
     A label stands above its point and lists the settings of all equal runs.
     """
     groups: dict[tuple, list] = {}
-    for one, share in points:
-        groups.setdefault((one.seconds, share), []).append(one.label)
+    for run, error in points:
+        groups.setdefault((run.seconds, error), []).append(run.label)
     decades, width = (float(np.log(high / low)) for low, high in (y_range, x_range))
     out = []
     height = -1.0
-    for (seconds, share), texts in sorted(groups.items(), key=lambda group: group[0][1]):
-        place = np.log(share / y_range[0]) / decades
-        height = max(place, height + LABEL_HEIGHT)
+    for (seconds, error), texts in sorted(groups.items(), key=lambda group: group[0][1]):
+        position = np.log(error / y_range[0]) / decades
+        height = max(position, height + LABEL_HEIGHT)
         is_right = np.log(seconds / x_range[0]) >= LABEL_LEFT_FRACTION * width
         out.append(
             {
                 "text": "; ".join(texts),
                 "x": seconds,
-                "y": share,
-                "raised": (height - place) * HEIGHT,
+                "y": error,
+                "raised": (height - position) * HEIGHT,
                 "side": "left" if is_right else "right",
             }
         )

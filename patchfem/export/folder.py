@@ -35,7 +35,7 @@ class WrittenRun(NamedTuple):
 
 
 def run_into(
-    what, target: Path, say=None, progress=None, fresh: bool = False, resume: bool = False
+    run_plan, target: Path, say=None, progress=None, fresh: bool = False, resume: bool = False
 ) -> WrittenRun:
     """Run a plan into a results folder; `write_run_page` writes the page afterwards.
 
@@ -46,7 +46,7 @@ def run_into(
 
     Parameters
     ----------
-    what : Plan
+    run_plan : Plan
     target : Path
         Results folder.
     say, progress : callable, optional
@@ -70,9 +70,11 @@ def run_into(
     with Folder(target, resume) as folder:
         if folder.dropped and say is not None:
             say(folder.dropped)
-        kept = StateFile(folder.path / STATE, __version__, resume) if saves_state(what) else None
+        state_file = (
+            StateFile(folder.path / STATE, __version__, resume) if saves_state(run_plan) else None
+        )
         try:
-            result = run(what, say, progress, fresh=fresh, kept=kept)
+            result = run(run_plan, say, progress, fresh=fresh, kept=state_file)
         except NotConverged as error:
             if error.partial_result is None:
                 raise NotConverged(
@@ -84,19 +86,24 @@ def run_into(
 
 def _partial_result(error: NotConverged) -> Result:
     """Return what a run had computed before it failed to converge, with the reason as a warning."""
-    found = error.partial_result
+    result = error.partial_result
     return replace(
-        found,
-        warnings=[*shorten_file_names([str(error)], found.plan.model.source.path), *found.warnings],
+        result,
+        warnings=[
+            *shorten_file_names([str(error)], result.plan.model.source.path),
+            *result.warnings,
+        ],
     )
 
 
-def saves_state(what) -> bool:
+def saves_state(run_plan) -> bool:
     """Return whether the run of a plan saves its state."""
-    return (what.model.wear is not None and what.model.patch is not None) or marches(what)
+    return (run_plan.model.wear is not None and run_plan.model.patch is not None) or marches(
+        run_plan
+    )
 
 
-def is_complete(what, target: Path) -> bool:
+def is_complete(run_plan, target: Path) -> bool:
     """Return whether a folder contains the complete run of a plan, with nothing left to resume.
 
     It is False for an incomplete folder, or one with the state of an interrupted run. PatchfemError
@@ -104,13 +111,13 @@ def is_complete(what, target: Path) -> bool:
     """
     state = target.parent / f"{target.name}.partial"
     try:
-        if state.is_dir() and any(is_state(one.name) for one in state.iterdir()):
+        if state.is_dir() and any(is_state(path.name) for path in state.iterdir()):
             return False
         version = read_summary(target / "summary.json")["patchfem"]
         text = (target / SCENE).read_text("utf-8")
     except (OSError, ValueError):
         return False
-    if (version, text) == (__version__, what.model.source.resolved):
+    if (version, text) == (__version__, run_plan.model.source.resolved):
         return True
     raise PatchfemError(
         f"{target}: this folder contains no interrupted run but a complete run of another scene or of "
@@ -121,7 +128,7 @@ def is_complete(what, target: Path) -> bool:
 
 def write_results(result: Result, path: Path) -> WrittenRun:
     """Write all files of a run except its page into the folder `path`."""
-    begin = perf_counter()
+    start_time = perf_counter()
     bodies = {}
     text = result.plan.model.source.resolved
     write_text(path / SCENE, text)
@@ -129,21 +136,23 @@ def write_results(result: Result, path: Path) -> WrittenRun:
     if result.patch is not None:
         bodies = body_fields.write_fields(result, path / "fields.vtkhdf")
     for face in result.extra.get("faces", ())[:MAX_INTERFACES]:
-        place = path / INTERFACES_FOLDER / face.folder
-        place.mkdir(parents=True, exist_ok=True)
-        own = replace(
+        face_folder = path / INTERFACES_FOLDER / face.folder
+        face_folder.mkdir(parents=True, exist_ok=True)
+        face_result = replace(
             result,
             plan=replace(result.plan, model=face.model),
             patch=face.patch,
             fields=face.fields,
             extra={},
         )
-        body_fields.write_fields(own, place / "fields.vtkhdf")
-        result.extra["notes"] += [f"interface {face.name}: {text}" for text in own.extra["notes"]]
-    result.seconds["files"] = perf_counter() - begin
-    answer = summarise_run(result)
-    write_json(answer, path / "summary.json")
-    return WrittenRun(answer, result, bodies, _folder_identity(path))
+        body_fields.write_fields(face_result, face_folder / "fields.vtkhdf")
+        result.extra["notes"] += [
+            f"interface {face.name}: {text}" for text in face_result.extra["notes"]
+        ]
+    result.seconds["files"] = perf_counter() - start_time
+    summary = summarise_run(result)
+    write_json(summary, path / "summary.json")
+    return WrittenRun(summary, result, bodies, _folder_identity(path))
 
 
 def write_run_page(written: WrittenRun, folder: Path) -> Path:
@@ -161,8 +170,8 @@ def write_run_page(written: WrittenRun, folder: Path) -> Path:
 
 def _folder_identity(folder: Path) -> tuple:
     """Return device and inode of a folder."""
-    found = os.stat(folder)
-    return found.st_dev, found.st_ino
+    status = os.stat(folder)
+    return status.st_dev, status.st_ino
 
 
 def save_run(result: Result, folder: Path, page: bool = True) -> None:

@@ -18,7 +18,7 @@ def result_contents(result: Result) -> netcdf.Contents:
 
     It consists of histories, interface frames, levels, events, curve and provenance.
     """
-    found, modal = collect_histories(result)
+    histories, modal = collect_histories(result)
     patch = result.patch
     extra = result.extra
     surface = patch_surface(patch, result.fields)
@@ -31,9 +31,9 @@ def result_contents(result: Result) -> netcdf.Contents:
     )
     levels = _level_columns(extra["levels"]) if "levels" in extra else None
     rig = result.plan.model.rig
-    names = list(rig.friction.names) if found and rig is not None else []
+    names = list(rig.friction.names) if histories and rig is not None else []
     data = netcdf.run_contents(
-        found, modal, fields, x, weight, strips, levels, names, _coordinate_description(rig)
+        histories, modal, fields, x, weight, strips, levels, names, _coordinate_description(rig)
     )
     if patch is not None:
         data = netcdf.add_surfaces(data, surface.unloaded_gap)
@@ -78,71 +78,79 @@ def collect_histories(result: Result) -> tuple:
         None; ({}, None) for a run without motion.
     """
     kind = result.plan.kind
-    r = result.response
-    if r is None:
+    response = result.response
+    if response is None:
         return {}, None
     if kind == "bench":
-        across = {
-            "lateral_displacement": r.lateral,
-            "lateral_force": r.lateral_force,
-            "yaw_moment": r.yaw_moment,
+        lateral = {
+            "lateral_displacement": response.lateral,
+            "lateral_force": response.lateral_force,
+            "yaw_moment": response.yaw_moment,
         }
         return {
-            "time": r.time,
-            "relative_displacement": r.slide,
-            "relative_velocity": r.rate,
-            "friction_force": r.force,
-            "normal_load": r.load,
-            **dict(zip(LEDGER, r.ledger)),
-            **{name: values for name, values in across.items() if values is not None},
+            "time": response.time,
+            "relative_displacement": response.slide,
+            "relative_velocity": response.rate,
+            "friction_force": response.force,
+            "normal_load": response.load,
+            **dict(zip(LEDGER, response.ledger)),
+            **{name: values for name, values in lateral.items() if values is not None},
         }, None
-    out = {
-        "time": r.time,
-        "relative_displacement": r.output,
-        "relative_velocity": r.output_rate,
-        "absolute_acceleration": r.acceleration,
-        "base_acceleration": r.base_acceleration,
+    histories = {
+        "time": response.time,
+        "relative_displacement": response.output,
+        "relative_velocity": response.output_rate,
+        "absolute_acceleration": response.acceleration,
+        "base_acceleration": response.base_acceleration,
     }
-    if kind == "rig" and "ledger" in r.extra:
-        out |= dict(zip(LEDGER, r.extra["ledger"]))
+    if kind == "rig" and "ledger" in response.extra:
+        histories |= dict(zip(LEDGER, response.extra["ledger"]))
     rig = result.plan.model.rig
     if rig.friction.names:
-        out |= _interface_histories(result)
+        histories |= _interface_histories(result)
     elif kind == "rig":
-        still = np.full(r.time.size, result.measures["normal_load"].value)
-        out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
+        constant_load = np.full(response.time.size, result.measures["normal_load"].value)
+        histories |= {
+            "friction_force": response.force,
+            "normal_load": response.extra.get("normal_load", constant_load),
+        }
         # If modes move the interface differently from the output, the slide is a separate
         # history.
-        if not np.array_equal(r.slide, r.output):
-            out["slide"] = r.slide
-    return out, (list(rig.modes.names), structure.compute_named_motions(rig.modes, r.modal))
+        if not np.array_equal(response.slide, response.output):
+            histories["slide"] = response.slide
+    return histories, (
+        list(rig.modes.names),
+        structure.compute_named_motions(rig.modes, response.modal),
+    )
 
 
 def _interface_histories(result: Result) -> dict:
     """Return the histories (i, k) of the interfaces of a rig of masses, and those of its output."""
-    r = result.response
+    response = result.response
     columns = {
-        "relative_displacement": ("slides", r.slide),
-        "relative_velocity": ("slide_rates", r.slide_rate),
-        "friction_force": ("forces", r.force),
+        "relative_displacement": ("slides", response.slide),
+        "relative_velocity": ("slide_rates", response.slide_rate),
+        "friction_force": ("forces", response.force),
     }
     second = {
-        f"lateral_{name}": np.ascontiguousarray(r.extra[f"lateral_{many}"].T)
-        for name, many in (
+        f"lateral_{name}": np.ascontiguousarray(response.extra[f"lateral_{key}"].T)
+        for name, key in (
             ("displacement", "slides"),
             ("velocity", "slide_rates"),
             ("force", "forces"),
         )
-        if f"lateral_{many}" in r.extra
+        if f"lateral_{key}" in response.extra
     }
     loads = np.array([interface.load for interface in result.plan.model.rig.friction.interfaces])
     return {
-        "output_displacement": r.output,
-        "output_velocity": r.output_rate,
-        "normal_load": np.repeat(loads[:, None], r.time.size, axis=1),
+        "output_displacement": response.output,
+        "output_velocity": response.output_rate,
+        "normal_load": np.repeat(loads[:, None], response.time.size, axis=1),
         **{
-            name: np.ascontiguousarray(r.extra[many].T) if many in r.extra else one[None, :]
-            for name, (many, one) in columns.items()
+            name: np.ascontiguousarray(response.extra[key].T)
+            if key in response.extra
+            else total[None, :]
+            for name, (key, total) in columns.items()
         },
         **second,
     }

@@ -112,8 +112,8 @@ class Contents:
         import xarray as xr
 
         variables, coordinates = (
-            {name: _xarray_variable(xr, *one) for name, one in part.items()}
-            for part in (self.variables, self.coordinates)
+            {name: _xarray_variable(xr, *variable) for name, variable in group.items()}
+            for group in (self.variables, self.coordinates)
         )
         return xr.Dataset(variables, coordinates, self.attributes)
 
@@ -125,7 +125,7 @@ def _xarray_variable(xr, dimensions, values, attributes=None):
     its own import time.
     """
     values = np.asarray(values)
-    texts = values.dtype.kind == "O" and all(isinstance(one, str) for one in values.flat)
+    texts = values.dtype.kind == "O" and all(isinstance(item, str) for item in values.flat)
     return xr.Variable(
         dimensions, values, attributes, fastpath=texts or values.dtype.kind in "biufcU"
     )
@@ -212,8 +212,8 @@ def run_contents(
                 }
                 data[name] = (("frame", "x"), values, flags)
             elif np.ndim(values) >= 2:
-                over = ("frame", "x") if np.ndim(values) == 2 else ("frame", "strip", "x")
-                data[name] = (over, values, _variable_attributes(name))
+                dimensions = ("frame", "x") if np.ndim(values) == 2 else ("frame", "strip", "x")
+                data[name] = (dimensions, values, _variable_attributes(name))
     if strips is not None:
         coords["strip_offset"] = (
             "strip",
@@ -316,7 +316,7 @@ def add_curve(data: Contents, curve: dict) -> Contents:
     names, number = np.unique(np.asarray(curve["regime"], str), return_inverse=True)
     point = "curve_point"
     meanings = [name.replace(" ", "_") for name in names]
-    out = {
+    variables = {
         "curve_frequency": (
             point,
             curve["frequency"],
@@ -347,25 +347,25 @@ def add_curve(data: Contents, curve: dict) -> Contents:
     }
     for name, (unit, text) in CURVE_COLUMNS.items():
         if name in curve:
-            out[f"curve_{name}"] = (
+            variables[f"curve_{name}"] = (
                 point,
                 curve[name],
                 {"units": unit, "long_name": f"{text} of the steady motion"},
             )
         if f"{name}_error" in curve:
-            out[f"curve_{name}_error"] = (
+            variables[f"curve_{name}_error"] = (
                 point,
                 curve[f"{name}_error"],
                 {"units": unit, "long_name": f"estimated half-width of the {text}"},
             )
     if len(curve.get("folds", ())):
-        over, unit = ("frequency", "Hz") if np.ptp(curve["frequency"]) > 0 else ("level", "m s-2")
-        out["curve_fold"] = (
+        swept, unit = ("frequency", "Hz") if np.ptp(curve["frequency"]) > 0 else ("level", "m s-2")
+        variables["curve_fold"] = (
             "fold",
             np.asarray(curve["folds"], float),
-            {"units": unit, "long_name": f"{over} at which the curve turns back"},
+            {"units": unit, "long_name": f"{swept} at which the curve turns back"},
         )
-    return data.also(out)
+    return data.also(variables)
 
 
 DECAY = {
@@ -377,21 +377,25 @@ DECAY = {
 
 def add_decay(data: Contents, decay) -> Contents:
     """Return the content with a `response.decay_curve.DecayCurve` over decay_time."""
-    over = "decay_time"
-    out = {}
+    dimension = "decay_time"
+    variables = {}
     for name, (unit, text) in DECAY.items():
-        out[f"decay_{name}"] = (over, getattr(decay, name), {"units": unit, "long_name": text})
+        variables[f"decay_{name}"] = (
+            dimension,
+            getattr(decay, name),
+            {"units": unit, "long_name": text},
+        )
         if name != "amplitude":
-            out[f"decay_{name}_error"] = (
-                over,
+            variables[f"decay_{name}_error"] = (
+                dimension,
                 getattr(decay, f"{name}_error"),
                 {"units": unit, "long_name": f"half-width of the interval of the {text}"},
             )
     return data.also(
-        out,
+        variables,
         {
-            over: (
-                over,
+            dimension: (
+                dimension,
                 decay.time,
                 {"units": "s", "long_name": "time at the middle of the evaluated cycle"},
             )
@@ -399,38 +403,38 @@ def add_decay(data: Contents, decay) -> Contents:
     )
 
 
-def add_spectra(data: Contents, found) -> Contents:
+def add_spectra(data: Contents, spectra) -> Contents:
     """Return the content with `response.stationary.Spectra` over frequency."""
     columns = {
         "base_acceleration_spectrum": (
             "m2 s-3",
-            found.drive,
+            spectra.drive,
             "one-sided spectral density of the base acceleration",
         ),
         "relative_displacement_spectrum": (
             "m2 Hz-1",
-            found.place,
+            spectra.place,
             "one-sided spectral density of the displacement of the output",
         ),
         "absolute_acceleration_spectrum": (
             "m2 s-3",
-            found.acceleration,
+            spectra.acceleration,
             "one-sided spectral density of the acceleration at the output",
         ),
         "gain": (
             "s2",
-            np.abs(found.gain),
+            np.abs(spectra.gain),
             "magnitude of H1, displacement of the output over base acceleration",
         ),
-        "phase": ("rad", np.angle(found.gain), "phase of H1"),
-        "coherence": ("1", found.coherence, "coherence"),
+        "phase": ("rad", np.angle(spectra.gain), "phase of H1"),
+        "coherence": ("1", spectra.coherence, "coherence"),
     }
     return data.also(
         {
             name: ("frequency", values, {"units": unit, "long_name": text})
             for name, (unit, values, text) in columns.items()
         },
-        {"frequency": ("frequency", found.frequency, {"units": "Hz"})},
+        {"frequency": ("frequency", spectra.frequency, {"units": "Hz"})},
     )
 
 
@@ -456,23 +460,25 @@ def add_faces(data: Contents, faces) -> Contents:
     faces: list of `runs.patch.faces.Face`. The number at the end of a name is that of the
     interface, from 1.
     """
-    out = {}
-    places = {}
+    variables = {}
+    coordinates = {}
     for face in faces:
         number = face.number + 1
         surface = face.surface
-        one = run_contents({}, None, face.fields, surface.x, surface.weight)
+        contents = run_contents({}, None, face.fields, surface.x, surface.weight)
         frame = "frame" if face.fields["time"].size > 1 else "frame_at_rest"
-        over = {"x": f"x_{number}", "frame": frame}
-        for part, found, ending in (
-            (one.variables, out, f"_{number}"),
-            (one.coordinates, places, ""),
+        renamed = {"x": f"x_{number}", "frame": frame}
+        for source, target, suffix in (
+            (contents.variables, variables, f"_{number}"),
+            (contents.coordinates, coordinates, ""),
         ):
-            for name, (dimensions, *rest) in part.items():
+            for name, (dimensions, *content) in source.items():
                 dimensions = (dimensions,) if isinstance(dimensions, str) else dimensions
-                name = {"x": over["x"], "frame_time": f"{frame}_time"}.get(name, f"{name}{ending}")
-                found[name] = (tuple(over[dimension] for dimension in dimensions), *rest)
-    return data.also(out, places)
+                name = {"x": renamed["x"], "frame_time": f"{frame}_time"}.get(
+                    name, f"{name}{suffix}"
+                )
+                target[name] = (tuple(renamed[dimension] for dimension in dimensions), *content)
+    return data.also(variables, coordinates)
 
 
 EDGE_PEAK = (
@@ -492,7 +498,7 @@ def add_wear(data: Contents, history: dict, units: dict) -> Contents:
     units : dict
         Unit by name.
     """
-    out = {
+    variables = {
         f"wear_{name}": (
             "wear_cycle",
             values,
@@ -501,14 +507,14 @@ def add_wear(data: Contents, history: dict, units: dict) -> Contents:
         for name, values in history.items()
         if name in units
     }
-    if (known := history.get("pressure_peak_at_edge")) is not None:
-        out["wear_pressure_peak_at_edge"] = (
+    if (edge_peaks := history.get("pressure_peak_at_edge")) is not None:
+        variables["wear_pressure_peak_at_edge"] = (
             "wear_cycle",
-            known,
+            edge_peaks,
             {"units": "Pa", "long_name": EDGE_PEAK},
         )
     count = {"units": "1", "long_name": "cycles of wear so far"}
-    return data.also(out, {"wear_cycle": ("wear_cycle", history["cycle"], count)})
+    return data.also(variables, {"wear_cycle": ("wear_cycle", history["cycle"], count)})
 
 
 def _variable_attributes(name: str, dimensions: int = 1) -> dict:
@@ -558,12 +564,12 @@ def write_netcdf(data: Contents, path: Path) -> None:
     closed.
     """
     path = Path(path)
-    size = sum(np.size(one[1]) for one in (data.variables | data.coordinates).values())
+    size = sum(np.size(variable[1]) for variable in (data.variables | data.coordinates).values())
     if size > MAX_VALUES_IN_MEMORY:
         with (
             write_atomically(path) as partial,
-            open_lossy(partial) as kept,
-            _CachingFile(kept, "w", track_order=True, rdcc_nbytes=CACHE_BYTES) as file,
+            open_lossy(partial) as opened,
+            _CachingFile(opened, "w", track_order=True, rdcc_nbytes=CACHE_BYTES) as file,
         ):
             _write_file(file, data)
         return
@@ -606,7 +612,7 @@ class _CachingFile(h5py.File):
     def __delitem__(self, name):
         # a dimension is replaced by its coordinate, which has the same name
         self.known = {
-            other: one for other, one in self.known.items() if other.strip("/") != name.strip("/")
+            path: item for path, item in self.known.items() if path.strip("/") != name.strip("/")
         }
         super().__delitem__(name)
 
@@ -616,27 +622,33 @@ def _write_variables(file, data: Contents) -> None:
 
     Coordinates that are not a dimension are named by the variables that have them.
     """
-    known = {
+    contents = {
         name: ((dims,) if isinstance(dims, str) else tuple(dims), values, attributes)
         for name, (dims, values, attributes) in (data.variables | data.coordinates).items()
     }
-    beside = {name: set(known[name][0]) for name in data.coordinates if known[name][0] != (name,)}
-    for dims, values, _ in known.values():
+    dimensions_of = {
+        name: set(contents[name][0]) for name in data.coordinates if contents[name][0] != (name,)
+    }
+    for dims, values, _ in contents.values():
         sizes = dict(zip(dims, np.shape(values)))
         file.dimensions.update(
             {name: size for name, size in sizes.items() if name not in file.dimensions}
         )
-    for name, (dims, values, attributes) in known.items():
+    for name, (dims, values, attributes) in contents.items():
         values = np.asarray(values)
-        named = [
-            other for other, its in beside.items() if name in data.variables and its <= set(dims)
+        coordinates = [
+            coordinate
+            for coordinate, own_dimensions in dimensions_of.items()
+            if name in data.variables and own_dimensions <= set(dims)
         ]
-        how = {"fillvalue": np.nan} if values.dtype.kind == "f" else {}
+        options = {"fillvalue": np.nan} if values.dtype.kind == "f" else {}
         if name in data.variables and values.ndim and values.size:
-            how |= {"compression": "gzip", "compression_opts": 1}
+            options |= {"compression": "gzip", "compression_opts": 1}
         texts = values.dtype.kind in "UO"
-        one = file.create_variable(
-            name, dims, h5py.string_dtype() if texts else values.dtype, **how
+        variable = file.create_variable(
+            name, dims, h5py.string_dtype() if texts else values.dtype, **options
         )
-        one[...] = values.astype(object) if texts else values
-        one.attrs.update(attributes | ({"coordinates": " ".join(named)} if named else {}))
+        variable[...] = values.astype(object) if texts else values
+        variable.attrs.update(
+            attributes | ({"coordinates": " ".join(coordinates)} if coordinates else {})
+        )

@@ -348,19 +348,19 @@ def _measured_responses(result: Result) -> Measured | None:
     if model.measured is None:
         return None
     path, gains, kind, cutoff = model.measured
-    found = Measured(measured.read_table(path), gains)
+    responses = Measured(measured.read_table(path), gains)
     rig = model.rig
     if rig is None:
-        return found
-    found = replace(
-        found, frequency=rig.drive.frequency, input=find_max_acceleration(rig.drive.signal)
+        return responses
+    responses = replace(
+        responses, frequency=rig.drive.frequency, input=find_max_acceleration(rig.drive.signal)
     )
     acceleration = result.measures.get("absolute_acceleration_peak")
     if kind == "peak" or not isinstance(rig.drive.signal, SineDrive) or acceleration is None:
-        return found
+        return responses
     peak = acceleration.value
     return replace(
-        found,
+        responses,
         reading=kind,
         share=spectrum.read_instrument(result.window, rig.drive.signal, peak, kind, cutoff) / peak,
     )

@@ -42,9 +42,9 @@ def reading_errors(path: Path, form: str) -> Iterator[None]:
     except PatchfemError:
         raise
     except Exception as fault:  # a damaged file can fail in many ways
-        said = " ".join(str(fault).split())[:200]
+        reason = " ".join(str(fault).split())[:200]
         raise PatchfemError(
-            f"{path}: cannot be read as {form}: {said or type(fault).__name__}"
+            f"{path}: cannot be read as {form}: {reason or type(fault).__name__}"
         ) from None
 
 
@@ -70,40 +70,44 @@ def read_variables(path: Path, names: set | None = None) -> tuple:
     import h5netcdf
 
     with reading_errors(path, "netCDF"), h5netcdf.File(path, "r") as file:
-        about = {name: file.attrs[name] for name in file.attrs}
-        found = {
+        attributes = {name: file.attrs[name] for name in file.attrs}
+        variables = {
             name: Variable(
-                tuple(one.dimensions), np.asarray(one[...]), str(one.attrs.get("units", "1"))
+                tuple(variable.dimensions),
+                np.asarray(variable[...]),
+                str(variable.attrs.get("units", "1")),
             )
-            for name, one in file.variables.items()
+            for name, variable in file.variables.items()
             if names is None or name in names
         }
         sizes = {}
-        for name, one in found.items():
-            _check_variable(name, one, sizes)
-        return about, found
+        for name, variable in variables.items():
+            _check_variable(name, variable, sizes)
+        return attributes, variables
 
 
-def _check_variable(name: str, one: Variable, sizes: dict) -> None:
+def _check_variable(name: str, variable: Variable, sizes: dict) -> None:
     """Raise ValueError for a variable that cannot be one of results.
 
     sizes: lengths of the dimensions so far, to which those of this variable are added.
     """
-    if one.values.dtype.kind not in "biufSUO" or len(one.dims) != one.values.ndim:
-        raise ValueError(f"{name} contains {one.values.ndim}-dimensional {one.values.dtype}")
-    for dim, size in zip(one.dims, one.values.shape):
+    if variable.values.dtype.kind not in "biufSUO" or len(variable.dims) != variable.values.ndim:
+        raise ValueError(
+            f"{name} contains {variable.values.ndim}-dimensional {variable.values.dtype}"
+        )
+    for dim, size in zip(variable.dims, variable.values.shape):
         if sizes.setdefault(dim, size) != size:
             raise ValueError(f"{name} has {size} values along {dim}, others {sizes[dim]}")
     if name in COORDINATES and not (
-        one.values.ndim == 1
-        and one.values.size
-        and is_real(one.values)
-        and np.isfinite(one.values).all()
+        variable.values.ndim == 1
+        and variable.values.size
+        and is_real(variable.values)
+        and np.isfinite(variable.values).all()
     ):
         raise ValueError(f"{name} is not a row of numbers")
     if (
-        one.values.dtype.kind == "f"
-        and np.abs(one.values[np.isfinite(one.values)]).max(initial=0.0) > MAX_NUMBER
+        variable.values.dtype.kind == "f"
+        and np.abs(variable.values[np.isfinite(variable.values)]).max(initial=0.0) > MAX_NUMBER
     ):
         raise ValueError(f"{name} contains a number beyond {MAX_NUMBER:g}")
 
@@ -113,7 +117,7 @@ def is_real(values) -> bool:
     return values.dtype.kind in "iuf"
 
 
-def require_valid(fine: bool, text: str) -> None:
+def require_valid(is_valid: bool, text: str) -> None:
     """Raise ValueError with a message unless a condition is true."""
-    if not fine:
+    if not is_valid:
         raise ValueError(text)

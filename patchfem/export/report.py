@@ -48,15 +48,15 @@ RESULT_FILES = (
 
 def verdict_html(data: RunData) -> str:
     """Return the results of a run in a few sentences of HTML, with the error of each number."""
-    known = data.verdict
-    answer = f"<b>{escape(known.summary['outcome'])}</b>: {sentence_html(known.sentence)}"
+    verdict = data.verdict
+    outcome_html = f"<b>{escape(verdict.summary['outcome'])}</b>: {sentence_html(verdict.sentence)}"
     text = headline_sentence(
-        known.summary,
-        known.cycles,
+        verdict.summary,
+        verdict.cycles,
         lambda number, name: measure_link(number, name, " class=v"),
-        known.released,
+        verdict.released,
     )
-    return f"{answer}{escape(charts.regime_sentence(known.steady))} {text}".strip()
+    return f"{outcome_html}{escape(charts.regime_sentence(verdict.steady))} {text}".strip()
 
 
 def page_html(data: RunData) -> str:
@@ -64,11 +64,11 @@ def page_html(data: RunData) -> str:
     summary = data.verdict.summary
     title = summary["title"] or data.source.name or "patchfem run"
     # The title of the scene refers to the values before keys were set.
-    of = f"Scene: {escape(title)} &middot; " if data.source.sets else ""
-    title = list_changed_keys(data.source.sets) if of else title
+    scene_text = f"Scene: {escape(title)} &middot; " if data.source.sets else ""
+    title = list_changed_keys(data.source.sets) if scene_text else title
     motion = f" &middot; {escape(data.source.driven)}" if data.source.driven else ""
     lead = [
-        f"<p class=soft>{of}patchfem {escape(summary['patchfem'])} &middot; {escape(summary['kind'])}{motion} "
+        f"<p class=soft>{scene_text}patchfem {escape(summary['patchfem'])} &middot; {escape(summary['kind'])}{motion} "
         f"&middot; engine {escape(data.verdict.engine or 'static')} &middot; "
         f"computed in {summary['seconds'].get('total', 0):.2f} s</p>",
         f"<p class=verdict>{verdict_html(data)}</p>",
@@ -76,9 +76,9 @@ def page_html(data: RunData) -> str:
     warnings = [w for w in summary["warnings"] if w != data.verdict.sentence]
     lead.append(warning_box(warnings, "Warnings"))
     lead += [f"<p class=soft>Note: {sentence_html(text)}</p>" for text in summary["notes"]]
-    drawn, shown = draw_figures(data)
-    drawn = charts.limit_characters(drawn, MAX_CHART_CHARACTERS)
-    sections = [Section("pictures", "Pictures", shown)] if drawn else []
+    chart_data, figures = draw_figures(data)
+    chart_data = charts.limit_characters(chart_data, MAX_CHART_CHARACTERS)
+    sections = [Section("pictures", "Pictures", figures)] if chart_data else []
     film = data.patch.film if data.patch.touches() else None
     if film is not None:
         sections.append(player.player_section(film))
@@ -89,38 +89,38 @@ def page_html(data: RunData) -> str:
     sections += [_measures_section(data), _cost_section(data), _origin_section(data)]
     scripts = (
         "figures.js",
-        *(("curves.js",) if drawn else ()),
+        *(("curves.js",) if chart_data else ()),
         *(("stage.js", "player.js") if film else ()),
     )
     return document_html(
         title,
         "".join(lead),
         sections,
-        {"charts": drawn} | ({"player": film} if film else {}),
-        scripts if drawn or film else (),
+        {"charts": chart_data} | ({"player": film} if film else {}),
+        scripts if chart_data or film else (),
     )
 
 
 def draw_figures(data: RunData) -> tuple:
     """Return the charts of a run, each with its anchor, and the HTML of their containers."""
-    drawn = []
-    places = []
-    for found in (find_picture(name, data) for name in PICTURES):
-        if found is None:
+    chart_data = []
+    figures = []
+    for picture in (find_picture(name, data) for name in PICTURES):
+        if picture is None:
             continue
-        made = [
-            one | {"anchor": f"chart{len(drawn) + number}"}
-            for number, one in enumerate(found.charts(*found.values))
+        charts_of_picture = [
+            chart | {"anchor": f"chart{len(chart_data) + number}"}
+            for number, chart in enumerate(picture.charts(*picture.values))
         ]
         cells = "".join(
-            f'<div id="{one["anchor"]}" class=chart role=img aria-label="{escape(one["title"])}"></div>'
-            for one in made
+            f'<div id="{chart["anchor"]}" class=chart role=img aria-label="{escape(chart["title"])}"></div>'
+            for chart in charts_of_picture
         )
-        places.append(
-            f"<figure><div class=row>{cells}</div><figcaption>{sentence_html(found.caption)}</figcaption></figure>"
+        figures.append(
+            f"<figure><div class=row>{cells}</div><figcaption>{sentence_html(picture.caption)}</figcaption></figure>"
         )
-        drawn += made
-    return drawn, "\n".join(places)
+        chart_data += charts_of_picture
+    return chart_data, "\n".join(figures)
 
 
 class Picture(NamedTuple):
@@ -151,26 +151,26 @@ def _spectra_picture(data: RunData) -> Picture | None:
     """Return the picture of the spectra of a random drive."""
     if data.evaluations.spectra is None:
         return None
-    found = data.verdict.summary["measures"]
-    at = found.get("response_frequency", {}).get("value")
-    told = (
+    measures = data.verdict.summary["measures"]
+    peak_frequency = measures.get("response_frequency", {}).get("value")
+    peak_note = (
         ""
-        if at is None
+        if peak_frequency is None
         else (
             " The peak of H1 is marked by a ring. It is the peak of a mode at {} ({}) with a damping ratio of {} ({}), "
             "friction included.".format(
-                *record_interval("response_frequency", found),
-                *record_interval("response_damping", found),
+                *record_interval("response_frequency", measures),
+                *record_interval("response_damping", measures),
             )
         )
     )
     return Picture(
         charts.spectra_charts,
-        (data.evaluations.spectra, at),
+        (data.evaluations.spectra, peak_frequency),
         "One-sided spectral densities of output and drive, and the "
         "frequency response H1 (displacement of the output divided "
         "by acceleration of the base). H1 is drawn "
-        f"faint where the coherence is below {charts.MIN_COHERENCE:g}.{told}",
+        f"faint where the coherence is below {charts.MIN_COHERENCE:g}.{peak_note}",
     )
 
 
@@ -227,12 +227,12 @@ def _edge_peaks_sentence(history: dict) -> str:
     if not (above > 0).any():
         return ""
     cycles = ", ".join(
-        formatting.format_number(one, 4) for one in np.asarray(history["cycle"])[above > 0]
+        formatting.format_number(cycle, 4) for cycle in np.asarray(history["cycle"])[above > 0]
     )
-    most = formatting.format_quantity(float(above.max()), "Pa", 2)
+    largest = formatting.format_quantity(float(above.max()), "Pa", 2)
     return (
         f" After {cycles} cycles the peak pressure is that of a node at the edge of the contact; it stands up to "
-        f"{most} above all pressures farther inside and has an error of this size."
+        f"{largest} above all pressures farther inside and has an error of this size."
     )
 
 
@@ -276,32 +276,34 @@ def _interface_picture(data: RunData) -> Picture | None:
 
 def _faces_picture(data: RunData) -> Picture | None:
     """Return the picture of the stresses on interfaces that have a patch."""
-    found = [face for face in data.patch.faces if np.any(face[1]["normal_stress"][0] > 0)]
-    part = any(charts.contact_range(x, fields["normal_stress"][0]) for x, fields, _ in found)
-    shear = any(np.any(fields.get("shear_stress", 0.0)) for _, fields, _ in found)
-    moved = (
+    touching = [face for face in data.patch.faces if np.any(face[1]["normal_stress"][0] > 0)]
+    is_partial = any(
+        charts.contact_range(x, fields["normal_stress"][0]) for x, fields, _ in touching
+    )
+    has_shear = any(np.any(fields.get("shear_stress", 0.0)) for _, fields, _ in touching)
+    shear_note = (
         "; shear stress at several instants of the last cycle; the instant with the largest resultant force is "
         "in colour"
-        if shear
+        if has_shear
         else ""
     )
     return (
         Picture(
             charts.faces_charts,
-            (found[:MAX_INTERFACES],),
-            f"Normal stress of the pressed patch of each interface{moved}."
-            f"{' Only the part in contact is drawn.' * part}{_omitted_charts_sentence(found)}",
+            (touching[:MAX_INTERFACES],),
+            f"Normal stress of the pressed patch of each interface{shear_note}."
+            f"{' Only the part in contact is drawn.' * is_partial}{_omitted_charts_sentence(touching)}",
         )
-        if found
+        if touching
         else None
     )
 
 
-def _omitted_charts_sentence(found: list) -> str:
+def _omitted_charts_sentence(drawn_interfaces: list) -> str:
     """Return the sentence, for the end of a caption, on charts that are left out."""
     return (
-        f" Only the first {MAX_INTERFACES} of {len(found)} interfaces are shown."
-        if len(found) > MAX_INTERFACES
+        f" Only the first {MAX_INTERFACES} of {len(drawn_interfaces)} interfaces are shown."
+        if len(drawn_interfaces) > MAX_INTERFACES
         else ""
     )
 
@@ -330,13 +332,13 @@ def _stress_picture(data: RunData) -> Picture | None:
 def _mesh_sentence(data: RunData) -> str:
     """Return the sentence about pressure peaks that the stress in the pieces misses; else ""."""
     sigma = data.patch.fields["normal_stress"][0]
-    mine = data.patch.bodies["pressure"]
-    if sigma.size == mine.size:
+    mesh_pressure = data.patch.bodies["pressure"]
+    if sigma.size == mesh_pressure.size:
         return ""
     unit, scale = formatting.choose_axis_unit([sigma.max()], "Pa")
     return (
         f" The stress is computed on a mesh, on which the largest pressure is "
-        f"{mine.max() * scale:.3g} {unit}; near the narrow pressure peaks of up to "
+        f"{mesh_pressure.max() * scale:.3g} {unit}; near the narrow pressure peaks of up to "
         f"{sigma.max() * scale:.3g} {unit} it is larger."
     )
 
@@ -344,25 +346,25 @@ def _mesh_sentence(data: RunData) -> str:
 def _corner_sentence(bodies: dict) -> str:
     """Describe the corner in which the largest stress of both pieces is unbounded; else ""."""
     parts = zip(bodies["depth"], bodies["coating"], bodies["mises"])
-    depth, coating, part = max(parts, key=lambda one: one[2].max())
-    column, row = np.unravel_index(np.argmax(part), part.shape)
-    if column not in (0, part.shape[0] - 1):
+    depth, coating, stress = max(parts, key=lambda fields: fields[2].max())
+    column, row = np.unravel_index(np.argmax(stress), stress.shape)
+    if column not in (0, stress.shape[0] - 1):
         return ""
     faces = {
         "the face of the coating meets the end of the piece": coating,
         "the held far face ends": depth[-1],
     }
-    near = [
-        words
-        for words, face in faces.items()
+    corner_texts = [
+        text
+        for text, face in faces.items()
         if face > 0 and np.isclose(depth[row : row + 2], face).any()
     ]
     return (
         (
-            f", where {near[0]}: the stress "
+            f", where {corner_texts[0]}: the stress "
             "is unbounded in this corner, and a finer mesh shows a larger value"
         )
-        if near
+        if corner_texts
         else ""
     )
 
@@ -372,27 +374,27 @@ def _loop_picture(data: RunData) -> Picture | None:
     motion = data.motion
     if motion is None or not np.any(motion.loop["force"]) or np.ptp(motion.loop["slide"]) == 0:
         return None
-    own = motion.loop
-    whole = motion.window is None or data.verdict.is_part_of_cycle()
-    count = 0.0 if whole else (own["time"][-1] - own["time"][0]) / motion.period
+    loop = motion.loop
+    is_whole_run = motion.window is None or data.verdict.is_part_of_cycle()
+    count = 0.0 if is_whole_run else (loop["time"][-1] - loop["time"][0]) / motion.period
     span = "the whole run"
-    if not whole:
+    if not is_whole_run:
         span = f"the last {count:.3g} cycles" if count > 1 + 1e-6 else "one cycle"
     open_loop = data.verdict.is_part_of_cycle() or data.verdict.cycles is None
     title = "Friction force against slide" if open_loop else "Friction loop"
-    name, *read = motion.recorded or ("",)
-    beside = f" Grey: the force measured in {name}." if read else ""
-    if each := own.get("each"):
+    name, *measured_loop = motion.recorded or ("",)
+    measured_note = f" Grey: the force measured in {name}." if measured_loop else ""
+    if interface_loops := loop.get("each"):
         return Picture(
             charts.loop_charts,
-            (each[:MAX_INTERFACES],),
+            (interface_loops[:MAX_INTERFACES],),
             f"Friction force against the slide of each interface, over {span}."
-            f"{_drive_sentence(data)}{_omitted_charts_sentence(each)}",
+            f"{_drive_sentence(data)}{_omitted_charts_sentence(interface_loops)}",
         )
     return Picture(
         charts.loop_chart,
-        (own["slide"], own["force"], title, tuple(read) or None),
-        f"Resultant friction force against the slide of the interface, over {span}.{_drive_sentence(data)}{beside}",
+        (loop["slide"], loop["force"], title, tuple(measured_loop) or None),
+        f"Resultant friction force against the slide of the interface, over {span}.{_drive_sentence(data)}{measured_note}",
     )
 
 
@@ -411,9 +413,9 @@ def _histories_picture(data: RunData) -> Picture | None:
             f"Slide{force} over the whole run.{_drive_sentence(data)}"
             + (" Grey: the measured force." if "measured" in history else ""),
         )
-    w = motion.window
-    late = w["time"] >= w["time"][-1] - 3 * period * (1 + 1e-9)
-    window = {k: v[late] for k, v in w.items()}
+    run_window = motion.window
+    is_shown = run_window["time"] >= run_window["time"][-1] - 3 * period * (1 + 1e-9)
+    window = {k: v[is_shown] for k, v in run_window.items()}
     count = (window["time"][-1] - window["time"][0]) / period
     title = (
         f"The run's {count:.2g} cycles"
@@ -426,17 +428,17 @@ def _histories_picture(data: RunData) -> Picture | None:
         "Displacement over the whole run. At the end of the run: displacement, and acceleration of "
         f"{bodies}.{_drive_sentence(data)}"
     )
-    begin = charts.first_complete_time(history["time"], period, w["time"][0])
+    first_complete = charts.first_complete_time(history["time"], period, run_window["time"][0])
     swings = bool(data.verdict.released)
-    kept = int(np.sum(history["time"] < begin))
-    if kept:
-        what = f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
+    n_kept = int(np.sum(history["time"] < first_complete))
+    if n_kept:
+        remark = f"{n_kept} of the samples {'was' if n_kept == 1 else 'were'} kept."
         if swings:
-            what = "turning points and stops were kept, joined by lines."
-        elif kept * period > begin:
-            what = "reversals were kept, drawn as a band from the lowest to the highest value of each cycle."
+            remark = "turning points and stops were kept, joined by lines."
+        elif n_kept * period > first_complete:
+            remark = "reversals were kept, drawn as a band from the lowest to the highest value of each cycle."
         unit, scale = formatting.choose_axis_unit(history["time"], "s")
-        caption += f" Before {begin * scale:.4g} {unit} only {what}"
+        caption += f" Before {first_complete * scale:.4g} {unit} only {remark}"
     # A decaying swing has no band per cycle: its reversals are stored, and the line through them
     # shows it.
     return Picture(charts.history_charts, (history, window, period, title, swings), caption)
@@ -460,15 +462,15 @@ def _drive_sentence(data: RunData) -> str:
 
 def _measured_picture(data: RunData) -> Picture | None:
     """Return the picture of computed and measured responses."""
-    m = data.measured
-    found = data.verdict.summary["measures"]
-    if m is None or not m.is_comparable():
+    responses = data.measured
+    measures = data.verdict.summary["measures"]
+    if responses is None or not responses.is_comparable():
         return None
     points = []
     for name, gain in zip(
-        ("absolute_acceleration_peak", "relative_displacement_amplitude"), m.factors()
+        ("absolute_acceleration_peak", "relative_displacement_amplitude"), responses.factors()
     ):
-        measure = found.get(name, {"value": None})
+        measure = measures.get(name, {"value": None})
         if measure["value"] is None:
             points.append(None)
             continue
@@ -476,14 +478,14 @@ def _measured_picture(data: RunData) -> Picture | None:
         points.append((measure["value"] * gain, error))
     factor = "".join(
         f" (computed {name} multiplied by the reading factor {gain:g})"
-        for name, gain in zip(("acceleration", "displacement"), m.gains)
+        for name, gain in zip(("acceleration", "displacement"), responses.gains)
         if gain != 1
     )
-    if m.reading != "peak":
-        factor += f" (readings are taken as {m.reading}, which is {m.share:.4g} of the peak)"
+    if responses.reading != "peak":
+        factor += f" (readings are taken as {responses.reading}, which is {responses.share:.4g} of the peak)"
     return Picture(
         charts.measured_charts,
-        (m.rows, m.frequency, m.input, *points),
+        (responses.rows, responses.frequency, responses.input, *points),
         f"Responses measured at the drive frequency, and the computed response{factor}.{_unsettled_sentence(data)}",
     )
 
@@ -520,33 +522,36 @@ def _unsettled_sentence(data: RunData) -> str:
 
 def _measured_section(data: RunData) -> list:
     """Return the section with computed and measured values; [] if they cannot be compared."""
-    m = data.measured
-    found = data.verdict.summary["measures"]
-    if not m.is_comparable():
+    responses = data.measured
+    measures = data.verdict.summary["measures"]
+    if not responses.is_comparable():
         return []
     rows = []
-    for r in m.rows:
-        if abs(r.frequency - m.frequency) > 0.5 or abs(r.input - m.input) > 0.01 * m.input:
+    for row in responses.rows:
+        if (
+            abs(row.frequency - responses.frequency) > 0.5
+            or abs(row.input - responses.input) > 0.01 * responses.input
+        ):
             continue
         for (name, key, scale, unit), gain in zip(
             (
                 ("acceleration", "absolute_acceleration_peak", G, "g"),
                 ("displacement", "relative_displacement_amplitude", 25.4e-6, "mil"),
             ),
-            m.factors(),
+            responses.factors(),
         ):
-            value = getattr(r, name)
-            mine = found.get(key, {"value": None})["value"]
-            if value is None or mine is None:
+            value = getattr(row, name)
+            computed = measures.get(key, {"value": None})["value"]
+            if value is None or computed is None:
                 continue
-            mine = mine * gain
-            kind = f"{name}{' (repeat run)' if 'R' in r.flag else ''}"
-            ratio = f"{mine / value:.2f}" if value else "&ndash;"
+            computed = computed * gain
+            kind = f"{name}{' (repeat run)' if 'R' in row.flag else ''}"
+            ratio = f"{computed / value:.2f}" if value else "&ndash;"
             rows.append(
                 [
                     measure_link(kind, key),
                     f"{value / scale:.3g} {unit}",
-                    f"{mine / scale:.3g} {unit}",
+                    f"{computed / scale:.3g} {unit}",
                     ratio,
                 ]
             )
@@ -574,15 +579,15 @@ def _levels_section(levels: list) -> Section:
     the interface sticks.
     """
     rows = []
-    judged = any(level.get("outcome") for level in levels)
+    has_outcomes = any(level.get("outcome") for level in levels)
     for number, one in enumerate(levels, 1):
         cells = []
         for name, unit in LEVEL_COLUMNS:
             value = one["values"].get(name)
             error = one["errors"].get(name)
-            there = value is not None and np.isfinite(value)
+            has_value = value is not None and np.isfinite(value)
             cells.append(
-                format_with_error(name, measure_entry(value, unit, error)) if there else EN_DASH
+                format_with_error(name, measure_entry(value, unit, error)) if has_value else EN_DASH
             )
         drive = f"{one['drive']:.4g} N" if one.get("unit") == "N" else f"{one['drive'] / G:.4g} g"
         rows.append(
@@ -590,11 +595,13 @@ def _levels_section(levels: list) -> Section:
                 str(number),
                 drive,
                 *cells,
-                *([escape(one["outcome"])] if judged else []),
+                *([escape(one["outcome"])] if has_outcomes else []),
                 "stuck" if one["stuck"] else "slips",
             ]
         )
-    sized = "force" if any(level.get("unit") == "N" for level in levels) else "base acceleration"
+    drive_name = (
+        "force" if any(level.get("unit") == "N" for level in levels) else "base acceleration"
+    )
     texts = (
         "half the peak-to-peak motion",
         "peak acceleration",
@@ -603,9 +610,9 @@ def _levels_section(levels: list) -> Section:
     )
     heads = [
         ">level",
-        f">{sized}",
+        f">{drive_name}",
         *(f">{measure_link(text, name)}" for text, (name, _) in zip(texts, LEVEL_COLUMNS)),
-        *(["outcome"] if judged else []),
+        *(["outcome"] if has_outcomes else []),
         "interface",
     ]
     return Section("levels", "Levels", table_html(heads, rows))
@@ -619,19 +626,25 @@ def measure_entry(value: float, unit: str, error: float | None) -> dict:
 def _measures_section(data: RunData) -> Section:
     """Return the section about all measures with errors, in other units, and with definitions."""
     rows = []
-    means = data.verdict.means
-    found = data.verdict.summary["measures"]
-    for name, m in order_measures(found).items():
-        value, error = format_value_and_error(name, m)
+    definitions = data.verdict.means
+    measures = data.verdict.summary["measures"]
+    for name, measure in order_measures(measures).items():
+        value, error = format_value_and_error(name, measure)
         cells = [f"<td id='measure-{escape(name)}'>{escape(name)}</td>", value]
-        if m["value"] is None:
-            cells.append(f"<td class=soft colspan=3>{sentence_html(m.get('reason', ''))}</td>")
+        if measure["value"] is None:
+            cells.append(
+                f"<td class=soft colspan=3>{sentence_html(measure.get('reason', ''))}</td>"
+            )
         else:
-            unit = display_units(name, m["value"], m["unit"], m["error"])[0][0]
-            error = error or ("unknown" if m["error"] is None else EN_DASH)
-            cells += [error, f"<td class=v>{escape(unit)}</td>", escape(format_imperial(name, m))]
-        others_lie = record_interval(name, found)[1]
-        text = means.get(name, "") + (
+            unit = display_units(name, measure["value"], measure["unit"], measure["error"])[0][0]
+            error = error or ("unknown" if measure["error"] is None else EN_DASH)
+            cells += [
+                error,
+                f"<td class=v>{escape(unit)}</td>",
+                escape(format_imperial(name, measure)),
+            ]
+        others_lie = record_interval(name, measures)[1]
+        text = definitions.get(name, "") + (
             f"; {others_lie} for other records of the random drive" if others_lie else ""
         )
         rows.append([*cells, f"<td class=soft>{sentence_html(text)}</td>"])
@@ -684,9 +697,11 @@ def _origin_section(data: RunData) -> Section:
     """Return the section about the scene as written and as understood, the files and the versions."""
     versions = ", ".join(f"{k} {v}" for k, v in data.versions.items())
     lacks = ["fields.vtkhdf"] * (data.patch.x is None) + ["interfaces"] * (not data.patch.faces)
-    there = [one for one in RESULT_FILES if one[0] not in lacks]
-    files = "".join(f"<li><a href={name}>{name}</a>: {what}</li>" for name, what in there)
-    again = (
+    file_entries = [file_entry for file_entry in RESULT_FILES if file_entry[0] not in lacks]
+    files = "".join(
+        f"<li><a href={name}>{name}</a>: {description}</li>" for name, description in file_entries
+    )
+    repeat_html = (
         ""
         if not data.source.command
         else f"<p>To repeat the run, in the folder of its scene:</p><pre>{escape(data.source.command)}</pre>"
@@ -694,7 +709,7 @@ def _origin_section(data: RunData) -> Section:
     return Section(
         "origin",
         "Scene and files",
-        f"{again}<p>Files beside this page:</p><ul>{files}</ul>"
+        f"{repeat_html}<p>Files beside this page:</p><ul>{files}</ul>"
         f"<details><summary>Scene</summary><pre>{escape(data.source.text)}</pre></details>"
         "<details><summary>Scene in SI, with the value of every default</summary><pre>"
         f"{escape(data.source.resolved)}</pre></details><details><summary>Versions</summary>"
@@ -735,14 +750,14 @@ def draw_axes(result: Result, names: tuple, onto=None, bodies: dict | None = Non
         None if the run has nothing to show.
     """
     data = _add_pieces(collect_run_data(result), bodies)
-    shown = next(
+    picture = next(
         (one for one in (find_picture(name, data) for name in names) if one is not None), None
     )
-    if shown is None:
+    if picture is None:
         return None
     if onto is None:
-        return pictures.draw_charts.figure(shown.charts(*shown.values)).axes[0]
-    pictures.draw_charts.figure(shown.charts(*shown.values), onto=onto)
+        return pictures.draw_charts.figure(picture.charts(*picture.values)).axes[0]
+    pictures.draw_charts.figure(picture.charts(*picture.values), onto=onto)
     return onto
 
 

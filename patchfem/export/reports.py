@@ -32,15 +32,15 @@ def write_report(folders: list, out: Path | None = None) -> Path:
     """
     if not folders:
         raise PatchfemError("report: give at least one results folder")
-    many = [(folder / "sweep.csv").is_file() for folder in folders]
-    if len(set(many)) > 1:
+    are_sweeps = [(folder / "sweep.csv").is_file() for folder in folders]
+    if len(set(are_sweeps)) > 1:
         raise PatchfemError(
-            f"runs and sweeps cannot be compared on one page: {folders[many.index(True)]} is a sweep, "
-            f"{folders[many.index(False)]} is not"
+            f"runs and sweeps cannot be compared on one page: {folders[are_sweeps.index(True)]} is a sweep, "
+            f"{folders[are_sweeps.index(False)]} is not"
         )
     if out is None:
-        out = folders[0] / PAGE if many[0] and len(folders) == 1 else Path(PAGE)
-    if not many[0]:
+        out = folders[0] / PAGE if are_sweeps[0] and len(folders) == 1 else Path(PAGE)
+    if not are_sweeps[0]:
         return _write_page(
             several_runs.page_html([several_runs.read_run(folder) for folder in folders]), out
         )

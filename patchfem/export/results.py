@@ -170,15 +170,15 @@ def is_state(name: str) -> bool:
     return STATES.fullmatch(name) is not None
 
 
-def refuse_others(place: Path, shown, known, kind: str, dots: bool = False) -> None:
+def refuse_others(place: Path, user_path, allowed, kind: str, dots: bool = False) -> None:
     """Raise PatchfemError for a path that is not a folder, or that contains other files.
 
     Parameters
     ----------
     place : Path
-    shown : Path
+    user_path : Path
         The path as the user named it.
-    known : container of str
+    allowed : container of str
         Names of files that are allowed, also with .partial at the end.
     kind : str
         What these files are, in words.
@@ -189,17 +189,17 @@ def refuse_others(place: Path, shown, known, kind: str, dots: bool = False) -> N
         return
     if not place.is_dir():
         raise PatchfemError(
-            f"{shown}: {place.name} is a file, but a folder is needed; choose another -o"
+            f"{user_path}: {place.name} is a file, but a folder is needed; choose another -o"
         )
     others = sorted(
-        one.name
-        for one in place.iterdir()
-        if one.name.removesuffix(".partial") not in known
-        and not (is_partial_name(one.name) or is_state(one.name))
-        and not (dots and one.name.startswith("."))
+        path.name
+        for path in place.iterdir()
+        if path.name.removesuffix(".partial") not in allowed
+        and not (is_partial_name(path.name) or is_state(path.name))
+        and not (dots and path.name.startswith("."))
     )
     if others:
         raise PatchfemError(
-            f"{shown}: {place.name} contains files that are not {kind} "
+            f"{user_path}: {place.name} contains files that are not {kind} "
             f"({', '.join(others[:3])}{', ...' if len(others) > 3 else ''}); choose another -o"
         )

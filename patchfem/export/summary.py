@@ -49,7 +49,7 @@ def make_summary(
     measures: dict,
     effects: list,
     absent: list,
-    said: tuple,
+    messages: tuple,
     seconds: dict,
 ) -> dict:
     """Return the content of summary.json.
@@ -63,7 +63,7 @@ def make_summary(
         With effect, equations and seconds.
     absent : list of str
         Effects that are not in the scene.
-    said : tuple
+    messages : tuple
         Warnings about numerical trust, and notes about what the model leaves out.
     seconds : dict
         Part of the run -> time.
@@ -80,8 +80,8 @@ def make_summary(
         "measures": {name: measure_object(m) for name, m in measures.items()},
         "effects": effects,
         "not_in_scene": absent,
-        "warnings": list(said[0]),
-        "notes": list(said[1]),
+        "warnings": list(messages[0]),
+        "notes": list(messages[1]),
         "seconds": {name: round(float(value), 6) for name, value in seconds.items()},
     }
 
@@ -145,21 +145,21 @@ def _summary_model() -> type:
 
 def summarise_run(result: Result) -> dict:
     """Return the content of summary.json for a run."""
-    what = result.plan
-    answer = make_summary(
+    run_plan = result.plan
+    summary = make_summary(
         __version__,
-        what.model.source.title,
-        what.kind,
+        run_plan.model.source.title,
+        run_plan.kind,
         str(result.outcome),
         result.measures,
         effect_entries(result),
-        list(what.not_in_scene),
+        list(run_plan.not_in_scene),
         (result.warnings, result.extra.get("notes", [])),
         result.seconds,
     )
     numerics = choices(result) | {"measures": measure_engines(result)}
     return (
-        answer
+        summary
         | {"numerics": numerics}
         | contact_entry(result)
         | runaway_data(result)
@@ -173,12 +173,16 @@ def runaway_data(result: Result) -> dict:
     It is {"run_away": {"drive", "knee"}}: the acceleration of the base, and the one above which
     friction alone does not limit the amplitude at resonance.
     """
-    found = (
+    drive_and_knee = (
         rig_plan.drive_and_knee(result.plan.model)
         if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS)
         else {}
     )
-    return {"run_away": found} if found and found["drive"] > found["knee"] else {}
+    return (
+        {"run_away": drive_and_knee}
+        if drive_and_knee and drive_and_knee["drive"] > drive_and_knee["knee"]
+        else {}
+    )
 
 
 def loop_entry(result: Result) -> dict:
@@ -218,14 +222,14 @@ def contact_entry(result: Result) -> dict:
     patch = result.patch
     if patch is None or patch.strips is not None or not patch.active.any():
         return {}
-    found = patch.stretches
-    if found is None:
-        found = values.contact_intervals(patch, values.contact_ends(patch))
+    intervals = patch.stretches
+    if intervals is None:
+        intervals = values.contact_intervals(patch, values.contact_ends(patch))
     return {
         "contact": {
             "from": float(patch.x[0]),
             "to": float(patch.x[-1]),
-            "stretches": found.tolist(),
+            "stretches": intervals.tolist(),
         }
     }
 
@@ -271,7 +275,7 @@ def effect_entries(result: Result) -> list:
 
 def package_versions() -> dict:
     """Return the versions, by name, of the interpreter and of the packages that compute."""
-    found = list_installed_versions()
+    installed = list_installed_versions()
     return {"python": ".".join(map(str, sys.version_info[:3]))} | {
-        name: found[name] for name in PACKAGES if name in found
+        name: installed[name] for name in PACKAGES if name in installed
     }

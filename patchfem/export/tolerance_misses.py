@@ -22,45 +22,45 @@ LONG_NAMES = {
 ZERO_ERROR_RATIO = 10.0  # error / value above which a value counts as 0
 
 
-def is_over_tolerance(one: dict, tolerance) -> np.ndarray:
+def is_over_tolerance(measure: dict, tolerance) -> np.ndarray:
     """Return whether (n,) the error of a measure exceeds tolerance * |value| + floor.
 
     This is the limit of the warning of a single run.
 
     Parameters
     ----------
-    one : dict
+    measure : dict
         `values`, `errors` and `floors` (n,) [SI], NaN if a case has none.
     tolerance : float or (n,) array
         NaN if it is not known.
     """
-    values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
-    floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
+    values, errors = (np.asarray(measure[name], float) for name in ("values", "errors"))
+    floors = np.nan_to_num(np.asarray(measure.get("floors", 0.0), float))
     with np.errstate(invalid="ignore"):
         # comparisons with NaN are False
         return errors > compute_allowed_error(tolerance, values, floors)
 
 
-def is_within_by_floor(one: dict, tolerance) -> np.ndarray:
+def is_within_by_floor(measure: dict, tolerance) -> np.ndarray:
     """Return whether (n,) an error meets the tolerance only by the floor of its measure.
 
     The value must exceed this floor, so that a reader sees it with its error. The arguments are
     those of `is_over_tolerance`.
     """
-    values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
-    floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
+    values, errors = (np.asarray(measure[name], float) for name in ("values", "errors"))
+    floors = np.nan_to_num(np.asarray(measure.get("floors", 0.0), float))
     with np.errstate(invalid="ignore"):
         return (
             (errors > tolerance * np.abs(values))
             & (np.abs(values) > floors)
-            & ~is_over_tolerance(one, tolerance)
+            & ~is_over_tolerance(measure, tolerance)
         )
 
 
-def format_floor(one: dict, cases: np.ndarray) -> str:
+def format_floor(measure: dict, cases: np.ndarray) -> str:
     """Return the largest floor of a measure in some cases (n,) as text."""
-    floors = np.broadcast_to(np.asarray(one.get("floors", 0.0), float), cases.shape)
-    return format_quantity(float(floors[cases].max()), one.get("unit", "1"), 2)
+    floors = np.broadcast_to(np.asarray(measure.get("floors", 0.0), float), cases.shape)
+    return format_quantity(float(floors[cases].max()), measure.get("unit", "1"), 2)
 
 
 def count_over_tolerance(measures: dict, tolerance) -> dict:
@@ -74,15 +74,17 @@ def count_over_tolerance(measures: dict, tolerance) -> dict:
         By measure `count` of cases, and `worst`: their largest error/|value|, None if all values
         are 0.
     """
-    out = {}
-    for name, one in measures.items():
-        if (missed := is_over_tolerance(one, tolerance)).any():
-            share = _relative_error(one)[missed & (np.asarray(one["values"], float) != 0)]
-            out[name] = {
+    counts = {}
+    for name, measure in measures.items():
+        if (missed := is_over_tolerance(measure, tolerance)).any():
+            relative_errors = _relative_error(measure)[
+                missed & (np.asarray(measure["values"], float) != 0)
+            ]
+            counts[name] = {
                 "count": int(missed.sum()),
-                "worst": float(share.max()) if share.size else None,
+                "worst": float(relative_errors.max()) if relative_errors.size else None,
             }
-    return out
+    return counts
 
 
 def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str:
@@ -106,15 +108,17 @@ def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str
         "" if no error is known.
     """
     known = {name: np.isfinite(np.asarray(one["errors"], float)) for name, one in measures.items()}
-    number = max((found.size for found in known.values()), default=0)
+    number = max((is_known.size for is_known in known.values()), default=0)
     limits = np.broadcast_to(np.asarray(tolerance, float), number)
-    if not any(found.any() for found in known.values()) or not np.isfinite(limits).any():
+    if not any(is_known.any() for is_known in known.values()) or not np.isfinite(limits).any():
         return ""
-    asked = f"the tolerance of {100 * limits[0]:g} %" if np.ptp(limits) == 0 else "their tolerance"
+    tolerance_text = (
+        f"the tolerance of {100 * limits[0]:g} %" if np.ptp(limits) == 0 else "their tolerance"
+    )
     lost = {name: is_over_tolerance(one, tolerance) for name, one in measures.items()}
     lost = {name: missed for name, missed in lost.items() if missed.any()}
     if not lost:
-        ran = int(
+        n_with_value = int(
             np.any(
                 [
                     np.isfinite(np.asarray(measure["values"], float))
@@ -138,35 +142,35 @@ def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str
             else f" or the floor of their measure, such as {format_floor(measures[some[0]], some[1])} "
             f"of {measure_label(some[0])}"
         )
-        if ran == number:
-            return f"All {number} cases meet {asked}{floor}."
-        these = "it meets" if ran == 1 else "all of these meet"
-        return f"{ran} of {number} cases have an answer; {these} {asked}{floor}."
+        if n_with_value == number:
+            return f"All {number} cases meet {tolerance_text}{floor}."
+        subject_and_verb = "it meets" if n_with_value == 1 else "all of these meet"
+        return f"{n_with_value} of {number} cases have an answer; {subject_and_verb} {tolerance_text}{floor}."
     if first in measures and first not in lost:
-        return f"In {measure_label(first)} all {number} cases meet {asked}; {_others_sentence(len(lost))}."
-    beyond = {
+        return f"In {measure_label(first)} all {number} cases meet {tolerance_text}; {_others_sentence(len(lost))}."
+    error_ratios = {
         name: float(np.max(_error_ratio(measures[name], tolerance), initial=0.0, where=missed))
         for name, missed in lost.items()
     }
     name = (
         first
         if first in lost
-        else max([name for name in FIRST if name in lost] or lost, key=beyond.get)
+        else max([name for name in FIRST if name in lost] or lost, key=error_ratios.get)
     )
-    share = np.where(lost[name], _relative_error(measures[name]), 0.0)
+    relative_errors = np.where(lost[name], _relative_error(measures[name]), 0.0)
     count = int(lost[name].sum())
-    case = int(np.argmax(share))
+    case = int(np.argmax(relative_errors))
     others = len(lost) - 1
     known = (
-        f"{format_number(100 * share[case], 2)} % of its value"
-        if share[case] <= ZERO_ERROR_RATIO
+        f"{format_number(100 * relative_errors[case], 2)} % of its value"
+        if relative_errors[case] <= ZERO_ERROR_RATIO
         else "larger than the value"
     )
-    called = LONG_NAMES.get(name) or measure_label(name)
-    more = f"; {_others_sentence(others)}" if others else ""
+    measure_text = LONG_NAMES.get(name) or measure_label(name)
+    others_text = f"; {_others_sentence(others)}" if others else ""
     return (
-        f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {called}; the largest error, at "
-        f"{where(case)}, is {known}{more}."
+        f"{count} of {number} cases miss{'es' * (count == 1)} {tolerance_text} in {measure_text}; the largest error, at "
+        f"{where(case)}, is {known}{others_text}."
     )
 
 
@@ -175,17 +179,17 @@ def _others_sentence(count: int) -> str:
     return f"{count} other measure{'s' * (count > 1)} miss{'es' * (count == 1)} the tolerance in some cases"
 
 
-def _error_ratio(one: dict, tolerance) -> np.ndarray:
+def _error_ratio(measure: dict, tolerance) -> np.ndarray:
     """Return the error over the allowed error (n,)."""
-    floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
+    floors = np.nan_to_num(np.asarray(measure.get("floors", 0.0), float))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(one["errors"], float) / compute_allowed_error(
-            tolerance, np.asarray(one["values"], float), floors
+        return np.asarray(measure["errors"], float) / compute_allowed_error(
+            tolerance, np.asarray(measure["values"], float), floors
         )
 
 
-def _relative_error(one: dict) -> np.ndarray:
+def _relative_error(measure: dict) -> np.ndarray:
     """Return error over |value| (n,); inf if the value is 0."""
-    values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
+    values, errors = (np.asarray(measure[name], float) for name in ("values", "errors"))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(errors > 0, errors / np.abs(values), 0.0)

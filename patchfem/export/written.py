@@ -25,7 +25,7 @@ def shorten_number(text: str) -> str:
     return _round_long_number(text, MAX_DIGITS)
 
 
-def shorten_to_spacing(text: str, value: float, apart: float) -> str:
+def shorten_to_spacing(text: str, value: float, spacing: float) -> str:
     """Return a value as written, with as few digits as distinguish it from its neighbours.
 
     For example, 3.16227766016838 urad between 1 urad and 10 urad becomes 3.2 urad.
@@ -36,28 +36,28 @@ def shorten_to_spacing(text: str, value: float, apart: float) -> str:
         The value as written.
     value : float
         The value in SI.
-    apart : float
+    spacing : float
         Distance to the nearest other value [SI].
     """
     for digits in range(2, MAX_DIGITS):
-        short = _round_long_number(text, digits)
-        if short == text:
+        shortened = _round_long_number(text, digits)
+        if shortened == text:
             break
-        number, near = (float(NUMBER.match(one)[1]) for one in (text, short))
-        if abs((near - number) * value) <= abs(MAX_ERROR_FRACTION * apart * number):
-            return short
+        number, rounded_number = (float(NUMBER.match(written)[1]) for written in (text, shortened))
+        if abs((rounded_number - number) * value) <= abs(MAX_ERROR_FRACTION * spacing * number):
+            return shortened
     return shorten_number(text)
 
 
-def drop_repeated_unit(text: str, beside: str) -> str:
+def drop_repeated_unit(text: str, next_text: str) -> str:
     """Return a value without its unit if the next value has the same: 0.1 before 0.2 mrad."""
     number, _, unit = text.partition(" ")
-    return number if unit and unit == beside.partition(" ")[2] else text
+    return number if unit and unit == next_text.partition(" ")[2] else text
 
 
 def _round_long_number(text: str, digits: int) -> str:
     """Shorten a number with many digits."""
-    found = NUMBER.match(text)
-    if found is None or len(found[1]) < MIN_LONG_NUMBER:
+    match = NUMBER.match(text)
+    if match is None or len(match[1]) < MIN_LONG_NUMBER:
         return text
-    return f"{format_number(float(found[1]), digits)} {found[2] or ''}".strip()
+    return f"{format_number(float(match[1]), digits)} {match[2] or ''}".strip()

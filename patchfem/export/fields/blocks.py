@@ -97,10 +97,12 @@ def build_blocks(lower: dict, upper: dict, x, interface: dict, width: float = 0.
     dict of Block
     """
     line = lower["interface"]
-    own = lower["points"][line, 0]
+    node_x = lower["points"][line, 0]
     move = np.zeros((len(lower["displacement"]), len(x), 3), np.float32)
     for axis in (0, 1):
-        move[..., axis] = [np.interp(x, own, row) for row in lower["displacement"][:, line, axis]]
+        move[..., axis] = [
+            np.interp(x, node_x, row) for row in lower["displacement"][:, line, axis]
+        ]
     areal = {
         name: np.asarray(rows, np.float32) for name, rows in interface.items() if np.ndim(rows) == 3
     }
@@ -130,14 +132,14 @@ def _strips_block(x, width: float, areal: dict) -> Block:
     edges = np.linspace(-width / 2, width / 2, count + 1)
     sides = np.stack([edges[:-1], edges[1:]], axis=1).ravel()  # edges of each strip in turn
     low = (np.arange(count)[:, None] * 2 * k + np.arange(k - 1)).ravel()
-    one = make_block(
+    block = make_block(
         np.column_stack([np.tile(x, 2 * count), np.zeros(2 * count * k)]),
         [np.stack([low, low + 1, low + k + 1, low + k], axis=1)],
         {name: np.repeat(rows, 2, axis=1).reshape(len(rows), -1) for name, rows in areal.items()},
         {},
     )
-    one.points[:, 2] = np.repeat(sides, k)
-    return one
+    block.points[:, 2] = np.repeat(sides, k)
+    return block
 
 
 def _piece_block(body: dict) -> Block:
@@ -171,17 +173,19 @@ def merge_blocks(blocks: dict) -> Block:
     all_of = list(blocks.values())
     part = np.repeat(
         np.array([PARTS.index(name) for name in blocks], np.int8),
-        [len(one.types) for one in all_of],
+        [len(piece.types) for piece in all_of],
     )
     return Block(
-        np.concatenate([one.points for one in all_of]),
-        np.concatenate([one.connectivity + at for one, at in zip(all_of, first)]),
-        np.concatenate([[0], *(one.offsets[1:] + at for one, at in zip(all_of, ends))]),
-        np.concatenate([one.types for one in all_of]),
+        np.concatenate([piece.points for piece in all_of]),
+        np.concatenate([piece.connectivity + start for piece, start in zip(all_of, first)]),
+        np.concatenate([[0], *(piece.offsets[1:] + start for piece, start in zip(all_of, ends))]),
+        np.concatenate([piece.types for piece in all_of]),
         _concatenate_arrays(
-            [one.point_data for one in all_of], [len(one.points) for one in all_of]
+            [piece.point_data for piece in all_of], [len(piece.points) for piece in all_of]
         ),
-        _concatenate_arrays([one.cell_data for one in all_of], [len(one.types) for one in all_of])
+        _concatenate_arrays(
+            [piece.cell_data for piece in all_of], [len(piece.types) for piece in all_of]
+        )
         | {"part": part},
     )
 

@@ -73,11 +73,11 @@ def write_fields(result, path: Path) -> dict:
     )
     x = patch_surface(patch, fields).x
     low, high = (
-        _collect_piece_fields(patch, fields, x, *of)
-        for of in zip(("lower", "upper"), insides, motions)
+        _collect_piece_fields(patch, fields, x, *piece_data)
+        for piece_data in zip(("lower", "upper"), insides, motions)
     )
-    for one, other in ((low, high), (high, low)):
-        one["stress_error"] = one["error"].relative_error(other["error"])[0]
+    for one, other_body in ((low, high), (high, low)):
+        one["stress_error"] = one["error"].relative_error(other_body["error"])[0]
     notes = result.extra.setdefault("notes", [])
     inside = find_yielding(result.plan.model.patch, {"lower": low, "upper": high})
     faces = result.extra.get("yielding_faces", {})
@@ -94,13 +94,13 @@ def write_fields(result, path: Path) -> dict:
     if not isinstance(patch.pair.piece, Piece):
         return {}
     shape = (patch.x.size - 1, -1)
-    shown = result.extra.get("wear_shown", {"states": 0})["states"]
+    n_worn_states = result.extra.get("wear_shown", {"states": 0})["states"]
     return {
         "x": patch.x,
         "pressure": patch.pressure.sigma_n,
         "depth": (patch.pair.grid.depth, patch.pair.upper_grid.depth),
         "coating": (patch.pair.grid.coating_thickness, patch.pair.upper_grid.coating_thickness),
-        "mises": [body["mises"][shown].reshape(shape) for body in (low, high)],
+        "mises": [body["mises"][n_worn_states].reshape(shape) for body in (low, high)],
     }
 
 
@@ -135,8 +135,10 @@ def _piece_displacements(patch, loads: list) -> list:
     """
     pair = patch.pair
     if pair.upper is pair.piece:
-        both = compute_displacement(pair.piece, *(np.concatenate(parts) for parts in zip(*loads)))
-        return np.split(both, 2)
+        displacements = compute_displacement(
+            pair.piece, *(np.concatenate(parts) for parts in zip(*loads))
+        )
+        return np.split(displacements, 2)
     pieces = (pair.piece, pair.upper)
     return [compute_displacement(piece, *load) for piece, load in zip(pieces, loads)]
 
@@ -221,20 +223,23 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, inside: _PieceField
     errors = []
     largest = 0.0
     for first in range(0, frames, FRAMES_PER_PASS):
-        some = slice(first, first + FRAMES_PER_PASS)
-        motion = u[:1] + u[1:][some]
+        frame_slice = slice(first, first + FRAMES_PER_PASS)
+        motion = u[:1] + u[1:][frame_slice]
         stress = inside.stress(motion)
         errors.append(estimate_error(inside.found, motion, stress, inside.rules))
-        out["mises"][some] = von_mises(stress)
-        out["stress"][some] = stress * [1.0, 1.0, 1.0, sign]
+        out["mises"][frame_slice] = von_mises(stress)
+        out["stress"][frame_slice] = stress * [1.0, 1.0, 1.0, sign]
         largest = max(largest, float(np.abs(motion).max()))
-        out["displacement"][some] = (
+        out["displacement"][frame_slice] = (
             motion * [1.0, sign]
             if lower
-            else motion + _holder_motion(patch, fields, inside.points, some)
+            else motion + _holder_motion(patch, fields, inside.points, frame_slice)
         )
     error = StressError(
-        *(np.concatenate([getattr(one, name) for one in errors]) for name in ("error", "energy"))
+        *(
+            np.concatenate([getattr(frame_error, name) for frame_error in errors])
+            for name in ("error", "energy")
+        )
     )
     bond = coating_traction.interpolate_coating_traction(
         cells, coating_traction.compute_coating_traction(cells, u), x

@@ -34,8 +34,8 @@ def last_consecutive_frames(times) -> tuple:
     bench all frames of its slide.
     """
     steps = np.diff(times)
-    apart = np.flatnonzero(steps > MIN_STEP_RATIO * np.median(steps)) if steps.size else steps
-    return tuple(range(int(apart[-1]) + 1 if apart.size else 0, len(times)))
+    breaks = np.flatnonzero(steps > MIN_STEP_RATIO * np.median(steps)) if steps.size else steps
+    return tuple(range(int(breaks[-1]) + 1 if breaks.size else 0, len(times)))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -63,11 +63,11 @@ class Frame(Block):
 
         part: 0 lower piece, 1 upper piece, 2 interface.
         """
-        mine = self.cell_data["part"] == part
+        is_in_part = self.cell_data["part"] == part
         size = np.diff(self.offsets)
         return [
-            self.connectivity[self.offsets[:-1][mine & (size == n)][:, None] + np.arange(n)]
-            for n in np.unique(size[mine])
+            self.connectivity[self.offsets[:-1][is_in_part & (size == n)][:, None] + np.arange(n)]
+            for n in np.unique(size[is_in_part])
         ]
 
     def interface(self) -> np.ndarray:
@@ -207,14 +207,14 @@ class Series:
         number %= count
         with reading_errors(self.path, f"frame {number}"):
             blocks = {name: self._block(self.root[name], number) for name in self.parts}
-        one = merge_blocks(blocks)
+        merged = merge_blocks(blocks)
         return Frame(
-            one.points,
-            one.connectivity,
-            one.offsets,
-            one.types,
-            one.point_data,
-            one.cell_data,
+            merged.points,
+            merged.connectivity,
+            merged.offsets,
+            merged.types,
+            merged.point_data,
+            merged.cell_data,
             blocks,
             self.units | {"part": "1"},
             float(self.times[number]),
@@ -241,9 +241,9 @@ class Series:
         size = len(group["Points" if kind == "PointData" else "Types"])
         first = group[f"Steps/{kind}Offsets/{name}"][:][numbers]
         if np.all(np.diff(first) == size):  # consecutive frames need a single read
-            whole = rows[int(first[0]) : int(first[-1]) + size]
-            return whole.reshape(len(numbers), size, *whole.shape[1:])
-        return np.stack([rows[int(at) : int(at) + size] for at in first])
+            consecutive = rows[int(first[0]) : int(first[-1]) + size]
+            return consecutive.reshape(len(numbers), size, *consecutive.shape[1:])
+        return np.stack([rows[int(start) : int(start) + size] for start in first])
 
     def points(self, block: str) -> np.ndarray:
         """Return the points (n, 3) [m] of a block."""

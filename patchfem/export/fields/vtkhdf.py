@@ -74,8 +74,8 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
     packed = large or size > MIN_COMPRESSED_BYTES
     with (
         write_atomically(path, None if large else size) as partial,
-        open_lossy(partial) as kept,
-        h5py.File(kept, "w", libver=("earliest", "v110")) as file,
+        open_lossy(partial) as opened,
+        h5py.File(opened, "w", libver=("earliest", "v110")) as file,
     ):
         root = _create_group(file, "VTKHDF")
         root.attrs["Version"] = VERSION
@@ -118,8 +118,8 @@ def _write_frames(file, steps: list, later: list, count: int) -> None:
     times = [step["Values"][:] for step in steps]
     for number in range(count):
         _set_frame_count(steps, times, number)
-        for one in later:
-            _write_frame(*one, number)
+        for frame_array in later:
+            _write_frame(*frame_array, number)
         file.flush()
     _set_frame_count(steps, times, count)
 
@@ -152,10 +152,10 @@ def _write_frame(dataset, values, nearest, number: int) -> None:
 
 def _set_frame_count(steps: list, times: list, count: int) -> None:
     """Set the number of frames that count."""
-    for one, all_times in zip(steps, times):
-        one.attrs["NSteps"] = np.int64(count)
-        one["Values"].resize((count,))
-        one["Values"][...] = all_times[:count]
+    for group, all_times in zip(steps, times):
+        group.attrs["NSteps"] = np.int64(count)
+        group["Values"].resize((count,))
+        group["Values"][...] = all_times[:count]
 
 
 def round_to_bits(values, bits: int) -> np.ndarray:
@@ -172,9 +172,9 @@ def round_to_bits(values, bits: int) -> np.ndarray:
     raw = np.ascontiguousarray(values, np.float32).view(np.uint32)
     drop = np.uint32(23 - bits)
     half = np.uint32(1) << (drop - np.uint32(1))
-    one = np.uint32(1)
-    near = (raw + (half - one) + ((raw >> drop) & one)) >> drop << drop
-    return np.where(np.isfinite(values), near.view(np.float32), values)
+    unit_bit = np.uint32(1)
+    rounded = (raw + (half - unit_bit) + ((raw >> drop) & unit_bit)) >> drop << drop
+    return np.where(np.isfinite(values), rounded.view(np.float32), values)
 
 
 def round_to_step(values, step: float) -> np.ndarray:
@@ -184,13 +184,15 @@ def round_to_step(values, step: float) -> np.ndarray:
     step are kept.
     """
     values = np.asarray(values, np.float32)
-    step, each = np.float32(step), np.float32(1 / step)
+    step, steps_per_unit = np.float32(step), np.float32(1 / step)
     # The comparison is False if there is a NaN.
     if max(values.max(initial=0.0), -values.min(initial=0.0)) < step * np.float32(1 << 23):
-        return np.rint(values * each) * step
+        return np.rint(values * steps_per_unit) * step
     with np.errstate(over="ignore"):
         return np.where(
-            np.abs(values) < step * np.float32(1 << 23), np.rint(values * each) * step, values
+            np.abs(values) < step * np.float32(1 << 23),
+            np.rint(values * steps_per_unit) * step,
+            values,
         )
 
 
@@ -248,30 +250,30 @@ def _write_field_data(group, steps, text: dict, count: int) -> None:
             sizes[name] = np.tile([1, len(lines)], (count, 1)).astype(np.int64)
 
 
-def _write_mesh(group, one: Block) -> None:
+def _write_mesh(group, block: Block) -> None:
     """Write the mesh of a block."""
     group.attrs["Version"] = VERSION
     group.attrs.create("Type", np.bytes_("UnstructuredGrid"))
-    group["NumberOfPoints"] = np.array([len(one.points)], np.int64)
-    group["NumberOfCells"] = np.array([len(one.types)], np.int64)
-    group["NumberOfConnectivityIds"] = np.array([one.connectivity.size], np.int64)
-    group["Points"] = one.points
-    group["Connectivity"] = one.connectivity
-    group["Offsets"] = one.offsets
-    group["Types"] = one.types
+    group["NumberOfPoints"] = np.array([len(block.points)], np.int64)
+    group["NumberOfCells"] = np.array([len(block.types)], np.int64)
+    group["NumberOfConnectivityIds"] = np.array([block.connectivity.size], np.int64)
+    group["Points"] = block.points
+    group["Connectivity"] = block.connectivity
+    group["Offsets"] = block.offsets
+    group["Types"] = block.types
     for kind in ("PointData", "CellData", "FieldData"):
         _create_group(group, kind)
 
 
-def _write_block(group, one: Block, times, about: tuple) -> None:
+def _write_block(group, block: Block, times, settings: tuple) -> None:
     """Write a block.
 
-    about: units by name; the field arrays of text; the list for arrays that are written frame after
+    settings: units by name; the field arrays of text; the list for arrays that are written frame after
     frame, None if all are written at once; and the steps of rounding by name, None without
     compression.
     """
-    units, text, later, rounding = about
-    _write_mesh(group, one)
+    units, text, later, rounding = settings
+    _write_mesh(group, block)
     steps = _create_steps(group, times)
     count = len(times)
     for name in ("PartOffsets", "PointOffsets"):
@@ -279,15 +281,15 @@ def _write_block(group, one: Block, times, about: tuple) -> None:
     steps["NumberOfParts"] = np.ones(count, np.int64)
     for name in ("CellOffsets", "ConnectivityIdOffsets"):
         steps[name] = np.zeros((count, 1), np.int64)
-    _write_arrays(group, steps, "PointData", one.point_data, (units, later, rounding))
-    _write_arrays(group, steps, "CellData", one.cell_data, (units, later, rounding))
+    _write_arrays(group, steps, "PointData", block.point_data, (units, later, rounding))
+    _write_arrays(group, steps, "CellData", block.cell_data, (units, later, rounding))
     _write_field_data(group, steps, text, count)
 
 
-def _write_arrays(group, steps, kind: str, data: dict, about: tuple) -> None:
+def _write_arrays(group, steps, kind: str, data: dict, settings: tuple) -> None:
     """Write the arrays of a block; about: as for `_write_block`, without the text."""
-    (units, later, rounding), into, offsets = (
-        about,
+    (units, later, rounding), target, offsets = (
+        settings,
         group[kind],
         _create_group(steps, f"{kind}Offsets"),
     )
@@ -297,7 +299,7 @@ def _write_arrays(group, steps, kind: str, data: dict, about: tuple) -> None:
         if rounding is not None and values.dtype == np.float32 and len(values) == count:
             # A chunk has one component: neighbours in it are neighbours in space, which compress to
             # three quarters.
-            one = into.create_dataset(
+            dataset = target.create_dataset(
                 name,
                 (count * size, *values.shape[2:]),
                 values.dtype,
@@ -306,20 +308,22 @@ def _write_arrays(group, steps, kind: str, data: dict, about: tuple) -> None:
                 compression="gzip",
                 compression_opts=1,
             )
-            nearest = _rounding_function(one, rounding.get(name, 0.0), BITS.get(name, MOST_BITS))
+            nearest = _rounding_function(
+                dataset, rounding.get(name, 0.0), BITS.get(name, MOST_BITS)
+            )
             if later is None:
                 for number in range(count):
-                    _write_frame(one, values, nearest, number)
+                    _write_frame(dataset, values, nearest, number)
             else:
-                later.append((one, values, nearest))
+                later.append((dataset, values, nearest))
         else:
-            one = into.create_dataset(name, data=values.reshape(-1, *values.shape[2:]))
-        one.attrs["units"] = units.get(name, "1")
+            dataset = target.create_dataset(name, data=values.reshape(-1, *values.shape[2:]))
+        dataset.attrs["units"] = units.get(name, "1")
         if name in MEANINGS:
-            one.attrs["long_name"] = MEANINGS[name]
+            dataset.attrs["long_name"] = MEANINGS[name]
         if name in CODES:
-            one.attrs["flag_values"] = np.array(list(CODES[name]), np.int8)
-            one.attrs["flag_meanings"] = " ".join(CODES[name].values())
+            dataset.attrs["flag_values"] = np.array(list(CODES[name]), np.int8)
+            dataset.attrs["flag_meanings"] = " ".join(CODES[name].values())
         offsets[name] = (
             np.arange(count) if len(values) == count else np.zeros(count, np.int64)
         ) * size

@@ -88,14 +88,14 @@ def _write_format(series: Series, out: Path, number: int) -> str:
         return f"{out}: {_format_frame_count(len(series))}"
     if out.suffix == ".pvd":
         return f"{out}: {_format_frame_count(write_pvd(out, series))} in {frames_folder(out).name}"
-    one = series.frame(number)
+    frame = series.frame(number)
     if out.suffix == ".vtu":
-        write_vtu(out, one, one.time, one.units)
+        write_vtu(out, frame, frame.time, frame.units)
     else:
-        write_csv(out, one)
+        write_csv(out, frame)
     last = len(series) - 1
-    which = "the last" if one.number == last else f"of 0 to {last}"
-    return f"{out}: frame {one.number} ({which}), {one.time:.6g} s"
+    which = "the last" if frame.number == last else f"of 0 to {last}"
+    return f"{out}: frame {frame.number} ({which}), {frame.time:.6g} s"
 
 
 def _format_frame_count(count: int) -> str:
@@ -129,13 +129,15 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
         If the folder contains other files.
     """
     folder = frames_folder(path)
-    old = list(folder.iterdir()) if folder.is_dir() else []
-    strange = sorted(
-        one.name for one in old if not FRAME.fullmatch(one.name) and not is_partial_name(one.name)
+    old_files = list(folder.iterdir()) if folder.is_dir() else []
+    other_files = sorted(
+        item.name
+        for item in old_files
+        if not FRAME.fullmatch(item.name) and not is_partial_name(item.name)
     )
-    if strange:
+    if other_files:
         raise PatchfemError(
-            f"{folder}: contains files that are not frames of patchfem ({', '.join(strange[:3])}); "
+            f"{folder}: contains files that are not frames of patchfem ({', '.join(other_files[:3])}); "
             "choose another -o"
         )
     try:
@@ -143,28 +145,28 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
     except OSError as error:
         raise explain_write_error(error, folder, folder) from None
     lines = []
-    written = set()
+    written_names = set()
     numbers = range(len(series)) if numbers is None else numbers
     for number in numbers:
-        one = series.frame(number)
-        names = _write_vtm(folder, f"frame_{number:04d}", one if change is None else change(one))
-        written.update(names)
+        item = series.frame(number)
+        names = _write_vtm(folder, f"frame_{number:04d}", item if change is None else change(item))
+        written_names.update(names)
         lines.append(
-            f'<DataSet timestep="{one.time!r}" group="" part="0" '
+            f'<DataSet timestep="{item.time!r}" group="" part="0" '
             f"file={quoteattr(f'{folder.name}/{names[0]}')}/>"
         )
     _write_listing(path, "Collection", "0.1", lines)
-    for one in old:
-        if one.name not in written:
-            one.unlink(missing_ok=True)
+    for item in old_files:
+        if item.name not in written_names:
+            item.unlink(missing_ok=True)
     return len(numbers)
 
 
 def _write_vtm(folder: Path, stem: str, frame: Frame) -> list:
     """Write a frame as a .vtm and a .vtu per block; return the file names, the .vtm first."""
     names = [f"{stem}_{name}.vtu" for name in frame.blocks]
-    for name, one in zip(names, frame.blocks.values()):
-        write_vtu(folder / name, one, frame.time, frame.units)
+    for name, block_data in zip(names, frame.blocks.values()):
+        write_vtu(folder / name, block_data, frame.time, frame.units)
     _write_listing(
         folder / f"{stem}.vtm",
         "vtkMultiBlockDataSet",
@@ -255,18 +257,18 @@ def _field_meanings(names: tuple, units: dict) -> list:
     ]
 
 
-def _array_xml(name: str, values, unit: str | None = None, more: str = "") -> str:
+def _array_xml(name: str, values, unit: str | None = None, attributes: str = "") -> str:
     """Return an array as XML."""
     values = np.ascontiguousarray(values)
     kind = TYPES[values.dtype.newbyteorder("<").str[1:]]
     if values.ndim > 1:
-        more += f' NumberOfComponents="{values.shape[1]}"'
+        attributes += f' NumberOfComponents="{values.shape[1]}"'
     label = (
         ""
         if unit is None
         else f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{unit}</InformationKey>'
     )
-    head = f'<DataArray type="{kind}" Name={quoteattr(name)}{more} format="binary">'
+    head = f'<DataArray type="{kind}" Name={quoteattr(name)}{attributes} format="binary">'
     return f"{head}\n{_compress_array(values)}\n{label}</DataArray>"
 
 
@@ -293,11 +295,11 @@ def write_csv(path: Path, frame: Frame) -> None:
     head = ["x [m]"]
     columns = [[repr(float(x)) for x in line.points[nodes, 0]]]
     for name, values in line.point_data.items():
-        mine = values[nodes]
+        node_values = values[nodes]
         parts = (
-            [(name, mine)]
-            if mine.ndim == 1
-            else [(f"{name}_{axis}", mine[:, k]) for k, axis in enumerate("xyz")]
+            [(name, node_values)]
+            if node_values.ndim == 1
+            else [(f"{name}_{axis}", node_values[:, k]) for k, axis in enumerate("xyz")]
         )
         for label, part in parts:
             head.append(f"{label} [{frame.units.get(name, '1')}]")

@@ -44,18 +44,20 @@ class Estimate(NamedTuple):
     begin: str = ""
 
 
-def convert_file(file: Path, out: Path, asked: Iterable[str], zero: bool, how: Estimate) -> dict:
+def convert_file(
+    file: Path, out: Path, requests: Iterable[str], zero: bool, settings: Estimate
+) -> dict:
     """Write the records (.csv), modes (.toml) or response (.uff) of a file.
 
     Parameters
     ----------
     file : Path
     out : Path
-    asked : iterable of str
+    requests : iterable of str
         Channels as in `patchfem import --map`.
     zero : bool
         Whether time and displacement are measured from their first row.
-    how : Estimate
+    settings : Estimate
 
     Returns
     -------
@@ -67,53 +69,55 @@ def convert_file(file: Path, out: Path, asked: Iterable[str], zero: bool, how: E
     PatchfemError
         If options do not fit together.
     """
-    ending = out.suffix.lower()
-    if ending not in (".csv", ".toml", ".uff", ".unv"):
+    suffix = out.suffix.lower()
+    if suffix not in (".csv", ".toml", ".uff", ".unv"):
         raise PatchfemError(
             f"{out}: records are written as .csv, modes as .toml, a frequency response as .uff"
         )
-    if ending == ".csv" and how != Estimate(decay=how.decay, begin=how.begin if how.decay else ""):
+    if suffix == ".csv" and settings != Estimate(
+        decay=settings.decay, begin=settings.begin if settings.decay else ""
+    ):
         raise PatchfemError(
             "--segment, --window, --band and, without --decay, --begin can be used only for modes (-o "
             "modes.toml) and responses (-o response.uff)"
         )
-    if zero and how.decay:
+    if zero and settings.decay:
         raise PatchfemError(
             "--zero can be used only when importing a table of records, not with --decay"
         )
-    if zero and ending != ".csv":
+    if zero and suffix != ".csv":
         raise PatchfemError(
             "--zero can be used only when importing a table of records (-o table.csv)"
         )
-    if ending == ".csv":
+    if suffix == ".csv":
         return (
-            _write_decay(file, out, asked, how.begin)
-            if how.decay
-            else _write_table(file, out, asked, zero)
+            _write_decay(file, out, requests, settings.begin)
+            if settings.decay
+            else _write_table(file, out, requests, zero)
         )
-    return (_write_modes if ending == ".toml" else _write_response)(file, out, asked, how)
+    return (_write_modes if suffix == ".toml" else _write_response)(file, out, requests, settings)
 
 
-def _write_table(file: Path, out: Path, asked, zero: bool) -> dict:
+def _write_table(file: Path, out: Path, requests, zero: bool) -> dict:
     """Write records as a table."""
-    found = laboratory.read_records(file, records.parse_requests(asked))
-    values = records.shift_to_zero(found.values) if zero else found.values
+    laboratory_records = laboratory.read_records(file, records.parse_requests(requests))
+    values = records.shift_to_zero(laboratory_records.values) if zero else laboratory_records.values
     units = {name: SI_UNITS[name] for name in values}
     write.write_table(out, values, units)
     rows = len(next(iter(values.values())))
-    moved = [
+    shifted_starts = [
         f"{name} starts at {values[name][0]:g} {SI_UNITS[name]}"
         for name in ("time", "displacement", "lateral")
         if "displacement" in values and name in values and values[name][0] != 0
     ]
     notes = [
-        *found.notes,
+        *laboratory_records.notes,
         *(
             [
-                f"{', '.join(moved)}: slide.file needs a table that starts at 0; use --zero to subtract "
+                f"{', '.join(shifted_starts)}: slide.file needs a table that starts at 0; use --zero to subtract "
                 "the first row"
             ]
-            if moved
+            if shifted_starts
             else []
         ),
     ]
@@ -125,109 +129,116 @@ def _write_table(file: Path, out: Path, asked, zero: bool) -> dict:
     }
 
 
-def _write_decay(file: Path, out: Path, asked, begin: str) -> dict:
+def _write_decay(file: Path, out: Path, requests, begin_text: str) -> dict:
     """Write frequency and damping of a free decay as a table."""
-    values, notes = _read_records(file, asked)
-    found, more = measured.compute_decay_curve(
-        values, _parse_quantity(begin, "time", f"--begin {begin}")
+    values, notes = _read_records(file, requests)
+    curve, curve_notes = measured.compute_decay_curve(
+        values, _parse_quantity(begin_text, "time", f"--begin {begin_text}")
     )
     write.write_table(
         out,
-        {f"decay_{name}": one for name, one in found._asdict().items()},
+        {f"decay_{name}": values_of_name for name, values_of_name in curve._asdict().items()},
         {f"decay_{name}": unit for name, unit in write.DECAY.items()},
     )
     ends = [
-        f"{formatting.format_value(found.frequency[k], found.frequency_error[k], unit='Hz')} with a damping ratio of "
-        f"{formatting.format_value(found.damping[k], found.damping_error[k])} at "
-        f"{formatting.format_quantity(found.amplitude[k], 'm', 3)}"
+        f"{formatting.format_value(curve.frequency[k], curve.frequency_error[k], unit='Hz')} with a damping ratio of "
+        f"{formatting.format_value(curve.damping[k], curve.damping_error[k])} at "
+        f"{formatting.format_quantity(curve.amplitude[k], 'm', 3)}"
         for k in (0, -1)
     ]
     return {
-        "points": found.time.size,
-        **{f"decay_{name}": one.tolist() for name, one in found._asdict().items()},
-        "notes": [*notes, *more],
-        "told": f"{found.time.size} amplitudes, from {ends[0]} to {ends[1]}",
+        "points": curve.time.size,
+        **{
+            f"decay_{name}": values_of_name.tolist()
+            for name, values_of_name in curve._asdict().items()
+        },
+        "notes": [*notes, *curve_notes],
+        "told": f"{curve.time.size} amplitudes, from {ends[0]} to {ends[1]}",
     }
 
 
-def _write_modes(file: Path, out: Path, asked, how: Estimate) -> dict:
+def _write_modes(file: Path, out: Path, requests, settings: Estimate) -> dict:
     """Write modes as tables of a scene."""
-    shapes, notes = _read_shapes(file, asked, how)
+    shapes, notes = _read_shapes(file, requests, settings)
     if shapes is not None:
-        found = measured.list_shape_modes(*shapes)
+        modes = measured.list_shape_modes(*shapes)
     else:
-        values, notes = _read_records(file, asked)
-        found = (
+        values, notes = _read_records(file, requests)
+        modes = (
             measured.identify_decay_modes(
-                values, _parse_quantity(how.begin, "time", f"--begin {how.begin}")
+                values, _parse_quantity(settings.begin, "time", f"--begin {settings.begin}")
             )
-            if how.decay
+            if settings.decay
             else measured.identify_driven_modes(
                 values,
-                _parse_segment(how.segment),
-                _parse_window(how.window),
-                _parse_band(how.band),
+                _parse_segment(settings.segment),
+                _parse_window(settings.window),
+                _parse_band(settings.band),
             )
         )
-    atomic_write.write_text(out, mode_lines.structure_text(found, file.name))
-    listed = [
+    atomic_write.write_text(out, mode_lines.structure_text(modes, file.name))
+    mode_entries = [
         {"frequency": f, "damping": zeta, "about": about}
         for f, zeta, about in zip(
-            found.frequency.tolist(), found.damping.tolist(), found.descriptions
+            modes.frequency.tolist(), modes.damping.tolist(), modes.descriptions
         )
     ]
-    told = "; ".join(
-        f"{one['frequency']:.5g} Hz with a damping of {one['damping']:.4g}" for one in listed
+    summary = "; ".join(
+        f"{entry['frequency']:.5g} Hz with a damping of {entry['damping']:.4g}"
+        for entry in mode_entries
     )
     return {
-        "modes": listed,
-        "moving_mass": found.mass,
-        "notes": [*notes, *found.notes],
-        "told": told,
+        "modes": mode_entries,
+        "moving_mass": modes.mass,
+        "notes": [*notes, *modes.notes],
+        "told": summary,
     }
 
 
-def _write_response(file: Path, out: Path, asked, how: Estimate) -> dict:
+def _write_response(file: Path, out: Path, requests, settings: Estimate) -> dict:
     """Write a frequency response as a universal file."""
-    if how.decay or how.begin or how.band:
+    if settings.decay or settings.begin or settings.band:
         raise PatchfemError(
             "--decay, --begin and --band can be used only for modes (-o modes.toml)"
         )
-    values, notes = _read_records(file, asked)
-    found, step, drive, response = measured.estimate_record(
-        values, _parse_segment(how.segment), _parse_window(how.window)
+    values, notes = _read_records(file, requests)
+    estimate, step, drive, response = measured.estimate_record(
+        values, _parse_segment(settings.segment), _parse_window(settings.window)
     )
-    write.write_response(out, found, drive, response)
+    write.write_response(out, estimate, drive, response)
     return {
-        "lines": found.frequency.size,
-        "segments": found.segments,
-        "window": found.window,
+        "lines": estimate.frequency.size,
+        "segments": estimate.segments,
+        "window": estimate.window,
         "notes": notes,
-        "told": f"{response} over {drive}, {found.frequency.size} frequencies from {found.segments} segments of "
-        f"{found.segment * step:.4g} s, window {found.window}",
+        "told": f"{response} over {drive}, {estimate.frequency.size} frequencies from {estimate.segments} segments of "
+        f"{estimate.segment * step:.4g} s, window {estimate.window}",
     }
 
 
-def _read_records(file: Path, asked) -> tuple:
+def _read_records(file: Path, requests) -> tuple:
     """Read records and check that one of them is a response."""
-    found = laboratory.read_records(file, records.parse_requests(asked), OUTPUT)
-    if found.channel_list and not found.values.keys() & measured.DERIVATIVE_ORDERS.keys():
+    laboratory_records = laboratory.read_records(file, records.parse_requests(requests), OUTPUT)
+    if (
+        laboratory_records.channel_list
+        and not laboratory_records.values.keys() & measured.DERIVATIVE_ORDERS.keys()
+    ):
         raise PatchfemError(
             f"{file}: no channel is known as a response ({', '.join(measured.DERIVATIVE_ORDERS)}); choose one with "
-            f"--map {next(iter(measured.DERIVATIVE_ORDERS))}=CHANNEL among {found.channel_list}"
+            f"--map {next(iter(measured.DERIVATIVE_ORDERS))}=CHANNEL among {laboratory_records.channel_list}"
         )
-    return found.values, found.notes
+    return laboratory_records.values, laboratory_records.notes
 
 
-def _read_shapes(file: Path, asked, how: Estimate) -> tuple:
+def _read_shapes(file: Path, requests, settings: Estimate) -> tuple:
     """Return ((shapes, points), notes) of a universal file with modes or frequency responses.
 
     (None, ()) for any other file.
     """
-    names = {text.partition("=")[0].strip() for text in asked}
+    names = {text.partition("=")[0].strip() for text in requests}
     if (
         file.suffix.lower() not in laboratory.UNIVERSAL_EXTENSIONS
-        or how != Estimate()
+        or settings != Estimate()
         or names & set(CHANNEL_UNITS)
     ):
         return None, ()
@@ -243,8 +254,8 @@ def _read_shapes(file: Path, asked, how: Estimate) -> tuple:
     return (
         shapes,
         {
-            one.quantity: one.source
-            for one in records.parse_requests(asked, measured.SHAPE_QUANTITIES)
+            request.quantity: request.source
+            for request in records.parse_requests(requests, measured.SHAPE_QUANTITIES)
         },
     ), ()
 
@@ -275,8 +286,8 @@ def _parse_band(text: str) -> tuple:
         return (0.0, float("inf"))
     low, dots, high = text.partition("..")
     ends = [
-        _parse_quantity(one, "frequency", f"--band {one}")
-        for one in (low.strip(), high.strip())
+        _parse_quantity(end, "frequency", f"--band {end}")
+        for end in (low.strip(), high.strip())
         if dots
     ]
     if not ends or None in ends or not 0 <= ends[0] < ends[1]:

@@ -9,19 +9,19 @@ from .series import Histories, program_name
 LONGEST = 63  # largest number of characters of a name in MATLAB
 
 
-def write_arrays(path: Path, found: Histories) -> None:
+def write_arrays(path: Path, histories: Histories) -> None:
     """Write all arrays of a folder by name, histories as (k, 1).
 
     `units.NAME` is the unit of NAME.
     """
     from scipy.io import savemat
 
-    values = {name[:LONGEST]: np.asarray(array) for name, (array, _) in found.arrays.items()}
-    units = {name[:LONGEST]: unit for name, (_, unit) in found.arrays.items()}
+    values = {name[:LONGEST]: np.asarray(array) for name, (array, _) in histories.arrays.items()}
+    units = {name[:LONGEST]: unit for name, (_, unit) in histories.arrays.items()}
     with open(path, "wb") as file:
         savemat(
             file,
-            {**values, "units": units, "title": found.title, "source": program_name()},
+            {**values, "units": units, "title": histories.title, "source": program_name()},
             oned_as="column",
             long_field_names=True,
         )

@@ -18,22 +18,22 @@ RESPONSE = 4
 COHERENCE = 6
 
 
-def structure_text(found, source: str) -> str:
+def structure_text(modes, source: str) -> str:
     """Return [structure] and its [[structure.mode]] as text.
 
-    found: `identify.measured_modes.ListedModes`; source: name of the file with the measurement.
+    modes: `identify.measured_modes.ListedModes`; source: name of the file with the measurement.
     """
     lines = [f"# modes of {make_printable(source)}, by {program_name()}"] + [
-        f"# {make_printable(note)}" for note in found.notes
+        f"# {make_printable(note)}" for note in modes.notes
     ]
     mass = (
-        f'moving_mass = "{found.mass!r} kg"'
-        if found.mass is not None
+        f'moving_mass = "{modes.mass!r} kg"'
+        if modes.mass is not None
         else 'moving_mass = "1 kg"  # assumed: not in the record'
     )
     lines += ["", "[structure]", mass]
     for k, (f, zeta, about) in enumerate(
-        zip(found.frequency.tolist(), found.damping.tolist(), found.descriptions)
+        zip(modes.frequency.tolist(), modes.damping.tolist(), modes.descriptions)
     ):
         lines += [
             "",
@@ -44,7 +44,7 @@ def structure_text(found, source: str) -> str:
         ]
         lines += [
             f'{key} = "{float(row[k])!r} rad/m"' if key == "pitch" else f"{key} = {float(row[k])!r}"
-            for key, row in found.rows.items()
+            for key, row in modes.rows.items()
         ]
     return "\n".join(lines) + "\n"
 
@@ -68,8 +68,8 @@ def write_response(path: Path, estimate, drive: str, response: str) -> None:
     drive, response : str
         Kinds of input and output, keys of OVER and KINDS.
     """
-    (kind, unit), (over, below) = KINDS[response], OVER[drive]
-    both = {
+    (kind, unit), (drive_type, drive_unit) = KINDS[response], OVER[drive]
+    common = {
         "type": 58,
         "binary": 1,
         "id1": f"{response} over {drive}",
@@ -86,19 +86,19 @@ def write_response(path: Path, estimate, drive: str, response: str) -> None:
     }
     sets = [
         SI,
-        both
+        common
         | {
             "func_type": RESPONSE,
             "ordinate_spec_data_type": kind,
             "ordinate_axis_units_lab": unit,
-            "orddenom_spec_data_type": over,
-            "orddenom_axis_units_lab": below,
+            "orddenom_spec_data_type": drive_type,
+            "orddenom_axis_units_lab": drive_unit,
             "data": np.array(estimate.value),
         },
     ]
     if estimate.coherence is not None:
         sets.append(
-            both
+            common
             | {
                 "func_type": COHERENCE,
                 "id1": f"coherence of {response} and {drive}",

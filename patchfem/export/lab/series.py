@@ -64,12 +64,15 @@ class Histories:
 
     def loops(self) -> list:
         """Return the friction loops as pairs of columns (slide, resistance), one per interface."""
-        by = {(column.name, column.number): column for column in self.columns}
+        columns_by_name = {(column.name, column.number): column for column in self.columns}
         found = {}
         for slide, force in LOOPS:
-            for number in sorted(number for name, number in by if name == slide):
-                if (force, number) in by:
-                    found.setdefault((force, number), (by[slide, number], by[force, number]))
+            for number in sorted(number for name, number in columns_by_name if name == slide):
+                if (force, number) in columns_by_name:
+                    found.setdefault(
+                        (force, number),
+                        (columns_by_name[slide, number], columns_by_name[force, number]),
+                    )
         return list(found.values())
 
 
@@ -93,11 +96,15 @@ def read_histories(folder: Path) -> Histories:
 
 def _read_run_histories(path: Path) -> Histories:
     """Read the histories of a run."""
-    about, found = read_variables(path)
-    title = str(about.get("title", ""))
-    arrays = {name: (one.values, one.unit) for name, one in found.items() if is_real(one.values)}
+    attributes, variables = read_variables(path)
+    title = str(attributes.get("title", ""))
+    arrays = {
+        name: (variable.values, variable.unit)
+        for name, variable in variables.items()
+        if is_real(variable.values)
+    }
     columns = []
-    for name, (dims, values, unit) in found.items():
+    for name, (dims, values, unit) in variables.items():
         if "time" not in dims or name == "time" or not is_real(values):
             continue
         if len(dims) == 1:
@@ -105,12 +112,12 @@ def _read_run_histories(path: Path) -> Histories:
         elif len(dims) == 2:
             rows = values if dims[1] == "time" else values.T
             columns += [Column(name, unit, row.astype(float), k) for k, row in enumerate(rows, 1)]
-    if not columns or "time" not in found:
+    if not columns or "time" not in variables:
         raise PatchfemError(
             f"{path}: a static patch has no history; its fields are exported as .pvd, .vtu, .vtkhdf, "
             "or .csv of the interface"
         )
-    return Histories(title, found["time"][1].astype(float), columns, arrays)
+    return Histories(title, variables["time"][1].astype(float), columns, arrays)
 
 
 def _read_fit_histories(path: Path) -> Histories:

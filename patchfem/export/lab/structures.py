@@ -79,17 +79,17 @@ def export_structure(model: Model, out: Path) -> str:
             )
         _refuse_unsupported(model)
         arrays = rig_matrices(model)
-        found = friction_elements(model)
+        elements = friction_elements(model)
     with write_atomically(out) as partial, open(partial, "wb") as file:
         if out.suffix.lower() == ".npz":
-            np.savez(file, **arrays, **found._asdict())
+            np.savez(file, **arrays, **elements._asdict())
         else:
-            _write_nlvib(file, arrays, found)
+            _write_nlvib(file, arrays, elements)
     counts = (
         f"{count} {name}{'s' * (count != 1)}"
         for count, name in (
             (len(arrays["M"]), "coordinate"),
-            (found.limit.size, "friction element"),
+            (elements.limit.size, "friction element"),
         )
     )
     name = "output" if out.suffix.lower() == ".npz" else "T_out"
@@ -128,32 +128,32 @@ def rig_matrices(model: Model) -> dict:
     """
     rig = model.rig
     modes = model.rig.modes
-    turn = _coordinate_basis(
+    basis = _coordinate_basis(
         modes.interfaces if rig.friction.interfaces else np.zeros((0, modes.omega.size))
     )
     mass = modes.mass
     sine = isinstance(rig.drive.signal, SineDrive)
     size = rig.drive.signal.acceleration if sine else float(rig.drive.kind != "free")
-    found = {}
+    vectors = {}
     if rig.drive.kind == "base":
-        found["base"] = np.linalg.solve(turn, modes.base)
+        vectors["base"] = np.linalg.solve(basis, modes.base)
     elif rig.drive.kind == "force":
-        found["force"] = -modes.base @ turn
+        vectors["force"] = -modes.base @ basis
     if rig.friction.interfaces:
-        found["slide"] = modes.interfaces @ turn
+        vectors["slide"] = modes.interfaces @ basis
     if sine or rig.drive.levels.amplitudes:
-        found["Omega"] = 2 * np.pi * rig.drive.frequency
+        vectors["Omega"] = 2 * np.pi * rig.drive.frequency
     M, C, K = (
-        mass * turn.T @ one @ turn
-        for one in (np.eye(len(turn)), modes.damping_matrix, np.diag(modes.omega**2))
+        mass * basis.T @ modal_matrix @ basis
+        for modal_matrix in (np.eye(len(basis)), modes.damping_matrix, np.diag(modes.omega**2))
     )
     return {
         "M": M,
         "C": C,
         "K": K,
-        "output": modes.output @ turn,
-        "Fex1": -size * mass * modes.base @ turn,
-        **found,
+        "output": modes.output @ basis,
+        "Fex1": -size * mass * modes.base @ basis,
+        **vectors,
     }
 
 
@@ -162,10 +162,10 @@ def _coordinate_basis(slides) -> np.ndarray:
     i, n = slides.shape
     if not i or i > n:
         return np.eye(n)
-    left, size, right = np.linalg.svd(slides)
+    left_vectors, singular_values, right_vectors = np.linalg.svd(slides)
     return (
-        np.hstack([right[:i].T / size @ left.T, right[i:].T])
-        if size[-1] > DEPENDENCE_TOL * size[0]
+        np.hstack([right_vectors[:i].T / singular_values @ left_vectors.T, right_vectors[i:].T])
+        if singular_values[-1] > DEPENDENCE_TOL * singular_values[0]
         else np.eye(n)
     )
 
@@ -180,18 +180,18 @@ def _refuse_unsupported(model: Model) -> None:
     rig = model.rig
     motion = engines.motion_properties(model, steady=True)
     if _is_speed_only(rig):
-        why = methods.find_first_unsupported(SPEED_LAW_SUPPORT, motion)
+        reason = methods.find_first_unsupported(SPEED_LAW_SUPPORT, motion)
     else:
-        why = engines.PIECES.lacks(model, steady=True)
-    if why.startswith("for law"):
+        reason = engines.PIECES.lacks(model, steady=True)
+    if reason.startswith("for law"):
         raise PatchfemError(
-            f"{why.removeprefix('for ')} cannot be written as friction elements that stretch and slip; "
+            f"{reason.removeprefix('for ')} cannot be written as friction elements that stretch and slip; "
             "use law 'elastic-plastic', 'iwan' or 'tanh', or law 'coulomb' with [contact.shear]",
             f"{rig.friction.interfaces[0].key}.law",
         )
-    if why:
+    if reason:
         raise PatchfemError(
-            f"matrices and friction elements cannot be written {why}; remove this feature from the "
+            f"matrices and friction elements cannot be written {reason}; remove this feature from the "
             "scene",
             "structure",
         )
@@ -201,9 +201,9 @@ def friction_elements(model: Model) -> Elements:
     """Return the friction elements of a rig; none if it has no friction."""
     rig = model.rig
     n = model.rig.modes.omega.size
-    none = np.zeros(0)
+    no_values = np.zeros(0)
     if not rig.friction.interfaces:
-        return Elements("elements", np.zeros((0, n)), none, none, none)
+        return Elements("elements", np.zeros((0, n)), no_values, no_values, no_values)
     rows = rig.modes.interfaces @ _coordinate_basis(rig.modes.interfaces)
     laws = [interface.numbers for interface in rig.friction.interfaces]
     if _is_speed_only(rig):
@@ -213,7 +213,9 @@ def friction_elements(model: Model) -> Elements:
                 for law, one in zip(laws, rig.friction.interfaces)
             ]
         )
-        return Elements("tanh", rows, limit, none, np.array([law.reference_speed for law in laws]))
+        return Elements(
+            "tanh", rows, limit, no_values, np.array([law.reference_speed for law in laws])
+        )
     patch = None
     if model.patch is not None:
         patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
@@ -224,29 +226,30 @@ def friction_elements(model: Model) -> Elements:
     stiffness = np.concatenate([group.stiffness for group in groups])
     limit = np.concatenate([group.stiffness * group.yield_displacement for group in groups])
     direction = np.repeat(rows, [group.stiffness.size for group in groups], axis=0)
-    return Elements("elements", direction, limit, stiffness, none)
+    return Elements("elements", direction, limit, stiffness, no_values)
 
 
-def _write_nlvib(file, arrays: dict, found: Elements) -> None:
+def _write_nlvib(file, arrays: dict, elements: Elements) -> None:
     """Write the variables of NLvib, column vectors, and a cell array of its structures."""
     from scipy.io import savemat
 
-    cells = np.empty((1, found.limit.size), dtype=object)
-    for k, limit in enumerate(found.limit):
-        own = (
-            {"stiffness": found.stiffness[k], "ishysteretic": 1.0}
-            if found.form == "elements"
-            else {"eps": found.speed[k], "ishysteretic": 0.0}
+    cells = np.empty((1, elements.limit.size), dtype=object)
+    for k, limit in enumerate(elements.limit):
+        settings = (
+            {"stiffness": elements.stiffness[k], "ishysteretic": 1.0}
+            if elements.form == "elements"
+            else {"eps": elements.speed[k], "ishysteretic": 0.0}
         )
         cells[0, k] = {
-            "type": NLVIB[found.form],
-            "force_direction": found.direction[k][:, None],
+            "type": NLVIB[elements.form],
+            "force_direction": elements.direction[k][:, None],
             "friction_limit_force": limit,
             "islocal": 1.0,
-            **own,
+            **settings,
         }
     column = {
-        name: np.asarray(one)[:, None] if np.ndim(one) == 1 else one for name, one in arrays.items()
+        name: np.asarray(array)[:, None] if np.ndim(array) == 1 else array
+        for name, array in arrays.items()
     }
     savemat(
         file,

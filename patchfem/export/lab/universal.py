@@ -32,7 +32,7 @@ SI = {
 }
 
 
-def write_histories(path: Path, found: Histories) -> int:
+def write_histories(path: Path, histories: Histories) -> int:
     """Write the columns over time and the loops; return the number of datasets 58.
 
     Identification line 1 is the name of the history (for a loop, "force over slide"), line 2 the
@@ -46,7 +46,7 @@ def write_histories(path: Path, found: Histories) -> int:
     Missing
         If pyuff is not installed.
     """
-    for column in found.columns:
+    for column in histories.columns:
         if not np.isfinite(column.values).all():  # pyuff would write these values as 0
             raise PatchfemError(
                 f"{path}: {column.label} has values that are not finite, which a universal file cannot "
@@ -54,17 +54,21 @@ def write_histories(path: Path, found: Histories) -> int:
             )
     sets = (
         []
-        if found.time is None
+        if histories.time is None
         else [
             _function_dataset(
-                column.label, Column("time", "s", found.time, 0), column, HISTORY, found.title
+                column.label,
+                Column("time", "s", histories.time, 0),
+                column,
+                HISTORY,
+                histories.title,
             )
-            for column in found.columns
+            for column in histories.columns
         ]
     )
     sets += [
-        _function_dataset(f"{force.label} over {slide.label}", slide, force, LOOP, found.title)
-        for slide, force in found.loops()
+        _function_dataset(f"{force.label} over {slide.label}", slide, force, LOOP, histories.title)
+        for slide, force in histories.loops()
     ]
     if not sets:
         raise PatchfemError(f"{path}: contains neither times nor a loop to write")
@@ -86,37 +90,37 @@ def write_sets(path: Path, sets: list) -> None:
     path = Path(path)
     path.write_bytes(b"")
     file = pyuff.UFF(str(path))
-    for one in sets:
-        begin = path.stat().st_size
-        file.write_sets(one, "add")
-        if one["type"] == 58:
-            values = 2 if one["data"].dtype.kind == "c" else 1
+    for dataset in sets:
+        start = path.stat().st_size
+        file.write_sets(dataset, "add")
+        if dataset["type"] == 58:
+            values = 2 if dataset["data"].dtype.kind == "c" else 1
             _write_byte_count(
-                path, begin, 8 * one["data"].size * (values + 1 - one["abscissa_spacing"])
+                path, start, 8 * dataset["data"].size * (values + 1 - dataset["abscissa_spacing"])
             )
 
 
-def _write_byte_count(path: Path, begin: int, size: int) -> None:
+def _write_byte_count(path: Path, start: int, size: int) -> None:
     """Write the number of bytes after the eleven lines of text into a dataset 58.
 
     Parameters
     ----------
     path : Path
-    begin : int
+    start : int
         Position of the dataset in the file.
     size : int
         Number of bytes.
     """
     with open(path, "r+b") as file:
-        file.seek(begin)
+        file.seek(start)
         head = file.read(200)
         # The number follows the byte order, the float format and the number of lines of text.
         at = head.index(b"b", head.index(b"    58")) + 1 + 6 + 6 + 12
-        file.seek(begin + at)
+        file.seek(start + at)
         file.write(b"%12d" % size)
 
 
-def _function_dataset(name: str, over: Column, one: Column, kind: int, title: str) -> dict:
+def _function_dataset(name: str, abscissa: Column, ordinate: Column, kind: int, title: str) -> dict:
     """Return a dataset 58 of a column over another one."""
     line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
     return {
@@ -132,20 +136,20 @@ def _function_dataset(name: str, over: Column, one: Column, kind: int, title: st
         "id4": line or "NONE",
         "id5": "NONE",
         "rsp_ent_name": "NONE",
-        "rsp_node": one.number or 1,
+        "rsp_node": ordinate.number or 1,
         "rsp_dir": 1,
         "ref_ent_name": "NONE",
         "ref_node": 0,
         "ref_dir": 0,
         "abscissa_spacing": 0,
-        "abscissa_spec_data_type": TIME if over.name == "time" else DISPLACEMENT,
-        "abscissa_axis_lab": "Time" if over.name == "time" else "Displacement",
-        "abscissa_axis_units_lab": over.unit,
-        "ordinate_spec_data_type": TYPES.get(one.unit, GENERAL),
-        "ordinate_axis_lab": one.label[:20],
-        "ordinate_axis_units_lab": LABELS.get(one.unit, one.unit)[:20],
+        "abscissa_spec_data_type": TIME if abscissa.name == "time" else DISPLACEMENT,
+        "abscissa_axis_lab": "Time" if abscissa.name == "time" else "Displacement",
+        "abscissa_axis_units_lab": abscissa.unit,
+        "ordinate_spec_data_type": TYPES.get(ordinate.unit, GENERAL),
+        "ordinate_axis_lab": ordinate.label[:20],
+        "ordinate_axis_units_lab": LABELS.get(ordinate.unit, ordinate.unit)[:20],
         "orddenom_spec_data_type": 0,
         "z_axis_spec_data_type": 0,
-        "data": np.ascontiguousarray(one.values, float),
-        "x": np.ascontiguousarray(over.values, float),
+        "data": np.ascontiguousarray(ordinate.values, float),
+        "x": np.ascontiguousarray(abscissa.values, float),
     }

@@ -32,36 +32,38 @@ def export_histories(folder: Path, out: Path) -> str:
     out = Path(out)
     if out.suffix.lower() not in ENDINGS:
         raise PatchfemError(f"{out}: histories are exported as {', '.join(ENDINGS)}")
-    found = read_histories(folder)
-    rows = found.columns[0].values.size
-    told = f"{out}: {rows} rows of {', '.join(column.label for column in found.columns[:8])}" + (
-        f" and {len(found.columns) - 8} more" if len(found.columns) > 8 else ""
+    histories = read_histories(folder)
+    rows = histories.columns[0].values.size
+    summary = (
+        f"{out}: {rows} rows of {', '.join(column.label for column in histories.columns[:8])}"
+        + (f" and {len(histories.columns) - 8} more" if len(histories.columns) > 8 else "")
     )
-    told += _thinning_note(found)
+    summary += _thinning_note(histories)
     with write_atomically(out) as partial:
         if out.suffix.lower() == ".mat":
-            matlab.write_arrays(partial, found)
+            matlab.write_arrays(partial, histories)
         elif out.suffix.lower() == ".csv":
-            table.write_columns(partial, found.time, found.columns)
+            table.write_columns(partial, histories.time, histories.columns)
         else:
-            universal.write_histories(partial, found)
-            told += f"; {len(found.loops())} loops"
-    return told
+            universal.write_histories(partial, histories)
+            summary += f"; {len(histories.loops())} loops"
+    return summary
 
 
-def _thinning_note(found) -> str:
+def _thinning_note(histories) -> str:
     """Return the note about early rows of histories that contain only reversals; else ""."""
-    place = next(
-        (column.values for column in found.columns if column.name.endswith("displacement")), None
+    displacement = next(
+        (column.values for column in histories.columns if column.name.endswith("displacement")),
+        None,
     )
-    if place is None or found.time is None:
+    if displacement is None or histories.time is None:
         return ""
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(place))) != 0) + 1
-    few = np.flatnonzero(np.diff(turns) < MIN_ROWS_PER_SWING)
-    if few.size < MIN_ROWS_PER_SWING or few.size < (few[-1] + 1) / 2:
+    reversals = np.flatnonzero(np.diff(np.sign(np.diff(displacement))) != 0) + 1
+    thinned = np.flatnonzero(np.diff(reversals) < MIN_ROWS_PER_SWING)
+    if thinned.size < MIN_ROWS_PER_SWING or thinned.size < (thinned[-1] + 1) / 2:
         return ""
     return (
-        f"; before {format_quantity(float(found.time[turns[few[-1] + 1]]), 's', 3)} the rows are turning points, stops and "
+        f"; before {format_quantity(float(histories.time[reversals[thinned[-1] + 1]]), 's', 3)} the rows are turning points, stops and "
         f"starts of slip alone: a release of up to {MAX_STORED_SAMPLES // MIN_SAMPLES_PER_CYCLE} cycles "
         "(drive.cycles) has even rows all along, any other run in its last cycles"
     )

@@ -73,10 +73,10 @@ def document_html(
         f'<section id="{section.anchor}"><h2>{escape(section.heading)}</h2>\n{section.html}</section>'
         for section in sections
     )
-    drawn = ""
+    library_and_data = ""
     if scripts:
         lead = f"<p id=old class='verdict warn' hidden>{OLD_BROWSER_NOTE}</p>{lead}"
-        drawn = (
+        library_and_data = (
             f"<script type=text/plain id=library>{library.packed_bokeh()}</script>\n<script type=text/plain id=data>"
             f"{library.pack_text(to_json(data or {}))}</script>\n"
             + "".join(
@@ -89,7 +89,7 @@ def document_html(
         f"<!doctype html><html lang=en><head><meta charset=utf-8>"
         f"<meta name=viewport content='width=device-width, initial-scale=1'><title>{escape(title)}</title>"
         f"<style>{library.read_file('page.css')}</style></head><body>\n"
-        f"<header><h1>{with_line_breaks(title)}</h1>{lead}</header>\n{contents}<main>\n{body}\n</main>\n{drawn}</body></html>\n"
+        f"<header><h1>{with_line_breaks(title)}</h1>{lead}</header>\n{contents}<main>\n{body}\n</main>\n{library_and_data}</body></html>\n"
     )
 
 
@@ -114,7 +114,7 @@ def table_html(heads: Sequence, rows: Iterable, frame: str = "across", kind: str
     str
     """
     numbers = [" class=n" * head.startswith(">") for head in heads]
-    top = "".join(
+    head_cells = "".join(
         f"<th scope=col{number}>{head.removeprefix('>')}</th>"
         for number, head in zip(numbers, heads)
     )
@@ -134,7 +134,7 @@ def table_html(heads: Sequence, rows: Iterable, frame: str = "across", kind: str
         )
     return (
         f"<div class='{frame}'><table{f' class={kind}' if kind else ''}>"
-        f"{f'<thead><tr>{top}</tr></thead>' if headed else ''}<tbody>{body}</tbody></table></div>"
+        f"{f'<thead><tr>{head_cells}</tr></thead>' if headed else ''}<tbody>{body}</tbody></table></div>"
     )
 
 
@@ -150,8 +150,11 @@ def with_line_breaks(text: str) -> str:
 
 def warning_box(texts: Sequence, heading: str = "") -> str:
     """Return warnings as an HTML box under a heading; "" if there are none."""
-    told = "".join(f"<p>{sentence_html(text)}</p>" for text in texts)
-    return told and f"<div class='verdict warn'>{heading and f'<b>{heading}</b>'}{told}</div>"
+    paragraphs = "".join(f"<p>{sentence_html(text)}</p>" for text in texts)
+    return (
+        paragraphs
+        and f"<div class='verdict warn'>{heading and f'<b>{heading}</b>'}{paragraphs}</div>"
+    )
 
 
 def figure_html(number: int | str, svg: str, caption: str, alternative: str) -> str:
@@ -175,7 +178,7 @@ def figure_html(number: int | str, svg: str, caption: str, alternative: str) -> 
     svg = re.sub(r'(url\(|href=")#', rf"\1#f{number}", svg)
     svg = re.sub(
         r"(?<=: )#[0-9a-f]{6}\b",
-        lambda one: f"var(--{PAGE_COLOURS[one[0]]})" if one[0] in PAGE_COLOURS else one[0],
+        lambda match: f"var(--{PAGE_COLOURS[match[0]]})" if match[0] in PAGE_COLOURS else match[0],
         svg,
     )
     return f"<figure>{svg}<figcaption>{sentence_html(caption)}</figcaption></figure>"
@@ -189,7 +192,7 @@ def to_json(value) -> str:
     if isinstance(value, dict):
         return (
             "{"
-            + ",".join(f"{json.dumps(str(key))}:{to_json(one)}" for key, one in value.items())
+            + ",".join(f"{json.dumps(str(key))}:{to_json(item)}" for key, item in value.items())
             + "}"
         )
     if isinstance(value, np.ndarray):

@@ -40,26 +40,28 @@ def select_cases(table: dict, data) -> DrawnCases:
         data(cases, whole) returns what the scripts would draw of some cases, with all digits or not.
     """
     number = len(table["outcome"])
-    some = _evenly_spaced(number, N_SAMPLED)
-    if number * len(to_json(data(some, True))) <= MAX_BYTES * some.size:
+    sample = _evenly_spaced(number, N_SAMPLED)
+    if number * len(to_json(data(sample, True))) <= MAX_BYTES * sample.size:
         return DrawnCases(np.arange(number))
-    most = max(MIN_CASES, int(MAX_BYTES * some.size / len(to_json(data(some, False)))))
-    if most >= number:
+    max_cases = max(MIN_CASES, int(MAX_BYTES * sample.size / len(to_json(data(sample, False)))))
+    if max_cases >= number:
         return DrawnCases(np.arange(number))
-    return _select_rows(table, most)
+    return _select_rows(table, max_cases)
 
 
-def _select_rows(table: dict, most: int) -> DrawnCases:
+def _select_rows(table: dict, max_cases: int) -> DrawnCases:
     """Select evenly spaced cases, the extremes of measures and keys, and one of each outcome."""
     number = len(table["outcome"])
-    ends = {
+    always_drawn = {
         case
-        for one in (*table["measures"].values(), *table["keys"])
-        for case in _extreme_cases(one["values"])
+        for column in (*table["measures"].values(), *table["keys"])
+        for case in _extreme_cases(column["values"])
     }
-    kinds = np.unique(np.asarray(table["outcome"], str), return_index=True)[1]
-    ends = np.array(sorted({*ends, *kinds.tolist()}), int)
-    cases = np.union1d(_evenly_spaced(number, max(most - ends.size, MIN_CASES)), ends)
+    first_of_each_outcome = np.unique(np.asarray(table["outcome"], str), return_index=True)[1]
+    always_drawn = np.array(sorted({*always_drawn, *first_of_each_outcome.tolist()}), int)
+    cases = np.union1d(
+        _evenly_spaced(number, max(max_cases - always_drawn.size, MIN_CASES)), always_drawn
+    )
     return DrawnCases(
         cases,
         f"{cases.size} of {number} cases are drawn: evenly spaced cases, and the cases with the "
@@ -68,12 +70,12 @@ def _select_rows(table: dict, most: int) -> DrawnCases:
     )
 
 
-def _evenly_spaced(number: int, most: int) -> np.ndarray:
+def _evenly_spaced(number: int, max_number: int) -> np.ndarray:
     """Return at most `most` of `number` indices, evenly spaced and including both ends."""
     return (
         np.arange(number)
-        if number <= most
-        else np.unique(np.linspace(0, number - 1, most).astype(int))
+        if number <= max_number
+        else np.unique(np.linspace(0, number - 1, max_number).astype(int))
     )
 
 
@@ -94,5 +96,5 @@ def round_to_digits(values: np.ndarray, count: int) -> np.ndarray:
     """Round values to `count` significant digits."""
     with np.errstate(all="ignore"):
         unit = 10.0 ** (np.floor(np.log10(np.abs(values))) - count + 1)
-        short = np.round(values / unit) * unit
-    return np.where(np.isfinite(short), short, values)
+        rounded = np.round(values / unit) * unit
+    return np.where(np.isfinite(rounded), rounded, values)

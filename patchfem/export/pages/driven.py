@@ -112,18 +112,20 @@ def _describe_slide(keys: dict) -> str:
         return f"a sine slide of ±{format_resolved(keys['amplitude'])} at {format_resolved(keys['frequency'])}"
     if kind == "triangle":
         return f"a triangle slide of ±{format_resolved(keys['amplitude'])} at {format_resolved(keys['speed'])}"
-    held = (
+    hold_text = (
         f", held for {format_resolved(keys['hold'])}" if kind == "dwell" and "hold" in keys else ""
     )
-    return (
-        f"a slide of {format_resolved(keys['distance'])} at {format_resolved(keys['speed'])}{held}"
-    )
+    return f"a slide of {format_resolved(keys['distance'])} at {format_resolved(keys['speed'])}{hold_text}"
 
 
 def list_changed_keys(sets: tuple) -> str:
     """List the keys that were changed with --set; sets: `key=value` strings as given."""
     return shorten(
-        ", ".join(f"{key} = {value}" for key, _, value in (one.partition("=") for one in sets)), 160
+        ", ".join(
+            f"{key} = {value}"
+            for key, _, value in (assignment.partition("=") for assignment in sets)
+        ),
+        160,
     )
 
 
@@ -132,10 +134,15 @@ def run_command(path: Path, sets: tuple) -> str:
 
     sets: `key=value` strings as given; files are named without their folder.
     """
-    short = [
+    assignments = [
         f"{key}={Path(value).name if value.startswith('/') else value}"
-        for key, _, value in (one.partition("=") for one in sets)
+        for key, _, value in (assignment.partition("=") for assignment in sets)
     ]
     return shlex.join(
-        ["patchfem", "run", Path(path).name, *(word for one in short for word in ("--set", one))]
+        [
+            "patchfem",
+            "run",
+            Path(path).name,
+            *(word for assignment in assignments for word in ("--set", assignment)),
+        ]
     )

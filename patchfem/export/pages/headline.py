@@ -111,9 +111,13 @@ class SweepHeadline(NamedTuple):
         used = self._answer_parts()
         misses = "" if self.missed or not used else said.misses
         return [
-            one
-            for one in (self.answer(), misses, *(one for one in others if one not in used))
-            if one
+            sentence
+            for sentence in (
+                self.answer(),
+                misses,
+                *(sentence for sentence in others if sentence not in used),
+            )
+            if sentence
         ]
 
     def answer(self) -> str:
@@ -133,18 +137,18 @@ class SweepHeadline(NamedTuple):
 
     def _answer_parts(self) -> list:
         """Return the sentences of the answer."""
-        said = self.said
-        drawn = [one for one in (said.rank, said.scatter) if one]
-        over_key = said.limit or said.peak
-        if self.asked == "peak_frequency" and said.peak and not drawn:
-            first = [said.peak]
-        elif self.asked and (drawn or said.span):
-            first = drawn or [said.span]
+        sentences = self.said
+        of_random_cases = [sentence for sentence in (sentences.rank, sentences.scatter) if sentence]
+        over_key = sentences.limit or sentences.peak
+        if self.asked == "peak_frequency" and sentences.peak and not of_random_cases:
+            parts = [sentences.peak]
+        elif self.asked and (of_random_cases or sentences.span):
+            parts = of_random_cases or [sentences.span]
         elif over_key:
-            first = [over_key]
+            parts = [over_key]
         else:
-            first = drawn or [said.span]
-        return [one for one in (said.unsettled, *first) if one]
+            parts = of_random_cases or [sentences.span]
+        return [sentence for sentence in (sentences.unsettled, *parts) if sentence]
 
 
 def summarise_sweep(table: dict) -> SweepHeadline:
@@ -155,7 +159,8 @@ def summarise_sweep(table: dict) -> SweepHeadline:
     outcome = np.asarray(table["outcome"], str)
     settled = np.isin(outcome, SETTLED_OUTCOMES)
     trusted = {
-        name: _trusted_cases(name, one, tolerance, settled) for name, one in measures.items()
+        name: _trusted_cases(name, measure, tolerance, settled)
+        for name, measure in measures.items()
     }
     keys = [
         key | {"words": not any(NUMBER.match(str(text)) for text in key["texts"])}
@@ -185,14 +190,14 @@ def summarise_sweep(table: dict) -> SweepHeadline:
         _cases_within_floor(measures, tolerance),
     )
     unsettled = _unsettled_sentence(values, outcome)
-    asked = table.get("first", "")
-    said = Sentences(
+    first_measure = table.get("first", "")
+    sentences = Sentences(
         limit=limits.limits_sentence(key_limits),
         peak=peaks.peaks_sentence(found_peaks),
         rank=keys_ranked.rank,
         scatter=keys_ranked.scatter,
         span=span_of_measure,
-        misses=tolerance_misses.tolerance_sentence(measures, tolerance, where, asked),
+        misses=tolerance_misses.tolerance_sentence(measures, tolerance, where, first_measure),
         left=_qualification_sentence(
             table, outcome, keys_ranked.rank == ranked.too_few(table, settled)
         ),
@@ -200,12 +205,19 @@ def summarise_sweep(table: dict) -> SweepHeadline:
         unsettled=unsettled,
     )
     if table.get("drawn"):
-        said = said._replace(
-            span=join_sentences([one for one in (unsettled, span_of_measure) if one]), unsettled=""
+        sentences = sentences._replace(
+            span=join_sentences([measure for measure in (unsettled, span_of_measure) if measure]),
+            unsettled="",
         )
-    over = tolerance_misses.count_over_tolerance(measures, tolerance)
+    missed_counts = tolerance_misses.count_over_tolerance(measures, tolerance)
     return SweepHeadline(
-        said, over, key_limits, keys_ranked.shares, keys_ranked.quantiles, found_peaks, asked
+        sentences,
+        missed_counts,
+        key_limits,
+        keys_ranked.shares,
+        keys_ranked.quantiles,
+        found_peaks,
+        first_measure,
     )
 
 
@@ -227,7 +239,8 @@ def _cases_within_floor(measures: dict, tolerance) -> dict:
     The floor is given as text.
     """
     by_floor = {
-        name: tolerance_misses.is_within_by_floor(one, tolerance) for name, one in measures.items()
+        name: tolerance_misses.is_within_by_floor(measure, tolerance)
+        for name, measure in measures.items()
     }
     return {
         name: (cases, tolerance_misses.format_floor(measures[name], cases))
@@ -250,12 +263,16 @@ def _unsettled_sentence(measures: dict, outcome: np.ndarray) -> str:
         return ""
     values = np.asarray(measures[name][0], float)
     unit = measures[name][2]
-    known = np.isfinite(values)
-    late = values[known & np.isin(outcome, CHANGING_OUTCOMES)]
-    settled = values[known & np.isin(outcome, SETTLED_OUTCOMES)]
-    if not late.size or not settled.size or late.max() <= settled.max():
+    has_value = np.isfinite(values)
+    unsettled_values = values[has_value & np.isin(outcome, CHANGING_OUTCOMES)]
+    settled_values = values[has_value & np.isin(outcome, SETTLED_OUTCOMES)]
+    if (
+        not unsettled_values.size
+        or not settled_values.size
+        or unsettled_values.max() <= settled_values.max()
+    ):
         return ""
-    low, high = format_pair(name, late.min(), late.max(), unit, 4)
+    low, high = format_pair(name, unsettled_values.min(), unsettled_values.max(), unit, 4)
     extent = high if low == high else f"{low} to {high}"
     count = int(np.isin(outcome, CHANGING_OUTCOMES).sum())
     return (
@@ -286,7 +303,7 @@ def _end_peaks_sentence(table: dict) -> str:
     )
 
 
-def _qualification_sentence(table: dict, outcome: np.ndarray, known: bool) -> str:
+def _qualification_sentence(table: dict, outcome: np.ndarray, is_stated: bool) -> str:
     """State what qualifies the whole summary; "" if nothing does.
 
     This is how many cases of an interrupted sweep have no result, that no case has settled, and
@@ -297,25 +314,25 @@ def _qualification_sentence(table: dict, outcome: np.ndarray, known: bool) -> st
     table : dict
         As for `sweep.page_html`.
     outcome : (n,) ndarray
-    known : bool
+    is_stated : bool
         Whether another sentence already says that no case has settled.
     """
     count = int(np.sum(outcome == ""))
-    ran = outcome[(outcome != "") & (outcome != FAILED_OUTCOME)]
-    said = []
+    run_outcomes = outcome[(outcome != "") & (outcome != FAILED_OUTCOME)]
+    sentences = []
     if count:
-        said.append(
+        sentences.append(
             f"{count} of {outcome.size} cases {'has' if count == 1 else 'have'} no result yet and "
             f"{'is' if count == 1 else 'are'} left out."
         )
-    if ran.size and not np.isin(ran, SETTLED_OUTCOMES).any() and not known:
-        said.append("No case has settled, so this answer describes the end of each run.")
+    if run_outcomes.size and not np.isin(run_outcomes, SETTLED_OUTCOMES).any() and not is_stated:
+        sentences.append("No case has settled, so this answer describes the end of each run.")
     first = table.get("first", "")
     if first and not np.isfinite(table["measures"].get(first, {"values": ()})["values"]).any():
-        said.append(
+        sentences.append(
             f"No case has a value of {measure_label(first)}, so this answer describes other measures."
         )
-    return join_sentences(said)
+    return join_sentences(sentences)
 
 
 def span_sentence(
@@ -323,7 +340,7 @@ def span_sentence(
     trusted: dict,
     settled: np.ndarray,
     names: Sequence = MAIN_MEASURES,
-    least: Mapping = EMPTY,
+    within_floor: Mapping = EMPTY,
 ) -> str:
     """State the range of the first measure that any case has, and the errors of its values.
 
@@ -336,7 +353,7 @@ def span_sentence(
     settled : (n,) ndarray of bool
     names : sequence of str
         Measures, the most important first.
-    least : mapping
+    within_floor : mapping
         {name: (`tolerance_misses.is_within_by_floor`, the floor as text)} of measures that meet the tolerance
         by their floor.
 
@@ -346,44 +363,49 @@ def span_sentence(
         "" if the first measure has no value that counts.
     """
     for name in names:
-        every = np.isfinite(measures[name][0]) if name in measures else np.zeros(1, bool)
-        if not every.any():
+        has_value = np.isfinite(measures[name][0]) if name in measures else np.zeros(1, bool)
+        if not has_value.any():
             continue
-        there = every & trusted[name]
-        if not there.any():
+        counted = has_value & trusted[name]
+        if not counted.any():
             return ""
         values, errors, unit = (
-            part if isinstance(part, str) else np.asarray(part, float)[there]
-            for part in measures[name]
+            column if isinstance(column, str) else np.asarray(column, float)[counted]
+            for column in measures[name]
         )
         low, high = format_pair(name, values.min(), values.max(), unit, 4)
-        ran = f"is {high}"
+        range_text = f"is {high}"
         if low != high:
-            ran = f"ranges from {low} to {high}"
-        elif there.sum() > 1:  # a single case has no range
-            ran = f"is {high} throughout"
+            range_text = f"ranges from {low} to {high}"
+        elif counted.sum() > 1:  # a single case has no range
+            range_text = f"is {high} throughout"
         # A value of 0 is known absolutely.
-        known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > format_zero(name))
-        known &= ~least[name][0][there] if name in least else True
-        share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
-        bands = [f"{format_number(100 * share, 1)} %"] * (share > MIN_STATED_ERROR)
-        if name in least and least[name][0][there].any():
-            bands.append(f"{least[name][1]}, the floor of this measure")
-        band = f", with errors of at most {' or '.join(bands)}" if bands else ""
-        counts = there.sum()
-        ended = (every & settled).sum()
-        whose = ""
-        if counts != every.sum() and counts == ended:
-            whose = f" of the {'only settled case' if counts == 1 else 'settled cases'}"
-        elif counts != every.sum():
-            those = "only case that meets" if counts == 1 else "cases that meet"
-            whose = f" in the {those} the tolerance in this measure"
-        return f"{ranked.measure_name(name).capitalize()}{whose} {ran}{band}."
+        has_error = np.isfinite(errors) & (errors > 0) & (np.abs(values) > format_zero(name))
+        has_error &= ~within_floor[name][0][counted] if name in within_floor else True
+        largest_error = (
+            float(np.max(errors[has_error] / np.abs(values[has_error]))) if has_error.any() else 0.0
+        )
+        error_texts = [f"{format_number(100 * largest_error, 1)} %"] * (
+            largest_error > MIN_STATED_ERROR
+        )
+        if name in within_floor and within_floor[name][0][counted].any():
+            error_texts.append(f"{within_floor[name][1]}, the floor of this measure")
+        error_clause = f", with errors of at most {' or '.join(error_texts)}" if error_texts else ""
+        n_counted = counted.sum()
+        n_settled = (has_value & settled).sum()
+        qualifier = ""
+        if n_counted != has_value.sum() and n_counted == n_settled:
+            qualifier = f" of the {'only settled case' if n_counted == 1 else 'settled cases'}"
+        elif n_counted != has_value.sum():
+            cases_text = "only case that meets" if n_counted == 1 else "cases that meet"
+            qualifier = f" in the {cases_text} the tolerance in this measure"
+        return f"{ranked.measure_name(name).capitalize()}{qualifier} {range_text}{error_clause}."
     return ""
 
 
 def measure_columns(table: dict) -> dict:
     """Return the measures of a table as (values, errors, unit)."""
     return {
-        name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()
+        name: (measure["values"], measure["errors"], measure["unit"])
+        for name, measure in table["measures"].items()
     }

@@ -20,11 +20,11 @@ def key_formatter(key: dict) -> Callable[[int], str]:
     """
     values = np.asarray(key["values"], float)
     sizes = np.unique(values)
-    apart = np.minimum(np.diff(sizes, prepend=-np.inf), np.diff(sizes, append=np.inf))
+    spacings = np.minimum(np.diff(sizes, prepend=-np.inf), np.diff(sizes, append=np.inf))
 
     def format_case(case: int) -> str:
         """Return the value of the key in a case."""
-        spacing = apart[np.searchsorted(sizes, values[case])]
+        spacing = spacings[np.searchsorted(sizes, values[case])]
         return shorten_to_spacing(str(key["texts"][case]), values[case], spacing)
 
     return format_case

@@ -156,25 +156,25 @@ def find_limits(
     if key["name"].startswith(KEYS_WITHOUT_LIMIT):
         return Limits()
     lines = group_cases_along_key(key, [other for other in keys if other is not key])
-    found = []
-    lost = []
+    key_limits = []
+    measures_without_limit = []
     for name in CHANGE_AT_LIMIT:
         values, errors = (
-            np.asarray(part, float) for part in measures.get(name, ([np.nan], [np.nan]))[:2]
+            np.asarray(column, float) for column in measures.get(name, ([np.nan], [np.nan]))[:2]
         )
         if not np.any(np.abs(values) > format_zero(name)):  # no case has a value above round-off
             continue
         values = np.where(trusted[name], values, np.nan)
-        along = [
+        limits_of_lines = [
             _limit_along_line(name, key, line, values[line], np.nan_to_num(errors[line]))
             for line in lines
         ]
-        if None not in along:
-            found.append(min(along, key=_sort_key))
+        if None not in limits_of_lines:
+            key_limits.append(min(limits_of_lines, key=_sort_key))
         elif name in MOTION_MEASURES:
-            lost.append(name)
-    limits = Limits(key, found, lost, patch=patch)
-    if not any(limits.is_resolved(limit) for limit in found):
+            measures_without_limit.append(name)
+    limits = Limits(key, key_limits, measures_without_limit, patch=patch)
+    if not any(limits.is_resolved(limit) for limit in key_limits):
         return limits
     unit, scale = _choose_unit(limits)
     return limits._replace(key=_convert_to_unit(key, unit, scale), unit=unit, scale=scale)
@@ -197,17 +197,17 @@ def _limit_along_line(
     values, errors : (m,) array
         The measure in these cases; NaN if a case does not count.
     """
-    known = np.flatnonzero(np.isfinite(values))
-    if known.size < 2 or known[0] != 0 or values[0] == 0:
+    valid = np.flatnonzero(np.isfinite(values))
+    if valid.size < 2 or valid[0] != 0 or values[0] == 0:
         return None
     largest = CHANGE_AT_LIMIT[name]
-    change = (values[known] - values[0]) / abs(values[0])
-    error = (errors[known] + errors[0]) / abs(values[0])
+    change = (values[valid] - values[0]) / abs(values[0])
+    error = (errors[valid] + errors[0]) / abs(values[0])
     # Only an increase can double a pressure.
     size = np.abs(change) if largest < DOUBLING else change
     open_or_beyond = np.flatnonzero(size[1:] + error[1:] > largest)
-    inside = int(open_or_beyond[0]) if open_or_beyond.size else known.size - 1
-    case = int(line[known[inside]])
+    inside = int(open_or_beyond[0]) if open_or_beyond.size else valid.size - 1
+    case = int(line[valid[inside]])
     sizes = np.asarray(key["values"], float)
     limit = KeyLimit(
         name=name,
@@ -216,25 +216,25 @@ def _limit_along_line(
         last_change=float(change[-1]),
         inside=case,
         beyond=None,
-        covers_line=bool(known[inside] == line.size - 1),
+        covers_line=bool(valid[inside] == line.size - 1),
         value=float(sizes[case]),
     )
     surely_beyond = np.flatnonzero(size - error > largest)
     if not surely_beyond.size:
         return limit
     beyond = int(surely_beyond[0])
-    wanted = float(np.copysign(largest, change[beyond]))
-    case_beyond = int(line[known[beyond]])
+    change_at_limit = float(np.copysign(largest, change[beyond]))
+    case_beyond = int(line[valid[beyond]])
     grown_by_factors = bool(key["log"] and sizes[case] > 0)
-    values_along = np.array([change[inside], wanted, change[beyond]])
+    values_along = np.array([change[inside], change_at_limit, change[beyond]])
     if grown_by_factors and largest >= DOUBLING:
         # A power of the key is a straight line in both logarithms.
         values_along = np.log1p(values_along)
-    part = (values_along[1] - values_along[0]) / (values_along[2] - values_along[0])
+    fraction = (values_along[1] - values_along[0]) / (values_along[2] - values_along[0])
     value = _interpolate(
-        float(sizes[case]), float(sizes[case_beyond]), float(part), grown_by_factors
+        float(sizes[case]), float(sizes[case_beyond]), float(fraction), grown_by_factors
     )
-    return limit._replace(change=wanted, beyond=case_beyond, value=value)
+    return limit._replace(change=change_at_limit, beyond=case_beyond, value=value)
 
 
 def _interpolate(low: float, high: float, part: float, by_factors: bool) -> float:
@@ -322,13 +322,13 @@ def _motion_sentence(limits: Limits) -> str:
     if not ends:
         if limits.lost:
             return ""
-        far = moving[0]._replace(value=float(limits.sizes().max()))
+        largest_value = moving[0]._replace(value=float(limits.sizes().max()))
         names = (
             f"{', '.join(first_names)} and {last_name} change"
             if first_names
             else f"{last_name} changes"
         )
-        return f"{key_name} may reach {_format_limit_and_gap(limits, far)}: {names} by less than {percent}"
+        return f"{key_name} may reach {_format_limit_and_gap(limits, largest_value)}: {names} by less than {percent}"
     names = f"{', '.join(first_names)} or {last_name}" if first_names else last_name
     before = f"before {names} changes by {percent}"
     smallest = ends[0]
@@ -400,10 +400,10 @@ def _count_digits(limits: Limits, limit: KeyLimit) -> int:
     """Count the digits of a limit: two, or as many as distinguish the cases around it."""
     if limit.beyond is None or not limit.value:
         return 2
-    apart = limits.sizes()[limit.beyond] - limits.sizes()[limit.inside]
-    if not apart:  # the same value of the key, with another value of a second key
+    spacing = limits.sizes()[limit.beyond] - limits.sizes()[limit.inside]
+    if not spacing:  # the same value of the key, with another value of a second key
         return 2
-    return max(2, 1 + ceil(log10(abs(limit.value) / apart)))
+    return max(2, 1 + ceil(log10(abs(limit.value) / spacing)))
 
 
 def _format_gap(limits: Limits, limit: KeyLimit) -> str:
@@ -423,9 +423,9 @@ def _format_position(limits: Limits, limit: KeyLimit, *notes: str) -> str:
 
 def _format_cases(limits: Limits, limit: KeyLimit) -> str:
     """Write the values of the key in the two cases around a limit: `0.1 and 0.32 mrad`."""
-    shown = key_formatter(limits.key)
-    inside = shown(limit.inside)
-    beyond = shown(limit.beyond)
+    format_case = key_formatter(limits.key)
+    inside = format_case(limit.inside)
+    beyond = format_case(limit.beyond)
     return f"{drop_repeated_unit(inside, beyond)} and {beyond}"
 
 
@@ -444,10 +444,12 @@ def _choose_unit(limits: Limits) -> tuple:
         default=None,
     )
     value, case = (float(limits.sizes().max()), 0) if first is None else (first.value, first.inside)
-    written = NUMBER.match(str(key["texts"][case]))
+    number_with_unit = NUMBER.match(str(key["texts"][case]))
     size = float(limits.sizes()[case])
     unit, scale = (
-        (written[2] or "", float(written[1]) / size) if written and size else (key["unit"], 1.0)
+        (number_with_unit[2] or "", float(number_with_unit[1]) / size)
+        if number_with_unit and size
+        else (key["unit"], 1.0)
     )
     as_written = unit.removesuffix("1"), scale
     fits = MIN_NUMBER < abs(value * scale) < MAX_NUMBER
@@ -483,7 +485,7 @@ def limits_table(limits: Limits, measures: dict) -> str:
     """
     if not limits.found:
         return ""
-    shown = key_formatter(limits.key)
+    format_case = key_formatter(limits.key)
     sizes = limits.sizes()
     rows = []
     for limit in limits.found:
@@ -493,7 +495,7 @@ def limits_table(limits: Limits, measures: dict) -> str:
             where = "in no case"
         else:
             where = (
-                f"not up to {shown(limit.inside)}; the cases with larger values do not show where this change is "
+                f"not up to {format_case(limit.inside)}; the cases with larger values do not show where this change is "
                 "reached"
             )
         reference = format_measure(limit.name, limit.reference, measures[limit.name][2], 4)
@@ -520,7 +522,7 @@ def limits_table(limits: Limits, measures: dict) -> str:
         "changed by",
         "where",
     )
-    start = shown(int(np.argmin(sizes)))
+    start = format_case(int(np.argmin(sizes)))
     return (
         f"<p class=soft>{escape(limits.key['name'])} grows from {escape(start)}. A measure counts as "
         "changed if the difference from its value in the first case exceeds the amount under &ldquo;changed "

@@ -3,6 +3,7 @@
 There is one peak for each combination of the values of the other keys.
 """
 
+from collections.abc import Callable
 from html import escape
 from typing import NamedTuple
 
@@ -90,23 +91,33 @@ def find_peaks(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
     -------
     list of Peak
     """
-    key = next((one for one in keys if one["name"] in KEYS and not one["words"]), None)
-    name = next((one for one in HEIGHTS if one in measures), None)
+    key = next(
+        (candidate for candidate in keys if candidate["name"] in KEYS and not candidate["words"]),
+        None,
+    )
+    name = next((candidate for candidate in HEIGHTS if candidate in measures), None)
     if key is None or name is None or (len(keys) > 1 and not grid):
         return []
-    others = [one for one in keys if one is not key and is_varied(one)]
-    shown = {one["name"]: str if one["words"] else key_formatter(one) for one in others}
+    others = [candidate for candidate in keys if candidate is not key and is_varied(candidate)]
+    formatters = [_case_formatter(other) for other in others]
     height, error = _peak_heights(name, measures, trusted)
-    out = []
+    peaks = []
     for line in group_cases_along_key(key, others):
         swept = _find_swept_peak(np.asarray(key["values"], float)[line], height[line], error[line])
         if swept is not None:
-            held = ", ".join(
-                f"{one['name']} {one['texts'][line[0]] if one['words'] else shown[one['name']](line[0])}"
-                for one in others
+            other_values = ", ".join(
+                f"{other['name']} {format_case(line[0])}"
+                for other, format_case in zip(others, formatters)
             )
-            out.append(Peak(name, held, measures[name][2], swept))
-    return out
+            peaks.append(Peak(name, other_values, measures[name][2], swept))
+    return peaks
+
+
+def _case_formatter(key: dict) -> Callable[[int], str]:
+    """Return a function that formats the value of a key in a case."""
+    if key["words"]:
+        return lambda case: str(key["texts"][case])
+    return key_formatter(key)
 
 
 def _peak_heights(name: str, measures: dict, trusted: dict) -> tuple:
@@ -120,9 +131,9 @@ def _peak_heights(name: str, measures: dict, trusted: dict) -> tuple:
     error = np.nan_to_num(np.asarray(error, float))
     if steady is None:
         return np.where(trusted[name], value, np.nan), error
-    known = np.asarray(steady[1], float) <= MAX_STEADY_ERROR * np.abs(steady[0])
+    is_estimated = np.asarray(steady[1], float) <= MAX_STEADY_ERROR * np.abs(steady[0])
     return (
-        np.where(trusted[name], value, np.where(known, steady[0], np.nan)),
+        np.where(trusted[name], value, np.where(is_estimated, steady[0], np.nan)),
         np.where(trusted[name], error, np.asarray(steady[1], float)),
     )
 
@@ -143,48 +154,57 @@ def _find_swept_peak(
     height, error : (m,) array
         In SI; NaN if a case does not count.
     """
-    known = np.isfinite(height) & (height > 0)
-    x = frequency[known]
-    y = height[known]
-    top = int(np.argmax(y)) if y.size >= MIN_FREQUENCIES else 0
-    if not 0 < top < y.size - 1:
+    is_valid = np.isfinite(height) & (height > 0)
+    x = frequency[is_valid]
+    y = height[is_valid]
+    peak_index = int(np.argmax(y)) if y.size >= MIN_FREQUENCIES else 0
+    if not 0 < peak_index < y.size - 1:
         return None
-    if not known[np.flatnonzero(known)[top] + np.array([-1, 1])].all():
+    if not is_valid[np.flatnonzero(is_valid)[peak_index] + np.array([-1, 1])].all():
         return SweptPeak(UNKNOWN, np.nan, UNKNOWN, UNKNOWN, False)
-    spacing = float(x[top + 1] - x[top - 1]) / 2
-    case_error = float(np.nanmax(error[known][top - 1 : top + 2]) / y[top])
-    square = x**2 - x[top] ** 2
-    g = (y[top] / y) ** 2
-    at, least = _find_minimum(square, g, top, top - 1, top + 2) or (0.0, 1.0)
-    windows = ((top - 2, top + 2), (top - 1, top + 3), (top - 2, top + 3))
+    spacing = float(x[peak_index + 1] - x[peak_index - 1]) / 2
+    case_error = float(np.nanmax(error[is_valid][peak_index - 1 : peak_index + 2]) / y[peak_index])
+    square = x**2 - x[peak_index] ** 2
+    g = (y[peak_index] / y) ** 2
+    at, minimum = _find_minimum(square, g, peak_index, peak_index - 1, peak_index + 2) or (0.0, 1.0)
+    windows = (
+        (peak_index - 2, peak_index + 2),
+        (peak_index - 1, peak_index + 3),
+        (peak_index - 2, peak_index + 3),
+    )
     others = [
-        _find_minimum(square, g, top, low, high)
+        _find_minimum(square, g, peak_index, low, high)
         for low, high in windows
         if low >= 0 and high <= y.size
     ]
-    agreeing = [one for one in others if one]
-    places = np.sqrt(x[top] ** 2 + np.array([at, *(place for place, _ in agreeing)]))
-    heights = y[top] * np.array([least, *(value for _, value in agreeing)]) ** -0.5
+    agreeing = [result for result in others if result]
+    peak_squares = np.sqrt(x[peak_index] ** 2 + np.array([at, *(place for place, _ in agreeing)]))
+    heights = y[peak_index] * np.array([minimum, *(value for _, value in agreeing)]) ** -0.5
     # A polynomial through more cases has no peak here.
     unchecked = len(agreeing) < len(others) or not others
     peak = float(heights[0])
     height_error = ERROR_FACTOR * float(np.ptp(heights))
-    frequency_error = ERROR_FACTOR * float(np.ptp(places))
+    frequency_error = ERROR_FACTOR * float(np.ptp(peak_squares))
     if unchecked:
-        height_error += peak * (1 - (y[top - 1 : top + 2] / peak).min())
+        height_error += peak * (1 - (y[peak_index - 1 : peak_index + 2] / peak).min())
         frequency_error += spacing
     below, above = (
-        _find_crossing(square[top::step], g[top::step], x[top], (y[top] / peak) ** 2)
+        _find_crossing(
+            square[peak_index::step],
+            g[peak_index::step],
+            x[peak_index],
+            (y[peak_index] / peak) ** 2,
+        )
         for step in (-1, 1)
     )
     width = float(above.value - below.value)
     fallen = frequency[height <= peak / 2**0.5]
-    falls = bool(np.isnan(width) and fallen.size and fallen.min() < x[top] < fallen.max())
+    falls = bool(np.isnan(width) and fallen.size and fallen.min() < x[peak_index] < fallen.max())
     # A crossing moves by this fraction of the width on each side.
     slack = case_error + height_error / peak
     frequency_error += slack * (width if np.isfinite(width) else spacing)
     return SweptPeak(
-        frequency=Estimate(float(places[0]), frequency_error),
+        frequency=Estimate(float(peak_squares[0]), frequency_error),
         case_spacing=spacing,
         height=Estimate(peak, height_error + case_error * peak),
         half_power_width=Estimate(width, below.error + above.error + 2 * width * slack),
@@ -192,7 +212,9 @@ def _find_swept_peak(
     )
 
 
-def _find_minimum(square: np.ndarray, g: np.ndarray, top: int, low: int, high: int) -> tuple | None:
+def _find_minimum(
+    square: np.ndarray, g: np.ndarray, peak_index: int, low: int, high: int
+) -> tuple | None:
     """Find the minimum of the polynomial through 1/y^2 over f^2 in some cases.
 
     Parameters
@@ -201,7 +223,7 @@ def _find_minimum(square: np.ndarray, g: np.ndarray, top: int, low: int, high: i
         Squares of the frequencies minus that of the case `top` [Hz2].
     g : (m,) array
         (y_top / y)^2.
-    top : int
+    peak_index : int
         Index of the largest value.
     low, high : int
         The polynomial goes through the cases from `low` to `high` - 1.
@@ -212,21 +234,33 @@ def _find_minimum(square: np.ndarray, g: np.ndarray, top: int, low: int, high: i
         Position and value of the minimum; None if there is no minimum above 0 between the
         neighbours of `top`.
     """
-    line = np.polynomial.Polynomial.fit(square[low:high], g[low:high], high - low - 1)
-    slope = line.deriv()
-    bend = line.deriv(2)
-    at = 0.0
+    polynomial = np.polynomial.Polynomial.fit(square[low:high], g[low:high], high - low - 1)
+    slope = polynomial.deriv()
+    curvature = polynomial.deriv(2)
+    position = 0.0
     for _ in range(N_NEWTON_STEPS):
-        at = (
-            float(np.clip(at - slope(at) / bend(at), square[top - 1], square[top + 1]))
-            if bend(at) > 0
+        position = (
+            float(
+                np.clip(
+                    position - slope(position) / curvature(position),
+                    square[peak_index - 1],
+                    square[peak_index + 1],
+                )
+            )
+            if curvature(position) > 0
             else 0.0
         )
-    inside = bend(at) > 0 and square[top - 1] < at < square[top + 1] and line(at) > 0
-    return (at, float(line(at))) if inside else None
+    inside = (
+        curvature(position) > 0
+        and square[peak_index - 1] < position < square[peak_index + 1]
+        and polynomial(position) > 0
+    )
+    return (position, float(polynomial(position))) if inside else None
 
 
-def _find_crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) -> Estimate:
+def _find_crossing(
+    square: np.ndarray, g: np.ndarray, peak_frequency: float, minimum: float
+) -> Estimate:
     """Find the frequency at which 1/y^2 first reaches twice its minimum.
 
     It comes from parabolas through the interval and a case on either side, whose difference gives
@@ -238,41 +272,54 @@ def _find_crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) 
         Squares of the frequencies minus that of the peak case [Hz2], from the peak outwards.
     g : (m,) array
         (y_top / y)^2.
-    top : float
+    peak_frequency : float
         Frequency of the peak case [Hz].
-    least : float
+    minimum : float
         Minimum of g.
     """
-    above = np.flatnonzero(g >= 2 * least)
+    above = np.flatnonzero(g >= 2 * minimum)
     if not above.size or above[0] == 0:
         return UNKNOWN
-    k = above[0]
-    level = 2 * least
-    found = []
-    line = square[k - 1] + (level - g[k - 1]) / (g[k] - g[k - 1]) * (square[k] - square[k - 1])
-    for part in (slice(max(k - 2, 0), k + 1), slice(k - 1, k + 2)):
-        if square[part].size == 3:
-            curve = np.polynomial.Polynomial.fit(square[part], g[part], 2) - level
-            at = line
+    first_above = above[0]
+    level = 2 * minimum
+    crossings = []
+    linear_crossing = square[first_above - 1] + (level - g[first_above - 1]) / (
+        g[first_above] - g[first_above - 1]
+    ) * (square[first_above] - square[first_above - 1])
+    for window in (
+        slice(max(first_above - 2, 0), first_above + 1),
+        slice(first_above - 1, first_above + 2),
+    ):
+        if square[window].size == 3:
+            curve = np.polynomial.Polynomial.fit(square[window], g[window], 2) - level
+            position = linear_crossing
             for _ in range(N_NEWTON_STEPS):
-                at -= curve(at) / curve.deriv()(at)
-            found += [at] if (at - square[k - 1]) * (at - square[k]) <= 0 else []
-    at = np.sqrt(np.array([*found, line] if len(found) < 2 else found) + top**2)
-    return Estimate(float(at[0]), ERROR_FACTOR * float(np.ptp(at)))
+                position -= curve(position) / curve.deriv()(position)
+            crossings += (
+                [position]
+                if (position - square[first_above - 1]) * (position - square[first_above]) <= 0
+                else []
+            )
+    position = np.sqrt(
+        np.array([*crossings, linear_crossing] if len(crossings) < 2 else crossings)
+        + peak_frequency**2
+    )
+    return Estimate(float(position[0]), ERROR_FACTOR * float(np.ptp(position)))
 
 
 def peaks_sentence(peaks: list) -> str:
     """State where the peak is, or from where to where it moves; "" if there is none."""
-    known, lost = (
-        [peak for peak in peaks if peak.swept.height.is_known() == there] for there in (True, False)
+    known_peaks, unknown_peaks = (
+        [peak for peak in peaks if peak.swept.height.is_known() == is_known]
+        for is_known in (True, False)
     )
     return "; ".join(
-        said
-        for said in (
-            _known_peaks_sentence(known).rstrip("." if lost else ""),
-            _unknown_peaks(lost, bool(known)),
+        sentence
+        for sentence in (
+            _known_peaks_sentence(known_peaks).rstrip("." if unknown_peaks else ""),
+            _unknown_peaks(unknown_peaks, bool(known_peaks)),
         )
-        if said
+        if sentence
     )
 
 
@@ -283,11 +330,13 @@ def _unknown_peaks(peaks: list, others: bool) -> str:
     """
     if not peaks:
         return ""
-    more = f" and {len(peaks) - 1} other{'s' * (len(peaks) > 2)}" if len(peaks) > 1 else ""
-    held = f" with {peaks[0].held}{more}" if peaks[0].held else ""
+    number_of_others = (
+        f" and {len(peaks) - 1} other{'s' * (len(peaks) > 2)}" if len(peaks) > 1 else ""
+    )
+    line_text = f" with {peaks[0].held}{number_of_others}" if peaks[0].held else ""
     where = "where it" if others else f"Where {measure_label(peaks[0].name)}"
     return (
-        f"{where} peaks{held} is not known: cases next to the largest value have not settled or miss the "
+        f"{where} peaks{line_text} is not known: cases next to the largest value have not settled or miss the "
         "tolerance; raise drive.cycles so that these cases settle."
     )
 
@@ -308,21 +357,22 @@ def _known_peaks_sentence(peaks: list) -> str:
     )
 
 
-def _format_frequency(one: Peak) -> str:
+def _format_frequency(peak: Peak) -> str:
     """Write the frequency of a peak."""
-    return f"{format_value(*one.swept.frequency, unit='Hz')} (cases lie {format_number(one.swept.case_spacing, 2)} Hz apart)"
+    spacing = format_number(peak.swept.case_spacing, 2)
+    return f"{format_value(*peak.swept.frequency, unit='Hz')} (cases lie {spacing} Hz apart)"
 
 
-def _format_height(one: Peak) -> str:
+def _format_height(peak: Peak) -> str:
     """Write the height of a peak."""
-    return format_value(*one.swept.height, format_zero(one.name), one.unit)
+    return format_value(*peak.swept.height, format_zero(peak.name), peak.unit)
 
 
-def _format_width(one: Peak) -> str:
+def _format_width(peak: Peak) -> str:
     """Write the half-power width of a peak, as the end of a clause."""
-    if one.swept.half_power_width.is_known():
-        return f", half-power width {format_value(*one.swept.half_power_width, unit='Hz')}"
-    return f", half-power width {OPEN}" if one.swept.falls_unresolved else ""
+    if peak.swept.half_power_width.is_known():
+        return f", half-power width {format_value(*peak.swept.half_power_width, unit='Hz')}"
+    return f", half-power width {OPEN}" if peak.swept.falls_unresolved else ""
 
 
 def peaks_table(peaks: list) -> str:

@@ -47,13 +47,15 @@ def pack_array(values) -> dict:
     Rounding changes a value by at most 1e-5 of the range.
     """
     values = np.asarray(values, float)
-    there = np.isfinite(values)
+    is_finite = np.isfinite(values)
     low, high = (
-        (float(values[there].min()), float(values[there].max())) if there.any() else (0.0, 0.0)
+        (float(values[is_finite].min()), float(values[is_finite].max()))
+        if is_finite.any()
+        else (0.0, 0.0)
     )
     step = (high - low) / 65534
     number = np.where(
-        there, np.rint((np.where(there, values, low) - low) / (step or 1.0)), 65535
+        is_finite, np.rint((np.where(is_finite, values, low) - low) / (step or 1.0)), 65535
     ).astype("<u2")
     return {
         "low": low,
@@ -104,28 +106,36 @@ def _read_frames(folder: Path) -> dict:
             np.linspace(0, cycle.size - 1, min(MAX_FRAMES, cycle.size)).round().astype(int)
         ].tolist()
         x = series.points("interface")[:, 0]
-        most = min(int((BYTES / len(numbers) - 10 * min(MAX_POSITIONS, x.size)) / 24), MAX_CELLS)
-        line = {
+        max_cells = min(
+            int((BYTES / len(numbers) - 10 * min(MAX_POSITIONS, x.size)) / 24), MAX_CELLS
+        )
+        interface_data = {
             name: series.stack("interface", "PointData", name, numbers)
             for name in ("displacement", *(name for name, _ in CURVES), "status")
             if name in series.names("interface", "PointData")
         }
-        near = _contact_range(x, line["normal_stress"])
-        places = select_lines(x, min(MAX_POSITIONS, x.size) - 1, near)
-        lower = _read_piece(series, "lower", numbers, most, near)
-        upper = _read_piece(series, "upper", numbers, most, near)
-        slide = _separate_slide(upper, x, line)
+        contact_range = _contact_range(x, interface_data["normal_stress"])
+        positions = select_lines(x, min(MAX_POSITIONS, x.size) - 1, contact_range)
+        lower = _read_piece(series, "lower", numbers, max_cells, contact_range)
+        upper = _read_piece(series, "upper", numbers, max_cells, contact_range)
+        slide = _separate_slide(upper, x, interface_data)
         times = series.times[numbers]
     unit, scale = choose_axis_unit(
         np.concatenate([piece["colours"].ravel() for piece in (lower, upper)]), "Pa"
     )
-    shear = np.any(line.get("shear_stress", 0.0))
+    shear = np.any(interface_data.get("shear_stress", 0.0))
     curves = [
-        _pack_curve(line[name][:, places], label, "Pa" if name.endswith("stress") else "m")
+        _pack_curve(
+            interface_data[name][:, positions], label, "Pa" if name.endswith("stress") else "m"
+        )
         for name, label in CURVES
-        if name in line and (name == "normal_stress" or np.any(line[name]))
+        if name in interface_data and (name == "normal_stress" or np.any(interface_data[name]))
     ]
-    force = np.abs(line["shear_stress"] @ np.gradient(x)) if "shear_stress" in line else np.zeros(1)
+    force = (
+        np.abs(interface_data["shear_stress"] @ np.gradient(x))
+        if "shear_stress" in interface_data
+        else np.zeros(1)
+    )
     return {
         "times": times,
         "of": cycle.size,
@@ -141,9 +151,13 @@ def _read_frames(folder: Path) -> dict:
         "colours": [
             {"label": label, "signed": signed, "unit": unit} for label, signed in STRESS_COMPONENTS
         ],
-        "x": pack_array(x[places] * MM_PER_M),
+        "x": pack_array(x[positions] * MM_PER_M),
         "curves": curves,
-    } | ({"status": pack_array(line["status"][:, places])} if "status" in line and shear else {})
+    } | (
+        {"status": pack_array(interface_data["status"][:, positions])}
+        if "status" in interface_data and shear
+        else {}
+    )
 
 
 def _contact_range(x, sigma) -> tuple | None:
@@ -155,11 +169,13 @@ def _contact_range(x, sigma) -> tuple | None:
     touching = x[np.any(sigma > 0, axis=0)]
     if not touching.size or np.ptp(touching) > MAX_CONTACT_FRACTION * np.ptp(x):
         return None
-    more = np.ptp(touching) / 2 + 4 * np.ptp(x) / x.size
-    return touching[0] - more, touching[-1] + more
+    margin = np.ptp(touching) / 2 + 4 * np.ptp(x) / x.size
+    return touching[0] - margin, touching[-1] + margin
 
 
-def _read_piece(series: Series, side: str, numbers: list, most: int, near: tuple | None) -> dict:
+def _read_piece(
+    series: Series, side: str, numbers: list, max_cells: int, fine_range: tuple | None
+) -> dict:
     """Read a piece and reduce it to about `most` cells.
 
     Parameters
@@ -168,8 +184,8 @@ def _read_piece(series: Series, side: str, numbers: list, most: int, near: tuple
     side : {"lower", "upper"}
     numbers : list of int
         Numbers of the frames.
-    most : int
-    near : tuple or None
+    max_cells : int
+    fine_range : tuple or None
         Range of x [m] in which the mesh stays fine.
 
     Returns
@@ -181,7 +197,7 @@ def _read_piece(series: Series, side: str, numbers: list, most: int, near: tuple
     points = series.points(side)[:, :2]
     cells = cell_corners(*series.cells(side))
     coated = series.stack(side, "CellData", "material", [0])[0] > 0
-    mesh = reduce_mesh(points, cells, coated, most, near)
+    mesh = reduce_mesh(points, cells, coated, max_cells, fine_range)
     moves = series.stack(side, "PointData", "displacement", numbers)[..., :2].astype(float)
     stress = series.stack(side, "CellData", "stress", numbers)
     rows = np.stack(
@@ -218,7 +234,7 @@ def _pack_piece(piece: dict, scale: float) -> dict:
         "cells": pack_array(mesh.cells),
         "coated": pack_array(piece["coated"]),
         "moves": pack_array(piece["moves"][:, mesh.nodes] * MM_PER_M),
-        "colours": [pack_array(one * scale) for one in piece["colours"]],
+        "colours": [pack_array(component * scale) for component in piece["colours"]],
     }
 
 
@@ -230,31 +246,33 @@ def _pack_curve(values, label: str, unit: str) -> dict:
 
 def player_section(film: dict) -> Section:
     """Return the section of a page that contains the player."""
-    frames, (cells, fine) = len(film["times"]), film["cells"]
+    n_frames, (n_cells, n_all_cells) = len(film["times"]), film["cells"]
     label, scale = choose_axis_unit(film["times"], "s")
-    still = f"The pressed state, {cells} cells"
-    if frames > 1:
-        still = (
-            f"{frames} frames from {film['times'][0] * scale:.6g} to {film['times'][-1] * scale:.6g} {label}, "
-            f"{cells} cells"
+    content_text = f"The pressed state, {n_cells} cells"
+    if n_frames > 1:
+        content_text = (
+            f"{n_frames} frames from {film['times'][0] * scale:.6g} to {film['times'][-1] * scale:.6g} {label}, "
+            f"{n_cells} cells"
         )
-    less = [f"{film['of']} frames"] * (film["of"] > frames) + [f"{fine} cells"] * (fine > cells)
+    sampled_from = [f"{film['of']} frames"] * (film["of"] > n_frames) + [f"{n_all_cells} cells"] * (
+        n_all_cells > n_cells
+    )
     sample = (
         (
-            f"; only a sample of {' and '.join(less)} is drawn, each cell with the mean of the cells that it "
+            f"; only a sample of {' and '.join(sampled_from)} is drawn, each cell with the mean of the cells that it "
             "replaces"
         )
-        if less
+        if sampled_from
         else ""
     )
-    text = f"{still}{sample}. Motion and gap are magnified by one factor"
+    text = f"{content_text}{sample}. Motion and gap are magnified by one factor"
     text += (
         (
             ", the slide of the upper piece as a whole by another factor; colours and scales are the same in every "
             "frame. "
             "Press space to play and the arrow keys to step."
         )
-        if frames > 1
+        if n_frames > 1
         else "."
     )
     return Section(

@@ -80,27 +80,29 @@ def rank_keys(table: dict, trusted: dict, settled: np.ndarray) -> RankedKeys:
     settled : (n,) ndarray of bool
     """
     shares = sobol_indices(table)
-    found = measure_quantiles(table, trusted)
+    quantiles = measure_quantiles(table, trusted)
     count = len(table["outcome"])
-    asked = table.get("first", "")
+    first_measure = table.get("first", "")
     ends_unsettled = not settled.any() or Outcome.TRANSIENT.value in list(table["outcome"])
     rank = ""
-    if not asked or asked in shares or asked not in table["measures"]:
+    if not first_measure or first_measure in shares or first_measure not in table["measures"]:
         left_out = count - int(np.sum(trusted[next(iter(shares))])) if shares else 0
         rank = ranking_sentence(shares, left_out, ends_unsettled, count)
     elif shares:
         rank = (
-            f"These {count} cases do not show on which key the {measure_label(asked)} depends most; more cases may show "
-            "this."
+            f"These {count} cases do not show on which key the {measure_label(first_measure)} depends most; "
+            "more cases may show this."
         )
-    rank = join_sentences([one for one in (rank, describe_trend(table, shares, settled)) if one])
-    few = "" if rank else too_few(table, settled)
+    rank = join_sentences(
+        [sentence for sentence in (rank, describe_trend(table, shares, settled)) if sentence]
+    )
+    too_few_text = "" if rank else too_few(table, settled)
     spread_text = ""
-    if not few:
+    if not too_few_text:
         spread_text = describe_scatter(
-            found, count, settled.any() and ends_unsettled, asked_first(SCATTER_MEASURES, table)
+            quantiles, count, settled.any() and ends_unsettled, asked_first(SCATTER_MEASURES, table)
         )
-    return RankedKeys(shares, rank or few, found, spread_text)
+    return RankedKeys(shares, rank or too_few_text, quantiles, spread_text)
 
 
 def too_few(table: dict, settled: np.ndarray) -> str:
@@ -116,25 +118,25 @@ def too_few(table: dict, settled: np.ndarray) -> str:
         or count >= min(MIN_RANDOM_CASES, 0.9 * len(outcome))
     ):
         return ""
-    ended = {name: outcome.count(name) for name in sorted(set(outcome) - {*FINAL_OUTCOMES, ""})}
-    helps = [f"raise drive.cycles so that the {Outcome.TRANSIENT.value} cases settle"] * (
-        "transient" in ended
-    ) + ["correct what the messages of the failed cases name"] * ("failed" in ended)
-    end = "has a result" if count == 1 else "have a result"
-    if Outcome.TRANSIENT.value in ended:
-        end = "settled"
-    said = f"{f'Only {count}' if count else 'None'} of {len(outcome)} cases {end}"
-    others = (
-        f" ({', '.join(f'{number} {measure_label(name)}' for name, number in ended.items())})"
-        if ended
+    counts = {name: outcome.count(name) for name in sorted(set(outcome) - {*FINAL_OUTCOMES, ""})}
+    remedies = [f"raise drive.cycles so that the {Outcome.TRANSIENT.value} cases settle"] * (
+        "transient" in counts
+    ) + ["correct what the messages of the failed cases name"] * ("failed" in counts)
+    verb = "has a result" if count == 1 else "have a result"
+    if Outcome.TRANSIENT.value in counts:
+        verb = "settled"
+    settled_text = f"{f'Only {count}' if count else 'None'} of {len(outcome)} cases {verb}"
+    counts_text = (
+        f" ({', '.join(f'{number} {measure_label(name)}' for name, number in counts.items())})"
+        if counts
         else ""
     )
-    lost = (
+    consequence = (
         "no ranking is possible"
         if sum(map(is_varied, table["keys"])) > 1
         else "the scatter is not known"
     )
-    return f"{said}{others}, so {lost}{'; ' * bool(helps)}{' and '.join(helps)}."
+    return f"{settled_text}{counts_text}, so {consequence}{'; ' * bool(remedies)}{' and '.join(remedies)}."
 
 
 def measure_name(name: str) -> str:
@@ -156,11 +158,13 @@ def describe_trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
         From `sobol_indices`.
     settled : (n,) ndarray of bool
     """
-    moving = [one for one in table["keys"] if is_varied(one)]
+    moving = [column for column in table["keys"] if is_varied(column)]
     first = table.get("first", "")
     name = first if first in table["measures"] else next(iter(ranks), SCATTER_MEASURES[0])
     strongest = ranks[name][0].key if name in ranks else ""
-    key = next((one for one in moving if len(moving) == 1 or one["name"] == strongest), None)
+    key = next(
+        (column for column in moving if len(moving) == 1 or column["name"] == strongest), None
+    )
     if (
         not table.get("drawn")
         or key is None
@@ -169,28 +173,28 @@ def describe_trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
     ):
         return ""
     values, size = (
-        np.asarray(one, float) for one in (table["measures"][name]["values"], key["values"])
+        np.asarray(column, float) for column in (table["measures"][name]["values"], key["values"])
     )
     cases = np.flatnonzero(np.isfinite(values) & (settled | ~settled.any()))
     cases = cases[np.argsort(size[cases], kind="stable")]
-    parts = np.array_split(cases, N_TREND_GROUPS)
+    groups = np.array_split(cases, N_TREND_GROUPS)
     if cases.size < MIN_RANDOM_CASES:
         return ""
-    middle = np.array([np.median(values[part]) for part in parts])
-    off = np.array(
+    medians = np.array([np.median(values[group]) for group in groups])
+    uncertainties = np.array(
         [
             0.0
             if len(moving) == 1
-            else TREND_ERROR_FACTOR * 1.25 * np.std(values[part]) / np.sqrt(part.size)
-            for part in parts
+            else TREND_ERROR_FACTOR * 1.25 * np.std(values[group]) / np.sqrt(group.size)
+            for group in groups
         ]
     )
     return _trend_sentence(
         name,
         key,
-        middle,
-        off,
-        parts if len(moving) > 1 else None,
+        medians,
+        uncertainties,
+        groups if len(moving) > 1 else None,
         cases,
         values,
         table["measures"][name]["unit"],
@@ -205,9 +209,9 @@ def has_word_values(key: dict) -> bool:
 def _trend_sentence(
     name: str,
     key: dict,
-    middle: np.ndarray,
-    off: np.ndarray,
-    parts: list | None,
+    medians: np.ndarray,
+    uncertainties: np.ndarray,
+    groups: list | None,
     cases: np.ndarray,
     values: np.ndarray,
     unit: str,
@@ -222,7 +226,7 @@ def _trend_sentence(
     middle, off : (N_TREND_GROUPS,) array
         Medians of the measure in groups of the cases by the value of the key, and their
         uncertainties.
-    parts : list or None
+    groups : list or None
         Cases of each group; None if only this key varies.
     cases : (m,) array
         Cases in the order of the key.
@@ -231,22 +235,30 @@ def _trend_sentence(
     unit : str
         SI unit.
     """
-    shown = key_formatter(key)
-    what = measure_name(name).capitalize()
+    format_case = key_formatter(key)
+    measure_text = measure_name(name).capitalize()
     for word, sign in (("largest", 1), ("least", -1)):
-        top = int(np.argmax(sign * middle))
-        ends = [sign * (middle[top] - middle[end]) > off[top] + off[end] for end in (0, -1)]
-        if 0 < top < N_TREND_GROUPS - 1 and all(ends):
-            if parts is not None:
-                part = parts[top]
-                return f"{what} is {word} between {key['name']} {shown(int(part[0]))} and {shown(int(part[-1]))}."
-            best = int(cases[np.argmax(sign * values[cases])])
-            value = format_measure(name, values[best], unit, 3)
-            return f"{what} is {word}, {value}, at {key['name']} {shown(best)}."
-    rise = middle[-1] - middle[0]
-    if abs(rise) <= off[0] + off[-1] or rise == 0:
+        extreme_group = int(np.argmax(sign * medians))
+        differs_from_ends = [
+            sign * (medians[extreme_group] - medians[end])
+            > uncertainties[extreme_group] + uncertainties[end]
+            for end in (0, -1)
+        ]
+        if 0 < extreme_group < N_TREND_GROUPS - 1 and all(differs_from_ends):
+            if groups is not None:
+                group = groups[extreme_group]
+                low = format_case(int(group[0]))
+                high = format_case(int(group[-1]))
+                return f"{measure_text} is {word} between {key['name']} {low} and {high}."
+            extreme_case = int(cases[np.argmax(sign * values[cases])])
+            value = format_measure(name, values[extreme_case], unit, 3)
+            return (
+                f"{measure_text} is {word}, {value}, at {key['name']} {format_case(extreme_case)}."
+            )
+    increase = medians[-1] - medians[0]
+    if abs(increase) <= uncertainties[0] + uncertainties[-1] or increase == 0:
         return ""
-    return f"{what} {'grows with' if rise > 0 else 'falls with growing'} {key['name']}."
+    return f"{measure_text} {'grows with' if increase > 0 else 'falls with growing'} {key['name']}."
 
 
 def asked_first(names: tuple, table: dict) -> tuple:
@@ -261,8 +273,8 @@ def sobol_indices(table: dict) -> dict:
     They are computed once for a table and stored in it.
     """
     if "ranks" not in table:
-        keys = [(one["name"], one["values"]) for one in table["keys"]]
-        shape = tuple(len(set(one["texts"])) for one in table["keys"]) if table["grid"] else None
+        keys = [(key["name"], key["values"]) for key in table["keys"]]
+        shape = tuple(len(set(key["texts"])) for key in table["keys"]) if table["grid"] else None
         fits = table.get("drawn") or (table["grid"] and np.prod(shape) == len(table["outcome"]))
         measures = {
             name: (table["measures"][name]["values"], table["measures"][name]["errors"])
@@ -273,7 +285,9 @@ def sobol_indices(table: dict) -> dict:
     return table["ranks"]
 
 
-def ranking_sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0) -> str:
+def ranking_sentence(
+    ranks: dict, n_unsettled: int = 0, moves: bool = True, n_cases: int = 0
+) -> str:
     """State how much each key matters for the first measure that is ranked; "" if there is none.
 
     Keys whose intervals overlap are named together.
@@ -282,12 +296,12 @@ def ranking_sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0
     ----------
     ranks : dict
         From `sobol_indices`.
-    left : int
+    n_unsettled : int
         Number of cases that miss the tolerance or have not settled; they count with their last
         values.
     moves : bool
         Whether such cases have not settled, rather than miss the tolerance.
-    of : int
+    n_cases : int
         Number of all cases.
 
     Returns
@@ -298,38 +312,44 @@ def ranking_sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0
     if name is None:
         return ""
     first, *others = _group_overlapping(ranks[name])
-    said = [
+    clauses = [
         f"depends most on {_list_keys(first)}"
         if others or len(first) == 1
         else f"depends on {_list_keys(first)}"
     ]
     if len(first) == 1:
-        said[0] += (
+        clauses[0] += (
             f", which contributes to {format_percent(first[0])} of the variance{_format_interval(first[0])}"
         )
     else:
-        said[0] += (
+        clauses[0] += (
             f"{' about equally' * _all_overlap(first)} ({_format_shares(first)} of the variance; their intervals overlap)"
         )
-    said += [
-        f"then on {_list_keys(one)} ({_format_shares(one)})" for one in others[: MAX_NAMED_KEYS - 1]
+    clauses += [
+        f"then on {_list_keys(group)} ({_format_shares(group)})"
+        for group in others[: MAX_NAMED_KEYS - 1]
     ]
     if len(others) >= MAX_NAMED_KEYS:
-        said.append(f"least on {_list_keys(others[-1])} ({_format_shares(others[-1])})")
-    if sum(round(100 * each.total) for each in ranks[name]) > 100:
-        said.append(
+        clauses.append(f"least on {_list_keys(others[-1])} ({_format_shares(others[-1])})")
+    if sum(round(100 * index.total) for index in ranks[name]) > 100:
+        clauses.append(
             "where each share includes interactions between keys, so that the shares can sum to more than "
             "100 %"
         )
-    what = measure_name(name)
-    said = ", ".join(said)
-    has, is_, its = ("has", "is", "its") if left == 1 else ("have", "are", "their")
-    last = f"last value{'s' * (left != 1)}"
-    ended = f"{has} not settled" if moves else f"miss{'es' * (left == 1)} the tolerance"
-    if 2 * left > of > 0:
-        return f"{left} of {of} cases {ended}; with {its} {last if moves else 'values'} included, {what} {said}."
-    counted = f"; {left} case{'s' * (left != 1)} that {ended} {is_} included" if left else ""
-    return f"{what.capitalize()} {said}{counted}{f' with {its} {last}' if left and moves else ''}."
+    measure_text = measure_name(name)
+    clauses = ", ".join(clauses)
+    has, is_, its = ("has", "is", "its") if n_unsettled == 1 else ("have", "are", "their")
+    last = f"last value{'s' * (n_unsettled != 1)}"
+    ended = f"{has} not settled" if moves else f"miss{'es' * (n_unsettled == 1)} the tolerance"
+    if 2 * n_unsettled > n_cases > 0:
+        included = last if moves else "values"
+        return f"{n_unsettled} of {n_cases} cases {ended}; with {its} {included} included, {measure_text} {clauses}."
+    counted = (
+        f"; {n_unsettled} case{'s' * (n_unsettled != 1)} that {ended} {is_} included"
+        if n_unsettled
+        else ""
+    )
+    return f"{measure_text.capitalize()} {clauses}{counted}{f' with {its} {last}' if n_unsettled and moves else ''}."
 
 
 def _group_overlapping(shares: list) -> list:
@@ -348,12 +368,12 @@ def _group_overlapping(shares: list) -> list:
 
 def _all_overlap(group: list) -> bool:
     """Return whether no index of a group lies outside the interval of another."""
-    return all(one.low <= other.total <= one.high for one in group for other in group)
+    return all(index.low <= other.total <= index.high for index in group for other in group)
 
 
 def _list_keys(group: list) -> str:
     """List the keys of a group; of many keys only the first."""
-    names = [one.key for one in group]
+    names = [index.key for index in group]
     if len(names) > MAX_NAMED_KEYS + 1:
         names[MAX_NAMED_KEYS:] = [f"{len(names) - MAX_NAMED_KEYS} other keys"]
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
@@ -364,40 +384,42 @@ def _format_shares(group: list) -> str:
     if len(group) == 1:
         return format_percent(group[0])
     if all(map(_may_be_zero, group)):
-        most = max(map(_upper_percent, group))
-        return f"at most {most} % each" if most else "below 1 % each"
+        largest_percent = max(map(_upper_percent, group))
+        return f"at most {largest_percent} % each" if largest_percent else "below 1 % each"
     if len(group) > MAX_NAMED_KEYS + 1:
-        ends = dict.fromkeys(f"{100 * one.total:.0f}" for one in (group[-1], group[0]))
-        return f"{' to '.join(ends)} % each"
-    *before, end = (format_percent(one) for one in group)
+        distinct_percents = dict.fromkeys(
+            f"{100 * index.total:.0f}" for index in (group[-1], group[0])
+        )
+        return f"{' to '.join(distinct_percents)} % each"
+    *before, end = (format_percent(index) for index in group)
     if not any(map(_may_be_zero, group)):
-        before = [one.removesuffix(" %") for one in before]
+        before = [index.removesuffix(" %") for index in before]
     return f"{', '.join(before)} and {end}"
 
 
-def format_percent(one) -> str:
+def format_percent(index) -> str:
     """Write the total index of a key; if its interval includes 0, the upper end of the interval."""
-    if not _may_be_zero(one):
-        return f"{100 * one.total:.0f} %"
-    return f"at most {_upper_percent(one)} %" if _upper_percent(one) else "below 1 %"
+    if not _may_be_zero(index):
+        return f"{100 * index.total:.0f} %"
+    return f"at most {_upper_percent(index)} %" if _upper_percent(index) else "below 1 %"
 
 
-def _may_be_zero(one) -> bool:
+def _may_be_zero(index) -> bool:
     """Return whether an index may be 0."""
-    return one.total < 0.01 or (one.low < 0.005 and one.total < 0.1)
+    return index.total < 0.01 or (index.low < 0.005 and index.total < 0.1)
 
 
-def _upper_percent(one) -> int:
+def _upper_percent(index) -> int:
     """Return the upper end [%] of the interval of an index, rounded up; 0 up to 1 %."""
-    most = int(np.ceil(100 * one.high - 1e-9))
-    return most if most > 1 else 0
+    percent = int(np.ceil(100 * index.high - 1e-9))
+    return percent if percent > 1 else 0
 
 
-def _format_interval(one) -> str:
+def _format_interval(index) -> str:
     """Write the interval of an index in brackets; "" if it has none."""
-    low = round(100 * one.low)
-    high = round(100 * one.high)
-    return f" ({low} to {high} %)" if low != high and not _may_be_zero(one) else ""
+    low = round(100 * index.low)
+    high = round(100 * index.high)
+    return f" ({low} to {high} %)" if low != high and not _may_be_zero(index) else ""
 
 
 def measure_quantiles(table: dict, trusted: dict) -> dict:
@@ -419,37 +441,42 @@ def measure_quantiles(table: dict, trusted: dict) -> dict:
         By measure: unit, quantiles of QUANTILE_LEVELS [SI], number of cases, and how many of these miss the
         tolerance.
     """
-    out = {}
+    quantiles = {}
     settled = np.isin(np.asarray(table["outcome"], str), FINAL_OUTCOMES)
     for name in (
         asked_first(RANKED_MEASURES, table)
         if table.get("drawn") and len(table["outcome"]) >= MIN_RANDOM_CASES
         else ()
     ):
-        one = table["measures"].get(name)
-        if one is None:
+        measure = table["measures"].get(name)
+        if measure is None:
             continue
-        values = np.asarray(one["values"], float)
-        there = np.isfinite(values) & (
+        values = np.asarray(measure["values"], float)
+        counted = np.isfinite(values) & (
             settled | trusted[name] | ~np.isfinite(values)[settled].any()
         )
-        misses = int(np.sum(there & ~trusted[name]))
-        values = values[there]
+        misses = int(np.sum(counted & ~trusted[name]))
+        values = values[counted]
         if values.size >= MIN_RANDOM_CASES and np.ptp(values) > 1e-9 * np.abs(values).max():
-            out[name] = one["unit"], np.quantile(values, QUANTILE_LEVELS), values.size, misses
-    return out
+            quantiles[name] = (
+                measure["unit"],
+                np.quantile(values, QUANTILE_LEVELS),
+                values.size,
+                misses,
+            )
+    return quantiles
 
 
 def describe_scatter(
-    found: dict, of: int, settled: bool = True, names: tuple = SCATTER_MEASURES
+    quantiles: dict, n_cases: int, settled: bool = True, names: tuple = SCATTER_MEASURES
 ) -> str:
     """State the range in which 90 % of the random cases lie, and how many miss the tolerance.
 
     Parameters
     ----------
-    found : dict
+    quantiles : dict
         From `measure_quantiles`.
-    of : int
+    n_cases : int
         Number of random cases.
     settled : bool
         Whether cases without a value may not have settled.
@@ -461,30 +488,34 @@ def describe_scatter(
     str
         "" if there are no such measures.
     """
-    said = []
-    most = max((found[name][2] for name in names if name in found), default=0)
-    if most and most < MIN_SETTLED_FRACTION * of:
-        why = "not settled within the tolerance" if settled else "no value"
-        missed = f"{'has' if of - most == 1 else 'have'} {why}"
+    clauses = []
+    largest_count = max((quantiles[name][2] for name in names if name in quantiles), default=0)
+    if largest_count and largest_count < MIN_SETTLED_FRACTION * n_cases:
+        reason = "not settled within the tolerance" if settled else "no value"
+        missed = f"{'has' if n_cases - largest_count == 1 else 'have'} {reason}"
         return (
-            f"{of - most} of {of} random cases {missed}, perhaps those with the largest motion, so the scatter of "
-            "the results is not known."
+            f"{n_cases - largest_count} of {n_cases} random cases {missed}, perhaps those with the largest motion, "
+            "so the scatter of the results is not known."
         )
-    for name in [name for name in names if name in found]:
-        unit, (low, _, high), count, misses = found[name]
+    for name in [name for name in names if name in quantiles]:
+        unit, (low, _, high), count, misses = quantiles[name]
         low, high = format_pair(name, low, high, unit, 3)
-        some = [f"in the {count} that have one"] * (count < most) + [
+        remarks = [f"in the {count} that have one"] * (count < largest_count) + [
             f"{misses} of {count} miss the tolerance and are included with their values"
             if misses > 1
             else f"1 of {count} misses the tolerance and is included with its value"
         ] * (misses > 0)
-        said.append(
+        clauses.append(
             f"{'an' if name[0] in 'aeio' else 'a'} {measure_name(name)} from {low} to {high}"
-            + (f" ({'; '.join(some)})" if some else "")
+            + (f" ({'; '.join(remarks)})" if remarks else "")
         )
     count = "settled" if settled else "have a value"
-    whose = f"{of} random cases" if most == of else f"{most} of {of} random cases that {count}"
-    return f"90 % of the {whose} have {', '.join(said)}." if said else ""
+    cases_text = (
+        f"{n_cases} random cases"
+        if largest_count == n_cases
+        else f"{largest_count} of {n_cases} random cases that {count}"
+    )
+    return f"90 % of the {cases_text} have {', '.join(clauses)}." if clauses else ""
 
 
 def share_bars(ranks: dict) -> str:
@@ -516,22 +547,26 @@ def share_bars(ranks: dict) -> str:
     )
 
 
-def _bar_svg(one) -> str:
+def _bar_svg(index) -> str:
     """Return the bar of a key's Sobol indices as SVG."""
-    first, total, low, high = (f"{100 * part:.1f}" for part in one[1:])
+    first, total, low, high = (f"{100 * part:.1f}" for part in index[1:])
     return (
-        f"<svg viewBox='0 0 100 8' preserveAspectRatio=none role=img aria-label='{format_percent(one)}'>"
+        f"<svg viewBox='0 0 100 8' preserveAspectRatio=none role=img aria-label='{format_percent(index)}'>"
         f"<rect class=total y=1 height=6 width={total} /><rect class=first y=1 height=6 width={first} />"
         f"<path class=range d='M{low} 4H{high}'/></svg>"
     )
 
 
-def _format_range(one) -> str:
+def _format_range(index) -> str:
     """Write the interval of an index."""
-    return "&ndash;" if one.low == one.high else f"{100 * one.low:.0f} to {100 * one.high:.0f} %"
+    return (
+        "&ndash;"
+        if index.low == index.high
+        else f"{100 * index.low:.0f} to {100 * index.high:.0f} %"
+    )
 
 
-def quantile_table(found: dict, of: int) -> str:
+def quantile_table(quantiles: dict, n_cases: int) -> str:
     """Return the quantiles of random cases as an HTML table; "" if there are none.
 
     If the cases that are left out may be the extreme ones, no quantiles are given. For a measure
@@ -539,9 +574,9 @@ def quantile_table(found: dict, of: int) -> str:
 
     Parameters
     ----------
-    found : dict
+    quantiles : dict
         From `measure_quantiles`.
-    of : int
+    n_cases : int
         Number of random cases.
 
     Returns
@@ -549,22 +584,22 @@ def quantile_table(found: dict, of: int) -> str:
     str
     """
     rows = []
-    most = max((one[2] for one in found.values()), default=0)
-    for name, (unit, values, count, misses) in found.items():
+    largest_count = max((entry[2] for entry in quantiles.values()), default=0)
+    for name, (unit, values, count, misses) in quantiles.items():
         in_unit, scale = (
             ("%", 100.0)
             if is_share(name)
             else choose_display_unit(float(np.abs(values).max()), unit)
         )
-        known = (
+        quantile_cells = (
             ["not known"] * len(QUANTILE_LEVELS)
-            if most < MIN_SETTLED_FRACTION * of
+            if largest_count < MIN_SETTLED_FRACTION * n_cases
             else [format_number(value * scale, 4) for value in values.tolist()]
         )
         rows.append(
             [
                 measure_link(measure_label(name), name),
-                *known,
+                *quantile_cells,
                 escape(in_unit),
                 str(count),
                 str(misses),
@@ -572,14 +607,12 @@ def quantile_table(found: dict, of: int) -> str:
         )
     if not rows:
         return ""
-    left = (
-        ""
-        if most >= MIN_SETTLED_FRACTION * of
-        else (
-            f" {of - most} of {of} cases do not count, perhaps those with the largest motion, so that these values are not "
-            "known; with more cycles (drive.cycles) more cases may settle."
+    left_out_note = ""
+    if largest_count < MIN_SETTLED_FRACTION * n_cases:
+        left_out_note = (
+            f" {n_cases - largest_count} of {n_cases} cases do not count, perhaps those with the largest motion, so "
+            "that these values are not known; with more cycles (drive.cycles) more cases may settle."
         )
-    )
     return (
         document.table_html(
             ("measure", ">5 %", ">half", ">95 %", "unit", ">cases", ">miss the tolerance"),
@@ -588,5 +621,5 @@ def quantile_table(found: dict, of: int) -> str:
         )
         + "<p class=soft>The columns 5 %, half and 95 % give the values below which so many of the random cases "
         "lie. If any case has settled, only settled cases count. Cases that miss the tolerance are included with "
-        f"their values.{left}</p>"
+        f"their values.{left_out_note}</p>"
     )

@@ -36,17 +36,17 @@ def describe_release(result: Result) -> str:
 
 def _describe_decay(decay) -> str:
     """Return a clause about frequency and damping of the second and the last known swing."""
-    known = (
+    known_swings = (
         []
         if decay is None
         else np.flatnonzero(np.isfinite(decay.damping_error + decay.frequency_error)).tolist()
     )
-    if len(known) < MIN_AMPLITUDES:
+    if len(known_swings) < MIN_AMPLITUDES:
         return ""
     parts = [
         f"{format_value(decay.frequency[k], decay.frequency_error[k], unit='Hz')}, damping ratio "
         f"{format_value(decay.damping[k], decay.damping_error[k])} at {format_quantity(float(decay.amplitude[k]), 'm', 3)}"
-        for k in dict.fromkeys((known[1], known[-1]))
+        for k in dict.fromkeys((known_swings[1], known_swings[-1]))
     ]
     return f"; it decays at {', and at '.join(parts)}"
 
@@ -71,34 +71,36 @@ def describe_swing(time, output, error: float = 0.0, amplitude: float | None = N
     str
     """
     end = float(output[-1])
-    begin = float(output[0])
+    start = float(output[0])
     end = 0.0 if abs(end) < ZERO_FRACTION * np.abs(output).max() else end
-    far = np.abs(output - end)
-    if not np.isfinite(far).all() or not far.max() > 0:
-        return f"released at {format_length(begin, 3)}, the output does not move"
+    distance = np.abs(output - end)
+    if not np.isfinite(distance).all() or not distance.max() > 0:
+        return f"released at {format_length(start, 3)}, the output does not move"
     moves = np.flatnonzero(np.abs(np.diff(output)) > ROUND_OFF_FRACTION * np.abs(output).max())
-    turns = 1 + moves[:-1][np.diff(np.sign(np.diff(output)[moves])) != 0]
-    still = max(error, REST_FRACTION * abs(end), ZERO_FRACTION * np.abs(output).max())
-    turns = turns[far[turns] > still]
-    way = (
-        f"first swings to {format_length(float(output[turns[0]]), 3)}"
-        if turns.size
+    reversals = 1 + moves[:-1][np.diff(np.sign(np.diff(output)[moves])) != 0]
+    rest_limit = max(error, REST_FRACTION * abs(end), ZERO_FRACTION * np.abs(output).max())
+    reversals = reversals[distance[reversals] > rest_limit]
+    first_motion = (
+        f"first swings to {format_length(float(output[reversals[0]]), 3)}"
+        if reversals.size
         else f"goes to {format_length(end, 3)}"
     )
-    first = f"released at {format_length(begin, 3)}, the output {way}"
+    first = f"released at {format_length(start, 3)}, the output {first_motion}"
     tenth = np.ptp(output[time >= time[-1] - 0.1 * (time[-1] - time[0])]) / 2
     last = tenth if amplitude is None else min(tenth, amplitude)
-    if last > still:
+    if last > rest_limit:
         at = format_quantity(float(time[-1]), "s", 3)
         return (
             f"{first} and at the end, after {at}, still moves with an amplitude (half peak-to-peak of its last "
             f"whole cycle) of {format_length(float(last), 3)}"
         )
-    beyond = int(np.flatnonzero(far > still)[-1]) if (far > still).any() else 0
-    beyond = min(beyond, time.size - 2)
-    rests = f"comes to rest at {format_length(end, 3)} after {format_quantity(float(time[beyond + 1]), 's', 3)}"
+    last_moving = (
+        int(np.flatnonzero(distance > rest_limit)[-1]) if (distance > rest_limit).any() else 0
+    )
+    last_moving = min(last_moving, time.size - 2)
+    rests = f"comes to rest at {format_length(end, 3)} after {format_quantity(float(time[last_moving + 1]), 's', 3)}"
     return (
-        f"{first}, reverses {turns.size} times and {rests}"
-        if turns.size
+        f"{first}, reverses {reversals.size} times and {rests}"
+        if reversals.size
         else f"{first} and {rests}"
     )

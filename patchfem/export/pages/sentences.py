@@ -180,7 +180,7 @@ def format_pair(name: str, low: float, high: float, unit: str, digits: int) -> t
     -------
     tuple of str
     """
-    texts = tuple(format_measure(name, one, unit, digits) for one in (low, high))
+    texts = tuple(format_measure(name, value, unit, digits) for value in (low, high))
     if (
         is_share(name)
         or unit not in formatting.UNIT_LADDERS
@@ -189,8 +189,10 @@ def format_pair(name: str, low: float, high: float, unit: str, digits: int) -> t
         or abs(high) > 1000 * abs(low)
     ):
         return texts
-    own, scale = formatting.choose_display_unit(max(abs(low), abs(high)), unit)
-    return tuple(f"{formatting.format_number(one * scale, digits)} {own}" for one in (low, high))
+    common_unit, scale = formatting.choose_display_unit(max(abs(low), abs(high)), unit)
+    return tuple(
+        f"{formatting.format_number(value * scale, digits)} {common_unit}" for value in (low, high)
+    )
 
 
 def format_with_error(name: str, measure: dict) -> str:
@@ -218,8 +220,8 @@ def format_zero(name: str, measure: dict = NONE) -> float:
     run has raised to the tolerance times larger terms is what is required of it, not what is known.
     """
     row = find_definition(name)
-    own = measure.get("floor") or inf
-    return 0.0 if row is None else min(row.floor, own)
+    floor_of_run = measure.get("floor") or inf
+    return 0.0 if row is None else min(row.floor, floor_of_run)
 
 
 def format_imperial(name: str, measure: dict) -> str:
@@ -236,21 +238,21 @@ def format_imperial(name: str, measure: dict) -> str:
         or abs(value) <= (error or 0.0)
     ):
         return ""
-    found = display_units(name, value, measure["unit"], error)[1:]
+    imperial_units = display_units(name, value, measure["unit"], error)[1:]
     return " = ".join(
         f"{format_value_and_error(name, measure, scale)[0]} {unit}"
-        for unit, scale in found
+        for unit, scale in imperial_units
         if abs(value) * scale >= 1e-3
     )
 
 
 def _unknown_measures(measures: dict) -> str:
     """Return the names of the static measures whose error is as large as the value; "" if none."""
-    found = {
-        name: Measure(**{key: one[key] for key in ("value", "unit", "error")})
-        for name, one in measures.items()
+    measure_records = {
+        name: Measure(**{key: measure[key] for key in ("value", "unit", "error")})
+        for name, measure in measures.items()
     }
-    return " and of ".join(unknown_measures(found))
+    return " and of ".join(unknown_measures(measure_records))
 
 
 def verdict_sentence(summary: dict) -> str:
@@ -263,8 +265,8 @@ def verdict_sentence(summary: dict) -> str:
     outcome = Outcome(summary["outcome"])
     measures = summary["measures"]
     if outcome is Outcome.NOT_CONVERGED and (unknown := _unknown_measures(measures)):
-        known = "use the other measures with their stated errors"
-        return f"The numerical error of {unknown} is as large as the value, so it is not known; {known}."
+        advice = "use the other measures with their stated errors"
+        return f"The numerical error of {unknown} is as large as the value, so it is not known; {advice}."
     if summary["kind"] == "bench" and outcome is Outcome.DONE:
         found = (
             _bench_loop_sentence(summary["loop"], measures["equivalent_stiffness"])
@@ -274,8 +276,8 @@ def verdict_sentence(summary: dict) -> str:
         return _bench_slip_sentence(
             measures.get("slip_amplitude"), found, "contact_fraction" in measures
         )
-    if away := summary.get("run_away"):
-        drive, knee = (format_measure("", away[name], "m s-2", 4) for name in ("drive", "knee"))
+    if run_away := summary.get("run_away"):
+        drive, knee = (format_measure("", run_away[name], "m s-2", 4) for name in ("drive", "knee"))
         return (
             f"{outcome.sentence} The drive, {drive}, is larger than {knee}, above which friction alone does not "
             "limit the amplitude at resonance."
@@ -294,17 +296,17 @@ def verdict_sentence(summary: dict) -> str:
         one.startswith(UNSETTLED) for one in summary.get("warnings", ())
     )
     part = "part of the patch slips" if "contact_fraction" in measures else "part of it slips"
-    for first, least, form in (
+    for kind, threshold, form in (
         ("loop_area", ROUND_OFF_FRACTION * abs(force * motion), "{} per cycle"),
         ("slip_amplitude", 0.0, "by {}"),
     ):
         found = {
             name: one
             for name, one in measures.items()
-            if re.sub(r"_\d+$", "", name) == first and one["value"]
+            if re.sub(r"_\d+$", "", name) == kind and one["value"]
         }
-        name = max(found, key=lambda each: found[each]["value"], default="")
-        if name and found[name]["value"] > max(_error_or_floor(found[name]), least):
+        name = max(found, key=lambda candidate: found[candidate]["value"], default="")
+        if name and found[name]["value"] > max(_error_or_floor(found[name]), threshold):
             size = form.format(format_with_error(name, found[name]))
             return f"The interface as a whole sticks, but {part} ({size}).{rings}"
     return _no_slip_sentence("contact_fraction" in measures, "cycles") + rings
@@ -323,24 +325,24 @@ def _no_slip_sentence(patch: bool, cycles: str) -> str:
     )
 
 
-def _bench_slip_sentence(slip: dict | None, done: str, patch: bool) -> str:
+def _bench_slip_sentence(slip: dict | None, first_sentence: str, patch: bool) -> str:
     """Return the sentence of a bench with its slip, if it exceeds its error.
 
     Parameters
     ----------
     slip : dict or None
         Slip amplitude, the mean weighted by the pressure.
-    done : str
+    first_sentence : str
         Sentence that comes first.
     patch : bool
         Whether the contact is a patch.
     """
     if slip is None or slip["value"] is None:
-        return done
+        return first_sentence
     if slip["value"] <= max(_error_or_floor(slip), NO_SLIP):
-        return f"{done} {_no_slip_sentence(patch, 'cycle')}"
+        return f"{first_sentence} {_no_slip_sentence(patch, 'cycle')}"
     return (
-        f"{done} Slip amplitude (half the peak-to-peak slip, averaged over the interface): "
+        f"{first_sentence} Slip amplitude (half the peak-to-peak slip, averaged over the interface): "
         f"{format_with_error('slip_amplitude', slip)}."
     )
 
@@ -367,9 +369,9 @@ def _bench_loop_sentence(loop: dict, stiffness: dict) -> str:
     )
 
 
-def _error_or_floor(one: dict) -> float:
+def _error_or_floor(measure: dict) -> float:
     """Return the error of a measure in its unit, or its floor if no error was estimated."""
-    return one["floor"] if one["error"] is None else one["error"]
+    return measure["floor"] if measure["error"] is None else measure["error"]
 
 
 class Statement(NamedTuple):
@@ -532,48 +534,48 @@ def describe_contact(contact: dict | None, fraction: float | None = None) -> str
     first = contact["from"]
     last = contact["to"]
     stretches = contact["stretches"]
-    left = stretches[0][0] <= first
-    right = stretches[-1][1] >= last
-    if left and right and len(stretches) == 1:
+    touches_left_end = stretches[0][0] <= first
+    touches_right_end = stretches[-1][1] >= last
+    if touches_left_end and touches_right_end and len(stretches) == 1:
         return ""
     unit, scale = formatting.choose_unit(formatting.UNIT_LADDERS["m"], max(abs(first), abs(last)))
-    least = min(
-        [1e-3 * (last - first), *(1e-2 * (end - begin) for begin, end in stretches if end > begin)]
+    shortest_length = min(
+        [1e-3 * (last - first), *(1e-2 * (end - start) for start, end in stretches if end > start)]
     )
     # This many digits distinguish both ends of the shortest stretch.
-    digits = max(0, -floor(log10(least * scale)))
+    digits = max(0, -floor(log10(shortest_length * scale)))
 
-    def number(place: float) -> str:
+    def number(position: float) -> str:
         """Write a position [m] in the unit of the sentence."""
         return (
-            f"{round(place * scale, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".")
+            f"{round(position * scale, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".")
             if digits
-            else f"{place * scale:.0f}"
+            else f"{position * scale:.0f}"
         )
 
     count = len(stretches)
     parts = stretches if count <= MAX_LISTED else [[stretches[0][0], stretches[-1][1]]]
     if count == 1 and parts[0][0] == parts[0][1]:
         return f", at x = {number(parts[0][0])} {unit}"
-    share = sum(end - begin for begin, end in stretches) / (last - first)
-    alike = (
+    fraction_on_mesh = sum(end - start for start, end in stretches) / (last - first)
+    agrees = (
         fraction is None
-        or abs(share - fraction) <= EQUAL_FRACTION_TOL * fraction
-        or f"{share:.3g}" == f"{fraction:.3g}"
+        or abs(fraction_on_mesh - fraction) <= EQUAL_FRACTION_TOL * fraction
+        or f"{fraction_on_mesh:.3g}" == f"{fraction:.3g}"
     )
-    here = (
+    mesh_note = (
         ""
-        if alike
-        else f" on the finest mesh ({100 * share:.3g} %; the fraction before is extrapolated from all meshes)"
+        if agrees
+        else f" on the finest mesh ({100 * fraction_on_mesh:.3g} %; the fraction before is extrapolated from all meshes)"
     )
-    told = " and from ".join(
-        f"{number(begin)} to {number(end)} {unit}{' (left end)' * (begin <= first)}{' (right end)' * (end >= last)}"
-        for begin, end in parts
+    ranges = " and from ".join(
+        f"{number(start)} to {number(end)} {unit}{' (left end)' * (start <= first)}{' (right end)' * (end >= last)}"
+        for start, end in parts
     )
     return (
-        f", from x = {told}{here}"
+        f", from x = {ranges}{mesh_note}"
         if count <= MAX_LISTED
-        else f", in {count} stretches from x = {told}{here}"
+        else f", in {count} stretches from x = {ranges}{mesh_note}"
     )
 
 
@@ -590,7 +592,7 @@ def tolerance_sentence(result: Result) -> str:
         "" if a measure misses the tolerance (a warning says so) or no error is known.
     """
     tolerance = result.plan.model.accuracy.tolerance
-    known = {
+    with_error = {
         name: one
         for name, one in result.measures.items()
         if one.value is not None and one.error is not None and not name.endswith(SCATTER)
@@ -599,11 +601,13 @@ def tolerance_sentence(result: Result) -> str:
         return GROWING_MOTION.format(
             formatting.format_quantity(float(result.response.time[-1]), "s", 3)
         )
-    if not known or max(one.error_ratio(tolerance) for one in known.values()) > 1:
+    if not with_error or max(one.error_ratio(tolerance) for one in with_error.values()) > 1:
         return ""
-    texts_of = {name: format_with_error(name, measure_object(one)) for name, one in known.items()}
+    texts_of = {
+        name: format_with_error(name, measure_object(one)) for name, one in with_error.items()
+    }
     visible = {
-        name: known[name]
+        name: with_error[name]
         for name, text in texts_of.items()
         if "±" in text and not text.startswith("0 ")
     }
@@ -613,13 +617,15 @@ def tolerance_sentence(result: Result) -> str:
     }
     sentence = f"Every measure with an error estimate meets the tolerance {tolerance:g}"
     if absolute:
-        sentence += f" ({_absolute_limits(absolute, known, tolerance)})"
+        sentence += f" ({_absolute_limits(absolute, with_error, tolerance)})"
     if relative:
         name = max(relative, key=lambda one: (relative[one], one))
         which = "of the other errors" if absolute else "error"
-        share = formatting.format_number(relative[name], 2)
-        sentence += f"; the largest {which} is {share} of the value ({name}, {texts_of[name]})"
-    if len(visible) < len(known):
+        largest_ratio = formatting.format_number(relative[name], 2)
+        sentence += (
+            f"; the largest {which} is {largest_ratio} of the value ({name}, {texts_of[name]})"
+        )
+    if len(visible) < len(with_error):
         unknown = any(
             measure.value is not None and measure.error is None
             for measure in result.measures.values()
@@ -628,31 +634,31 @@ def tolerance_sentence(result: Result) -> str:
     return f"{sentence}."
 
 
-def _absolute_limits(names: list, known: dict, tolerance: float) -> str:
+def _absolute_limits(names: list, measures: dict, tolerance: float) -> str:
     """State the limits of measures whose error exceeds the tolerance times their value."""
     parts = []
     for name in names:
-        one = known[name]
-        full = next(
+        measure = measures[name]
+        full_range = next(
             (size for kind, size in RANGES.items() if remove_interface_number(name).endswith(kind)),
             0.0,
         )
-        limit = compute_allowed_error(tolerance, one.value, one.floor)
+        limit = compute_allowed_error(tolerance, measure.value, measure.floor)
         if name in LEVEL_MEASURES:
             parts.append(f"{name}: one step between the drive levels of the scene")
-        elif one.error <= tolerance * full:
+        elif measure.error <= tolerance * full_range:
             parts.append(
-                f"{name}: {tolerance:g} of its range of {_plain_value(name, full, one.unit)}"
+                f"{name}: {tolerance:g} of its range of {_plain_value(name, full_range, measure.unit)}"
             )
         else:
-            parts.append(f"{name}: {_plain_value(name, limit, one.unit)}")
+            parts.append(f"{name}: {_plain_value(name, limit, measure.unit)}")
     return "; ".join(parts)
 
 
 def _plain_value(name: str, value: float, unit: str) -> str:
     """Write a value [SI] of a measure with three digits in a suitable unit."""
-    shown, scale = display_units(name, value, unit)[0]
-    return f"{formatting.format_number(value * scale, 3)} {shown}".rstrip()
+    display_unit, scale = display_units(name, value, unit)[0]
+    return f"{formatting.format_number(value * scale, 3)} {display_unit}".rstrip()
 
 
 def measure_link(text: str, name: str, more: str = "") -> str:
@@ -666,9 +672,9 @@ def find_definition(name: str, pressed: bool = False):
     None if there is none. pressed: whether a patch was pressed, which has a load of its own.
     """
     for table in (STATIC, MOTION) if pressed else (MOTION, STATIC):
-        for known in (name, re.sub(r"_\d+$", "", name)):
-            if known in table:
-                return table[known]
+        for candidate in (name, re.sub(r"_\d+$", "", name)):
+            if candidate in table:
+                return table[candidate]
     return None
 
 
@@ -703,19 +709,19 @@ def record_interval(name: str, measures: dict) -> tuple:
 
     They have the digits that the scatter of records allows; ("", "") for any other measure.
     """
-    one = measures.get(name, NONE)
-    spread = measures.get(f"{name}{SCATTER}", NONE)
-    if one.get("value") is None or spread.get("value") is None:
+    measure = measures.get(name, NONE)
+    scatter = measures.get(f"{name}{SCATTER}", NONE)
+    if measure.get("value") is None or scatter.get("value") is None:
         return "", ""
-    value = one["value"]
-    half = spread["value"]
-    unit, scale = display_units(name, value, one["unit"])[0]
-    digits = max(2, 2 + ceil(log10(abs(value) / half))) if half > 0 and value else 6
-    own, low, high = (
+    value = measure["value"]
+    half_width = scatter["value"]
+    unit, scale = display_units(name, value, measure["unit"])[0]
+    digits = max(2, 2 + ceil(log10(abs(value) / half_width))) if half_width > 0 and value else 6
+    value_text, low, high = (
         formatting.format_number(at * scale, digits + extra)
-        for at, extra in ((value, 1), (max(value - half, 0.0), 0), (value + half, 0))
+        for at, extra in ((value, 1), (max(value - half_width, 0.0), 0), (value + half_width, 0))
     )
-    return f"{own} {unit}".strip(), f"95 % interval {low} to {high} {unit}".strip()
+    return f"{value_text} {unit}".strip(), f"95 % interval {low} to {high} {unit}".strip()
 
 
 def format_measures(measures: dict, engine: str = "") -> list[str]:
@@ -734,23 +740,23 @@ def format_measures(measures: dict, engine: str = "") -> list[str]:
     -------
     list of str
     """
-    every = measures
+    all_measures = measures
     measures = order_measures(measures)
     width = max(map(len, measures), default=0)
-    out = []
+    all_lines = []
     pressed = "contact_fraction" in measures
-    over = (
+    range_text = (
         OVER_MOTION_CYCLES if "worn_volume" in measures else PERIOD_BY_ENGINE.get(engine, WHOLE_RUN)
     )
     for group in GROUPS:
         lines = [
-            f"  {name:<{width}}  {_format_measure_line(name, one, over, POWER in every)}"
-            f"{_format_record_interval(name, every)}"
-            for name, one in measures.items()
+            f"  {name:<{width}}  {_format_measure_line(name, measure, range_text, POWER in all_measures)}"
+            f"{_format_record_interval(name, all_measures)}"
+            for name, measure in measures.items()
             if measure_group(name, pressed) == group
         ]
-        out += [group, *lines] if lines else []
-    return out
+        all_lines += [group, *lines] if lines else []
+    return all_lines
 
 
 def notebook_html(summary: dict, sentence: str, cycles: float | None, released: str = "") -> str:
@@ -777,10 +783,10 @@ def notebook_html(summary: dict, sentence: str, cycles: float | None, released: 
         rows.append(f"<tr>{cells if value else f'<th colspan=2>{escape(name)}</th>'}</tr>")
     title = f"<b>{escape(summary['title'])}</b><br>" if summary["title"] else ""
     warnings = "".join(f"<p>&#9888; {sentence_html(text)}</p>" for text in summary["warnings"])
-    answer = escape(
+    headline = escape(
         f"{summary['outcome']}: {sentence} {headline_sentence(summary, cycles, released=released)}"
     )
-    return f"<div>{title}{answer}{warnings}<table>{''.join(rows)}</table></div>"
+    return f"<div>{title}{headline}{warnings}<table>{''.join(rows)}</table></div>"
 
 
 def _format_record_interval(name: str, measures: dict) -> str:
@@ -792,22 +798,24 @@ def _format_record_interval(name: str, measures: dict) -> str:
     return f" ({numerics}{text} for other records)" if text else ""
 
 
-def _format_measure_line(name: str, one: dict, over: str, shaken: bool) -> str:
+def _format_measure_line(name: str, measure: dict, range_text: str, shaken: bool) -> str:
     """Write a measure with its error and what it refers to, or the reason why it has no value."""
-    if one.get("reason"):
-        return f"- ({one['reason']})"
-    of_what = QUALIFIERS.get(re.sub(r"_\d+$", "", name))
-    of_what = over if of_what == WHOLE_RUN else of_what
-    of_what = f"{of_what} of the first mode" if shaken and of_what == "per cycle" else of_what
-    unknown = UNKNOWN if one["error"] is None and one["value"] is not None else ""
-    return f"{format_with_error(name, one)}{unknown}{f', {of_what}' if of_what else ''}"
+    if measure.get("reason"):
+        return f"- ({measure['reason']})"
+    qualifier = QUALIFIERS.get(re.sub(r"_\d+$", "", name))
+    qualifier = range_text if qualifier == WHOLE_RUN else qualifier
+    qualifier = (
+        f"{qualifier} of the first mode" if shaken and qualifier == "per cycle" else qualifier
+    )
+    unknown = UNKNOWN if measure["error"] is None and measure["value"] is not None else ""
+    return f"{format_with_error(name, measure)}{unknown}{f', {qualifier}' if qualifier else ''}"
 
 
 def join_sentences(sentences: Sequence) -> str:
     """Join sentences with semicolons; "" if there are none."""
     first, *others = sentences or [""]
-    said = [
+    clauses = [
         first,
         *(f"{one[0].lower() if one[1:2].islower() else one[0]}{one[1:]}" for one in others),
     ]
-    return "; ".join(one.rstrip(".") for one in said) + "." * bool(first)
+    return "; ".join(one.rstrip(".") for one in clauses) + "." * bool(first)

@@ -86,18 +86,20 @@ def _read_arrays(path: Path) -> dict:
     """Read the variables of CHARTS that have finite values."""
     if not path.is_file():
         return {}
-    shown = {name for _, *axes in CHARTS for name, _ in axes}
-    out = {}
-    for name, one in read_variables(path, shown)[1].items():
+    drawn_names = {name for _, *axes in CHARTS for name, _ in axes}
+    arrays = {}
+    for name, variable in read_variables(path, drawn_names)[1].items():
         with reading_errors(path, "results of a run"):
             require_valid(
-                is_real(one.values) and one.values.ndim in (1, 2) and one.values.size > 0,
-                f"{name} contains {one.values.ndim}-dimensional {one.values.dtype}",
+                is_real(variable.values)
+                and variable.values.ndim in (1, 2)
+                and variable.values.size > 0,
+                f"{name} contains {variable.values.ndim}-dimensional {variable.values.dtype}",
             )
-        values = one.values[0] if one.values.ndim == 2 else one.values
+        values = variable.values[0] if variable.values.ndim == 2 else variable.values
         if np.isfinite(values).any():
-            out[name] = (values.astype(float), one.unit)
-    return out
+            arrays[name] = (values.astype(float), variable.unit)
+    return arrays
 
 
 def page_html(runs: list) -> str:
@@ -123,15 +125,15 @@ def page_html(runs: list) -> str:
         )
         for chart in charts
     ]
-    known = dict.fromkeys(name for run in runs for name in run.summary["measures"])
-    means = [
+    measure_names = dict.fromkeys(name for run in runs for name in run.summary["measures"])
+    meaning_rows = [
         (
             f" id='measure-{escape(name)}'",
             [escape(measure_label(name)), sentence_html(measure_meaning(name))],
         )
-        for name in known
+        for name in measure_names
     ]
-    sections.append(Section("means", "What the measures are", table_html(("", ""), means)))
+    sections.append(Section("means", "What the measures are", table_html(("", ""), meaning_rows)))
     title = " and ".join(names) if len(names) < 4 else f"{len(names)} runs side by side"
     return document_html(
         title,
@@ -244,8 +246,12 @@ def _axis_unit(arrays: list, unit: str) -> tuple:
 
 def drive_period(run: FinishedRun) -> float | None:
     """Return the period [s] of the sine that drives a run; None if there is none."""
-    written = NUMBER.match(str(run.resolved.get("drive", {}).get("frequency", "")))
-    return 1 / float(written[1]) if written and float(written[1]) > 0 else None
+    number_with_unit = NUMBER.match(str(run.resolved.get("drive", {}).get("frequency", "")))
+    return (
+        1 / float(number_with_unit[1])
+        if number_with_unit and float(number_with_unit[1]) > 0
+        else None
+    )
 
 
 def _select_last_cycles(run: FinishedRun) -> np.ndarray:
@@ -261,7 +267,7 @@ def _select_last_cycles(run: FinishedRun) -> np.ndarray:
     return time >= time[-1] - span * (1 + 1e-9)
 
 
-def _flatten_tables(table, at: str = "") -> dict:
+def _flatten_tables(table, prefix: str = "") -> dict:
     """Flatten nested tables: "contact.tilt.angle" -> value.
 
     Entries of lists are named by their name or number.
@@ -269,27 +275,32 @@ def _flatten_tables(table, at: str = "") -> dict:
     if isinstance(table, dict):
         pairs = table.items()
     elif isinstance(table, list) and table and isinstance(table[0], dict):
-        pairs = [(one.get("name", number), one) for number, one in enumerate(table, 1)]
+        pairs = [(entry.get("name", number), entry) for number, entry in enumerate(table, 1)]
     else:
-        return {at: table}
+        return {prefix: table}
     return {
         key: value
-        for name, one in pairs
-        for key, value in _flatten_tables(one, f"{at}.{name}" if at else str(name)).items()
+        for name, entry in pairs
+        for key, value in _flatten_tables(
+            entry, f"{prefix}.{name}" if prefix else str(name)
+        ).items()
     }
 
 
 def _differences_table(runs: list, names: list) -> str:
     """Return a table of the keys whose values differ between the resolved scenes."""
-    flat = [_flatten_tables(run.resolved) for run in runs]
+    flat_scenes = [_flatten_tables(run.resolved) for run in runs]
     keys = [
         key
-        for key in dict.fromkeys(key for one in flat for key in one)
-        if any(one.get(key) != flat[0].get(key) for one in flat)
+        for key in dict.fromkeys(key for flat_scene in flat_scenes for key in flat_scene)
+        if any(flat_scene.get(key) != flat_scenes[0].get(key) for flat_scene in flat_scenes)
     ]
     if not keys:
         return "<p>There is no difference: the resolved scenes are the same.</p>"
-    rows = [[escape(key), *(_format_scene_value(one.get(key)) for one in flat)] for key in keys]
+    rows = [
+        [escape(key), *(_format_scene_value(flat_scene.get(key)) for flat_scene in flat_scenes)]
+        for key in keys
+    ]
     return (
         "<p class=soft>The table lists the keys whose values differ between the resolved scenes, in SI.</p>"
         + table_html(("key", *map(escape, names)), rows)
@@ -313,13 +324,13 @@ def _measures_table(runs: list, names: list) -> str:
     """
     rows = []
     for name in dict.fromkeys(name for run in runs for name in run.summary["measures"]):
-        found = [run.summary["measures"].get(name) for run in runs]
+        measures = [run.summary["measures"].get(name) for run in runs]
         rows.append(
             [
                 measure_link(measure_label(name), name),
                 *(
-                    _format_cell(name, one, found[0] if number else None)
-                    for number, one in enumerate(found)
+                    _format_cell(name, measure, measures[0] if number else None)
+                    for number, measure in enumerate(measures)
                 ),
             ]
         )
@@ -332,17 +343,17 @@ def _measures_table(runs: list, names: list) -> str:
     )
 
 
-def _format_cell(name: str, one: dict | None, first: dict | None) -> str:
+def _format_cell(name: str, measure: dict | None, first: dict | None) -> str:
     """Write a measure as a cell, with its change from the first run if both have one unit."""
-    if one is None or one["value"] is None or not math.isfinite(one["value"]):
+    if measure is None or measure["value"] is None or not math.isfinite(measure["value"]):
         return "&ndash;"
-    text = escape(format_with_error(name, one))
-    alone = first is None or first["value"] is None or first["unit"] != one["unit"]
-    if alone or abs(one["value"] - first["value"]) <= (one["error"] or 0.0) + (
+    text = escape(format_with_error(name, measure))
+    alone = first is None or first["value"] is None or first["unit"] != measure["unit"]
+    if alone or abs(measure["value"] - first["value"]) <= (measure["error"] or 0.0) + (
         first["error"] or 0.0
     ):
         return f"<span class=v>{text}</span>"
-    return f"<b class=v>{text}</b> <span class=v>({_format_change(one['value'], first)})</span>"
+    return f"<b class=v>{text}</b> <span class=v>({_format_change(measure['value'], first)})</span>"
 
 
 def _format_change(value: float, first: dict) -> str:

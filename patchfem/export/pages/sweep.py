@@ -33,7 +33,7 @@ MAX_LISTED_CASES = 400  # the table has at most this number of cases, sweep.csv 
 MIN_SCROLLED_ROWS = 24  # a table with more rows scrolls in its frame
 
 
-def page_html(table: dict, told: SweepHeadline | None = None) -> str:
+def page_html(table: dict, summary: SweepHeadline | None = None) -> str:
     """Return the HTML page of a sweep.
 
     Parameters
@@ -47,7 +47,7 @@ def page_html(table: dict, told: SweepHeadline | None = None) -> str:
         [m], if they are known; `outcome` (n,); `messages`: {case: why it has no result}; `folders`
         (n,): paths of the cases relative to the page, or None; `own`: False if the folder of the
         page has no sweep.csv.
-    told : SweepHeadline, optional
+    summary : SweepHeadline, optional
         The `summarise_sweep` of the table, if it is known.
 
     Returns
@@ -62,30 +62,30 @@ def page_html(table: dict, told: SweepHeadline | None = None) -> str:
         ),
         None,
     )
-    told = told or summarise_sweep(table)
-    part = select_cases(table, lambda cases, whole: _script_data(table, first, cases, whole))
-    data = _script_data(table, first, part.cases, not part.said)
+    summary = summary or summarise_sweep(table)
+    drawn_cases = select_cases(table, lambda cases, whole: _script_data(table, first, cases, whole))
+    data = _script_data(table, first, drawn_cases.cases, not drawn_cases.said)
     sections = [
         Section(
             "answers",
             "Results",
-            _explorer_html(part.said, table["folders"])
+            _explorer_html(drawn_cases.said, table["folders"])
             if data["measures"]
             else "<p>No case has a value to draw.</p>",
         ),
-        *_change_section(table, told.limits),
+        *_change_section(table, summary.limits),
         *(
-            Section(*one)
-            for one in (
-                ("peaks", "Peaks", peaks.peaks_table(told.peaks)),
-                ("ranking", "Keys that matter most", ranked.share_bars(told.ranks)),
+            Section(*section)
+            for section in (
+                ("peaks", "Peaks", peaks.peaks_table(summary.peaks)),
+                ("ranking", "Keys that matter most", ranked.share_bars(summary.ranks)),
                 (
                     "scatter",
                     "Scatter of the answers",
-                    ranked.quantile_table(told.spread, len(table["outcome"])),
+                    ranked.quantile_table(summary.spread, len(table["outcome"])),
                 ),
             )
-            if one[2]
+            if section[2]
         ),
         Section("cases", "Cases", _cases_table(table)),
         Section("measures", "What the measures mean", _meanings_table(table)),
@@ -93,24 +93,24 @@ def page_html(table: dict, told: SweepHeadline | None = None) -> str:
     ]
     return document.document_html(
         table["title"] or "patchfem sweep",
-        _lead_html(table, told),
+        _lead_html(table, summary),
         sections,
         *((data, ("figures.js", "explorer.js")) if data["measures"] else (None, ())),
     )
 
 
-def _script_data(table: dict, first: str | None, cases: np.ndarray, whole: bool) -> dict:
+def _script_data(table: dict, first: str | None, cases: np.ndarray, is_exact: bool) -> dict:
     """Return the data of some cases for the scripts; whole: with all digits."""
-    keys = [_key_data(one, cases) for one in table["keys"]]
+    keys = [_key_data(item, cases) for item in table["keys"]]
     measures = [
-        _measure_data(name, one, cases, table.get("tolerance", np.nan))
-        for name, one in table["measures"].items()
-        if np.isfinite(one["values"]).any()
+        _measure_data(name, item, cases, table.get("tolerance", np.nan))
+        for name, item in table["measures"].items()
+        if np.isfinite(item["values"]).any()
     ]
-    for one in measures if not whole else ():
-        one |= {
-            "values": round_to_digits(one["values"], VALUE_DIGITS),
-            "errors": round_to_digits(one["errors"], ERROR_DIGITS),
+    for item in measures if not is_exact else ():
+        item |= {
+            "values": round_to_digits(item["values"], VALUE_DIGITS),
+            "errors": round_to_digits(item["errors"], ERROR_DIGITS),
         }
     links = table["folders"]
     return {
@@ -118,41 +118,43 @@ def _script_data(table: dict, first: str | None, cases: np.ndarray, whole: bool)
         "measures": measures,
         "outcome": [str(table["outcome"][i]) for i in cases.tolist()],
         "settled": SETTLED_OUTCOMES,
-        "grid": bool(table["grid"] and whole),
+        "grid": bool(table["grid"] and is_exact),
         "first": first,
         "along": _axis_key(keys),
-        "whole": whole,
+        "whole": is_exact,
         "links": None if links is None else [links[i] for i in cases.tolist()],
     }
 
 
-def _key_data(one: dict, cases) -> dict:
+def _key_data(key: dict, cases) -> dict:
     """Return a swept key in the unit in which it was written, if all values have the same unit.
 
     `words`: (number, text) of its values if they are words.
     """
-    texts = [str(one["texts"][i]) for i in cases]
-    written = [NUMBER.match(text) for text in texts]
-    units = {(match[2] or "").strip() if match else None for match in written}
+    texts = [str(key["texts"][i]) for i in cases]
+    matches = [NUMBER.match(text) for text in texts]
+    units = {(match[2] or "").strip() if match else None for match in matches}
     if len(units) == 1 and None not in units:
         unit = units.pop()
-        values = [float(match[1]) for match in written]
+        values = [float(match[1]) for match in matches]
     else:
-        unit = one["unit"]
-        values = np.asarray(one["values"], float)[cases]
-    words = None if any(written) else list(dict(zip(values, map(shorten_number, texts))).items())
+        unit = key["unit"]
+        values = np.asarray(key["values"], float)[cases]
+    word_values = (
+        None if any(matches) else list(dict(zip(values, map(shorten_number, texts))).items())
+    )
     return {
-        "name": one["name"],
-        "label": one["name"],
+        "name": key["name"],
+        "label": key["name"],
         "unit": "" if unit == "1" else unit,
         "values": values,
         "texts": [shorten_number(text) for text in texts],
-        "log": bool(one["log"]),
-        "words": words,
+        "log": bool(key["log"]),
+        "words": word_values,
     }
 
 
-def _measure_data(name: str, one: dict, cases, tolerance=np.nan) -> dict:
+def _measure_data(name: str, measure: dict, cases, tolerance=np.nan) -> dict:
     """Return a measure in a unit that suits its largest value, for the scripts.
 
     `over`: whether a case misses its tolerance.
@@ -160,31 +162,31 @@ def _measure_data(name: str, one: dict, cases, tolerance=np.nan) -> dict:
     Parameters
     ----------
     name : str
-    one : dict
+    measure : dict
         The measure, as in the table of `page_html`.
     cases : (m,) array or slice
     tolerance : float or (n,) array
     """
-    unit = one["unit"]
+    unit = measure["unit"]
     scale = 1.0
     if is_share(name):
         unit = "%"
         scale = 100.0
     elif unit in UNIT_LADDERS:
-        unit, scale = choose_axis_unit(one["values"], unit)
-    some = {
-        part: np.asarray(one[part], float)[cases]
+        unit, scale = choose_axis_unit(measure["values"], unit)
+    columns = {
+        part: np.asarray(measure[part], float)[cases]
         for part in ("values", "errors", "floors")
-        if part in one
+        if part in measure
     }
-    missed = is_over_tolerance(some, tolerance[cases] if np.ndim(tolerance) else tolerance)
+    missed = is_over_tolerance(columns, tolerance[cases] if np.ndim(tolerance) else tolerance)
     return {
         "name": name,
         "label": measure_label(name),
         "unit": "" if unit == "1" else unit,
-        "means": one.get("means", ""),
-        "values": some["values"] * scale,
-        "errors": some["errors"] * scale,
+        "means": measure.get("means", ""),
+        "values": columns["values"] * scale,
+        "errors": columns["errors"] * scale,
         "least": format_zero(name) * scale,
         "minimum": minimum_value(name) * scale,
         "over": missed.astype(int),
@@ -193,27 +195,27 @@ def _measure_data(name: str, one: dict, cases, tolerance=np.nan) -> dict:
 
 def _axis_key(keys: list) -> str:
     """Return the name of the key with the most values, which is along the axis."""
-    return max(keys, key=lambda one: np.unique(one["values"]).size)["name"] if keys else ""
+    return max(keys, key=lambda key: np.unique(key["values"]).size)["name"] if keys else ""
 
 
-def _explorer_html(said: str, folders: list | None) -> str:
+def _explorer_html(drawn_note: str, folders: list | None) -> str:
     """Return the controls and the empty figure, which `explorer.js` fills.
 
     Parameters
     ----------
-    said : str
+    drawn_note : str
         Sentence that says which cases are drawn; "" for all.
     folders : list or None
         Paths of the cases; None if nothing is stored of them.
     """
-    kept = {Path(folder).name for folder in folders or ()}
+    stored_files = {Path(folder).name for folder in folders or ()}
     opens = ""
-    if kept == {PAGE}:
+    if stored_files == {PAGE}:
         opens = " Click on a case to open its page."
-    elif kept:
-        stored = f"page or its {SUMMARY}" if PAGE in kept else SUMMARY
+    elif stored_files:
+        stored = f"page or its {SUMMARY}" if PAGE in stored_files else SUMMARY
         opens = f" Click on a case to open its {stored}; <code>--keep pages</code> keeps a page of every case."
-    thinned = said and f"<p class=soft>{sentence_html(said)}</p>"
+    thinned = drawn_note and f"<p class=soft>{sentence_html(drawn_note)}</p>"
     return (
         "<div class=choices><label>Measure<select id=measure></select></label>"
         "<label>Key on the axis<select id=along></select></label>"
@@ -230,27 +232,27 @@ def _explorer_html(said: str, folders: list | None) -> str:
     )
 
 
-def _change_section(table: dict, found: limits.Limits) -> list:
+def _change_section(table: dict, key_limits: limits.Limits) -> list:
     """Return the section about the change of each main measure since the first case.
 
     [] if the sweep has no limits.
     """
-    text = limits.limits_table(found, measure_columns(table))
+    text = limits.limits_table(key_limits, measure_columns(table))
     return [Section("change", "Change relative to the first case", text)] if text else []
 
 
-def _lead_html(table: dict, said: SweepHeadline) -> str:
+def _lead_html(table: dict, summary: SweepHeadline) -> str:
     """Return the verdict as HTML: the answer, number of cases, keys, outcomes, other sentences."""
     number = len(table["outcome"])
-    over = " × ".join(one["name"] for one in table["keys"])
-    ended = ", ".join(
+    swept_keys = " × ".join(one["name"] for one in table["keys"])
+    outcome_counts = ", ".join(
         f"{count} {measure_label(name)}" for name, count in Counter(table["outcome"]).most_common()
     )
-    first = said.sentences()[:1]
-    others = said.sentences()[1:]
+    first = summary.sentences()[:1]
+    others = summary.sentences()[1:]
     lines = [
         *map(sentence_html, first),
-        f"<b>{number} case{'s' * (number != 1)}</b> over {escape(over)}: {escape(ended)}.",
+        f"<b>{number} case{'s' * (number != 1)}</b> over {escape(swept_keys)}: {escape(outcome_counts)}.",
         *map(escape, others),
     ]
     lines += [
@@ -261,38 +263,38 @@ def _lead_html(table: dict, said: SweepHeadline) -> str:
     text = "".join(f"<p>{line}</p>" for line in lines)
     fault = document.warning_box(
         [
-            f"{count} case{'s' if count > 1 else ''} failed: {why}"
-            for why, count in Counter(table["messages"].values()).most_common(5)
+            f"{count} case{'s' if count > 1 else ''} failed: {message}"
+            for message, count in Counter(table["messages"].values()).most_common(5)
         ]
     )
     scene = f"Scene: {escape(table['of'])} &middot; " if "of" in table else ""
     return (
         f"<p class=soft>{scene}patchfem {escape(table['version'])}</p>"
-        f"<div class='verdict{' warn' * bool(said.missed)}'>{text}</div>{fault}"
+        f"<div class='verdict{' warn' * bool(summary.missed)}'>{text}</div>{fault}"
     )
 
 
 def _cases_table(table: dict) -> str:
     """Return the first cases as a table with keys, outcome and the measures that vary."""
-    shown = [
+    shown_measures = [
         name
         for name in ranked.asked_first(
             (MAIN_MEASURES[0], "peak_frequency", *MAIN_MEASURES[1:]), table
         )
         if name in table["measures"]
     ]
-    shown += [
+    shown_measures += [
         name
         for name, one in table["measures"].items()
-        if name not in shown
+        if name not in shown_measures
         and _is_varied(one["values"])
         and np.nanmax(np.abs(one["values"])) > format_zero(name)
     ]
-    shown = shown[: min(MAX_MEASURES, max(2, MAX_COLUMNS - len(table["keys"])))]
-    few = slice(MAX_LISTED_CASES)
+    shown_measures = shown_measures[: min(MAX_MEASURES, max(2, MAX_COLUMNS - len(table["keys"])))]
+    listed = slice(MAX_LISTED_CASES)
     columns = [
-        _measure_data(name, table["measures"][name], few, table.get("tolerance", np.nan))
-        for name in shown
+        _measure_data(name, table["measures"][name], listed, table.get("tolerance", np.nan))
+        for name in shown_measures
     ]
     heads = [
         *(with_line_breaks(one["name"]) for one in table["keys"]),
@@ -304,9 +306,9 @@ def _cases_table(table: dict) -> str:
     ]
     rows = []
     for i, outcome in enumerate(table["outcome"][:MAX_LISTED_CASES]):
-        said = escape(measure_label(outcome))
+        outcome_cell = escape(measure_label(outcome))
         if table["folders"] is not None:
-            said = f'<a href="{escape(table["folders"][i])}">{said}</a>'
+            outcome_cell = f'<a href="{escape(table["folders"][i])}">{outcome_cell}</a>'
         numbers = (
             f"<td class=n{' data-over' * bool(column['over'][i])}>"
             f"{_format_number(column['values'][i], column['errors'][i], column['least'])}</td>"
@@ -320,28 +322,29 @@ def _cases_table(table: dict) -> str:
                         _keep_unit_together(shorten_number(str(one["texts"][i])))
                         for one in table["keys"]
                     ),
-                    said,
+                    outcome_cell,
                     *numbers,
                 ],
             )
         )
     number = len(table["outcome"])
-    more = (
+    more_note = (
         f"<p class=soft>The first {MAX_LISTED_CASES} of {number} cases; sweep.csv contains all cases.</p>"
         if number > MAX_LISTED_CASES
         else ""
     )
-    named = (
+    table_files = (
         "<a href=sweep.csv>sweep.csv</a>, <a href=sweep.nc>sweep.nc</a>"
         if table.get("tabled", True)
         else "sweep.csv and sweep.nc (run the same command with --collect to write them)"
     )
-    files = (
-        f"<p class=soft>Every case with every measure and its error: {named}.</p>"
+    files_note = (
+        f"<p class=soft>Every case with every measure and its error: {table_files}.</p>"
         if table.get("own", True)
         else ""
     )
-    return f"{files}{document.table_html(heads, rows, 'wide long' if len(rows) > MIN_SCROLLED_ROWS else 'wide')}{more}"
+    frame = "wide long" if len(rows) > MIN_SCROLLED_ROWS else "wide"
+    return f"{files_note}{document.table_html(heads, rows, frame)}{more_note}"
 
 
 def _keep_unit_together(text: str) -> str:
@@ -351,17 +354,17 @@ def _keep_unit_together(text: str) -> str:
 
 def _is_varied(values) -> bool:
     """Return whether values (n,) differ by more than round-off."""
-    found = np.asarray(values, float)
-    found = found[np.isfinite(found)]
-    return found.size > 0 and np.ptp(found) > 1e-9 * np.abs(found).max()
+    finite = np.asarray(values, float)
+    finite = finite[np.isfinite(finite)]
+    return finite.size > 0 and np.ptp(finite) > 1e-9 * np.abs(finite).max()
 
 
-def _format_number(value: float, error: float, least: float) -> str:
+def _format_number(value: float, error: float, floor: float) -> str:
     """Write a value with its error, rounded by this error; least: its floor in the same unit."""
     if not np.isfinite(value):
         return "&ndash;"
     return " ± ".join(
-        text for text in round_to_error(value, error if np.isfinite(error) else None, least) if text
+        text for text in round_to_error(value, error if np.isfinite(error) else None, floor) if text
     )
 
 
@@ -370,9 +373,13 @@ def _meanings_table(table: dict) -> str:
     rows = [
         (
             f" id='measure-{escape(name)}'",
-            [escape(measure_label(name)), escape(one["unit"]), sentence_html(one.get("means", ""))],
+            [
+                escape(measure_label(name)),
+                escape(measure["unit"]),
+                sentence_html(measure.get("means", "")),
+            ],
         )
-        for name, one in table["measures"].items()
+        for name, measure in table["measures"].items()
     ]
     return document.table_html(("measure", "unit", "meaning"), rows)
 

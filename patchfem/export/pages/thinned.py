@@ -42,7 +42,9 @@ class ReducedMesh:
         return (sums / np.add.reduceat(self.areas, self.starts)[:, None])[self.groups]
 
 
-def reduce_mesh(points, cells, material, most: int, near: tuple | None = None) -> ReducedMesh:
+def reduce_mesh(
+    points, cells, material, max_cells: int, fine_range: tuple | None = None
+) -> ReducedMesh:
     """Reduce a mesh to about `most` cells.
 
     In a grid, every so many lines are kept, including the outer lines and those between two
@@ -56,8 +58,8 @@ def reduce_mesh(points, cells, material, most: int, near: tuple | None = None) -
     cells : (m, 4) array
         Corners.
     material : (m,) array
-    most : int
-    near : tuple, optional
+    max_cells : int
+    fine_range : tuple, optional
         Range of x [m] in which half of the columns are kept, if there are so many.
 
     Returns
@@ -66,70 +68,79 @@ def reduce_mesh(points, cells, material, most: int, near: tuple | None = None) -
     """
     count = len(cells)
     size = quadrilateral_areas(points, cells)
-    if count <= most:
-        every = np.arange(count)
-        return ReducedMesh(np.arange(len(points)), cells, every, every, every, size)
-    bins, heights = _line_bins(points, cells, material, most, near)
+    if count <= max_cells:
+        all_cells = np.arange(count)
+        return ReducedMesh(np.arange(len(points)), cells, all_cells, all_cells, all_cells, size)
+    bins, heights = _line_bins(points, cells, material, max_cells, fine_range)
     key = bins[0] * heights + bins[1]
-    away = np.abs(points[:, 0] - points[:, 0].min()) + np.abs(points[:, 1])
+    corner_distance = np.abs(points[:, 0] - points[:, 0].min()) + np.abs(points[:, 1])
     # The first point of a box is the one nearest to its corner; in a grid it is this corner.
-    by_key = np.lexsort((away, key))
+    by_key = np.lexsort((corner_distance, key))
     _, first, number = np.unique(key[by_key], return_index=True, return_inverse=True)
     stand_in = np.empty(len(points), int)
     stand_in[by_key] = number
-    moved = stand_in[cells]
-    ranked = np.sort(moved, axis=1)
-    whole = np.flatnonzero((np.diff(ranked, axis=1) > 0).sum(axis=1) >= 2)
-    whole = whole[np.unique(ranked[whole], axis=0, return_index=True)[1]]
+    reduced_cells = stand_in[cells]
+    ranked = np.sort(reduced_cells, axis=1)
+    kept_cells = np.flatnonzero((np.diff(ranked, axis=1) > 0).sum(axis=1) >= 2)
+    kept_cells = kept_cells[np.unique(ranked[kept_cells], axis=0, return_index=True)[1]]
     box = (bins[0][cells].min(axis=1) * heights + bins[1][cells].min(axis=1)) * 2 + (material > 0)
     order = np.argsort(box, kind="stable")
     _, starts, group = np.unique(box[order], return_index=True, return_inverse=True)
     of_cell = np.empty(count, int)
     of_cell[order] = group
-    return ReducedMesh(by_key[first], moved[whole], order, starts, of_cell[whole], size[order])
+    return ReducedMesh(
+        by_key[first], reduced_cells[kept_cells], order, starts, of_cell[kept_cells], size[order]
+    )
 
 
-def _line_bins(points, cells, material, most: int, near: tuple | None) -> tuple:
+def _line_bins(points, cells, material, max_cells: int, fine_range: tuple | None) -> tuple:
     """Return the indices of the kept lines at or before each point, and the number of rows.
 
     The indices count columns along x and rows in depth.
     """
     x = points[:, 0]
     depth = np.abs(points[:, 1])
-    columns, rows = (np.unique(one) for one in (x, depth))
+    columns, rows = (np.unique(coordinate) for coordinate in (x, depth))
     # not a grid: a box between lines needs two triangles
     if columns.size * rows.size > len(points):
-        most //= 2
-    down = min(rows.size - 1, max(int((most / COLUMNS_PER_ROW) ** 0.5), most // (columns.size - 1)))
+        max_cells //= 2
+    n_rows = min(
+        rows.size - 1,
+        max(int((max_cells / COLUMNS_PER_ROW) ** 0.5), max_cells // (columns.size - 1)),
+    )
     coat = np.zeros((2, len(points)), bool)
     for kind in (0, 1):
         coat[kind][cells[(material > 0) == kind]] = True
     border = np.unique(depth[coat.all(axis=0)])
-    kept = np.union1d(rows[select_lines(rows, down)], border if border.size < down / 2 else [])
-    across = columns[
-        select_lines(columns, min(columns.size - 1, max(most // (kept.size - 1), 2)), near)
+    kept_rows = np.union1d(
+        rows[select_lines(rows, n_rows)], border if border.size < n_rows / 2 else []
+    )
+    kept_columns = columns[
+        select_lines(
+            columns, min(columns.size - 1, max(max_cells // (kept_rows.size - 1), 2)), fine_range
+        )
     ]
     return [
         np.searchsorted(lines, values, "right") - 1
-        for lines, values in ((across, x), (kept, depth))
-    ], kept.size
+        for lines, values in ((kept_columns, x), (kept_rows, depth))
+    ], kept_rows.size
 
 
-def select_lines(lines, count: int, near: tuple | None = None) -> np.ndarray:
+def select_lines(lines, count: int, fine_range: tuple | None = None) -> np.ndarray:
     """Return the indices of at most `count` + 1 sorted lines (n,), evenly spaced.
 
     The first and the last line are included. near: (left, right) between which half of the lines
     are taken, if there are so many.
     """
     weight = np.ones(lines.size - 1)
-    if near is not None:
-        inside = (lines[1:] > near[0]) & (lines[:-1] < near[1])
-        share = min(inside.sum() / count, 0.5)  # fraction of all lines that are kept
-        if 0 < share < 1 and inside.sum() < share * inside.size:
-            weight[inside] = share * (~inside).sum() / ((1 - share) * inside.sum())
-    place = np.concatenate([[0.0], np.cumsum(weight)])
+    if fine_range is not None:
+        inside = (lines[1:] > fine_range[0]) & (lines[:-1] < fine_range[1])
+        fraction = min(inside.sum() / count, 0.5)  # fraction of all lines that are kept
+        if 0 < fraction < 1 and inside.sum() < fraction * inside.size:
+            weight[inside] = fraction * (~inside).sum() / ((1 - fraction) * inside.sum())
+    cumulative_weight = np.concatenate([[0.0], np.cumsum(weight)])
     return np.unique(
-        np.searchsorted(place, np.linspace(0, place[-1], count + 1) * (1 - 1e-12)).clip(
-            0, lines.size - 1
-        )
+        np.searchsorted(
+            cumulative_weight, np.linspace(0, cumulative_weight[-1], count + 1) * (1 - 1e-12)
+        ).clip(0, lines.size - 1)
     )

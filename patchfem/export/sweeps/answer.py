@@ -54,7 +54,7 @@ def sweep_summary(
             "over_tolerance": lead.missed,
         },
         "ranking": {
-            name: [share._asdict() for share in shares] for name, shares in lead.ranks.items()
+            name: [index._asdict() for index in indices] for name, indices in lead.ranks.items()
         },
         "limits": limits_json(lead.limits),
         "of": dict(of),
@@ -62,15 +62,15 @@ def sweep_summary(
     }
 
 
-def write_answer(found: dict, path: Path) -> None:
+def write_answer(answer: dict, path: Path) -> None:
     """Write sweep.json to `path`."""
-    write_text(path, json.dumps(found, allow_nan=False, ensure_ascii=False, indent=1) + "\n")
+    write_text(path, json.dumps(answer, allow_nan=False, ensure_ascii=False, indent=1) + "\n")
 
 
 def read_answer(path: Path) -> dict:
     """Return the content of sweep.json; {} if it cannot be read."""
     try:
-        found = json.loads(path.read_bytes())
+        answer = json.loads(path.read_bytes())
     except (OSError, ValueError):
         return {}
-    return found if isinstance(found, dict) and isinstance(found.get("cases"), dict) else {}
+    return answer if isinstance(answer, dict) and isinstance(answer.get("cases"), dict) else {}

@@ -29,7 +29,9 @@ MAX_CASES_PER_FILE = 4096  # maximum number of cases of a file
 PARTS = ("values", "errors", "floors")
 
 
-def write_chunk(folder: Path, numbers: Sequence[int], names: np.ndarray, found: CaseResults) -> str:
+def write_chunk(
+    folder: Path, numbers: Sequence[int], names: np.ndarray, results: CaseResults
+) -> str:
     """Write the results of cases into a folder, and return the name of the file.
 
     The name consists of the numbers of the first and last case and a hash of the bytes.
@@ -41,33 +43,44 @@ def write_chunk(folder: Path, numbers: Sequence[int], names: np.ndarray, found: 
         Numbers of the cases.
     names : (n,) array of uint64
         Names of the cases.
-    found : CaseResults
+    results : CaseResults
 
     Raises
     ------
     WriteError
         If there is no space.
     """
-    words = list(dict.fromkeys(map(str, found.outcome)))
+    outcomes = list(dict.fromkeys(map(str, results.outcome)))
     reasons = [
-        [measure, why, [case for case, one in told.items() if one == why]]
-        for measure, told in found.reasons.items()
-        for why in dict.fromkeys(told.values())
+        [
+            measure,
+            reason,
+            [
+                case
+                for case, outcome_or_reason in reason_by_case.items()
+                if outcome_or_reason == reason
+            ],
+        ]
+        for measure, reason_by_case in results.reasons.items()
+        for reason in dict.fromkeys(reason_by_case.values())
     ]
     about = {
-        "outcomes": words,
-        "measures": list(found.units.items()),
+        "outcomes": outcomes,
+        "measures": list(results.units.items()),
         "reasons": reasons,
-        "messages": {str(case): text for case, text in found.messages.items()},
+        "messages": {str(case): text for case, text in results.messages.items()},
     }
     with h5py.File("chunk", "w", driver="core", backing_store=False, libver="latest") as file:
         file.attrs["about"] = np.void(json.dumps(about, ensure_ascii=False).encode())
         file["case"] = names
-        file["outcome"] = np.array([words.index(str(one)) for one in found.outcome], np.uint8)
-        file["seconds"] = np.asarray(found.seconds, np.float32)
-        for part in PARTS if found.units else ():
-            held = getattr(found, part)
-            table = np.stack([held[measure] for measure in found.units])
+        file["outcome"] = np.array(
+            [outcomes.index(str(outcome_or_reason)) for outcome_or_reason in results.outcome],
+            np.uint8,
+        )
+        file["seconds"] = np.asarray(results.seconds, np.float32)
+        for part in PARTS if results.units else ():
+            columns = getattr(results, part)
+            table = np.stack([columns[measure] for measure in results.units])
             file.create_dataset(
                 part,
                 data=table,
@@ -105,20 +118,22 @@ def read_chunk(path: Path) -> tuple[np.ndarray, CaseResults]:
         about = json.loads(bytes(file.attrs["about"]))
         names = _read_column(file["case"], np.uint64)
         count = names.size
-        found = CaseResults.blank(count)
-        found.outcome[:] = np.array(about["outcomes"], object)[
+        results = CaseResults.blank(count)
+        results.outcome[:] = np.array(about["outcomes"], object)[
             _read_column(file["outcome"], np.uint8, count)
         ]
-        found.seconds[:] = _read_column(file["seconds"], np.float32, count)
+        results.seconds[:] = _read_column(file["seconds"], np.float32, count)
         measures = [(str(name), str(unit)) for name, unit in about["measures"]]
         for part in PARTS if measures else ():
             table = _read_column(file[part], np.float64, count, len(measures))
-            getattr(found, part).update({name: row for (name, _), row in zip(measures, table)})
-    found.units.update(measures)
-    found.messages.update({int(case): str(text) for case, text in about["messages"].items()})
-    for measure, why, cases in about["reasons"]:
-        found.reasons.setdefault(str(measure), {}).update(dict.fromkeys(map(int, cases), str(why)))
-    return names, found
+            getattr(results, part).update({name: row for (name, _), row in zip(measures, table)})
+    results.units.update(measures)
+    results.messages.update({int(case): str(text) for case, text in about["messages"].items()})
+    for measure, reason, cases in about["reasons"]:
+        results.reasons.setdefault(str(measure), {}).update(
+            dict.fromkeys(map(int, cases), str(reason))
+        )
+    return names, results
 
 
 def read_names(path: Path) -> np.ndarray:
@@ -130,29 +145,29 @@ def read_names(path: Path) -> np.ndarray:
         return np.empty(0, np.uint64)
 
 
-def _read_column(held, kind, count: int | None = None, rows: int | None = None) -> np.ndarray:
+def _read_column(dataset, kind, count: int | None = None, rows: int | None = None) -> np.ndarray:
     """Read a dataset; ValueError if it has another shape or type.
 
     Parameters
     ----------
-    held : h5py.Dataset
+    dataset : h5py.Dataset
     kind : numpy type
     count : int, optional
         Number of cases; by default any up to 2 * MAX_CASES_PER_FILE.
     rows : int, optional
         Number of measures of a two-dimensional dataset.
     """
-    shape = held.shape
+    shape = dataset.shape
     if count is not None:
         shape = (count,) if rows is None else (rows, count)
     if (
-        held.dtype != kind
-        or held.shape != shape
+        dataset.dtype != kind
+        or dataset.shape != shape
         or len(shape) > 2
-        or (count is None and held.size > 2 * MAX_CASES_PER_FILE)
+        or (count is None and dataset.size > 2 * MAX_CASES_PER_FILE)
     ):
-        raise ValueError(f"{held.name}: {held.dtype} of shape {held.shape}")
-    return held[...]
+        raise ValueError(f"{dataset.name}: {dataset.dtype} of shape {dataset.shape}")
+    return dataset[...]
 
 
 @dataclass(eq=False, slots=True)
@@ -180,23 +195,27 @@ class Chunks:
     def look(self) -> None:
         """Find the files that the folder contains now."""
         # A case may occur twice in a sweep.
-        known, same = np.unique(self.names, return_inverse=True)
-        held = np.full(known.size, -1, np.int32)
-        there = [
-            one
-            for one in os.scandir(self.folder)
-            if one.name.endswith(ENDING) and not one.name.startswith(".")
+        distinct_names, position_of_name = np.unique(self.names, return_inverse=True)
+        file_of_name = np.full(distinct_names.size, -1, np.int32)
+        entries = [
+            entry
+            for entry in os.scandir(self.folder)
+            if entry.name.endswith(ENDING) and not entry.name.startswith(".")
         ]
         # If two files contain a case, the later one counts.
-        there.sort(key=lambda one: (one.stat().st_mtime_ns, one.name))
-        self.files, others = [Path(one.path) for one in there], [self.names[:0]]
-        for place, path in enumerate(self.files):
+        entries.sort(key=lambda entry: (entry.stat().st_mtime_ns, entry.name))
+        self.files, others = [Path(entry.path) for entry in entries], [self.names[:0]]
+        for file_number, path in enumerate(self.files):
             names = read_names(path)
-            at = np.minimum(np.searchsorted(known, names), known.size - 1)
-            wanted = known[at] == names if known.size else np.zeros(names.size, bool)
-            held[at[wanted]] = place
-            others.append(names[~wanted])
-        self.held = held[same]
+            position = np.minimum(np.searchsorted(distinct_names, names), distinct_names.size - 1)
+            is_requested = (
+                distinct_names[position] == names
+                if distinct_names.size
+                else np.zeros(names.size, bool)
+            )
+            file_of_name[position[is_requested]] = file_number
+            others.append(names[~is_requested])
+        self.held = file_of_name[position_of_name]
         self.others = np.unique(np.concatenate(others)).size
 
     def parts(self, numbers: np.ndarray) -> Iterator[tuple[np.ndarray, CaseResults]]:
@@ -205,42 +224,58 @@ class Chunks:
         A damaged file contains no cases.
         """
         numbers = np.asarray(numbers, int)
-        for place in np.unique(self.held[numbers]).tolist():
-            own = numbers[self.held[numbers] == place]
+        for file_number in np.unique(self.held[numbers]).tolist():
+            numbers_in_file = numbers[self.held[numbers] == file_number]
             try:
-                names, found = read_chunk(self.files[place]) if place >= 0 else (None, None)
+                names, results = (
+                    read_chunk(self.files[file_number]) if file_number >= 0 else (None, None)
+                )
             except (OSError, KeyError, ValueError, TypeError, IndexError, AttributeError):
-                self.held[self.held == place] = -1
+                self.held[self.held == file_number] = -1
                 continue
-            if place >= 0:
+            if file_number >= 0:
                 order = np.argsort(names)
-                yield own, found.some(order[np.searchsorted(names, self.names[own], sorter=order)])
+                yield (
+                    numbers_in_file,
+                    results.some(
+                        order[np.searchsorted(names, self.names[numbers_in_file], sorter=order)]
+                    ),
+                )
 
     def pack(self, others: bool) -> None:
         """Merge files if most of them contain few cases.
 
         others: whether to remove files of other sweeps as well.
         """
-        wanted = np.flatnonzero(self.held >= 0)
-        used = set(np.unique(self.held[wanted]).tolist())
-        old = [self.files[place] for place in sorted(used)]
-        if len(old) > 2 * -(-wanted.size // MAX_CASES_PER_FILE):
-            kept = set()
-            for first in range(0, wanted.size, MAX_CASES_PER_FILE):
-                numbers = wanted[first : first + MAX_CASES_PER_FILE]
-                found = CaseResults.blank(numbers.size)
-                for at, part in self.parts(numbers):
-                    found.place(np.searchsorted(numbers, at), part)
-                kept.add(write_chunk(self.folder, numbers.tolist(), self.names[numbers], found))
-            gone = [path for path in old if path.name not in kept]
+        numbers_with_result = np.flatnonzero(self.held >= 0)
+        used = set(np.unique(self.held[numbers_with_result]).tolist())
+        old_files = [self.files[file_number] for file_number in sorted(used)]
+        if len(old_files) > 2 * -(-numbers_with_result.size // MAX_CASES_PER_FILE):
+            new_files = set()
+            for first in range(0, numbers_with_result.size, MAX_CASES_PER_FILE):
+                numbers = numbers_with_result[first : first + MAX_CASES_PER_FILE]
+                results = CaseResults.blank(numbers.size)
+                for part_numbers, part in self.parts(numbers):
+                    results.place(np.searchsorted(numbers, part_numbers), part)
+                new_files.add(
+                    write_chunk(self.folder, numbers.tolist(), self.names[numbers], results)
+                )
+            removed_files = [path for path in old_files if path.name not in new_files]
         else:
-            gone = []
-        gone += [path for place, path in enumerate(self.files) if place not in used]
-        known = np.sort(self.names) if gone and not others else self.names[:0]
-        for path in gone:
+            removed_files = []
+        removed_files += [
+            path for file_number, path in enumerate(self.files) if file_number not in used
+        ]
+        sorted_names = np.sort(self.names) if removed_files and not others else self.names[:0]
+        for path in removed_files:
             names = read_names(path)
             if (
                 others
-                or (known[np.searchsorted(known, names).clip(max=known.size - 1)] == names).all()
+                or (
+                    sorted_names[
+                        np.searchsorted(sorted_names, names).clip(max=sorted_names.size - 1)
+                    ]
+                    == names
+                ).all()
             ):
                 path.unlink(missing_ok=True)

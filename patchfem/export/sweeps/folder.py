@@ -51,7 +51,7 @@ class SummaryWriter:
     cases: Cases
 
     def __call__(
-        self, number: int, model: Model | PatchfemError, found: CaseResults, case: int
+        self, number: int, model: Model | PatchfemError, results: CaseResults, case: int
     ) -> str:
         """Return the text of summary.json of a case.
 
@@ -60,29 +60,29 @@ class SummaryWriter:
         number : int
             Number of the case in the sweep.
         model : Model or PatchfemError
-        found : CaseResults
+        results : CaseResults
         case : int
             Index of the case in `found`.
         """
         values = {axis.key: text for axis, text in zip(self.cases.axes, self.cases.texts(number))}
-        known = isinstance(model, Model)
-        effects = model.source.effects if known else ()
-        answer = make_summary(
+        has_model = isinstance(model, Model)
+        effects = model.source.effects if has_model else ()
+        summary = make_summary(
             __version__,
-            model.source.title if known else "",
-            model.kind if known else "",
-            found.outcome[case],
-            _case_measures(found, case),
+            model.source.title if has_model else "",
+            model.kind if has_model else "",
+            results.outcome[case],
+            _case_measures(results, case),
             [{"effect": name, "equations": EFFECTS[name].equations} for name in effects],
-            list(model.absent) if known else [],
-            (found.warnings.get(case, ()), found.notes.get(case, ())),
-            {"total": found.seconds[case]},
+            list(model.absent) if has_model else [],
+            (results.warnings.get(case, ()), results.notes.get(case, ())),
+            {"total": results.seconds[case]},
         )
-        if case in found.messages:
-            answer["message"] = found.messages[case]
+        if case in results.messages:
+            summary["message"] = results.messages[case]
         return (
             json.dumps(
-                answer | {"numerics": found.numerics.get(case, {}), "case": values},
+                summary | {"numerics": results.numerics.get(case, {}), "case": values},
                 allow_nan=False,
                 ensure_ascii=False,
             )
@@ -90,20 +90,20 @@ class SummaryWriter:
         )
 
 
-def _case_measures(found: CaseResults, case: int) -> dict:
+def _case_measures(results: CaseResults, case: int) -> dict:
     """Return the measures of a case by name."""
-    out = {}
-    for name, unit in found.units.items():
-        if found.has(name, case):
-            reasons = found.reasons.get(name, {})
+    measures = {}
+    for name, unit in results.units.items():
+        if results.has(name, case):
+            reasons = results.reasons.get(name, {})
             value, error = (
                 None if number != number else float(number)
-                for number in (found.values[name][case], found.errors[name][case])
+                for number in (results.values[name][case], results.errors[name][case])
             )
-            out[name] = Measure(
-                value, unit, error, float(found.floors[name][case]), reason=reasons.get(case, "")
+            measures[name] = Measure(
+                value, unit, error, float(results.floors[name][case]), reason=reasons.get(case, "")
             )
-    return out
+    return measures
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,25 +142,25 @@ class Writer:
     keep: str
     token: str = ""
 
-    def __call__(self, numbers: Sequence[int], found: CaseResults, texts: Sequence[str]) -> bool:
+    def __call__(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> bool:
         """Write results as `put` does; return False if the folder is not accessible or is full."""
         try:
-            there = (self.target / CHUNKS / self.token).is_file()
-            if there:
-                self.put(numbers, found, texts)
-            return there
+            is_accessible = (self.target / CHUNKS / self.token).is_file()
+            if is_accessible:
+                self.put(numbers, results, texts)
+            return is_accessible
         except Missing:  # the process that requested the case reports this
             return False
 
-    def put(self, numbers: Sequence[int], found: CaseResults, texts: Sequence[str]) -> None:
+    def put(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> None:
         """Write the results of cases, their folders first; Missing if this fails."""
         for case, (number, text) in enumerate(zip(numbers, texts)):
             # Other cases have a results folder already.
-            if self.keep == "summaries" or case in found.messages:
+            if self.keep == "summaries" or case in results.messages:
                 self._put(self.target / CASES / case_folder_name(self.names[number]), text)
         try:
             chunks.write_chunk(
-                self.target / CHUNKS, numbers, self.names[np.asarray(numbers, int)], found
+                self.target / CHUNKS, numbers, self.names[np.asarray(numbers, int)], results
             )
         except (OSError, WriteError) as error:
             raise self._fault(error) from None
@@ -181,8 +181,10 @@ class Writer:
 
     def _fault(self, error) -> Missing:
         """Return the error of a case that cannot be written."""
-        why = str(error) if isinstance(error, WriteError) else error.strerror
-        return Missing(f"{self.shown}: a case cannot be written ({why}); complete cases are kept")
+        reason = str(error) if isinstance(error, WriteError) else error.strerror
+        return Missing(
+            f"{self.shown}: a case cannot be written ({reason}); complete cases are kept"
+        )
 
 
 class Folder:
@@ -238,29 +240,29 @@ class Folder:
         """Convert the results of an older folder, which has only summaries of its cases, to columns."""
         if not (self.target / CASES).is_dir():
             return
-        named = {one.name for one in os.scandir(self.target / CASES)}
+        folder_names = {summary.name for summary in os.scandir(self.target / CASES)}
         numbers = []
-        found = []
+        summaries = []
         for number in np.flatnonzero(self.chunks.held < 0).tolist():
-            if (key := case_folder_name(self.chunks.names[number])) in named:
+            if (key := case_folder_name(self.chunks.names[number])) in folder_names:
                 with suppress(OSError, ValueError):
-                    found.append(read_summary(self.target / CASES / key / SUMMARY))
+                    summaries.append(read_summary(self.target / CASES / key / SUMMARY))
                     numbers.append(number)
         for first in range(0, len(numbers), chunks.MAX_CASES_PER_FILE):
             part = slice(first, first + chunks.MAX_CASES_PER_FILE)
-            answers = CaseResults.blank(len(numbers[part]))
-            for case, one in enumerate(found[part]):
+            results = CaseResults.blank(len(numbers[part]))
+            for case, summary in enumerate(summaries[part]):
                 measures = {
                     name: Measure(
                         m["value"], m["unit"], m["error"], m["floor"], reason=m.get("reason", "")
                     )
-                    for name, m in one["measures"].items()
+                    for name, m in summary["measures"].items()
                 }
-                answers.put(case, one["outcome"], measures, one["seconds"]["total"])
-                if one["outcome"] == FAILED_OUTCOME:
-                    answers.fail(case, one.get("message", ""))
+                results.put(case, summary["outcome"], measures, summary["seconds"]["total"])
+                if summary["outcome"] == FAILED_OUTCOME:
+                    results.fail(case, summary.get("message", ""))
             chunks.write_chunk(
-                self.chunks.folder, numbers[part], self.chunks.names[numbers[part]], answers
+                self.chunks.folder, numbers[part], self.chunks.names[numbers[part]], results
             )
         if numbers:
             self.chunks.look()
@@ -287,17 +289,20 @@ class Folder:
 
         A resumed sweep would replace them. of: from `run.sweep_identity`.
         """
-        held = read_answer(self.target / "sweep.json").get("of", of)
-        if held == of:
+        stored_identity = read_answer(self.target / "sweep.json").get("of", of)
+        if stored_identity == of:
             return
-        keys = [one.get("keys", []) if isinstance(one, dict) else [] for one in (held, of)]
-        what = (
+        keys = [
+            identity.get("keys", []) if isinstance(identity, dict) else []
+            for identity in (stored_identity, of)
+        ]
+        difference = (
             "other keys" + f" ({', '.join(map(str, keys[0]))})" * bool(keys[0])
             if keys[0] != keys[1]
             else "another scene or of another version of patchfem"
         )
         raise PatchfemError(
-            f"{self.shown}: this folder contains a sweep of {what}; name another folder with -o, or "
+            f"{self.shown}: this folder contains a sweep of {difference}; name another folder with -o, or "
             "run without --resume to replace that sweep"
         )
 
@@ -322,21 +327,21 @@ class Folder:
 
     def _has_kept_files(self, number: int, keep: str, failed: bool) -> bool:
         """Return whether the folder of a case has the files that `keep` requires."""
-        place = os.path.join(self.target, CASES, case_folder_name(self.chunks.names[number]))
-        asked = (
+        case_folder = os.path.join(self.target, CASES, case_folder_name(self.chunks.names[number]))
+        required_files = (
             ()
             if failed or keep == "summaries"
             else ("scene.resolved.toml", PAGE)[: KEEP.index(keep) - 1]
         )
         try:
-            with open(os.path.join(place, SUMMARY), "rb") as file:
+            with open(os.path.join(case_folder, SUMMARY), "rb") as file:
                 text = file.read()
         except OSError:
             return False
         return (
             text[:1] == b"{"
             and text.rstrip()[-1:] == b"}"
-            and all(os.path.isfile(os.path.join(place, name)) for name in asked)
+            and all(os.path.isfile(os.path.join(case_folder, name)) for name in required_files)
         )
 
     def answers(self, total: CaseResults) -> CaseResults:
@@ -370,21 +375,23 @@ class Folder:
             The folders of cases are removed if it is "none".
         """
         self.chunks.pack(others)
-        for one in os.scandir(self.target / CHUNKS):
-            if one.name.startswith(".") and one.name != self.token and not self.shared:
-                Path(one.path).unlink(missing_ok=True)
+        for entry in os.scandir(self.target / CHUNKS):
+            if entry.name.startswith(".") and entry.name != self.token and not self.shared:
+                Path(entry.path).unlink(missing_ok=True)
         if (self.target / CASES).is_dir():
-            own = set() if keep == "none" else set(map(case_folder_name, self.chunks.names))
-            for one in os.scandir(self.target / CASES):
+            folder_names = (
+                set() if keep == "none" else set(map(case_folder_name, self.chunks.names))
+            )
+            for entry in os.scandir(self.target / CASES):
                 if (
-                    one.name.startswith(".")
-                    or one.name.endswith(".partial")
-                    or (others and one.name not in own)
+                    entry.name.startswith(".")
+                    or entry.name.endswith(".partial")
+                    or (others and entry.name not in folder_names)
                 ):
-                    if one.is_dir(follow_symlinks=False):
-                        shutil.rmtree(one.path, ignore_errors=True)
+                    if entry.is_dir(follow_symlinks=False):
+                        shutil.rmtree(entry.path, ignore_errors=True)
                     else:  # the lock file of a process that was killed while it wrote a case
-                        Path(one.path).unlink(missing_ok=True)
+                        Path(entry.path).unlink(missing_ok=True)
             with suppress(OSError):  # cases/ is not empty
                 (self.target / CASES).rmdir()
         self.finish()

@@ -51,18 +51,18 @@ def hash_request(path: Path, words: Sequence[str], cases: Path | None = None) ->
     ).hexdigest()
 
 
-def write_manifest(folder: Path, signed: str) -> None:
+def write_manifest(folder: Path, request_hash: str) -> None:
     """Write the record of a sweep in which every case has a result."""
     atomic_write.write_text(
-        folder / NAME, json.dumps({"sign": signed, "files": _sweep_files(folder)}) + "\n"
+        folder / NAME, json.dumps({"sign": request_hash, "files": _sweep_files(folder)}) + "\n"
     )
 
 
-def read_manifest(folder: Path, signed: str) -> dict:
+def read_manifest(folder: Path, request_hash: str) -> dict:
     """Return sweep.json of a folder with the complete sweep of this hash; else {}."""
     try:
-        held = json.loads((folder / NAME).read_bytes())
-        if not signed or held != {"sign": signed, "files": _sweep_files(folder)}:
+        manifest = json.loads((folder / NAME).read_bytes())
+        if not request_hash or manifest != {"sign": request_hash, "files": _sweep_files(folder)}:
             return {}
         return json.loads((folder / "sweep.json").read_bytes())
     except (OSError, ValueError):
@@ -71,7 +71,9 @@ def read_manifest(folder: Path, signed: str) -> dict:
 
 def _sweep_files(folder: Path) -> list:
     """Return the files of a sweep with size and time; OSError if there is no folder."""
-    chunks = [Path(one.path) for one in os.scandir(folder / "chunks") if one.name != "whole.json"]
+    chunks = [
+        Path(entry.path) for entry in os.scandir(folder / "chunks") if entry.name != "whole.json"
+    ]
     return sorted(
         _file_stamps([*chunks, *(folder / name for name in TABLES if (folder / name).is_file())])
     )

@@ -38,15 +38,15 @@ def write_page(table: dict, lead: SweepHeadline, folder: Path) -> None:
 
 
 def sweep_table(
-    asked: SweepScene, cases: Cases, found: CaseResults, keys: list, folder: Path
+    sweep_scene: SweepScene, cases: Cases, results: CaseResults, keys: list, folder: Path
 ) -> dict:
     """Return the table for `pages.sweep.page_html` from the results of the cases.
 
     Parameters
     ----------
-    asked : SweepScene
+    sweep_scene : SweepScene
     cases : Cases
-    found : CaseResults
+    results : CaseResults
     keys : list of str
         Folders of the cases in cases/; [] if there are none.
     folder : Path
@@ -59,36 +59,40 @@ def sweep_table(
     columns = key_columns(cases)
     measures = {
         name: {
-            "unit": found.units[name],
+            "unit": results.units[name],
             "means": meaning(name),
-            "values": found.values[name],
-            "errors": found.errors[name],
-            "floors": found.floors[name],
+            "values": results.values[name],
+            "errors": results.errors[name],
+            "floors": results.floors[name],
         }
-        for name in sort_measures(found)
+        for name in sort_measures(results)
         if name not in [axis.name for axis in cases.axes]
     }
     return {
-        **page_titles(columns, tomllib.loads(asked.text).get("title") or asked.path.stem),
+        **page_titles(
+            columns, tomllib.loads(sweep_scene.text).get("title") or sweep_scene.path.stem
+        ),
         "version": __version__,
-        **_shared_facts(shared_facts(asked, cases), columns),
-        "command": sweep_command(asked, cases),
-        "scene": asked.text,
-        "first": asked.of,
+        **_shared_facts(shared_facts(sweep_scene, cases), columns),
+        "command": sweep_command(sweep_scene, cases),
+        "scene": sweep_scene.text,
+        "first": sweep_scene.of,
         "grid": not cases.rows,
         "drawn": cases.drawn,
         "keys": columns,
         "measures": measures,
-        "outcome": [str(one) for one in found.outcome],
-        "messages": found.messages,
+        "outcome": [str(outcome) for outcome in results.outcome],
+        "messages": results.messages,
         "folders": [case_link(folder, key) for key in keys] if len(keys) else None,
     }
 
 
 def key_columns(cases: Cases) -> list:
     """Return the swept keys, each with its values in SI and as written in every case."""
-    every = np.arange(len(cases))
-    places = [every] * len(cases.axes) if cases.rows else np.unravel_index(every, cases.shape)
+    all_cases = np.arange(len(cases))
+    places = (
+        [all_cases] * len(cases.axes) if cases.rows else np.unravel_index(all_cases, cases.shape)
+    )
     return [
         {
             "name": axis.key,
@@ -101,21 +105,21 @@ def key_columns(cases: Cases) -> list:
     ]
 
 
-def _shared_facts(held: dict, columns: list) -> dict:
+def _shared_facts(facts: dict, columns: list) -> dict:
     """Return tolerance, patch size [m] and ends [Hz] of the swept frequencies of all cases.
 
     They are those of the scene (`held`), or swept values (`columns`).
     """
     swept = {column["name"]: column["values"] for column in columns}
     return {
-        "tolerance": held.get("tolerance", swept.get("accuracy.tolerance", np.nan)),
+        "tolerance": facts.get("tolerance", swept.get("accuracy.tolerance", np.nan)),
         "ends": tuple(
-            held.get(f"drive_{end}", swept.get(f"drive.{end}", np.nan)) for end in ("from", "to")
+            facts.get(f"drive_{end}", swept.get(f"drive.{end}", np.nan)) for end in ("from", "to")
         ),
         "patch": {
-            name: float(held[f"patch_{name}"])
+            name: float(facts[f"patch_{name}"])
             for name in ("length", "width")
-            if f"patch_{name}" in held
+            if f"patch_{name}" in facts
         },
     }
 
@@ -137,7 +141,7 @@ def axis_numbers(values) -> np.ndarray:
     """Return values along an axis: numbers unchanged, words numbered in order of occurrence."""
     if isinstance(values, array) or all(isinstance(value, int | float) for value in values):
         return np.asarray(values, float)
-    order = {one: place for place, one in enumerate(dict.fromkeys(values))}
+    order = {word: place for place, word in enumerate(dict.fromkeys(values))}
     return np.array([order[value] for value in values], float)
 
 
@@ -163,14 +167,14 @@ def suits_log_axis(values) -> bool:
     return bool(above[-1] >= 10 * above[0])
 
 
-def sweep_command(asked: SweepScene, cases: Cases) -> str:
+def sweep_command(sweep_scene: SweepScene, cases: Cases) -> str:
     """Return the command line that computes the same cases."""
     words = [
         "patchfem",
         "sweep",
-        asked.path.name,
-        *(word for one in asked.sets for word in ("--set", one)),
-        *(("--of", asked.of) if asked.of else ()),
+        sweep_scene.path.name,
+        *(word for assignment in sweep_scene.sets for word in ("--set", assignment)),
+        *(("--of", sweep_scene.of) if sweep_scene.of else ()),
     ]
     if cases.rows:
         return shlex.join([*words, *(cases.words or REPEAT_WORDS)])
@@ -218,22 +222,22 @@ def read_table(folder: Path) -> dict:
         name = Path(fault.filename).name if fault.filename else "sweep.nc"
         raise PatchfemError(f"{folder}: not the folder of a sweep: it has no {name}") from None
     except Exception as fault:  # damaged files can fail in many ways
-        said = " ".join(str(fault).split())[:200]
+        reason = " ".join(str(fault).split())[:200]
         raise PatchfemError(
-            f"{folder}: the sweep in this folder cannot be read: {said or type(fault).__name__}"
+            f"{folder}: the sweep in this folder cannot be read: {reason or type(fault).__name__}"
         ) from None
 
 
 def _check_table(table: dict) -> dict:
     """Return the table; ValueError if a column has a wrong length or impossible numbers."""
     count = len(table["outcome"])
-    parts = [(one["name"], one["values"]) for one in table["keys"]]
-    parts += [
-        (name, one[part])
-        for name, one in table["measures"].items()
+    columns = [(column["name"], column["values"]) for column in table["keys"]]
+    columns += [
+        (name, column[part])
+        for name, column in table["measures"].items()
         for part in ("values", "errors", "floors")
     ]
-    for name, values in parts:
+    for name, values in columns:
         require_valid(
             np.shape(values) == (count,), f"{name} has {np.size(values)} values for {count} cases"
         )
@@ -250,12 +254,12 @@ def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
     for key in keys:
         held = file[re.sub(r"\W", "_", key)]
         texts = [row[key] for row in rows]
-        along = np.asarray(held[...])
+        axis_values = np.asarray(held[...])
         places = {text: place for place, text in enumerate(dict.fromkeys(texts))}
         values = (
-            along
-            if along.size == len(rows) and "case" in file.dimensions
-            else along[[places[t] for t in texts]]
+            axis_values
+            if axis_values.size == len(rows) and "case" in file.dimensions
+            else axis_values[[places[t] for t in texts]]
         )
         values = axis_numbers(values.tolist())
         columns.append(
@@ -295,7 +299,7 @@ def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
     held = {name: float(file.attrs[name]) for name in FACTS if name in file.attrs}
     title = tomllib.loads(text).get("title") or folder.resolve().name
     require_valid(
-        isinstance(title, str) and all(isinstance(one, list | tuple) for one in (sets, words)),
+        isinstance(title, str) and all(isinstance(entry, list | tuple) for entry in (sets, words)),
         "sweep.nc: the scene, the --set or the cases stored in this file cannot be read",
     )
     return {
@@ -308,7 +312,7 @@ def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
                 "patchfem",
                 "sweep",
                 str(file.attrs["scene_file"]),
-                *(word for one in sets for word in ("--set", one)),
+                *(word for entry in sets for word in ("--set", entry)),
                 *overs,
             ]
         ),
@@ -400,9 +404,9 @@ def join_tables(tables: list, names: list) -> dict:
         "measures": measures,
         "outcome": [one for table in tables for one in table["outcome"]],
         "messages": {
-            number + start: why
+            number + start: message
             for table, start in zip(tables, shift.tolist())
-            for number, why in table["messages"].items()
+            for number, message in table["messages"].items()
         },
         "folders": [one for table in tables for one in table["folders"]]
         if all(table["folders"] is not None for table in tables)
@@ -414,8 +418,8 @@ def relink_cases(table: dict, folder: Path, page: Path) -> dict:
     """Return the table with links of its cases that are relative to another page."""
     if table["folders"] is None:
         return table
-    way = os.path.relpath(folder, page.parent)
+    path_to_folder = os.path.relpath(folder, page.parent)
     return table | {
-        "own": way == ".",
-        "folders": [Path(way, one).as_posix() for one in table["folders"]],
+        "own": path_to_folder == ".",
+        "folders": [Path(path_to_folder, case_path).as_posix() for case_path in table["folders"]],
     }

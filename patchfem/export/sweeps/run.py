@@ -59,12 +59,12 @@ class SweepTarget:
 
 
 def sweep_into(
-    asked: SweepScene,
+    sweep_scene: SweepScene,
     cases: Cases,
     place: SweepTarget,
     executor,
     say: Callable | None = None,
-    told: Callable | None = None,
+    report_progress: Callable | None = None,
 ) -> CaseResults:
     """Compute the cases of a sweep into a folder and write its tables; a shard writes none.
 
@@ -73,14 +73,14 @@ def sweep_into(
 
     Parameters
     ----------
-    asked : SweepScene
+    sweep_scene : SweepScene
     cases : Cases
     place : SweepTarget
     executor : object
         From `campaigns.sweeps.executors`.
     say : callable, optional
         Takes a line of text.
-    told : callable, optional
+    report_progress : callable, optional
         told(done, total, seconds left or None) is called as cases are done, first with those that
         existed.
 
@@ -90,72 +90,83 @@ def sweep_into(
     """
     shared = place.shard is not None
     keep = place.kept_files(len(cases))
-    with Folder(place.target, cases.names(asked), shared) as folder:
+    with Folder(place.target, cases.names(sweep_scene), shared) as folder:
         if place.resume:
-            folder.refuse_another(sweep_identity(asked, cases))
+            folder.refuse_another(sweep_identity(sweep_scene, cases))
             if folder.chunks.others and folder.is_complete() and say is not None:
                 say(_left_out(folder.chunks.others))
-        wanted = _shard_cases(len(cases), place.shard)
-        there = folder.find_complete_cases(wanted, keep)
+        requested = _shard_cases(len(cases), place.shard)
+        complete = folder.find_complete_cases(requested, keep)
         if not (place.resume or shared):
-            if there.size and not folder.is_complete() and say is not None:
+            if complete.size and not folder.is_complete() and say is not None:
                 say(
-                    f"note: {there.size} of {len(cases)} cases already have an answer from an interrupted sweep but "
+                    f"note: {complete.size} of {len(cases)} cases already have an answer from an interrupted sweep but "
                     "are run again; use --resume to keep such answers"
                 )
-            there = there[:0]
-        left = np.setdiff1d(wanted, there)
-        if left.size:
+            complete = complete[:0]
+        remaining = np.setdiff1d(requested, complete)
+        if remaining.size:
             folder.unfinish()
-        if told is not None:
-            told(there.size, wanted.size, None)
+        if report_progress is not None:
+            report_progress(complete.size, requested.size, None)
         total = CaseResults.blank(len(cases), folder.target)
         try:
-            died = _compute_cases(
-                Jobs(asked, cases, folder, keep),
-                left,
+            dead_cases = _compute_cases(
+                Jobs(sweep_scene, cases, folder, keep),
+                remaining,
                 executor,
                 say,
-                told and (lambda done, seconds: told(there.size + done, wanted.size, seconds)),
+                report_progress
+                and (
+                    lambda done, seconds: report_progress(
+                        complete.size + done, requested.size, seconds
+                    )
+                ),
             )
         except (KeyboardInterrupt, PatchfemError):
             if not shared:
                 with suppress(PatchfemError):
-                    _write_partial_tables(asked, cases, folder, folder.answers(total), place.page)
+                    _write_partial_tables(
+                        sweep_scene, cases, folder, folder.answers(total), place.page
+                    )
             raise
         if shared:
             return total
         folder.answers(total)
-        for numbers, found in died:
+        for numbers, found in dead_cases:
             total.place(numbers, found)
-        sign = hash_tables(asked, cases, folder, place.page)
-        if left.size or not _tables_are_current(sign, folder, place.page):
-            write_tables(asked, cases, total, folder, place.page, sign="" if died else sign)
+        sign = hash_tables(sweep_scene, cases, folder, place.page)
+        if remaining.size or not _tables_are_current(sign, folder, place.page):
+            write_tables(
+                sweep_scene, cases, total, folder, place.page, sign="" if dead_cases else sign
+            )
         folder.tidy(not place.resume, keep)
     return total
 
 
-def sweep_identity(asked: SweepScene, cases: Cases) -> dict:
+def sweep_identity(sweep_scene: SweepScene, cases: Cases) -> dict:
     """Return scene (as a hash) and keys of a sweep, by which `--resume` recognises it."""
-    return {"scene": asked.digest(), "keys": [axis.key for axis in cases.axes]}
+    return {"scene": sweep_scene.digest(), "keys": [axis.key for axis in cases.axes]}
 
 
 def _left_out(count: int) -> str:
     """Return a note that a resumed sweep has fewer values than the folder has results."""
-    one = count == 1
+    is_single = count == 1
+    verb = "is" if is_single else "are"
+    these = "this case" if is_single else "these cases"
     return (
-        f"note: {count} case{'s' * (not one)} of this folder {'is' if one else 'are'} not among the values of this "
-        f"sweep and will not be in its tables; the results of {'this case' if one else 'these cases'} stay in "
-        "chunks/; to include them, run again with --resume and name all values"
+        f"note: {count} case{'s' * (not is_single)} of this folder {verb} not among the values of this sweep and will "
+        f"not be in its tables; the results of {these} stay in chunks/; to include them, run again with --resume and "
+        "name all values"
     )
 
 
 def _write_partial_tables(
-    asked: SweepScene, cases: Cases, folder: Folder, found: CaseResults, page: bool
+    sweep_scene: SweepScene, cases: Cases, folder: Folder, results: CaseResults, page: bool
 ) -> None:
     """Write the tables of an interrupted sweep, if it has any results."""
-    if any(found.outcome):
-        write_tables(asked, cases, found, folder, page)
+    if any(results.outcome):
+        write_tables(sweep_scene, cases, results, folder, page)
         folder.finish()
 
 
@@ -169,7 +180,11 @@ class Jobs(NamedTuple):
 
 
 def _compute_cases(
-    jobs: Jobs, numbers: np.ndarray, executor, say: Callable | None, told: Callable | None
+    jobs: Jobs,
+    numbers: np.ndarray,
+    executor,
+    say: Callable | None,
+    report_progress: Callable | None,
 ) -> list:
     """Compute cases into the folder, and return (numbers, CaseResults) of those that died.
 
@@ -182,83 +197,93 @@ def _compute_cases(
         Numbers of the cases.
     executor : object
     say : callable or None
-    told : callable or None
+    report_progress : callable or None
         told(done, seconds left or None) is called as cases are done.
     """
     keep = jobs.keep
     folder = jobs.folder
     names = jobs.folder.chunks.names
-    died = []
+    dead_cases = []
     clock = RemainingTime(numbers.size, executor.workers)
     writer = Writer(folder.target, folder.shown, names, keep, folder.token)
-    whole = (
+    results_writer = (
         ResultsWriter(folder.target, names, keep == "pages")
         if keep in ("results", "pages")
         else None
     )
     work = Work(
-        jobs.asked, jobs.cases, None if keep == "none" else SummaryWriter(jobs.cases), whole, writer
+        jobs.asked,
+        jobs.cases,
+        None if keep == "none" else SummaryWriter(jobs.cases),
+        results_writer,
+        writer,
     )
-    for chunk, found, texts, seconds in iterate_chunks(work, numbers.tolist(), executor, say):
+    for chunk, results, texts, seconds in iterate_chunks(work, numbers.tolist(), executor, say):
         if texts is None:
-            died.append((chunk, found))
-        elif found is not None:  # The worker has no access to the folder, or found it full.
-            writer.put(chunk, found, texts)
-        left = clock(len(chunk), seconds)
-        if told is not None:
-            told(numbers.size - clock.left, left)
-    return died
+            dead_cases.append((chunk, results))
+        elif results is not None:  # The worker has no access to the folder, or found it full.
+            writer.put(chunk, results, texts)
+        seconds_left = clock(len(chunk), seconds)
+        if report_progress is not None:
+            report_progress(numbers.size - clock.left, seconds_left)
+    return dead_cases
 
 
 def compute_in_memory(
-    asked: SweepScene, cases: Cases, executor, say: Callable | None = None, estimate: bool = True
+    sweep_scene: SweepScene,
+    cases: Cases,
+    executor,
+    say: Callable | None = None,
+    estimate: bool = True,
 ) -> CaseResults:
     """Compute the cases in memory only.
 
     estimate: whether errors are computed for cases that run one by one.
     """
     total = CaseResults.blank(len(cases))
-    for numbers, found, *_ in iterate_chunks(
-        Work(asked, cases, estimate=estimate), range(len(cases)), executor, say
+    for numbers, results, *_ in iterate_chunks(
+        Work(sweep_scene, cases, estimate=estimate), range(len(cases)), executor, say
     ):
-        for part in (found.warnings, found.notes, found.numerics):  # no table contains these
+        for part in (results.warnings, results.notes, results.numerics):  # no table contains these
             part.clear()
-        total.place(numbers, found)
+        total.place(numbers, results)
     return total
 
 
-def collect_shards(asked: SweepScene, cases: Cases, target: Path, page: bool = True) -> CaseResults:
+def collect_shards(
+    sweep_scene: SweepScene, cases: Cases, target: Path, page: bool = True
+) -> CaseResults:
     """Write all tables of a sweep whose shards are complete, from its folder.
 
     Missing if cases have no result yet.
     """
-    with Folder(target, cases.names(asked)) as folder:
-        found = folder.answers(CaseResults.blank(len(cases), folder.target))
-        missing = int(np.sum(found.outcome == ""))
+    with Folder(target, cases.names(sweep_scene)) as folder:
+        results = folder.answers(CaseResults.blank(len(cases), folder.target))
+        missing = int(np.sum(results.outcome == ""))
         if missing:
             raise Missing(
                 f"{target}: {missing} of {len(cases)} cases have no answer; run their shards again, or "
                 "continue with --resume"
             )
-        write_tables(asked, cases, found, folder, page, True)
+        write_tables(sweep_scene, cases, results, folder, page, True)
         folder.tidy(False)
-    return found
+    return results
 
 
-def hash_tables(asked: SweepScene, cases: Cases, folder: Folder, page: bool) -> str:
+def hash_tables(sweep_scene: SweepScene, cases: Cases, folder: Folder, page: bool) -> str:
     """Return a hash of all that the tables of a complete sweep depend on.
 
     If sweep.json contains this hash, the tables exist.
     """
-    made = [
+    content = [
         environment_versions()["patchfem"],
-        asked.text,
+        sweep_scene.text,
         [(axis.key, *_axis_content(axis)) for axis in cases.axes],
-        sweep_command(asked, cases),
+        sweep_command(sweep_scene, cases),
         page,
         [case_link(folder.target, key) for key in folder.keys()],
     ]
-    return sha256(json.dumps(made).encode() + folder.chunks.names.tobytes()).hexdigest()
+    return sha256(json.dumps(content).encode() + folder.chunks.names.tobytes()).hexdigest()
 
 
 def _axis_content(axis: Axis) -> tuple:
@@ -282,12 +307,12 @@ def _tables_are_current(sign: str, folder: Folder, page: bool) -> bool:
 
 
 def write_tables(
-    asked: SweepScene,
+    sweep_scene: SweepScene,
     cases: Cases,
-    found: CaseResults,
+    results: CaseResults,
     folder: Folder,
     page: bool = True,
-    every: bool = False,
+    at_any_size: bool = False,
     sign: str = "",
 ) -> None:
     """Write sweep.json, report.html, sweep.csv and sweep.nc.
@@ -296,27 +321,28 @@ def write_tables(
 
     Parameters
     ----------
-    asked : SweepScene
+    sweep_scene : SweepScene
     cases : Cases
-    found : CaseResults
+    results : CaseResults
     folder : Folder
     page : bool
         Whether report.html is written.
-    every : bool
+    at_any_size : bool
         Whether sweep.csv and sweep.nc are written for more than MAX_CASES_WITH_TABLES cases.
     sign : str
         From `hash_tables` if every case has a result that is stored; else "".
     """
     keys = folder.keys()
-    tabled = every or len(cases) <= MAX_CASES_WITH_TABLES
-    table = sweep_table(asked, cases, found, keys, folder.target) | {"tabled": tabled}
+    has_tables = at_any_size or len(cases) <= MAX_CASES_WITH_TABLES
+    table = sweep_table(sweep_scene, cases, results, keys, folder.target) | {"tabled": has_tables}
     lead = summarise_sweep(table)
-    for name in () if tabled else ("sweep.csv", "sweep.nc"):
+    for name in () if has_tables else ("sweep.csv", "sweep.nc"):
         (folder.target / name).unlink(missing_ok=True)
-    if tabled:
-        write_csv(cases, found, keys, folder.target / "sweep.csv")
+    if has_tables:
+        write_csv(cases, results, keys, folder.target / "sweep.csv")
         netcdf.write_netcdf(
-            table_contents(asked, cases, found, keys, lead.answer()), folder.target / "sweep.nc"
+            table_contents(sweep_scene, cases, results, keys, lead.answer()),
+            folder.target / "sweep.nc",
         )
     if page:
         write_page(table, lead, folder.target)
@@ -324,7 +350,7 @@ def write_tables(
         (folder.target / FULL_PAGE).unlink(missing_ok=True)
     # This file comes last, because it contains the hash of the others.
     write_answer(
-        sweep_summary(lead, table["outcome"], sign, sweep_identity(asked, cases)),
+        sweep_summary(lead, table["outcome"], sign, sweep_identity(sweep_scene, cases)),
         folder.target / "sweep.json",
     )
 

@@ -49,29 +49,29 @@ class Column(NamedTuple):
     long_name: str
 
 
-def sort_measures(found: CaseResults) -> list[str]:
+def sort_measures(results: CaseResults) -> list[str]:
     """Return the measures of the cases in the order of the reference."""
     return sorted(
-        found.values,
+        results.values,
         key=lambda name: (ORDER.get(rows.remove_interface_number(name), len(ORDER)), name),
     )
 
 
-def measure_columns(found: CaseResults, name: str) -> list[Column]:
+def measure_columns(results: CaseResults, name: str) -> list[Column]:
     """Return the columns of a measure: its values and their errors."""
-    unit = found.units[name]
+    unit = results.units[name]
     return [
-        Column(name, found.values[name], unit, meaning(name)),
+        Column(name, results.values[name], unit, meaning(name)),
         Column(
-            f"{name}_error", found.errors[name], unit, f"estimated numerical half-width of {name}"
+            f"{name}_error", results.errors[name], unit, f"estimated numerical half-width of {name}"
         ),
     ]
 
 
-def column_names(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> list[str]:
+def column_names(cases: Cases, results: CaseResults, keys: Sequence[str] = ()) -> list[str]:
     """Return the column names of `csv_lines`."""
     measures = [
-        column.name for name in sort_measures(found) for column in measure_columns(found, name)
+        column.name for name in sort_measures(results) for column in measure_columns(results, name)
     ]
     return [
         *(axis.key for axis in cases.axes),
@@ -82,13 +82,15 @@ def column_names(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> 
     ]
 
 
-def csv_lines(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> Iterator[list[str]]:
+def csv_lines(cases: Cases, results: CaseResults, keys: Sequence[str] = ()) -> Iterator[list[str]]:
     """Yield a line of sweep.csv per case; a missing value is "".
 
     A line contains the swept keys as written, the outcome, every measure with its error in SI, the
     message of a failed case, and the name of its folder if `keys` are given.
     """
-    columns = [column for name in sort_measures(found) for column in measure_columns(found, name)]
+    columns = [
+        column for name in sort_measures(results) for column in measure_columns(results, name)
+    ]
     for first in range(
         0, len(cases), CASES_PER_BLOCK
     ):  # the strings of all cases would fill the memory
@@ -104,21 +106,25 @@ def csv_lines(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> Ite
             folder = [keys[number]] if keys else []
             yield [
                 *cases.texts(number),
-                str(found.outcome[number]),
+                str(results.outcome[number]),
                 *cells,
-                found.messages.get(number, ""),
+                results.messages.get(number, ""),
                 *folder,
             ]
 
 
-def write_csv(cases: Cases, found: CaseResults, keys: Sequence[str], path: Path) -> Path:
+def write_csv(cases: Cases, results: CaseResults, keys: Sequence[str], path: Path) -> Path:
     """Write sweep.csv to `path`."""
-    write_rows(path, chain([column_names(cases, found, keys)], csv_lines(cases, found, keys)))
+    write_rows(path, chain([column_names(cases, results, keys)], csv_lines(cases, results, keys)))
     return path
 
 
 def table_contents(
-    asked: SweepScene, cases: Cases, found: CaseResults, keys: Sequence[str] = (), answer: str = ""
+    sweep_scene: SweepScene,
+    cases: Cases,
+    results: CaseResults,
+    keys: Sequence[str] = (),
+    answer: str = "",
 ) -> netcdf.Contents:
     """Return the content of sweep.nc in SI.
 
@@ -128,9 +134,9 @@ def table_contents(
 
     Parameters
     ----------
-    asked : SweepScene
+    sweep_scene : SweepScene
     cases : Cases
-    found : CaseResults
+    results : CaseResults
     keys : sequence of str
         Folders of the cases.
     answer : str
@@ -156,13 +162,13 @@ def table_contents(
             {"units": "1", "long_name": "number of the case"},
         )
     columns = []
-    for name in sort_measures(found):
+    for name in sort_measures(results):
         if name in coordinates:  # normal.load is also the name of a measure
             continue
-        columns += measure_columns(found, name)
-        if np.nan_to_num(found.floors[name]).any():
+        columns += measure_columns(results, name)
+        if np.nan_to_num(results.floors[name]).any():
             text = f"error of {name} that is allowed in addition to the tolerance"
-            columns.append(Column(f"{name}_floor", found.floors[name], found.units[name], text))
+            columns.append(Column(f"{name}_floor", results.floors[name], results.units[name], text))
     data = {
         column.name: (
             dims,
@@ -171,43 +177,43 @@ def table_contents(
         )
         for column in columns
     }
-    texts = {"outcome": (found.outcome, "how the case ended")}
-    if found.messages:
-        messages = [found.messages.get(number, "") for number in range(len(cases))]
+    texts = {"outcome": (results.outcome, "how the case ended")}
+    if results.messages:
+        messages = [results.messages.get(number, "") for number in range(len(cases))]
         texts["message"] = (messages, "why the case failed")
     if keys:
         texts["folder"] = (keys, "folder of the case inside cases/")
     for name, (values, text) in texts.items():
         data[name] = (dims, np.array(values, object).reshape(cases.shape), {"long_name": text})
-    return netcdf.Contents(data, coordinates, _file_attributes(asked, cases, answer))
+    return netcdf.Contents(data, coordinates, _file_attributes(sweep_scene, cases, answer))
 
 
-def _file_attributes(asked: SweepScene, cases: Cases, answer: str) -> dict:
+def _file_attributes(sweep_scene: SweepScene, cases: Cases, answer: str) -> dict:
     """Return the attributes of sweep.nc: its scene, its command and the versions."""
     return {
         "Conventions": "CF-1.11",
         "title": f"sweep over {', '.join(axis.key for axis in cases.axes)}",
         "source": f"patchfem {__version__}",
-        "scene": asked.text,
-        "scene_file": asked.path.name,
-        "sets": json.dumps(list(asked.sets)),
+        "scene": sweep_scene.text,
+        "scene_file": sweep_scene.path.name,
+        "sets": json.dumps(list(sweep_scene.sets)),
         "answer": answer,
         "drawn": int(cases.drawn),
         "words": json.dumps(list(cases.words)),
-        **shared_facts(asked, cases),
-        "scene_sha256": hashlib.sha256(asked.text.encode()).hexdigest(),
+        **shared_facts(sweep_scene, cases),
+        "scene_sha256": hashlib.sha256(sweep_scene.text.encode()).hexdigest(),
         "versions": json.dumps(package_versions()),
     }
 
 
-def shared_facts(asked: SweepScene, cases: Cases) -> dict:
+def shared_facts(sweep_scene: SweepScene, cases: Cases) -> dict:
     """Collect the FACTS that all cases share and that are not swept.
 
     These are the tolerance, the size of the patch [m] and the ends of the swept frequencies [Hz].
     """
     for number in range(min(len(cases), MAX_CASES_TRIED)):
         try:
-            tables = tomllib.loads(asked.scene(cases.sets(number)).resolved())
+            tables = tomllib.loads(sweep_scene.scene(cases.sets(number)).resolved())
             break
         except PatchfemError:  # this case has no model
             continue
@@ -241,8 +247,8 @@ def _key_attributes(axis) -> dict:
 def cf_unit(unit: str) -> str:
     """Return a unit of a scene as results write it: "m/s^2" becomes "m s-2"."""
     above, *below = unit.split("/")
-    parts = [one.replace("^", "") for one in above.split() if one != "1" or not below]
-    for one in " ".join(below).replace("(", "").replace(")", "").split():
-        name, _, power = one.partition("^")
+    parts = [factor.replace("^", "") for factor in above.split() if factor != "1" or not below]
+    for factor in " ".join(below).replace("(", "").replace(")", "").split():
+        name, _, power = factor.partition("^")
         parts.append(f"{name}-{power or 1}")
     return " ".join(parts)
