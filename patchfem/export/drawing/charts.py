@@ -69,52 +69,52 @@ def make_line(x, y, colour: str, name: str = "", most: int = MAX_LINE_POINTS, **
     return make_mark("line", colour, name, x=x[keep], y=y[keep], **style)
 
 
-def sample_indices(x, y, most: int) -> np.ndarray:
+def sample_indices(x, y, max_points: int) -> np.ndarray:
     """Return the indices of at most `most` points of a line.
 
     From every stretch of the line these are the lowest and the highest x and y.
     """
-    if x.size <= most:
+    if x.size <= max_points:
         return np.arange(x.size)
-    size = -(-x.size // ((most - 2) // 4))
+    size = -(-x.size // ((max_points - 2) // 4))
     first = np.arange(0, x.size, size)
-    room = np.full((2, first.size * size), np.nan)
-    room[:, : x.size] = x, y
-    held = np.where(np.isnan(room), 0.0, room).reshape(2, -1, size)
+    padded = np.full((2, first.size * size), np.nan)
+    padded[:, : x.size] = x, y
+    stretches = np.where(np.isnan(padded), 0.0, padded).reshape(2, -1, size)
     # The last stretch may be shorter than the others.
-    held[:, -1, x.size - first[-1] :] = held[:, -1, :1]
-    ends = np.concatenate([held.argmin(axis=2).ravel(), held.argmax(axis=2).ravel()]) + np.tile(
-        first, 4
-    )
+    stretches[:, -1, x.size - first[-1] :] = stretches[:, -1, :1]
+    ends = np.concatenate(
+        [stretches.argmin(axis=2).ravel(), stretches.argmax(axis=2).ravel()]
+    ) + np.tile(first, 4)
     return np.unique(np.concatenate([[0], ends, [x.size - 1]]))
 
 
-def limit_characters(made: list, room: int) -> list:
+def limit_characters(all_charts: list, max_characters: int) -> list:
     """Reduce lines and bands so that all charts take about `room` characters.
 
     A number takes NUMBER characters.
     """
     sizes = [
-        sum(np.size(value) for value in one.values() if not isinstance(value, str | dict))
-        for found in made
-        for one in found["marks"]
+        sum(np.size(value) for value in mark.values() if not isinstance(value, str | dict))
+        for chart in all_charts
+        for mark in chart["marks"]
     ]
-    if (total := NUMBER * sum(sizes)) <= room:
-        return made
+    if (total := NUMBER * sum(sizes)) <= max_characters:
+        return all_charts
     return [
-        found | {"marks": [_reduce_mark(one, room / total) for one in found["marks"]]}
-        for found in made
+        chart | {"marks": [_reduce_mark(mark, max_characters / total) for mark in chart["marks"]]}
+        for chart in all_charts
     ]
 
 
-def _reduce_mark(one: dict, share: float) -> dict:
+def _reduce_mark(mark: dict, fraction: float) -> dict:
     """Reduce a line or band to a fraction of its points."""
-    rows = {"line": ("x", "y"), "band": ("x", "low", "high")}.get(one["kind"])
-    if rows is None or np.size(one["x"]) <= MIN_LINE_POINTS:
-        return one
-    x, *_, y = (np.asarray(one[name], float) for name in rows)
-    keep = sample_indices(x, y, max(int(share * x.size), MIN_LINE_POINTS))
-    return one | {name: np.asarray(one[name], float)[keep] for name in rows}
+    rows = {"line": ("x", "y"), "band": ("x", "low", "high")}.get(mark["kind"])
+    if rows is None or np.size(mark["x"]) <= MIN_LINE_POINTS:
+        return mark
+    x, *_, y = (np.asarray(mark[name], float) for name in rows)
+    keep = sample_indices(x, y, max(int(fraction * x.size), MIN_LINE_POINTS))
+    return mark | {name: np.asarray(mark[name], float)[keep] for name in rows}
 
 
 def contact_range(x, sigma) -> tuple | None:
@@ -145,51 +145,58 @@ def interface_charts(x, fields: dict, name: str = "") -> list:
     """
     sigma = fields["normal_stress"][0]
     tau = fields.get("shear_stress")
-    part = contact_range(x, sigma) or (x[0], x[-1])
-    along, size = choose_axis_unit(part, "m")
-    place = make_axis("x", along) | {"range": [part[0] * size, part[1] * size]}
+    drawn_range = contact_range(x, sigma) or (x[0], x[-1])
+    length_unit, length_scale = choose_axis_unit(drawn_range, "m")
+    x_axis = make_axis("x", length_unit) | {
+        "range": [drawn_range[0] * length_scale, drawn_range[1] * length_scale]
+    }
     unit, scale = choose_axis_unit(sigma, "Pa")
-    out = [
+    drawn_charts = [
         make_chart(
             f"Pressure on {name or 'the interface'}",
-            place,
+            x_axis,
             make_axis("normal stress", unit),
             [
-                make_mark("band", "accent", x=x * size, low=0 * x, high=sigma * scale),
-                make_line(x * size, sigma * scale, "accent"),
+                make_mark("band", "accent", x=x * length_scale, low=0 * x, high=sigma * scale),
+                make_line(x * length_scale, sigma * scale, "accent"),
             ],
         )
     ]
     if tau is not None and np.any(tau):
         unit, scale = choose_axis_unit(tau, "Pa")
         frame = int(np.argmax(np.abs(tau @ np.gradient(x))))
-        shown = np.unique(
+        frame_numbers = np.unique(
             np.linspace(1, len(tau) - 1, min(MAX_FRAMES, len(tau) - 1)).round().astype(int)
         )
         frames = [
             make_line(
-                x * size, tau[k] * scale, "soft", most=FAINT_FRAME_POINTS, width=0.6, alpha=0.6
+                x * length_scale,
+                tau[k] * scale,
+                "soft",
+                most=FAINT_FRAME_POINTS,
+                width=0.6,
+                alpha=0.6,
             )
-            for k in shown
+            for k in frame_numbers
         ]
-        title = f"Shear stress{f' on {name}' * bool(name)} at {len(shown)} instants"
-        out.append(
+        title = f"Shear stress{f' on {name}' * bool(name)} at {len(frame_numbers)} instants"
+        drawn_charts.append(
             make_chart(
                 title,
-                place,
+                x_axis,
                 make_axis("shear stress", unit),
-                [*frames, make_line(x * size, tau[frame] * scale, "warm")],
+                [*frames, make_line(x * length_scale, tau[frame] * scale, "warm")],
             )
         )
-    return out
+    return drawn_charts
 
 
-def faces_charts(found: list) -> list:
+def faces_charts(faces: list) -> list:
     """Return the charts of all interfaces that have a patch.
 
     Each entry of `found` contains the arguments of `interface_charts`.
     """
-    return [interface_chart for each in found for interface_chart in interface_charts(*each)]
+    return [interface_chart for face in faces for interface_chart in interface_charts(*face)]
 
 
 def contact_window(x, depth, sigma, ratio: float) -> tuple:
@@ -206,9 +213,9 @@ def contact_window(x, depth, sigma, ratio: float) -> tuple:
     ratio : float
         Width / height of the picture.
     """
-    used = np.flatnonzero(sigma > 0)
-    first = x[used[0]]
-    last = x[used[-1]]
+    pressed_nodes = np.flatnonzero(sigma > 0)
+    first = x[pressed_nodes[0]]
+    last = x[pressed_nodes[-1]]
     length = x[-1] - x[0]
     width = min(1.6 * (last - first) + 2 * (x[1] - x[0]), 0.4 * length)
     middle = (first + last) / 2
@@ -234,13 +241,13 @@ def stress_charts(x, depths, mises, sigma) -> list:
         Normal stress [Pa].
     """
     depth = max(depths, key=lambda rows: rows[-1])
-    box = contact_window(x, depth, sigma, 1.3)
-    (unit, scale), top, out = (
+    contact_box = contact_window(x, depth, sigma, 1.3)
+    (unit, scale), colour_limit, drawn_charts = (
         choose_axis_unit(np.concatenate([np.ravel(part) for part in mises]), "Pa"),
         0.0,
         [],
     )
-    for left, right, height in (box, (x[0], x[-1], depth[-1])):
+    for left, right, height in (contact_box, (x[0], x[-1], depth[-1])):
         name, size = choose_axis_unit((left, right, height), "m")
         i = slice(max(np.searchsorted(x, left, "right") - 1, 0), np.searchsorted(x, right) + 1)
         rows = [part[: np.searchsorted(part, height) + 1] for part in depths]
@@ -248,7 +255,9 @@ def stress_charts(x, depths, mises, sigma) -> list:
             part[i.start : i.stop - 1, : row.size - 1] * scale for part, row in zip(mises, rows)
         ]
         # The part around the contact comes first and determines the colours.
-        top = top or float(np.quantile(np.concatenate([part.ravel() for part in cells]), 0.998))
+        colour_limit = colour_limit or float(
+            np.quantile(np.concatenate([part.ravel() for part in cells]), 0.998)
+        )
         marks = []
         for side, row, part in zip((-1, 1), rows, cells):
             along, down, means = reduce_grid(x[i], row, part, GRID)
@@ -263,19 +272,19 @@ def stress_charts(x, depths, mises, sigma) -> list:
                     x=along * size,
                     y=side * down * size,
                     value=values,
-                    top=top,
+                    top=colour_limit,
                     unit=unit,
                 )
             )
         across, up = (
             {"range": [low * size, high * size]} for low, high in ((left, right), (-height, height))
         )
-        title = "Von Mises stress" if out else "Von Mises stress at the contact"
-        out.append(
+        title = "Von Mises stress" if drawn_charts else "Von Mises stress at the contact"
+        drawn_charts.append(
             make_chart(title, make_axis("x", name) | across, make_axis("y", name) | up, marks)
             | {"frame": _frame_size((right - left) / (2 * height))}
         )
-    return out[::-1]
+    return drawn_charts[::-1]
 
 
 def worn_map_chart(x, width: float, depth) -> list:
@@ -285,15 +294,17 @@ def worn_map_chart(x, width: float, depth) -> list:
         choose_axis_unit(depth, "m"),
         choose_axis_unit(np.concatenate([x, edges]), "m"),
     )
-    along, over, means = reduce_grid(x, edges, (depth[:, 1:] + depth[:, :-1]).T / 2 * scale, GRID)
+    x_lines, across_lines, means = reduce_grid(
+        x, edges, (depth[:, 1:] + depth[:, :-1]).T / 2 * scale, GRID
+    )
     values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(means.shape)
     marks = [
         make_mark(
             "cells",
             "",
             "worn depth",
-            x=along * size,
-            y=over * size,
+            x=x_lines * size,
+            y=across_lines * size,
             value=values,
             top=float(values.max()),
             unit=unit,
@@ -308,7 +319,7 @@ def worn_map_chart(x, width: float, depth) -> list:
     ]
 
 
-def reduce_grid(x, depth, cells, most: int) -> tuple:
+def reduce_grid(x, depth, cells, max_cells: int) -> tuple:
     """Reduce a grid to about `most` cells, each with the mean over its area.
 
     Parameters
@@ -316,25 +327,25 @@ def reduce_grid(x, depth, cells, most: int) -> tuple:
     x, depth : (nx,), (ny,) array
         Lines.
     cells : (nx - 1, ny - 1) array
-    most : int
+    max_cells : int
 
     Returns
     -------
     tuple
         Lines (n,), (m,) and cells (n - 1, m - 1).
     """
-    if cells.size <= most:
+    if cells.size <= max_cells:
         return x, depth, cells
-    rows = min(depth.size - 1, max(int((most / 2) ** 0.5), most // (x.size - 1)))
-    kept = [
+    rows = min(depth.size - 1, max(int((max_cells / 2) ** 0.5), max_cells // (x.size - 1)))
+    kept_lines = [
         np.linspace(0, line.size - 1, count + 1).round().astype(int)
-        for line, count in ((x, min(x.size - 1, most // rows)), (depth, rows))
+        for line, count in ((x, min(x.size - 1, max_cells // rows)), (depth, rows))
     ]
-    for axis, (line, keep) in enumerate(zip((x, depth), kept)):
+    for axis, (line, keep) in enumerate(zip((x, depth), kept_lines)):
         size = np.diff(line)
         parts = np.add.reduceat(np.moveaxis(cells, axis, -1) * size, keep[:-1], axis=-1)
         cells = np.moveaxis(parts / np.add.reduceat(size, keep[:-1]), -1, axis)
-    return x[kept[0]], depth[kept[1]], cells
+    return x[kept_lines[0]], depth[kept_lines[1]], cells
 
 
 def _frame_size(ratio: float) -> list:
@@ -373,12 +384,12 @@ def loop_chart(slide, force, title: str, measured: tuple | None = None) -> list:
     ]
 
 
-def loop_charts(found: list) -> list:
+def loop_charts(loops: list) -> list:
     """Return the friction loop of every interface; found: (name, slide [m], force [N]) each."""
     return [
-        one
-        for name, slide, force in found
-        for one in loop_chart(slide, force, f"Friction loop of interface {name}")
+        chart
+        for name, slide, force in loops
+        for chart in loop_chart(slide, force, f"Friction loop of interface {name}")
     ]
 
 
@@ -394,8 +405,8 @@ def cycle_envelope(time, value, period: float) -> tuple:
     period : float
         [s]
     """
-    many = int(np.ceil(max(1.0, (time[-1] - time[0]) / period / MAX_ENVELOPE_CYCLES)))
-    number = np.floor(time / (many * period) + 1e-9).astype(int)
+    cycles_per_bin = int(np.ceil(max(1.0, (time[-1] - time[0]) / period / MAX_ENVELOPE_CYCLES)))
+    number = np.floor(time / (cycles_per_bin * period) + 1e-9).astype(int)
     count = number[-1] + 1
     low = np.full(count, np.inf)
     high = np.full(count, -np.inf)
@@ -403,7 +414,7 @@ def cycle_envelope(time, value, period: float) -> tuple:
     np.maximum.at(high, number, value)
     empty = low > high
     low[empty] = high[empty] = np.nan
-    return (np.arange(count) + 0.5) * many * period, low, high
+    return (np.arange(count) + 0.5) * cycles_per_bin * period, low, high
 
 
 def first_complete_time(time, period: float, window_start: float) -> float:
@@ -452,48 +463,53 @@ def history_charts(
     value = history["displacement"]
     name, per = choose_axis_unit(time, "s")
     unit, scale = choose_axis_unit(value, "m")
-    begin = time[0]
+    first_complete = time[0]
     if period:
-        begin = first_complete_time(time, period, window["time"][0] if window else 0.0)
-    late = time >= begin
+        first_complete = first_complete_time(time, period, window["time"][0] if window else 0.0)
+    is_late = time >= first_complete
     marks = []
-    if joined and not late.all():
-        early = slice(0, int(np.argmax(late)) + 1)
+    if joined and not is_late.all():
+        early = slice(0, int(np.argmax(is_late)) + 1)
         marks.append(make_line(time[early] * per, value[early] * scale, "accent", width=1.0))
-    elif not late.all():
-        middle, low, high = cycle_envelope(time[~late], value[~late], period)
+    elif not is_late.all():
+        middle, low, high = cycle_envelope(time[~is_late], value[~is_late], period)
         marks.append(
             make_mark("band", "accent", x=middle * per, low=low * scale, high=high * scale)
         )
-    marks.append(make_line(time[late] * per, value[late] * scale, "accent", width=1.0))
-    out = [make_chart("Whole run", make_axis("time", name), make_axis("displacement", unit), marks)]
+    marks.append(make_line(time[is_late] * per, value[is_late] * scale, "accent", width=1.0))
+    drawn_charts = [
+        make_chart("Whole run", make_axis("time", name), make_axis("displacement", unit), marks)
+    ]
     if window is None:
         if np.any(history["force"]):
-            up, size = choose_axis_unit(history["force"], "N")
-            read = history.get("measured")
-            read = read and make_line(
-                read[0] * per, read[1] * size, "soft", "measured", width=3, alpha=0.55
+            force_unit, size = choose_axis_unit(history["force"], "N")
+            measured = history.get("measured")
+            measured = measured and make_line(
+                measured[0] * per, measured[1] * size, "soft", "measured", width=3, alpha=0.55
             )
-            out.append(
+            drawn_charts.append(
                 make_chart(
                     "Friction force",
                     make_axis("time", name),
-                    make_axis("friction force", up),
+                    make_axis("friction force", force_unit),
                     [
-                        read,
+                        measured,
                         make_line(
-                            time * per, history["force"] * size, "warm", "computed" if read else ""
+                            time * per,
+                            history["force"] * size,
+                            "warm",
+                            "computed" if measured else "",
                         ),
                     ],
                 )
             )
-        return out
+        return drawn_charts
     since = window["time"] - window["time"][0]
     (name, per), (unit, scale) = (
         choose_axis_unit(since, "s"),
         choose_axis_unit(window["displacement"], "m"),
     )
-    out.append(
+    drawn_charts.append(
         make_chart(
             title,
             make_axis("time", name),
@@ -502,7 +518,7 @@ def history_charts(
         )
     )
     moves = np.any(window["base"])
-    out.append(
+    drawn_charts.append(
         make_chart(
             title,
             make_axis("time", name),
@@ -517,7 +533,7 @@ def history_charts(
             ],
         )
     )
-    return out
+    return drawn_charts
 
 
 def measured_charts(rows: list, frequency: float, level: float, acceleration, displacement) -> list:
@@ -534,46 +550,50 @@ def measured_charts(rows: list, frequency: float, level: float, acceleration, di
     acceleration, displacement : tuple or None
         Computed value and error in SI.
     """
-    near = [r for r in rows if abs(r.frequency - frequency) < 0.5]
-    out = []
-    for name, unit, scale, found in (
+    rows_at_frequency = [r for r in rows if abs(r.frequency - frequency) < 0.5]
+    drawn_charts = []
+    for name, unit, scale, computed in (
         ("acceleration", "g", G_N, acceleration),
         ("displacement", "mil", MIL, displacement),
     ):
-        read = [r for r in near if getattr(r, name) is not None]
+        rows_with_value = [r for r in rows_at_frequency if getattr(r, name) is not None]
         marks = []
         marks += [
             make_mark("rule", "warm", "unstable in the test", x=place)
-            for place in sorted({r.input / G_N for r in near if "U" in r.flag})
+            for place in sorted({r.input / G_N for r in rows_at_frequency if "U" in r.flag})
         ]
         for repeat, text in ((False, "measured"), (True, "measured, repeat run")):
-            pick = [r for r in read if ("R" in r.flag) == repeat]
-            if pick:
+            drawn_rows = [r for r in rows_with_value if ("R" in r.flag) == repeat]
+            if drawn_rows:
                 marks.append(
                     make_mark(
                         "dots",
                         "soft",
                         text,
-                        x=[r.input / G_N for r in pick],
-                        y=[getattr(r, name) / scale for r in pick],
+                        x=[r.input / G_N for r in drawn_rows],
+                        y=[getattr(r, name) / scale for r in drawn_rows],
                         shape="square" if repeat else "circle",
                     )
                 )
-        if found is not None:
+        if computed is not None:
             marks.append(
                 make_mark(
                     "dots",
                     "accent",
                     "computed",
                     x=[level / G_N],
-                    y=[found[0] / scale],
+                    y=[computed[0] / scale],
                     shape="diamond",
-                    errors=[(found[1] or 0.0) / scale],
+                    errors=[(computed[1] or 0.0) / scale],
                 )
             )
-        title = f"{name.capitalize()} at {frequency:g} Hz" + ("" if read else ", not measured")
-        out.append(make_chart(title, make_axis("input", "g"), make_axis(name, unit), marks))
-    return out
+        title = f"{name.capitalize()} at {frequency:g} Hz" + (
+            "" if rows_with_value else ", not measured"
+        )
+        drawn_charts.append(
+            make_chart(title, make_axis("input", "g"), make_axis(name, unit), marks)
+        )
+    return drawn_charts
 
 
 def regime_stretches(curve: dict) -> list:
@@ -606,45 +626,45 @@ def regime_sentence(steady: dict | None) -> str:
     )
 
 
-def curve_caption(found: dict) -> str:
+def curve_caption(curve: dict) -> str:
     """Return the caption of a curve of steady motions: content, regimes, folds and gaps."""
-    what = curve_axis(found)[1]
-    parts = [regime for regime, _, _ in regime_stretches(found)]
-    count = np.asarray(found["amplitude"]).size
-    folds = len(found.get("folds", ()))
-    text = f"Half the peak-to-peak steady motion at the output against the {what}, {count} points; "
+    abscissa_name = curve_axis(curve)[1]
+    parts = [regime for regime, _, _ in regime_stretches(curve)]
+    count = np.asarray(curve["amplitude"]).size
+    folds = len(curve.get("folds", ()))
+    text = f"Half the peak-to-peak steady motion at the output against the {abscissa_name}, {count} points; "
     text += "colour and line style show the regime: " + ", ".join(dict.fromkeys(parts)) + "."
     if folds:
         text += f" The curve turns back at {folds} fold{'s' if folds > 1 else ''}."
     return text + (
-        " Shaded: no bounded motion." if not np.all(np.isfinite(found["amplitude"])) else ""
+        " Shaded: no bounded motion." if not np.all(np.isfinite(curve["amplitude"])) else ""
     )
 
 
-def curve_charts(found: dict) -> list:
+def curve_charts(curve: dict) -> list:
     """Return charts of a curve of steady motions over frequency or level.
 
     They show the amplitude, with the regime as colour and line style and with the folds, and the
     largest acceleration with its first harmonic.
     """
-    along, what, unit = curve_axis(found)
-    name, scale = choose_axis_unit(found["amplitude"], "m")
-    value = np.asarray(found["amplitude"]) * scale
-    parts = regime_stretches(found)
+    along, abscissa_name, unit = curve_axis(curve)
+    name, scale = choose_axis_unit(curve["amplitude"], "m")
+    value = np.asarray(curve["amplitude"]) * scale
+    parts = regime_stretches(curve)
     colours = dict(zip(dict.fromkeys(part[0] for part in parts), COLOURS * 9))
-    lost = np.concatenate([[False], ~np.isfinite(value), [False]]).astype(int)
+    is_unbounded = np.concatenate([[False], ~np.isfinite(value), [False]]).astype(int)
     marks = [
         make_mark(
             "span", "soft", left=along[max(first - 1, 0)], right=along[min(last, along.size - 1)]
         )
-        for first, last in np.flatnonzero(np.diff(lost)).reshape(-1, 2)
+        for first, last in np.flatnonzero(np.diff(is_unbounded)).reshape(-1, 2)
     ]
     for regime, first, last in parts:
-        stop = min(last + 1, along.size)  # up to the next stretch, so the line has no gap
+        end = min(last + 1, along.size)  # up to the next stretch, so the line has no gap
         marks.append(
             make_line(
-                along[first:stop],
-                value[first:stop],
+                along[first:end],
+                value[first:end],
                 colours[regime],
                 regime,
                 dash="dashed" if "unstable" in regime else REGIMES.get(regime, "solid"),
@@ -652,35 +672,35 @@ def curve_charts(found: dict) -> list:
         )
     marks += [
         make_mark("rule", "soft", "fold", x=at if unit == "Hz" else at / G_N)
-        for at in found.get("folds", ())
+        for at in curve.get("folds", ())
     ]
-    out = [
+    drawn_charts = [
         make_chart(
             "Steady motion at the output",
-            make_axis(what, unit),
+            make_axis(abscissa_name, unit),
             make_axis("half the peak-to-peak motion", name),
             marks,
         )
     ]
-    if "acceleration_peak" in found:
+    if "acceleration_peak" in curve:
         lines = [
             make_line(
-                along, np.asarray(found[f"acceleration_{key}"]) / G_N, colour, text, dash=dash
+                along, np.asarray(curve[f"acceleration_{key}"]) / G_N, colour, text, dash=dash
             )
             for key, colour, text, dash in (
                 ("peak", "accent", "largest", "solid"),
                 ("fundamental", "warm", "first harmonic", "dashed"),
             )
         ]
-        out.append(
+        drawn_charts.append(
             make_chart(
                 "Absolute acceleration at the output",
-                make_axis(what, unit),
+                make_axis(abscissa_name, unit),
                 make_axis("acceleration", "g"),
                 lines,
             )
         )
-    return out
+    return drawn_charts
 
 
 def spectra_charts(found, frequency: float | None) -> list:
@@ -693,13 +713,13 @@ def spectra_charts(found, frequency: float | None) -> list:
         Frequency [Hz] of the mode that was fitted to the peak of H1.
     """
     # outside the band of the drive the spectrum is only leakage
-    driven = np.isfinite(found.coherence)
-    out = []
-    found = type(found)(*(column[driven] for column in found))
+    has_drive = np.isfinite(found.coherence)
+    drawn_charts = []
+    found = type(found)(*(column[has_drive] for column in found))
     hertz = found.frequency
     unit, scale = choose_axis_unit([float(np.sqrt(found.place.max(initial=0.0)))], "m")
     along = make_axis("frequency", "Hz", True)
-    out.append(
+    drawn_charts.append(
         make_chart(
             "Displacement of the output",
             along,
@@ -707,7 +727,7 @@ def spectra_charts(found, frequency: float | None) -> list:
             [_positive_line(hertz, found.place * scale**2, "accent")],
         )
     )
-    out.append(
+    drawn_charts.append(
         make_chart(
             "Acceleration of output and base",
             along,
@@ -719,18 +739,20 @@ def spectra_charts(found, frequency: float | None) -> list:
         )
     )
     gain = np.abs(found.gain) * G_N
-    told = found.coherence >= MIN_COHERENCE
+    is_coherent = found.coherence >= MIN_COHERENCE
     unit, scale = choose_axis_unit([gain.max(initial=0.0)], "m")
     marks = [
         _positive_line(hertz, gain * scale, "soft"),
-        _positive_line(hertz, np.where(told, gain * scale, np.nan), "accent", "H1"),
+        _positive_line(hertz, np.where(is_coherent, gain * scale, np.nan), "accent", "H1"),
     ]
     if frequency is not None:
-        top = float(np.interp(frequency, hertz, gain)) * scale
+        peak_gain = float(np.interp(frequency, hertz, gain)) * scale
         marks.append(
-            make_mark("dots", "warm", "peak", x=[frequency], y=[top], errors=[0.0], shape="circle")
+            make_mark(
+                "dots", "warm", "peak", x=[frequency], y=[peak_gain], errors=[0.0], shape="circle"
+            )
         )
-    out.append(
+    drawn_charts.append(
         make_chart(
             "H1: displacement of the output divided by base acceleration",
             along,
@@ -738,42 +760,51 @@ def spectra_charts(found, frequency: float | None) -> list:
             marks,
         )
     )
-    return out
+    return drawn_charts
 
 
 def _positive_line(x, y, colour: str, name: str = "") -> dict | None:
     """Return a line through the positive values; None if there are none."""
-    there = np.isfinite(y) & (y > 0)
-    return make_line(x[there], y[there], colour, name) if there.any() else None
+    is_positive = np.isfinite(y) & (y > 0)
+    return make_line(x[is_positive], y[is_positive], colour, name) if is_positive.any() else None
 
 
-def decay_charts(found) -> list:
+def decay_charts(decay) -> list:
     """Return charts of frequency and damping ratio of a released output against its amplitude.
 
-    found: a `response.decay_curve.DecayCurve`, whose errors become bars.
+    decay: a `response.decay_curve.DecayCurve`, whose errors become bars.
     """
-    unit, scale = choose_axis_unit(found.amplitude, "m")
-    out = []
-    for name, label, of in (("frequency", "frequency", "Hz"), ("damping", "damping ratio", "")):
-        error = getattr(found, f"{name}_error")
-        y = getattr(found, name)
-        known = np.isfinite(error)
-        x = found.amplitude[known] * scale
-        out.append(
+    unit, scale = choose_axis_unit(decay.amplitude, "m")
+    drawn_charts = []
+    for name, label, unit_of_value in (
+        ("frequency", "frequency", "Hz"),
+        ("damping", "damping ratio", ""),
+    ):
+        error = getattr(decay, f"{name}_error")
+        y = getattr(decay, name)
+        has_error = np.isfinite(error)
+        x = decay.amplitude[has_error] * scale
+        drawn_charts.append(
             make_chart(
                 f"{label.capitalize()} of the decay",
                 make_axis("half the peak-to-peak motion", unit, True),
-                make_axis(label, of),
+                make_axis(label, unit_of_value),
                 [
-                    make_line(x, y[known], "accent"),
+                    make_line(x, y[has_error], "accent"),
                     make_mark(
-                        "dots", "accent", "", x=x, y=y[known], errors=error[known], shape="circle"
+                        "dots",
+                        "accent",
+                        "",
+                        x=x,
+                        y=y[has_error],
+                        errors=error[has_error],
+                        shape="circle",
                     ),
                 ]
-                * bool(known.any()),
+                * bool(has_error.any()),
             )
         )
-    return out
+    return drawn_charts
 
 
 def levels_chart(rows: list) -> list:
@@ -794,16 +825,16 @@ def levels_chart(rows: list) -> list:
         np.array([row["errors"].get("relative_displacement_amplitude") or 0.0 for row in rows])
         * scale
     )
-    held = np.array([row["stuck"] for row in rows])
+    is_stuck = np.array([row["stuck"] for row in rows])
     y = amplitude * scale
     log = needs_log_scale(amplitude)
-    drawn = y > 0 if log else np.isfinite(y)
+    is_drawn = y > 0 if log else np.isfinite(y)
     # Lower end of error bars that would extend below 0.
     marks = []
-    style = {"floor": 0.1 * float(y[drawn].min())} if log else {}
+    style = {"floor": 0.1 * float(y[is_drawn].min())} if log else {}
     for k, (a, b) in enumerate(pairwise(drive)):
         up = b >= a
-        if drawn[k] and drawn[k + 1]:
+        if is_drawn[k] and is_drawn[k + 1]:
             marks.append(
                 make_mark(
                     "arrow",
@@ -816,8 +847,8 @@ def levels_chart(rows: list) -> list:
                 )
             )
     for which, text, shape in (
-        (drawn & ~held, "slips", "circle"),
-        (drawn & held, "stuck", "square"),
+        (is_drawn & ~is_stuck, "slips", "circle"),
+        (is_drawn & is_stuck, "stuck", "square"),
     ):
         if which.any():
             marks.append(
@@ -832,10 +863,13 @@ def levels_chart(rows: list) -> list:
                     **style,
                 )
             )
-    what = make_axis("force", "N") if forced else make_axis("base acceleration", "g")
+    drive_axis = make_axis("force", "N") if forced else make_axis("base acceleration", "g")
     return [
         make_chart(
-            "Level by level", what, make_axis("half the peak-to-peak motion", name, log), marks
+            "Level by level",
+            drive_axis,
+            make_axis("half the peak-to-peak motion", name, log),
+            marks,
         )
     ]
 
@@ -854,7 +888,7 @@ def wear_charts(x, cycles, pressure, depth, history: dict) -> list:
     history : dict
         Name -> (j,), with `cycle`; measures are divided by their first value.
     """
-    (along, size), out = choose_axis_unit(x, "m"), []
+    (along, size), drawn_charts = choose_axis_unit(x, "m"), []
     pick = np.unique(np.linspace(0, len(cycles) - 1, PROFILES).round().astype(int))
     for values, unit, title in ((pressure, "Pa", "Pressure"), (depth, "m", "Worn depth")):
         name, scale = choose_axis_unit(values, unit)
@@ -867,19 +901,24 @@ def wear_charts(x, cycles, pressure, depth, history: dict) -> list:
             )
             for k, colour in zip(pick, ("soft", *COLOURS))
         ]
-        out.append(make_chart(title, make_axis("x", along), make_axis(title.lower(), name), lines))
-    out[0]["y"]["range"] = [
+        drawn_charts.append(
+            make_chart(title, make_axis("x", along), make_axis(title.lower(), name), lines)
+        )
+    drawn_charts[0]["y"]["range"] = [
         0.0,
         1.05 * float(np.max(pressure)) * choose_axis_unit(pressure, "Pa")[1],
     ]
-    over = [
+    change_lines = [
         make_line(history["cycle"], history[name] / history[name][0], colour, text)
         for colour, (name, text) in zip(COLOURS, WEAR_LABELS.items())
         if history.get(name) is not None and history[name][0]
     ]
     return [
-        *out,
+        *drawn_charts,
         make_chart(
-            "Change with wear", make_axis("cycles"), make_axis("value divided by first value"), over
+            "Change with wear",
+            make_axis("cycles"),
+            make_axis("value divided by first value"),
+            change_lines,
         ),
     ]

@@ -79,8 +79,8 @@ class Film:
     def panels(self, frame: Frame) -> tuple:
         """Return the panels of a frame, with the windows and colours of the film."""
         return tuple(
-            replace(one, window=window, top=top, over=over)
-            for one, window, top, over in zip(
+            replace(panel, window=window, top=top, over=over)
+            for panel, window, top, over in zip(
                 make_panels(frame, self.factors, self.close, self.aside),
                 self.windows,
                 self.tops,
@@ -110,44 +110,49 @@ def make_film(series: Series, magnify: float | None = None) -> Film:
             f"{series.path}: contains only one frame, so there is no motion to show; write a picture "
             "with -o FILE.png"
         )
-    seen = []
+    first_panels = []
     windows = []
     slides = []
-    reach = {"normal_stress": [], "shear_stress": []}
+    stress_ranges = {"normal_stress": [], "shear_stress": []}
     for number in numbers:
-        one = series.frame(number)
-        seen.append(make_panels(one, magnify))
-        windows.append(find_contact_window(one))
-        slides.append(abs(upper_piece_slide(one)) * 1e3)
-        line = one.interface()
-        for name in reach.keys() & one.point_data.keys():
-            reach[name] += [
-                float(one.point_data[name][line].min()),
-                float(one.point_data[name][line].max()),
+        frame = series.frame(number)
+        first_panels.append(make_panels(frame, magnify))
+        windows.append(find_contact_window(frame))
+        slides.append(abs(upper_piece_slide(frame)) * 1e3)
+        line = frame.interface()
+        for name in stress_ranges.keys() & frame.point_data.keys():
+            stress_ranges[name] += [
+                float(frame.point_data[name][line].min()),
+                float(frame.point_data[name][line].max()),
             ]
-    factors = tuple(min(both) for both in zip(*((one.factor for one in pair) for pair in seen)))
+    factors = tuple(
+        min(values_or_factors)
+        for values_or_factors in zip(*((frame.factor for frame in pair) for pair in first_panels))
+    )
     close = (*_enclosing_window(windows)[:2], *windows[0][2:])
-    left, right = np.array([pair[0].window for pair in seen])[:, :2].T
+    left, right = np.array([pair[0].window for pair in first_panels])[:, :2].T
     length = float((right - left).max())
-    aside = round_down_factor(SLIDE_LABEL * length / max(slides)) if max(slides) > 0 else 1.0
-    both = [value for values in reach.values() for value in values]
+    slide_factor = round_down_factor(SLIDE_LABEL * length / max(slides)) if max(slides) > 0 else 1.0
+    values_or_factors = [value for values in stress_ranges.values() for value in values]
     film = Film(
         numbers,
         factors,
         close,
-        aside,
+        slide_factor,
         (),
         (),
         (),
-        (min(both), max(both)),
-        max(reach["normal_stress"]),
+        (min(values_or_factors), max(values_or_factors)),
+        max(stress_ranges["normal_stress"]),
     )
-    shown = [make_panels(series.frame(number), factors, close, aside) for number in numbers]
+    final_panels = [
+        make_panels(series.frame(number), factors, close, slide_factor) for number in numbers
+    ]
     return replace(
         film,
-        windows=tuple(_enclosing_window([pair[k].window for pair in shown]) for k in (0, 1)),
-        tops=tuple(max(pair[k].top for pair in shown) for k in (0, 1)),
-        over=tuple(any(pair[k].over for pair in shown) for k in (0, 1)),
+        windows=tuple(_enclosing_window([pair[k].window for pair in final_panels]) for k in (0, 1)),
+        tops=tuple(max(pair[k].top for pair in final_panels) for k in (0, 1)),
+        over=tuple(any(pair[k].over for pair in final_panels) for k in (0, 1)),
     )
 
 
@@ -190,13 +195,13 @@ def write_film(series: Series, head: str, magnify: float | None, out: Path) -> s
         for number in film.numbers:
             frame = series.frame(number)
             text = f"{head}, {frame.time:.6g} s"
-            shown = film.panels(frame)
+            panels = film.panels(frame)
             if picture is None:
-                picture = Picture(frame, text, shown, FRAME_SIZE, film.reach)
+                picture = Picture(frame, text, panels, FRAME_SIZE, film.reach)
                 picture.freeze_layout(DPI)
                 writer.setup(picture.figure, str(out), dpi=DPI)
             else:
-                picture.show(frame, text, shown)
+                picture.show(frame, text, panels)
             try:
                 writer.grab_frame()
             except BrokenPipeError:  # ffmpeg has ended early; `finish` gives the reason

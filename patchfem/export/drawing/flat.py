@@ -76,17 +76,17 @@ class Picture:
             low, high = np.array(reach) * choose_axis_unit(reach, "Pa")[1]
             axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
         axes.legend(loc="best" if reach is None else "upper right")
-        drawn = self.bodies[0].cells[0][2]
+        cell_collection = self.bodies[0].cells[0][2]
         unit = choose_axis_unit([shown[0].top], "Pa")[0]
         self.figure.colorbar(
-            drawn, ax=self.bodies[0].axes, label=f"von Mises stress [{unit}]", shrink=0.7
+            cell_collection, ax=self.bodies[0].axes, label=f"von Mises stress [{unit}]", shrink=0.7
         )
         self._head(head, shown)
 
     def show(self, frame: Frame, head: str, shown: tuple) -> None:
         """Change the pieces and the curves to those of another frame."""
-        for one, panel in zip(self.bodies, shown):
-            one.show(frame, panel)
+        for bodies, panel in zip(self.bodies, shown):
+            bodies.show(frame, panel)
         for line, (_, values) in zip(self.lines, interface_curves(frame, self.reach)[1]):
             line.set_ydata(values)
         self._head(head, shown)
@@ -99,9 +99,9 @@ class Picture:
 
     def _head(self, head: str, shown: tuple) -> None:
         """Write the titles of both panels."""
-        whole, close = self.bodies
-        whole.axes.set_title(f"{head}\n{shown[0].title()}")
-        close.axes.set_title(f"where they touch, {shown[1].title(False)}")
+        whole_bodies, contact_bodies = self.bodies
+        whole_bodies.axes.set_title(f"{head}\n{shown[0].title()}")
+        contact_bodies.axes.set_title(f"where they touch, {shown[1].title(False)}")
 
 
 class _Bodies:
@@ -116,18 +116,18 @@ class _Bodies:
         self.cells = []  # (selection, corners, collection) of triangles and of quadrilaterals
         size = np.diff(frame.offsets)
         for count in np.unique(size[panel.cells]):
-            mine = panel.cells & (size == count)
-            corners = frame.connectivity[frame.offsets[:-1][mine][:, None] + np.arange(count)]
-            drawn = PolyCollection(
+            is_drawn = panel.cells & (size == count)
+            corners = frame.connectivity[frame.offsets[:-1][is_drawn][:, None] + np.arange(count)]
+            collection = PolyCollection(
                 panel.places[corners],
                 cmap="viridis",
                 edgecolors="none",
                 antialiaseds=False,
                 rasterized=True,
             )
-            drawn.set_clim(0, max(panel.top * self.scale, 1e-12))
-            axes.add_collection(drawn)
-            self.cells.append((mine, corners, drawn))
+            collection.set_clim(0, max(panel.top * self.scale, 1e-12))
+            axes.add_collection(collection)
+            self.cells.append((is_drawn, corners, collection))
         self.borders = [
             LineCollection([], colors=colour, linewidths=1.2) for colour in ("black", "white")
         ]
@@ -141,8 +141,8 @@ class _Bodies:
 
     def show(self, frame: Frame, panel: Panel) -> None:
         """Change the cells and borders to those of another frame."""
-        for mine, corners, drawn in self.cells:
-            drawn.set_verts(panel.places[corners])
-            drawn.set_array(frame.cell_data["von_mises"][mine] * self.scale)
-        for one, edges in zip(self.borders, self.edges):
-            one.set_segments(panel.places[edges])
+        for is_drawn, corners, collection in self.cells:
+            collection.set_verts(panel.places[corners])
+            collection.set_array(frame.cell_data["von_mises"][is_drawn] * self.scale)
+        for border, edges in zip(self.borders, self.edges):
+            border.set_segments(panel.places[edges])

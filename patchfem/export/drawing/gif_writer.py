@@ -56,6 +56,6 @@ def _make_palette() -> np.ndarray:
     """Return the palette (256, 3) uint8: the scale of stresses, greys, and tints of both curves."""
     scale = colormaps["viridis"](np.linspace(0, 1, N_SCALE))[:, :3]
     greys = np.linspace(0, 1, N_GREYS)[:, None] * np.ones(3)
-    share = np.linspace(0, 1, N_TINTS)[:, None]
-    tints = [1 - share * (1 - np.array(to_rgb(colour))) for colour in (BLUE, ORANGE)]
+    fraction = np.linspace(0, 1, N_TINTS)[:, None]
+    tints = [1 - fraction * (1 - np.array(to_rgb(colour))) for colour in (BLUE, ORANGE)]
     return np.round(255 * np.concatenate([scale, greys, *tints])).astype(np.uint8)

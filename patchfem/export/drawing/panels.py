@@ -99,19 +99,22 @@ def make_panels(
     tuple of Panel
     """
     motion = drawn_displacement(frame), upper_piece_slide(frame), aside
-    used = np.unique(
+    used_points = np.unique(
         np.concatenate([block.ravel() for part in (0, 1) for block in frame.cells(part)])
     )
-    x, y = frame.points[used, :2].T * 1e3
-    whole = (x.min(), x.max(), y.min(), y.max())
+    x, y = frame.points[used_points, :2].T * 1e3
+    whole_window = (x.min(), x.max(), y.min(), y.max())
     factors = magnify if isinstance(magnify, tuple) else (magnify, magnify)
-    windows = (whole, find_contact_window(frame) if close is None else close)
+    windows = (whole_window, find_contact_window(frame) if close is None else close)
     inside = [_stressed_cells(frame, window) for window in windows]
     mises = frame.cell_data["von_mises"]
     area = cell_areas(frame)
     # Panels side by side have the same scale.
-    top = max(_colour_limit(mises[cells], area[cells]) for cells in inside)
-    return tuple(_make_panel(frame, motion, *each, top) for each in zip(windows, inside, factors))
+    colour_limit = max(_colour_limit(mises[cells], area[cells]) for cells in inside)
+    return tuple(
+        _make_panel(frame, motion, *panel_settings, colour_limit)
+        for panel_settings in zip(windows, inside, factors)
+    )
 
 
 def _stressed_cells(frame: Frame, window: tuple) -> np.ndarray:
@@ -133,12 +136,12 @@ def _colour_limit(mises, area) -> float:
     It is the largest stress, unless this is a peak in a corner.
     """
     largest = float(mises.max(initial=0.0))
-    most = float(_weighted_quantile(mises, area, COLOURED_AREA))
-    return most if most < MIN_PEAK_RATIO * largest else largest
+    bulk_limit = float(_weighted_quantile(mises, area, COLOURED_AREA))
+    return bulk_limit if bulk_limit < MIN_PEAK_RATIO * largest else largest
 
 
 def _make_panel(
-    frame: Frame, motion: tuple, window: tuple, here, magnify: float | None, limit: float
+    frame: Frame, motion: tuple, window: tuple, is_drawn, magnify: float | None, limit: float
 ) -> Panel:
     """Return the panel of a window.
 
@@ -149,7 +152,7 @@ def _make_panel(
         Displacement (N, 2) [m], slide [m] and factor of the slide.
     window : tuple
         (left, right, bottom, top) [mm].
-    here : (cells,) array of bool
+    is_drawn : (cells,) array of bool
         Cells that are drawn.
     magnify : float or None
         Factor of the motion.
@@ -159,27 +162,33 @@ def _make_panel(
     move, slide, aside = motion
     left, right, bottom, top = window
     x, y = frame.points[:, :2].T * 1e3
-    mine = (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
+    is_inside = (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
     if magnify is None:
-        largest = np.abs(move[mine, 1]).max(initial=0.0) * 1e3
+        largest = np.abs(move[is_inside, 1]).max(initial=0.0) * 1e3
         magnify = (
             round_down_factor(DRAWN_MOTION_FRACTION * (top - bottom) / largest)
             if largest > 0
             else 0.0
         )
-    largest = float(frame.cell_data["von_mises"][here].max(initial=0.0))
-    whole = np.zeros_like(move)
-    whole[upper_points(frame), 0] = slide
+    largest = float(frame.cell_data["von_mises"][is_drawn].max(initial=0.0))
+    rigid_slide = np.zeros_like(move)
+    rigid_slide[upper_points(frame), 0] = slide
     places = (
-        frame.points[:, :2] + min(magnify, 1.0) * aside * whole + magnify * (move - whole)
+        frame.points[:, :2]
+        + min(magnify, 1.0) * aside * rigid_slide
+        + magnify * (move - rigid_slide)
     ) * 1e3
-    drawn = places[np.unique(frame.connectivity[np.repeat(here, np.diff(frame.offsets))])]
+    drawn_points = places[
+        np.unique(frame.connectivity[np.repeat(is_drawn, np.diff(frame.offsets))])
+    ]
     low, high = (
-        (drawn.min(axis=0), drawn.max(axis=0)) if len(drawn) else ((left, bottom), (right, top))
+        (drawn_points.min(axis=0), drawn_points.max(axis=0))
+        if len(drawn_points)
+        else ((left, bottom), (right, top))
     )
     return Panel(
         places,
-        here,
+        is_drawn,
         float(magnify),
         slide * 1e3,
         (low[0], high[0], low[1], high[1]),
@@ -189,13 +198,15 @@ def _make_panel(
     )
 
 
-def _weighted_quantile(values, weight, share: float) -> float:
+def _weighted_quantile(values, weight, fraction: float) -> float:
     """Return the value below which the fraction `share` of the weight lies."""
     if not values.size:
         return 0.0
     order = np.argsort(values)
-    heap = np.cumsum(weight[order])
-    return values[order][min(np.searchsorted(heap, share * heap[-1]), values.size - 1)]
+    cumulative_weight = np.cumsum(weight[order])
+    return values[order][
+        min(np.searchsorted(cumulative_weight, fraction * cumulative_weight[-1]), values.size - 1)
+    ]
 
 
 def upper_points(frame: Frame) -> np.ndarray:
@@ -227,11 +238,11 @@ def upper_piece_slides(points, moves) -> np.ndarray:
         Displacements [m].
     """
     height = points[:, 1].max()
-    far = points[:, 1] >= height * (1 - 1e-9)
-    apart = points[far, 0] - points[far, 0].mean()
+    is_far_face = points[:, 1] >= height * (1 - 1e-9)
+    x_from_centre = points[is_far_face, 0] - points[is_far_face, 0].mean()
     # The far face is rigid, so its slope is its rotation.
-    turn = moves[:, far, 1] @ apart / (apart @ apart)
-    slide = moves[:, far, 0].mean(axis=1) + turn * height
+    rotation = moves[:, is_far_face, 1] @ x_from_centre / (x_from_centre @ x_from_centre)
+    slide = moves[:, is_far_face, 0].mean(axis=1) + rotation * height
     return np.where(np.abs(slide) > ROUND_OFF * np.abs(moves).max(axis=(1, 2)), slide, 0.0)
 
 
@@ -269,16 +280,16 @@ def surface_shape_motion(points, up, x, surface) -> np.ndarray:
     face = np.flatnonzero(points[:, 1] <= 1e-9 * height)
     face = face[np.argsort(points[face, 0], kind="stable")]
     added = [
-        np.interp(points[:, 0], x, there - np.interp(x, points[face, 0], move[face]))
-        for there, move in zip(surface, up)
+        np.interp(points[:, 0], x, surface_row - np.interp(x, points[face, 0], move[face]))
+        for surface_row, move in zip(surface, up)
     ]
     return np.array(added) * (1 - points[:, 1] / height)
 
 
-def round_down_factor(factor: float, least: float = 1.0) -> float:
+def round_down_factor(factor: float, minimum: float = 1.0) -> float:
     """Return a factor > 0 rounded down to 1, 2 or 5 times a power of ten, but at least `least`."""
-    if factor < least:
-        return least
+    if factor < minimum:
+        return minimum
     power = 10.0 ** np.floor(np.log10(factor))
     return float(power * max(step for step in (1, 2, 5) if step * power <= factor * (1 + 1e-9)))
 
@@ -292,15 +303,15 @@ def find_contact_window(frame: Frame) -> tuple:
     touching = x[sigma > 0]
     cell = np.diff(x).max()
     if not touching.size:
-        middle = x.mean()
+        centre = x.mean()
         half = length / 8
     elif np.ptp(touching) > length / 4:
-        middle = x[np.argmax(sigma)]
+        centre = x[np.argmax(sigma)]
         half = length / 8
     else:
-        middle = (touching[0] + touching[-1]) / 2
+        centre = (touching[0] + touching[-1]) / 2
         half = max(np.ptp(touching), 4 * cell)
-    left = max(x[0], min(middle - half, x[-1] - 2 * half))
+    left = max(x[0], min(centre - half, x[-1] - 2 * half))
     right = min(x[-1], left + 2 * half)
     return (left, right, -0.3 * (right - left), 0.3 * (right - left))
 
@@ -329,13 +340,13 @@ def quadrilateral_areas(points, cells) -> np.ndarray:
     return np.abs((corner[..., 0] * after[..., 1] - corner[..., 1] * after[..., 0]).sum(axis=1)) / 2
 
 
-def interface_curves(frame: Frame, reach: tuple | None = None) -> tuple:
+def interface_curves(frame: Frame, stress_range: tuple | None = None) -> tuple:
     """Return the stresses along the interface of a frame: x [mm], curves, and their unit.
 
     Parameters
     ----------
     frame : Frame
-    reach : tuple, optional
+    stress_range : tuple, optional
         Minimum and maximum stress [Pa] that determine the unit; by default those of the frame.
 
     Returns
@@ -344,15 +355,16 @@ def interface_curves(frame: Frame, reach: tuple | None = None) -> tuple:
         x (m,) [mm], ((label, values (m,)), ...) and the unit.
     """
     line = frame.interface()
-    shown = [("normal stress", frame.point_data["normal_stress"][line])]
+    curves = [("normal stress", frame.point_data["normal_stress"][line])]
     if "shear_stress" in frame.point_data:
-        shown.append(("shear stress", frame.point_data["shear_stress"][line]))
+        curves.append(("shear stress", frame.point_data["shear_stress"][line]))
     unit, scale = choose_axis_unit(
-        np.concatenate([values for _, values in shown]) if reach is None else reach, "Pa"
+        np.concatenate([values for _, values in curves]) if stress_range is None else stress_range,
+        "Pa",
     )
     return (
         frame.points[line, 0] * 1e3,
-        tuple((label, values * scale) for label, values in shown),
+        tuple((label, values * scale) for label, values in curves),
         unit,
     )
 
@@ -369,19 +381,19 @@ def outer_edges(frame: Frame, cells) -> tuple:
     for part in (0, 1):
         ends = []
         coat = []
-        shown = []
+        is_drawn = []
         for count in (3, 4):
-            mine = (frame.cell_data["part"] == part) & (size == count)
-            block = frame.connectivity[frame.offsets[:-1][mine][:, None] + np.arange(count)]
+            is_selected = (frame.cell_data["part"] == part) & (size == count)
+            block = frame.connectivity[frame.offsets[:-1][is_selected][:, None] + np.arange(count)]
             ends.append(np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2))
-            coat.append(np.repeat(material[mine], count))
-            shown.append(np.repeat(cells[mine], count))
+            coat.append(np.repeat(material[is_selected], count))
+            is_drawn.append(np.repeat(cells[is_selected], count))
         ends = np.sort(np.concatenate(ends), axis=1)
         coat = np.concatenate(coat)
         pairs, number = np.unique(ends, axis=0, return_inverse=True)
         times = np.bincount(number.ravel())
         coats = np.bincount(number.ravel(), coat > 0)
-        seen = np.bincount(number.ravel(), np.concatenate(shown)) > 0
-        outer.append(pairs[(times == 1) & seen])
-        inner.append(pairs[(times == 2) & (coats == 1) & seen])
+        is_visible = np.bincount(number.ravel(), np.concatenate(is_drawn)) > 0
+        outer.append(pairs[(times == 1) & is_visible])
+        inner.append(pairs[(times == 2) & (coats == 1) & is_visible])
     return np.concatenate(outer), np.concatenate(inner)

@@ -142,22 +142,22 @@ def make_plotter(one: Frame, head: str, magnify: float | None, off_screen: bool 
 
     # it would report every display that it does not find
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    made = pv.Plotter(
+    plotter = pv.Plotter(
         off_screen=off_screen,
         window_size=WINDOW_SIZE,
         shape=(2, 2),
         groups=[(slice(None), 0)],
         border=False,
     )
-    made.set_background("white")
-    whole, close = make_panels(one, magnify)
-    made.subplot(0, 0)
-    _draw_pieces(made, one, whole, f"{head}\n{whole.title()}", True)
-    made.subplot(0, 1)
-    _draw_pieces(made, one, close, f"where they touch, {close.title(False)}", False)
-    made.subplot(1, 1)
-    _draw_stresses(made, one)
-    return made
+    plotter.set_background("white")
+    whole_panel, close = make_panels(one, magnify)
+    plotter.subplot(0, 0)
+    _draw_pieces(plotter, one, whole_panel, f"{head}\n{whole_panel.title()}", True)
+    plotter.subplot(0, 1)
+    _draw_pieces(plotter, one, close, f"where they touch, {close.title(False)}", False)
+    plotter.subplot(1, 1)
+    _draw_stresses(plotter, one)
+    return plotter
 
 
 def _draw_pieces(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
@@ -198,10 +198,10 @@ def _draw_pieces(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> 
         if len(edges):
             lines = pv.PolyData(places, lines=np.insert(edges, 0, 2, axis=1).ravel())
             plotter.add_mesh(lines, color=colour, line_width=2, lighting=False)
-    said = plotter.add_text(
+    title_actor = plotter.add_text(
         text, font_size=FONT * 0.6, color="black", position=(0.03, 0.98), viewport=True
     )
-    said.GetTextProperty().SetVerticalJustificationToTop()
+    title_actor.GetTextProperty().SetVerticalJustificationToTop()
     plotter.view_xy()
     plotter.enable_parallel_projection()
     plotter.show_bounds(
@@ -222,9 +222,9 @@ def _draw_stresses(plotter, one: Frame) -> None:
     """Draw the stresses along the interface."""
     import pyvista as pv
 
-    x, shown, unit = interface_curves(one)
+    x, curves, unit = interface_curves(one)
     chart = pv.Chart2D(x_label="x [mm]", y_label=f"stress on the interface [{unit}]")
-    for (label, values), colour in zip(shown, ("#1f5f99", "#c8551b")):
+    for (label, values), colour in zip(curves, ("#1f5f99", "#c8551b")):
         chart.line(x, values, color=colour, width=3, label=label)
     for axis in (chart.x_axis, chart.y_axis):
         axis.label_size = FONT

@@ -62,10 +62,11 @@ def _thinning_note(histories) -> str:
     thinned = np.flatnonzero(np.diff(reversals) < MIN_ROWS_PER_SWING)
     if thinned.size < MIN_ROWS_PER_SWING or thinned.size < (thinned[-1] + 1) / 2:
         return ""
+    first_even = format_quantity(float(histories.time[reversals[thinned[-1] + 1]]), "s", 3)
     return (
-        f"; before {format_quantity(float(histories.time[reversals[thinned[-1] + 1]]), 's', 3)} the rows are turning points, stops and "
-        f"starts of slip alone: a release of up to {MAX_STORED_SAMPLES // MIN_SAMPLES_PER_CYCLE} cycles "
-        "(drive.cycles) has even rows all along, any other run in its last cycles"
+        f"; before {first_even} the rows are turning points, stops and starts of slip alone: a release of up to "
+        f"{MAX_STORED_SAMPLES // MIN_SAMPLES_PER_CYCLE} cycles (drive.cycles) has even rows all along, any other run "
+        "in its last cycles"
     )
 
 
