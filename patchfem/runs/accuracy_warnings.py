@@ -90,29 +90,27 @@ def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
     """
     model = found.model
     tolerance = model.accuracy.tolerance
-    excess = {
-        name: min(measure.error_ratio(tolerance), MAX_EXCESS)
-        for name, measure in found.measures.items()
-    }
-    excess = {name: times for name, times in excess.items() if times > 1}
+    excess = {}
+    for name, measure in found.measures.items():
+        ratio = min(measure.error_ratio(tolerance), MAX_EXCESS)
+        if ratio > 1:
+            excess[name] = ratio
     has_faces = found.patch is None and model.has_interface_patches
-    pressed = (
-        faces.static_measures(model)
-        if has_faces
-        else patch_rows.TABLE
-        if found.patch is not None
-        else ()
-    )
-    static = {name: times for name, times in excess.items() if name in pressed}
-    moving = {name: times for name, times in excess.items() if name not in pressed}
+    static_names = ()
+    if has_faces:
+        static_names = faces.static_measures(model)
+    elif found.patch is not None:
+        static_names = patch_rows.TABLE
+    static = {name: ratio for name, ratio in excess.items() if name in static_names}
+    moving = {name: ratio for name, ratio in excess.items() if name not in static_names}
     warnings = []
     if has_faces:
-        warnings = faces.merge_sentences(
-            model,
-            lambda face: tolerance_warnings(
-                _select_interface_measures(found, face), face.patches[1:]
-            ),
-        )
+
+        def warn_of_face(face) -> list:
+            """Return the warnings on the patch of an interface."""
+            return tolerance_warnings(_select_interface_measures(found, face), face.patches[1:])
+
+        warnings = faces.merge_sentences(model, warn_of_face)
     elif static:
         at_rest = found
         meshes = coarse
@@ -130,12 +128,12 @@ def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
 
 def _select_interface_measures(found: Finding, face) -> Finding:
     """Return the static measures of the patch of an interface, without numbers in their names."""
-    numbered = {
-        name: found.measures.get(rows.add_interface_number(name, face.number))
-        for name in patch_rows.TABLE
-    }
-    own = {name: measure for name, measure in numbered.items() if measure is not None}
-    return Finding(face.model, own, face.patch)
+    measures = {}
+    for name in patch_rows.TABLE:
+        numbered = rows.add_interface_number(name, face.number)
+        if found.measures.get(numbered) is not None:
+            measures[name] = found.measures[numbered]
+    return Finding(face.model, measures, face.patch)
 
 
 def _named_measures(found: Finding, excess: dict) -> list[str]:
@@ -230,14 +228,8 @@ def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
     tolerances = [tolerance for tolerance in tolerances if tolerance is not None]
     if tolerances:
         return f"{cause}; set accuracy.tolerance = {min(tolerances):.3g} for a finer mesh"
-    seconds = max(
-        (
-            ladder.next_seconds(found.patch)
-            for found, _ in places
-            if isinstance(found.patch, press.Patch)
-        ),
-        default=0.0,
-    )
+    patches = [found.patch for found, _ in places if isinstance(found.patch, press.Patch)]
+    seconds = max(map(ladder.next_seconds, patches), default=0.0)
     limit = ladder.most_seconds(asked[0])
     if seconds > limit:
         cause += (
@@ -292,13 +284,9 @@ def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
     if cause == "modes" and extra["shear_modes"] < found.patch.x.size:
         return f"set accuracy.shear_modes = {min(4 * extra['shear_modes'], found.patch.x.size)}"
     if cause == "bonds":
-        pinned = [
-            f"accuracy.{key}"
-            for key in ("tail", "merge")
-            if getattr(model.accuracy, key) is not None
-        ]
+        pinned = [key for key in ("tail", "merge") if getattr(model.accuracy, key) is not None]
         if pinned:
-            return f"leave out {' and leave out '.join(pinned)}"
+            return " and ".join(f"leave out accuracy.{key}" for key in pinned)
         proposed = PROPOSED_TOLERANCE_RATIO * model.accuracy.tolerance
         return f"set accuracy.tolerance = {proposed:.3g} to refine the sum over bonds"
     if name == STEADY:  # the transient decays in a longer run
@@ -332,12 +320,9 @@ def _step_remedy(found: Finding, name: str, excess: dict, steps: int) -> str:
         and model.accuracy.method != "exact"
         and not engines.reason_not_exact(model)
     ):
-        pinned = (
-            ""
-            if model.accuracy.steps_per_cycle is None
-            else "leave out accuracy.steps_per_cycle and "
-        )
-        exact = f'{pinned}set accuracy.method = "exact", which has no steps'
+        exact = 'set accuracy.method = "exact", which has no steps'
+        if model.accuracy.steps_per_cycle is not None:
+            exact = f"leave out accuracy.steps_per_cycle and {exact}"
     if order is None:
         return f"{_no_order(name, steps)}{_remedy_without_order(model, steps, excess, exact)}"
     total = sum(part.get(name, 0.0) for part in parts["parts"].values())

@@ -11,7 +11,7 @@ from ..core import Missing
 from .cost import CODE_TO_COMPILE
 
 MAPPED_BYTES = 60e6  # bytes of address space of the packages in addition to the memory in use
-CODE = 150e6  # bytes of address space of the compiler library
+COMPILER_BYTES = 150e6  # bytes of address space of the compiler library
 MIN_NAMED_FRACTION = 0.3  # fraction of the memory from which a plan names the largest part
 CURES = {
     "contact.element_size": "make contact.element_size larger",
@@ -36,14 +36,15 @@ def describe_largest_part(parts: tuple) -> str:
     )
 
 
-def free_bytes(compiled: bool = False) -> float:
+def free_bytes(*, needs_compiler: bool = False) -> float:
     """Return the total memory [bytes] that this process may use.
 
-    The system, its control group and its own limits are considered; inf if none is known. compiled:
-    whether the compiler library is needed as well, which counts for address space only.
+    The system, its control group and its own limits are considered; inf if none is known.
+    needs_compiler: whether the compiler library is needed as well, which counts for address space
+    only.
     """
     used, mapped = process_bytes()
-    beside = mapped - used + MAPPED_BYTES + (CODE if compiled else 0.0)
+    beside = mapped - used + MAPPED_BYTES + (COMPILER_BYTES if needs_compiler else 0.0)
     return min(
         _available() + used, free_in_control_group(used), *(limit - beside for limit in _limits())
     )
@@ -131,9 +132,8 @@ def _remaining_bytes(folder: Path, limit: str, usage: str) -> float:
     try:
         most = int((folder / limit).read_text("ascii"))
         taken = int((folder / usage).read_text("ascii"))
-        known = dict(
-            line.split() for line in (folder / "memory.stat").read_text("ascii").splitlines()
-        )
+        lines = (folder / "memory.stat").read_text("ascii").splitlines()
+        known = dict(line.split() for line in lines)
     except (OSError, ValueError):  # the limit is "max", or a file is missing
         return float("inf")
     return float(
@@ -146,7 +146,8 @@ def reason_of_refusal(parts: tuple, free: float | None = None) -> str:
 
     The sentence names the required and the free memory, and the largest part with its key.
     """
-    free = free_bytes(any(part.what == CODE_TO_COMPILE for part in parts)) if free is None else free
+    if free is None:
+        free = free_bytes(needs_compiler=any(part.what == CODE_TO_COMPILE for part in parts))
     total = sum(part.bytes for part in parts)
     if total <= free:
         return ""

@@ -28,12 +28,9 @@ from .wear import plan as of_wear
 
 PACKAGE_BYTES = 80e6  # memory of the packages that every run imports [bytes]
 LONGEST = 1e6  # CPU seconds (twelve days) above which no run is started
-# engines that skip the cycles of a periodic motion, and number of cycles from which a plan says so
-SKIPS, MIN_SKIPPED_CYCLES = (
-    ("march", "exact", "piecewise"),
-    100,
-)
-UP_TO = (
+SKIPPING_ENGINES = ("march", "exact", "piecewise")  # they skip the cycles of a periodic motion
+MIN_SKIPPED_CYCLES = 100  # number of cycles from which a plan says so
+UPPER_LIMIT_NOTE = (
     "the computing time is an upper limit: as soon as the motion repeats itself, the remaining cycles are not "
     "computed one by one"
 )
@@ -118,10 +115,10 @@ class Plan:
         return self.cost.bytes
 
     def __repr__(self) -> str:
-        sizes = ", ".join(
-            f"{count} {name.removesuffix('_about').replace('_', ' ')}"
-            for name, count in self.unknowns.items()
-        )
+        sizes = []
+        for name, count in self.unknowns.items():
+            sizes.append(f"{count} {name.removesuffix('_about').replace('_', ' ')}")
+        sizes = ", ".join(sizes)
         lines = [
             f"Plan of {self.model.source.path.name}: {self.kind}, engine {self.engine}, {sizes or 'one point'}, "
             f"{self.steps} steps, about {self.seconds:.1f} s{compile_words(self.compile_seconds)} and "
@@ -205,14 +202,13 @@ def _make_plan(model: Model) -> Plan:
         chain |= patch_plan.chain(model.patch)
         groups |= patch_plan.groups(model)
         on_patch += patch_plan.verdict(groups, model.patch)
-    for number, one in enumerate(model.rig.friction.interfaces if model.rig is not None else ()):
-        if one.patch is not None:
-            chain |= {
-                rows.add_interface_number(name, number): link
-                for name, link in patch_plan.chain(one.patch).items()
-                if link != "rigid"
-            }
-            on_patch += patch_plan.face_words(model.rig.friction.names[number], one)
+    interfaces = model.rig.friction.interfaces if model.rig is not None else ()
+    for number, interface in enumerate(interfaces):
+        if interface.patch is not None:
+            for name, link in patch_plan.chain(interface.patch).items():
+                if link != "rigid":
+                    chain[rows.add_interface_number(name, number)] = link
+            on_patch += patch_plan.face_words(model.rig.friction.names[number], interface)
     cost = _cost(model)
     on_law += cost.words
     if model.kind == "bench":
@@ -224,11 +220,11 @@ def _make_plan(model: Model) -> Plan:
     if model.rig is not None:
         on_motion += of_rig.first_words(model.rig, groups, chain)
     if (
-        cost.engine in SKIPS
+        cost.engine in SKIPPING_ENGINES
         and drive_sizes.is_sinusoidal(model.rig.drive.signal)
         and model.rig.drive.cycles >= MIN_SKIPPED_CYCLES
     ):
-        on_law.append(UP_TO)
+        on_law.append(UPPER_LIMIT_NOTE)
     foreseen = forecast_tolerance(model)
     on_motion = [*([foreseen.sentence()] if foreseen.causes else []), *on_motion]
     is_compiled = cost.compile_seconds == 0 or compiled.has_run(
@@ -311,41 +307,40 @@ def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
 
 def _verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
     """Return the sentences of a plan; said: those on the motion, the patch and the friction law."""
-    out = list(said[0])
+    sentences = list(said[0])
     if text := memory.reason_of_refusal(parts):
-        out.append(f"`run` will refuse this scene: {text}")
+        sentences.append(f"`run` will refuse this scene: {text}")
     elif text := memory.describe_largest_part(parts):
-        out.append(text)
-    out += [*said[1], *said[2]]
+        sentences.append(text)
+    sentences += [*said[1], *said[2]]
     if "slip_length" in groups:
         about = f"by {format_length(groups['slip_length'], 3)} or more before the whole patch slips"
-        out.append(
-            f"the pieces shear elastically {about}"
-            if model.patch.interface.has_shear
-            else f"the pieces are rigid in shear in this scene; elastic pieces would shear {about}; add "
+        sentence = (
+            f"the pieces are rigid in shear in this scene; elastic pieces would shear {about}; add "
             "[contact.shear] to include this shear"
         )
+        if model.patch.interface.has_shear:
+            sentence = f"the pieces shear elastically {about}"
+        sentences.append(sentence)
     if model.kind == "rig" and model.partial_slip and model.rig.friction.load_varies:
-        out.append(
+        sentences.append(
             f"the normal load changes with the motion, so {model.partial_slip} is computed with the tangential modes of "
             "all nodes; the numerical error is estimated from a second run with half as many modes"
         )
-    return out
+    return sentences
 
 
 def refuse_size(what: Plan) -> None:
     """Raise Missing if a run needs too much memory, or more than LONGEST CPU seconds."""
     memory.refuse(what.cost.parts)
     if what.seconds > LONGEST:
-        pinned = what.model.accuracy.steps_per_cycle is not None
-        key = "accuracy.steps_per_cycle or " if pinned else ""
-        key += (
-            "slide.cycles"
-            if what.kind == "bench"
-            else "drive.cycles"
-            if what.model.rig is not None
-            else ""
-        )
+        key = ""
+        if what.model.accuracy.steps_per_cycle is not None:
+            key = "accuracy.steps_per_cycle or "
+        if what.kind == "bench":
+            key += "slide.cycles"
+        elif what.model.rig is not None:
+            key += "drive.cycles"
         raise Missing(
             f"the run would need a computing time of about {what.seconds:.2g} s ({what.steps:.2g} time "
             f"steps), more than the limit of {LONGEST:.0e} s; lower {key or 'the number of elements'}",
@@ -358,23 +353,23 @@ def _link(model: Model) -> dict:
     load = model.nominal_load
     if not load > 0:
         return {}
-    valley = {"grooves": model.grooves.stiffness(load)} if model.grooves is not None else {}
+    links = {}
+    if model.grooves is not None:
+        links["grooves"] = model.grooves.stiffness(load)
+    links["bonds"] = _law_link(model.friction, load)
     others = model.rig.friction.interfaces[1:] if model.rig is not None else ()
-    return (
-        valley
-        | _law_link(model.friction, load)
-        | {
-            f"bonds_{k}": _law_link(one.numbers, load if one.load is None else one.load)["bonds"]
-            for k, one in enumerate(others, 2)
-        }
-    )
+    for number, interface in enumerate(others, 2):
+        interface_load = load if interface.load is None else interface.load
+        links[f"bonds_{number}"] = _law_link(interface.numbers, interface_load)
+    return links
 
 
-def _law_link(f, load: float) -> dict:
-    """Return the link of a law under a load [N]."""
-    rigid = "none: it creeps" if law_has_trait(f.law, "creeps") else "rigid until it slips"
-    held = record.stick_stiffness(f, load)
-    return {"bonds": rigid if held == inf or law_has_trait(f.law, "creeps") else held}
+def _law_link(law, load: float):
+    """Return the stiffness [N/m] of a friction law in stick under a load [N], or a text."""
+    if law_has_trait(law.law, "creeps"):
+        return "none: it creeps"
+    stiffness = record.stick_stiffness(law, load)
+    return "rigid until it slips" if stiffness == inf else stiffness
 
 
 def _law_groups(model: Model) -> dict:

@@ -100,10 +100,12 @@ def run(
     what = what if isinstance(what, Plan) else plan(what)
     with locate_errors(what.model.source):
         refuse_size(what)
-        return _run(what, say, progress, estimate, fresh, kept)
+        return _run(what, say, progress, kept, estimate=estimate, fresh=fresh)
 
 
-def _run(what: Plan, say, progress, estimate: bool, fresh: bool, kept: StateFile | None) -> Result:
+def _run(
+    what: Plan, say, progress, kept: StateFile | None, *, estimate: bool, fresh: bool
+) -> Result:
     """Run a plan whose size was accepted; the parameters are those of `run`."""
     begin = perf_counter()
     model = what.model
@@ -114,12 +116,12 @@ def _run(what: Plan, say, progress, estimate: bool, fresh: bool, kept: StateFile
     if model.rig is not None:
         warnings += engines.unused_settings(model, what.engine)
     if model.patch is not None:
-        meshes = _press(model, estimate, fresh)
+        meshes = _press(model, estimate=estimate, fresh=fresh)
         seconds["contact"] = perf_counter() - begin
         if model.rig is not None and model.rig.structure.without_joint is not None:
             model = joint.remove_joint(model, meshes.patch)
             what = replace(what, model=model)
-        warnings += _warn_of_patch(model, meshes, estimate)
+        warnings += _warn_of_patch(model, meshes, estimate=estimate)
         notes += patch_result.notes_on_neglected_effects(model, meshes.patch, meshes.coarse)
     if model.has_interface_patches:
         if fresh:
@@ -159,7 +161,7 @@ def _run(what: Plan, say, progress, estimate: bool, fresh: bool, kept: StateFile
     return _complete_result(with_self_checks(result), notes, begin, meshes)
 
 
-def _press(model: Model, estimate: bool, fresh: bool) -> PatchMeshes:
+def _press(model: Model, *, estimate: bool, fresh: bool) -> PatchMeshes:
     """Press the patch of [contact] on the meshes that the run and its errors need."""
     tolerance = model.accuracy.tolerance
     patch, *coarse = patch_result.solve_all(model.patch, tolerance, estimate, fresh)
@@ -174,7 +176,7 @@ def _is_open(patch) -> bool:
     return patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT
 
 
-def _warn_of_patch(model: Model, meshes: PatchMeshes, estimate: bool) -> list:
+def _warn_of_patch(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list:
     """Return the warnings on large strains, and on a mesh that shows no error."""
     patch = meshes.patch
     warnings = list(patch_result.warn_of_strains(model.patch, patch))
@@ -212,7 +214,7 @@ def _solve_bench(inputs: RunInputs) -> Result:
 
 def _solve_rig(inputs: RunInputs) -> Result:
     """Return the Result of a rig."""
-    return rig.coupled(inputs)
+    return rig.run_coupled(inputs)
 
 
 SOLVERS = {
@@ -348,15 +350,24 @@ def state_key(model, patch, version: str) -> str:
 
     It depends on the scene in SI units, the unworn gap on the nodes, a slide from a file, and the
     version.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch or None
+    version : str
     """
-    corners = () if model.slide is None or model.slide.corners is None else model.slide.corners
-    of_patch = () if patch is None else (patch.x, patch.gap)
+    arrays = []
+    if patch is not None:
+        arrays += [patch.x, patch.gap]
     if model.wear is not None and model.wear.start is not None:
-        of_patch = *of_patch, model.wear.start.x, model.wear.start.depth
-    parts = (f"{version}\n{model.source.resolved}".encode(), *of_patch, *corners)
-    return hashlib.sha256(
-        b"".join(one if isinstance(one, bytes) else np.asarray(one).tobytes() for one in parts)
-    ).hexdigest()
+        arrays += [model.wear.start.x, model.wear.start.depth]
+    if model.slide is not None and model.slide.corners is not None:
+        arrays += model.slide.corners
+    digest = hashlib.sha256(f"{version}\n{model.source.resolved}".encode())
+    for array in arrays:
+        digest.update(np.asarray(array).tobytes())
+    return digest.hexdigest()
 
 
 def marches(what: Plan) -> bool:

@@ -66,7 +66,10 @@ class Forecast(NamedTuple):
 
     def cure(self) -> dict:
         """Return {key: value to set, or None to leave the key out} for all causes."""
-        return {key: value for cause in self.causes for key, value in cause.cure.items()}
+        cure = {}
+        for cause in self.causes:
+            cure |= cause.cure
+        return cure
 
     def as_json(self) -> dict:
         """Return the object that `plan --json` has under "tolerance"."""
@@ -159,12 +162,9 @@ def _rig_steps_cause(model: Model) -> Cause | None:
     wanted = costs.steps_wanted(model)
     if steps > FEWER_STEPS * wanted:
         return None
-    pinned = model.accuracy.steps_per_cycle is not None
-    words = (
-        f"with accuracy.steps_per_cycle = {steps}"
-        if pinned
-        else f"with the {steps} steps per cycle of this run"
-    )
+    words = f"with the {steps} steps per cycle of this run"
+    if model.accuracy.steps_per_cycle is not None:
+        words = f"with accuracy.steps_per_cycle = {steps}"
     return Cause(words, _steps_cure(model) | _more_cycles(model))
 
 
@@ -212,9 +212,8 @@ def _more_cycles(model: Model) -> dict:
 
 def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
     """Return the Cause if keys of the scene neglect too much of the sum over bonds."""
-    pinned = [
-        f"accuracy.{key}" for key in ("tail", "merge") if getattr(model.accuracy, key) is not None
-    ]
+    keys = [key for key in ("tail", "merge") if getattr(model.accuracy, key) is not None]
+    pinned = [f"accuracy.{key}" for key in keys]
     if (
         not pinned
         or model.friction is None

@@ -15,7 +15,7 @@ from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
 from patchfem import plan
 from patchfem.core import Missing
 from patchfem.runs import memory, run
-from patchfem.runs.plan import UP_TO, refuse_size
+from patchfem.runs.plan import UPPER_LIMIT_NOTE, refuse_size
 from patchfem.runs.rig import costs
 from patchfem.runs.rig.numerics import choose
 from patchfem.scene.scene import loads
@@ -92,7 +92,10 @@ def test_always_the_plan_estimates_the_memory_of_the_histories(method, cycles):
     )
     assert 0.4 < (many.bytes - few.bytes) / (taken[1] - taken[0]) < 2.5
     assert any("drive.cycles sets their size" in one for one in many.verdict)
-    assert UP_TO in many.verdict and UP_TO not in planned(text, "drive.cycles=50").verdict
+    assert (
+        UPPER_LIMIT_NOTE in many.verdict
+        and UPPER_LIMIT_NOTE not in planned(text, "drive.cycles=50").verdict
+    )
 
 
 def test_exact_memory_grows_with_the_square_of_the_nodes_and_with_the_steps_of_the_window():

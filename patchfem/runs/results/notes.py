@@ -13,12 +13,14 @@ from ...friction.bonds import parameters, temperature
 from ...scene.keys import materials
 
 # relative difference of the two values of the friction work, above which a warning is given
-BOOKS = 1e-3
-RIPE = 0.3  # slide during which bonds form over their length, above which a warning is given
+MAX_WORK_CHECK = 1e-3
+MAX_FORMING_RATIO = (
+    0.3  # slide during which bonds form over their length, above which a warning is given
+)
 MIN_EXCESS_RATIO = 1e-3  # excess over mu_s N relative to it, above which a note is given
 FARTHEST = 8  # most halvings of the steps that a warning proposes
-# proposed harmonics over those of a balance; smallest proposed number of harmonics
-HARMONICS_FACTOR, MIN_HARMONICS = 4, 31
+HARMONICS_FACTOR = 4  # proposed harmonics over those of a balance
+MIN_HARMONICS = 31  # smallest number of harmonics that is proposed
 MOST_HARMONICS = 500  # largest number of harmonics that is proposed for a sharp friction law
 
 
@@ -69,24 +71,32 @@ def warn_of_unformed_bonds(law, speed: float) -> list:
     speed: peak speed [m/s].
     """
     a = parameters.growth_path_ratio(law, speed) if law.reading == "report" else 0.0
-    if a <= RIPE:
+    if a <= MAX_FORMING_RATIO:
         return []
-    # with this growth path, growth_path_ratio(law, speed) = RIPE
-    least = law.ratio / (1 / (RIPE * law.length) - law.rest_growth / speed**2)
+    # with this growth path, growth_path_ratio(law, speed) = MAX_FORMING_RATIO
+    least = law.ratio / (1 / (MAX_FORMING_RATIO * law.length) - law.rest_growth / speed**2)
     return [
         f"at the peak speed of {speed:.3g} m/s a bond slides by {a:.2g} of its length while it forms (limit "
-        f"{RIPE:g}), so the law as printed in the report gives less friction than eqs. 2.18-2.21; set "
+        f"{MAX_FORMING_RATIO:g}), so the law as printed in the report gives less friction than eqs. 2.18-2.21; set "
         "friction.slip_growth = "
         f'"{0.95e6 * least:.2g} um", or friction.reading = "stretch"'
     ]
 
 
-def warn_of_creep(law, outcome, found) -> list:
+def warn_of_creep(law, outcome, measures: dict) -> list:
     """Return a warning, as a list, of a bounded motion whose mean position drifts.
 
-    This is Dahl's creep, not a property of the joint. found: measures by name.
+    This is Dahl's creep, not a property of the joint.
+
+    Parameters
+    ----------
+    law
+        Bond parameters.
+    outcome : Outcome
+    measures : dict
+        By name.
     """
-    drift = found.get("drift_per_cycle")
+    drift = measures.get("drift_per_cycle")
     if drift is None or drift.error is None or outcome not in (Outcome.STEADY, Outcome.STUCK):
         return []
     if law.reading != "stretch" or abs(drift.value) <= drift.error + 1e-2 * law.length:
@@ -118,29 +128,27 @@ def growth_notes(law, peak: float | None) -> list:
     """
     if not law.has_growth:
         return []
+    if law.reading == "report" and law.initial == 0:
+        return []
     if law.reading == "report":
-        return (
-            []
-            if law.initial == 0
-            else [
-                "in the law as printed in the report, the initial bonds keep the bond length eps_0, even though the length "
-                "of later bonds grows"
-            ]
-        )
-    out = []
+        return [
+            "in the law as printed in the report, the initial bonds keep the bond length eps_0, even though the length "
+            "of later bonds grows"
+        ]
+    notes = []
     if law.order > 1:
-        out.append(
+        notes.append(
             f"with friction.order = {law.order:g} and a growing bond length, friction has no limit: as the bond "
             "length grows, a bond that formed while the length was small pulls harder and breaks later; set "
             "friction.order <= 1 to keep friction near mu_s N"
         )
     if peak is not None and peak > 1 + MIN_EXCESS_RATIO:
-        out.append(
+        notes.append(
             f"the friction force reaches {peak:.3g} times mu_s N: the bond length grows during the run, and "
             "bonds that formed while the bond length was small then break later; to keep the friction force at "
             'or below mu_s N, set friction.reading = "report" and friction.order <= 0'
         )
-    return out
+    return notes
 
 
 def work_check_warning(values: dict, steps: int | None, harmonics: int | None = None) -> list:
@@ -156,25 +164,23 @@ def work_check_warning(values: dict, steps: int | None, harmonics: int | None = 
     steps, harmonics : int or None
         Steps per cycle, and harmonics, of the run; None for an engine without them.
     """
-    found = values.get("work_check")
-    if found is None or found.value is None or found.value <= BOOKS:
+    check = values.get("work_check")
+    if check is None or check.value is None or check.value <= MAX_WORK_CHECK:
         return []
-    wide = max(found.value, found.error or 0.0) / BOOKS
+    ratio = max(check.value, check.error or 0.0) / MAX_WORK_CHECK
     # one more halving, because in a motion with stops the difference is of second order only on
     # average
-    halvings = 1 + ceil(log2(wide) / 2)
+    halvings = 1 + ceil(log2(ratio) / 2)
     if harmonics:
         remedy = more_harmonics(harmonics)
     elif steps and halvings > FARTHEST:
         remedy = f"with this method {steps} steps per cycle are too few for this motion"
+    elif steps:
+        remedy = f"set accuracy.steps_per_cycle = {steps * 2**halvings}"
     else:
-        remedy = (
-            f"set accuracy.steps_per_cycle = {steps * 2**halvings}"
-            if steps
-            else 'compare with a run with accuracy.method = "march"'
-        )
+        remedy = 'compare with a run with accuracy.method = "march"'
     return [
-        f"work_check is {found.value:.2g} (limit {BOOKS:g}): the friction work computed from the samples by the "
+        f"work_check is {check.value:.2g} (limit {MAX_WORK_CHECK:g}): the friction work computed from the samples by the "
         f"trapezoidal rule differs from the friction work in the energy balance; {remedy}"
     ]
 

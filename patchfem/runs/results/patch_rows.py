@@ -194,9 +194,10 @@ def minimum_value(name: str) -> float:
 
 def unknown_measures(measures: dict) -> list:
     """Return names of the decisive positive measures whose error is as large as their value."""
-    found = {name: measures[name] for name in POSITIVE if name in measures}
-    return [
-        name
-        for name, one in found.items()
-        if one.value is not None and one.error and one.error >= one.value
-    ]
+    names = []
+    for name in POSITIVE:
+        measure = measures.get(name)
+        if measure is not None and measure.value is not None and measure.error:
+            if measure.error >= measure.value:
+                names.append(name)
+    return names

@@ -73,14 +73,17 @@ class Result:
     extra: dict
 
     def __repr__(self) -> str:
-        counts = [
-            f"{len(found) or 'no'} {word}{'s' * (len(found) != 1)}"
-            for found, word in ((self.measures, "measure"), (self.warnings, "warning"))
-        ]
+        measures = _count_words(len(self.measures), "measure")
+        warnings = _count_words(len(self.warnings), "warning")
         return (
             f"Result of {self.plan.model.source.path.name}, {self.outcome}: {self.outcome.sentence}\n"
-            f"  {' and '.join(counts)}, {self.seconds.get('total', 0.0):.2f} s"
+            f"  {measures} and {warnings}, {self.seconds.get('total', 0.0):.2f} s"
         )
+
+
+def _count_words(count: int, word: str) -> str:
+    """Return a number of things as words."""
+    return f"{count or 'no'} {word}{'s' * (count != 1)}"
 
 
 def with_meanings(measures: dict, apart: str) -> dict:
@@ -176,7 +179,13 @@ def has_known_mesh_error(model, patch, coarse) -> bool:
     """Return whether the error of a motion due to the mesh of its patch can be estimated.
 
     This requires the patch on a coarser mesh, unless the motion does not depend on the mesh.
-    coarse: patches on coarser meshes; None for a missing one.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch or None
+    coarse : sequence
+        Patches on coarser meshes; None for a missing one.
     """
     if patch is None or coarse[0] is not None:
         return True
@@ -234,12 +243,12 @@ def measure_engines(result) -> dict:
     A static measure of a patch names how it was computed on the meshes of the patch (`patch_rows`);
     another measure has the engine of the run.
     """
-    engines = {
-        name: measure.engine or result.extra.get("engine", "")
-        for name, measure in result.measures.items()
-        if measure.value is not None
-    }
-    return {name: engine for name, engine in engines.items() if engine}
+    engines = {}
+    for name, measure in result.measures.items():
+        engine = measure.engine or result.extra.get("engine", "")
+        if engine and measure.value is not None:
+            engines[name] = engine
+    return engines
 
 
 def shorten_file_names(texts, path: Path) -> list:
@@ -252,21 +261,18 @@ def shorten_file_names(texts, path: Path) -> list:
 
 def file_name_shortener(path: Path) -> Callable[[Iterable[str]], list]:
     """Return `shorten_file_names` for many remarks on scenes at one path."""
-    folders = [
-        f"{folder}/" for folder in (path.parent, path.parent.absolute()) if folder.is_absolute()
-    ]
+    folders = (path.parent, path.parent.absolute())
+    prefixes = [f"{folder}/" for folder in folders if folder.is_absolute()]
 
-    def told(texts) -> list:
+    def shorten(texts) -> list:
         """Return the remarks with shortened file names and rounded numbers."""
-        out = []
+        short_texts = []
         for text in texts:
-            for folder in folders:
-                text = text.replace(folder, "")
-            out.append(
-                rewrite_powers_of_ten(
-                    _FOLDER_OF_PATH.sub("", text, count=1) if text.startswith("/") else text
-                )
-            )
-        return out
+            for prefix in prefixes:
+                text = text.replace(prefix, "")
+            if text.startswith("/"):
+                text = _FOLDER_OF_PATH.sub("", text, count=1)
+            short_texts.append(rewrite_powers_of_ten(text))
+        return short_texts
 
-    return told
+    return shorten

@@ -65,9 +65,7 @@ def outcome_on_piece(outcome, asked, patch, slide, lateral=None):
         return outcome
     pieces = asked.pieces
     mean_length = (pieces.lower.length + pieces.upper.length) / 2
-    found = check_piece_length(outcome, largest_slide(slide), mean_length)
-    return (
-        found
-        if lateral is None
-        else check_piece_length(found, largest_slide(lateral), pieces.width)
-    )
+    outcome = check_piece_length(outcome, largest_slide(slide), mean_length)
+    if lateral is None:
+        return outcome
+    return check_piece_length(outcome, largest_slide(lateral), pieces.width)

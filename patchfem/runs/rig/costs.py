@@ -48,12 +48,10 @@ MOST_STEPS = 6400  # steps per cycle of the finest automatic march
 # an element sticks for the fraction (friction limit / force of the drive)**STICKING_EXPONENT of the time
 # (measured: .01)
 STICKING_EXPONENT = 6
-# Cells are merged in pairs at most this many times, at this tolerance and above: 49 of 769 cells
-# remain, with an error of 2e-4 of the motion of a slipping joint.
-MOST_PAIRS, AT = (
-    4,
-    1e-3,
-)
+# Cells are merged in pairs at most this many times: 49 of 769 cells remain, with an error of 2e-4 of
+# the motion of a slipping joint.
+MAX_MERGES = 4
+MERGE_TOLERANCE = 1e-3  # tolerance from which on cells are merged MAX_MERGES times
 REACH = 2.0  # phase of the fastest rate in a piece [rad], as in `dynamics.events.series_kernels`
 MARCH_SETTINGS = (
     "steps_per_cycle",
@@ -141,7 +139,13 @@ def count_merges(model: Model) -> int:
         or not all(law_has_trait(law, "cells") for law in laws)
     ):
         return 0
-    return int(min(max(MOST_PAIRS + log2(model.accuracy.tolerance / AT) / 2, 0), MOST_PAIRS))
+    n_merges = MAX_MERGES + log2(model.accuracy.tolerance / MERGE_TOLERANCE) / 2
+    return int(min(max(n_merges, 0), MAX_MERGES))
+
+
+def interface_load(model: Model, interface) -> float:
+    """Return the normal load [N] of an InterfaceLaw; by default that of the model."""
+    return model.nominal_load if interface.load is None else interface.load
 
 
 @lru_cache(8)
@@ -153,7 +157,7 @@ def expected_elements(model: Model) -> tuple:
     count = 0
     stiff = 0.0
     for interface in model.rig.friction.interfaces:
-        load = model.nominal_load if interface.load is None else interface.load
+        load = interface_load(model, interface)
         if law_has_trait(interface.numbers.law, "set-valued"):
             most = inf
             mine = 1
@@ -184,7 +188,8 @@ def ringing_and_events(model: Model) -> tuple:
     """
     modes = model.rig.modes
     drive = model.rig.drive.signal
-    (count, stiff), made = expected_elements(model), modal_system.make_modal_system(modes)
+    count, stiff = expected_elements(model)
+    made = modal_system.make_modal_system(modes)
     faces = len(made.interfaces)
     damping = made.damping_norm
     rate = damping / 2 + sqrt(
@@ -222,12 +227,10 @@ def expected_seconds(model: Model) -> float:
 
     The intervals that ringing requires count for the fraction of the time in stick.
     """
-    rig, (count, stiff) = model.rig, expected_elements(model)
-    limit = sum(
-        interface.numbers.static
-        * (model.nominal_load if interface.load is None else interface.load)
-        for interface in rig.friction.interfaces
-    )
+    rig = model.rig
+    count, stiff = expected_elements(model)
+    laws = rig.friction.interfaces
+    limit = sum(law.numbers.static * interface_load(model, law) for law in laws)
     push = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
     ringing, events = ringing_and_events(model)
     share = min(1.0, limit / push) ** STICKING_EXPONENT if stiff and push else 1.0
@@ -255,14 +258,13 @@ def reason_to_march_events(model: Model) -> str:
 
     Its events cost more than time steps, and more than an exact solution is worth.
     """
-    worth = (
-        MAX_EXACT_SECONDS_UNRESOLVED
-        if steps_wanted(model) > MOST_STEPS
-        else max(MAX_EXACT_SECONDS_OVER_MARCH, seconds_of_steps(model))
-    )
-    return (
-        "time steps are faster than the exact solution" if seconds_of_pieces(model) > worth else ""
-    )
+    if steps_wanted(model) > MOST_STEPS:
+        max_seconds = MAX_EXACT_SECONDS_UNRESOLVED
+    else:
+        max_seconds = max(MAX_EXACT_SECONDS_OVER_MARCH, seconds_of_steps(model))
+    if seconds_of_pieces(model) <= max_seconds:
+        return ""
+    return "time steps are faster than the exact solution"
 
 
 def reason_to_march_elements(model: Model) -> str:
@@ -270,11 +272,9 @@ def reason_to_march_elements(model: Model) -> str:
 
     Either the scene prescribes the steps, or see `reason_to_march_events`.
     """
-    return (
-        "accuracy.steps_per_cycle is set"
-        if model.accuracy.steps_per_cycle is not None
-        else reason_to_march_events(model)
-    )
+    if model.accuracy.steps_per_cycle is not None:
+        return "accuracy.steps_per_cycle is set"
+    return reason_to_march_events(model)
 
 
 def refuse_endless(model: Model, numerics=None) -> None:
@@ -310,9 +310,9 @@ def exact_cost(model: Model, numerics, points: int) -> Cost:
     if _python_seconds(model) <= compiled.MAX_PYTHON_SECONDS:
         # such a run takes 86 MB without machine code, and 152 MB with it, because it loads the LLVM
         # library
-        loading = replace(
-            (code if _is_loop_kept(model) else code._replace(bytes=0.0)).cost(), compile_seconds=0.0
-        )
+        if not _is_loop_kept(model):
+            code = code._replace(bytes=0.0)
+        loading = replace(code.cost(), compile_seconds=0.0)
     else:
         loading = code.cost()
     return Cost(times, history_parts(model, numerics, EVENT_HISTORY), (), steps) + loading
@@ -384,11 +384,11 @@ def reason_to_march_smooth_law(model: Model) -> str:
     """Return the reason to march a rig instead of integrating it at high order, or ""."""
     rig = model.rig
     accuracy = model.accuracy
-    pinned = next(
-        (f"accuracy.{key}" for key in MARCH_SETTINGS if getattr(accuracy, key) is not None), ""
-    )
-    if pinned or accuracy.quadrature not in ("auto", "recursion"):
-        return f"with {pinned or 'accuracy.quadrature'}"
+    for key in MARCH_SETTINGS:
+        if getattr(accuracy, key) is not None:
+            return f"with accuracy.{key}"
+    if accuracy.quadrature not in ("auto", "recursion"):
+        return "with accuracy.quadrature"
     if len(rig.modes.interfaces) > 1:
         return "with other forces"
     if model.side == "lower" and law_has_trait(model.friction.law, "bonds"):
@@ -396,11 +396,9 @@ def reason_to_march_smooth_law(model: Model) -> str:
     element = smooth_element(model)
     if element is None or element.state_scales is None:
         return f"for law '{model.friction.law}'"
-    return (
-        "in so many steps"
-        if smooth_steps(model, element) > MAX_STEP_RATIO * max(steps_per_cycle(model), 400)
-        else ""
-    )
+    if smooth_steps(model, element) > MAX_STEP_RATIO * max(steps_per_cycle(model), 400):
+        return "in so many steps"
+    return ""
 
 
 def smooth_element(model: Model) -> "Element | None":
@@ -429,18 +427,17 @@ def smooth_steps(model: Model, element: "Element") -> float:
     modes = model.rig.modes
     omega = find_drive_omega(rig.drive.signal)
     period = rig.drive.signal.period
-    damper = modes.damping if modes.damping is not None else np.diag(2 * modes.zeta * modes.omega)
+    damper = modes.damping_matrix
     pace = max(
         float(modes.omega.max()),
         float(np.abs(damper).sum(axis=1).max()),
         omega * find_max_frequency_ratio(rig.drive.signal),
     )
     ease = float((modes.slide**2).sum()) / modes.mass
-    rigid = (
-        0.0
-        if element.length
-        else element.limit / model.friction.reference_speed * ease * stiff_fraction(model, element)
-    )
+    rigid = 0.0
+    if not element.length:
+        slope = element.limit / model.friction.reference_speed
+        rigid = slope * ease * stiff_fraction(model, element)
     path = 4 * model.speed_scale / omega
     states = path / element.length if element.state_scales and element.length else 0.0
     grown = model.friction.slip_growth if law_has_trait(model.friction.law, "bonds") else None

@@ -93,25 +93,25 @@ class Engine(NamedTuple):
         richer = replace(few, richer=True)
         return [CoarserRuns((richer,), finer_errors, beside, "reduced")]
 
-    def lacks(self, model: Model, steady: bool = False) -> str:
+    def lacks(self, model: Model, *, steady: bool = False) -> str:
         """Return the first property of a model that the engine cannot compute, as text; "" if none.
 
         steady: whether the drive is the sine of a curve instead of its own waveform.
         """
-        return methods.find_unsupported_feature(self.name, motion_properties(model, steady))
+        return methods.find_unsupported_feature(self.name, motion_properties(model, steady=steady))
 
 
-def reason_not_exact(model: Model, steady: bool = False) -> str:
+def reason_not_exact(model: Model, *, steady: bool = False) -> str:
     """Return the reason why no engine of accuracy.method = "exact" can compute a model, or "".
 
     steady: see `Engine.lacks`.
     """
     engines = [engine for engine in ENGINES.values() if engine.method == EXACT.method]
-    reasons = [engine.lacks(model, steady) for engine in engines]
+    reasons = [engine.lacks(model, steady=steady) for engine in engines]
     return reasons[-1] if all(reasons) else ""
 
 
-def motion_properties(model: Model, steady: bool = False) -> methods.MotionFeatures:
+def motion_properties(model: Model, *, steady: bool = False) -> methods.MotionFeatures:
     """Return the properties of a model that decide which engines can compute it."""
     rig = model.rig
     spring = ""
@@ -242,10 +242,8 @@ def _numerics_of_meshes(model: Model, numerics) -> list:
     """Return one Numerics per interface patch, in which only this patch has a coarser mesh."""
     if not model.rig.friction.has_partial_slip:
         return []
-    return [
-        replace(numerics, meshed=interfaces)
-        for interfaces in faces.interfaces_with_coarse_mesh(model)
-    ]
+    meshes = faces.interfaces_with_coarse_mesh(model)
+    return [replace(numerics, meshed=interfaces) for interfaces in meshes]
 
 
 def _divide_steps(numerics, share: int):

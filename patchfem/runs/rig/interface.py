@@ -58,41 +58,36 @@ def make_contact(model: Model, numerics: Numerics, patch):
         return alone
 
     rows = [*rig.modes.interfaces]
-    found = []
+    all_joints = []
     if many:
-        found += [
-            joints.Joint(k, one) for k, one in enumerate(_side_by_side(model, numerics, patch))
-        ]
+        elements = _elements_side_by_side(model, numerics, patch)
+        all_joints = [joints.Joint(k, element) for k, element in enumerate(elements)]
     if second is not None:
-        found = joints.pair_plane_joints(
-            found, [bool(interface.lateral) for interface in rig.friction.interfaces]
-        )
-        rows += [row for row, one in zip(second, rig.friction.interfaces) if one.lateral]
+        is_lateral = [bool(interface.lateral) for interface in rig.friction.interfaces]
+        all_joints = joints.pair_plane_joints(all_joints, is_lateral)
+        rows += [row for row, lateral in zip(second, is_lateral) if lateral]
     if rig.springs.interlock is not None:
-        found.append(joints.make_interlocking_spring(0, *rig.springs.interlock))
+        all_joints.append(joints.make_interlocking_spring(0, *rig.springs.interlock))
     if rig.springs.cubic is not None:
-        found.append(joints.make_cubic_spring(len(rows), rig.springs.cubic))
+        all_joints.append(joints.make_cubic_spring(len(rows), rig.springs.cubic))
         rows.append(rig.modes.output)
     size = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
     beside = alone if alone is not None and alone.limit > 0 else None
-    return joints.JointsModel(beside, tuple(found), np.array(rows), size)
+    return joints.JointsModel(beside, tuple(all_joints), np.array(rows), size)
 
 
-def _side_by_side(model: Model, numerics: Numerics, patch) -> list:
+def _elements_side_by_side(model: Model, numerics: Numerics, patch) -> list:
     """Return the Elements of interfaces, or of the strips of a patch, that slide independently."""
     if patch is None:
         return own_elements(model, numerics.meshed)
     f = model.friction
     if model.partial_slip:
         length = make_law(f, patch.pressure.load).element(patch.pressure.load).length
-        return [
-            parallel_element(*strip_element)
-            for strip_element in jenkins_elements.strip_elements(patch, f.static, length)
-        ]
-    return [
-        make_element(model.rig.friction.interfaces[0], load, model.rig.speed_scale)
-        for load in strips.strip_loads(patch)
-    ]
+        strip_elements = jenkins_elements.strip_elements(patch, f.static, length)
+        return [parallel_element(*strip_element) for strip_element in strip_elements]
+    law = model.rig.friction.interfaces[0]
+    speed = model.rig.speed_scale
+    return [make_element(law, load, speed) for load in strips.strip_loads(patch)]
 
 
 def own_elements(model: Model, meshed: tuple) -> list:
@@ -100,12 +95,14 @@ def own_elements(model: Model, meshed: tuple) -> list:
 
     meshed: indices of interfaces whose patches are those on the coarser mesh.
     """
-    return [
-        parallel_element(*faces.make_elements(one, model.accuracy.tolerance, k in meshed)[:2])
-        if one.partial_slip
-        else make_element(one, one.load, model.rig.speed_scale)
-        for k, one in enumerate(model.rig.friction.interfaces)
-    ]
+    elements = []
+    for k, interface in enumerate(model.rig.friction.interfaces):
+        if interface.partial_slip:
+            parts = faces.make_elements(interface, model.accuracy.tolerance, k in meshed)
+            elements.append(parallel_element(*parts[:2]))
+        else:
+            elements.append(make_element(interface, interface.load, model.rig.speed_scale))
+    return elements
 
 
 def _climbing(model: Model, patch, count: int | None = None):
@@ -120,18 +117,18 @@ def _climbing(model: Model, patch, count: int | None = None):
     return run.make_model(model.grooves, load, f.static, kinetic, speed, model.rig.modes)
 
 
-def make_element(one: InterfaceLaw, load: float, speed: float) -> Element:
+def make_element(interface: InterfaceLaw, load: float, speed: float) -> Element:
     """Return the friction law of an interface under a load as an Element.
 
     Parameters
     ----------
-    one : InterfaceLaw
+    interface : InterfaceLaw
     load : float
         Normal load [N].
     speed : float
         Expected slip speed [m/s].
     """
-    f = one.numbers
+    f = interface.numbers
     if law_has_trait(f.law, "bonds"):
         return points_element(make_bond_parameters(f, speed, 1e-12), [1.0], [load])
     return make_law(f, load).element(load)
@@ -164,15 +161,15 @@ def contact_model(model: Model, numerics: Numerics, patch):
         return _bonds(model, numerics, patch, load)
     if law_has_trait(f.law, "averaged"):
         return models.coulomb_model(*(f.static * load * averaged.limit_share(model, patch),) * 2)
-    one = make_law(f, load).element(load)
+    element = make_law(f, load).element(load)
     if not soft:
-        return models.element_model(one)
+        return models.element_model(element)
 
     if patch.strips is not None:  # all strips have the same slide
-        strips = jenkins_elements.strip_elements(patch, f.static, one.length)
-        return models.jenkins_model(*map(np.concatenate, zip(*strips)))
-    found = jenkins_elements.elements(patch, f.static, one.length)
-    return models.jenkins_model(found.stiffness, found.yield_displacement, found)
+        strip_elements = jenkins_elements.strip_elements(patch, f.static, element.length)
+        return models.jenkins_model(*map(np.concatenate, zip(*strip_elements)))
+    elements = jenkins_elements.elements(patch, f.static, element.length)
+    return models.jenkins_model(elements.stiffness, elements.yield_displacement, elements)
 
 
 def _bonds(model: Model, numerics: Numerics, patch, load: float):
@@ -181,29 +178,24 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
     It is a list of bonds, points with shear modes, points of a field, or a single point.
     """
     law = model.bonds
-    found = choose_quadrature(model, numerics)
+    choice = choose_quadrature(model, numerics)
+    is_list = choice.engine != "recursion"
     limit = model.friction.static * load
-    if model.side == "lower" and (model.partial_slip or found.engine != "recursion"):
-        return shear.lists_on_lower_piece(
-            model,
-            patch,
-            found,
-            shear.shear_modes_of_points(model, patch, numerics.shear_modes)
-            if model.partial_slip
-            else None,
-        )
-    if found.engine != "recursion" and not model.partial_slip:
-        return models.bond_list_model(law, limit, found.reach(law.order), found.merge)
+    if model.side == "lower" and (model.partial_slip or is_list):
+        modes = None
+        if model.partial_slip:
+            modes = shear.shear_modes_of_points(model, patch, numerics.shear_modes)
+        return shear.lists_on_lower_piece(model, patch, choice, modes)
+    if is_list and not model.partial_slip:
+        return models.bond_list_model(law, limit, choice.reach(law.order), choice.merge)
     if model.partial_slip:
         reduced, force = _shear_modes(patch, law, numerics.shear_modes, model)
-        if found.engine != "recursion":
-            return shear.sheared_lists(patch, law, reduced, found, force)
-        pressed = (
-            (patch.pieces.interface.weight, patch.pressure.sigma_n)
-            if force is None
-            else (force, np.ones_like(force))
-        )
-        return models.points_model(law, *pressed, reduced)
+        if is_list:
+            return shear.sheared_lists(patch, law, reduced, choice, force)
+        if force is not None:
+            return models.points_model(law, force, np.ones_like(force), reduced)
+        weight = patch.pieces.interface.weight
+        return models.points_model(law, weight, patch.pressure.sigma_n, reduced)
     if numerics.per_point:
         x = patch.x
         weight = patch.pieces.interface.weight

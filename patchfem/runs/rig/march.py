@@ -185,7 +185,7 @@ class MarchReader(Reader):
             friction_works=tuple(run.ledger[name] for name in ("sampled", "booked", "passed"))
         )
 
-    def further_fields(self, run, drive, stuck: bool) -> dict:
+    def further_fields(self, run, drive, *, stuck: bool) -> dict:
         """Return the loop and, if an interface with a set-valued law sticks, its known measures.
 
         Parameters

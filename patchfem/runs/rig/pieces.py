@@ -126,7 +126,7 @@ def _run(reader, frames: int, say, progress) -> Solution:
             *state,
             even=bool(NEEDS_RUN),
         )
-        return reader.over_strips(done)
+        return reader.average_over_strips(done)
 
     if rig.drive.levels.amplitudes:
         done, more = run_levels(reader, integrate, (rig.start, None), lambda run: run.end, progress)
@@ -149,7 +149,7 @@ class PieceReader(Reader):
         self.reduced = found.seconds
         self.apart = found.rigid and model.rig.friction.strips_slide_apart
 
-    def over_strips(self, run):
+    def average_over_strips(self, run):
         """Return the run with histories of the whole patch, if its strips slide independently."""
         if not self.apart:
             return run
@@ -175,7 +175,7 @@ class PieceReader(Reader):
         """
         return IntegratedMeasures(loops=(_strips_loop(run, drive),) if self.apart else run.loops)
 
-    def further_fields(self, run, drive, stuck: bool) -> dict:
+    def further_fields(self, run, drive, *, stuck: bool) -> dict:
         """Return the measures that the engine computes between events, as fields of `LastCycles`.
 
         Rigid elements dissipate all work of friction, so that their ledger is known.

@@ -33,6 +33,7 @@ from .costs import (
     exact_cost,
     exact_words,
     history_parts,
+    interface_load,
     kept_samples,
     ringing_and_events,
     smooth_cost,
@@ -53,11 +54,9 @@ STEADY_CODES = {
     "harmonic": BALANCE_CODE,
     "march": None,
 }
-# points of a curve over frequency, including those at its bends and peak: by a map, by a balance
-CURVE = (
-    160,
-    250,
-)
+# points of a curve over frequency, including those at its bends and peak
+N_MAPPED_POINTS = 160  # points of a curve by maps of events or yields, or by marches
+N_BALANCE_POINTS = 250  # points of a curve by harmonic balance
 N_MARCHED_CYCLES = 400.0  # cycles of all marches until a motion repeats
 # relative distance from the frequency of a mode within which a sine excites a resonance
 RESONANT = 0.02
@@ -83,12 +82,12 @@ def held_stiffness(chain: dict, number: int = 0) -> float:
     number : int
         Index of the interface.
     """
-    links = {
-        remove_interface_number(name): link
-        for name, link in chain.items()
-        if name not in ("mode", "bonded", "grooves")
-        and name == add_interface_number(remove_interface_number(name), number)
-    }
+    links = {}
+    for name, link in chain.items():
+        plain_name = remove_interface_number(name)
+        is_own = name == add_interface_number(plain_name, number)
+        if is_own and name not in ("mode", "bonded", "grooves"):
+            links[plain_name] = link
     if str(links.get("bonds", "")).startswith("none"):
         return 0.0
     soft = sum(1 / link for link in links.values() if not isinstance(link, str) and link > 0)
@@ -100,13 +99,12 @@ def stuck_stiffness(rig, chain: dict) -> np.ndarray:
 
     Strips have that of their patch.
     """
-    faces = len(rig.friction.interfaces)
-    return np.array(
-        [
-            held_stiffness(chain, k if k < faces else 0) if faces else inf
-            for k in range(len(rig.modes.interfaces))
-        ]
-    )
+    n_interfaces = len(rig.friction.interfaces)
+    stiffness = np.full(len(rig.modes.interfaces), inf)
+    if n_interfaces:
+        for k in range(stiffness.size):
+            stiffness[k] = held_stiffness(chain, k if k < n_interfaces else 0)
+    return stiffness
 
 
 def remove_expected_joint(rig, links: dict):
@@ -216,7 +214,7 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
             MemoryPart(MODE_NODE * modes * points, f"{modes} shear modes", "accuracy.shear_modes")
         )
     else:
-        each = _step_without_modes(model, numerics, points, is_bonds)
+        each = _step_without_modes(model, numerics, points, is_bonds=is_bonds)
     # runs with a half and a quarter of the steps, and with each halving of the step
     passes = 0.75 + 2 ** (lists.halvings(model) + 1) - 1
     times = {
@@ -232,7 +230,7 @@ def march_code(model: Model) -> EngineCode:
     return SHEAR_MARCH_CODE if model.partial_slip else MARCH_CODE
 
 
-def _step_without_modes(model: Model, numerics, points: int, is_bonds: bool) -> float:
+def _step_without_modes(model: Model, numerics, points: int, *, is_bonds: bool) -> float:
     """Return the CPU seconds of a step of a march without shear modes and list of bonds."""
     rig = model.rig
     step = _step(model.rig, model.friction)
@@ -249,13 +247,17 @@ def _step_without_modes(model: Model, numerics, points: int, is_bonds: bool) -> 
     return step
 
 
-def _step(rig, f) -> float:
+def _step(rig, friction) -> float:
     """Return the CPU seconds of a step of a march.
 
     Growing bonds and several interfaces take longer than a single mode and interface.
     """
     faces = len(rig.friction.interfaces)
-    grows = f is not None and f.slip_growth is not None and law_has_trait(f.law, "bonds")
+    grows = (
+        friction is not None
+        and friction.slip_growth is not None
+        and law_has_trait(friction.law, "bonds")
+    )
     return (
         (
             cost_model.BOND_STEP_SECONDS
@@ -274,28 +276,28 @@ def groups(model: Model) -> dict:
     - knee [m s-2], or knee_force [N] of a drive by force: drive above which friction alone does not
       bound a motion at resonance, for a block that slides.
     """
-    out = {}
+    sizes = {}
     f = model.friction
     rig = model.rig
-    limits = [
-        interface.friction_limits(model.nominal_load if interface.load is None else interface.load)
-        for interface in rig.friction.interfaces
-    ]
-    limit, kinetic = (sum(one[k] for one in limits) for k in range(2))
+    limits = [law.friction_limits(interface_load(model, law)) for law in rig.friction.interfaces]
+    limit = sum(static for static, _ in limits)
+    kinetic = sum(sliding for _, sliding in limits)
     push = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
     if push > 0:
-        out |= {"D": limit / push} | ({} if kinetic == limit else {"D_kinetic": kinetic / push})
+        sizes["D"] = limit / push
+        if kinetic != limit:
+            sizes["D_kinetic"] = kinetic / push
     ratio = rig.first_mode.frequency * rig.drive.signal.period if rig.drive.frequency else inf
     if abs(ratio - 1) < 0.2:
         bound = 4 / pi * kinetic * _lever(rig)
-        out |= {"knee_force": bound} if rig.drive.force else {"knee": bound / rig.first_mode.mass}
+        sizes |= {"knee_force": bound} if rig.drive.force else {"knee": bound / rig.first_mode.mass}
     if f is not None and f.bond_length and f.stiffness is None and rig.drive.signal.moving:
-        out["drive_amplitude_over_bond_length"] = (
+        sizes["drive_amplitude_over_bond_length"] = (
             find_max_acceleration(rig.drive.signal)
             / find_drive_omega(rig.drive.signal) ** 2
             / f.bond_length
         )
-    return out
+    return sizes
 
 
 def drive_and_knee(model: Model) -> dict:
@@ -355,11 +357,9 @@ def first_words(rig, found: dict, chain: dict) -> list:
     ):
         return []
     d *= _lever(rig)
-    soft = [
-        name
-        for name, link in chain.items()
-        if name != "mode" and not isinstance(link, str) and link < STIFF * rig.first_mode.stiffness
-    ]
+    limit = STIFF * rig.first_mode.stiffness
+    links = {name: link for name, link in chain.items() if not isinstance(link, str)}
+    soft = [name for name, link in links.items() if name != "mode" and link < limit]
     if d >= 1 and soft:
         return [
             f"D = {d:.3g} >= 1, but the block still moves, because the interface is elastic: its stiffness "
@@ -370,13 +370,13 @@ def first_words(rig, found: dict, chain: dict) -> list:
     if "D_kinetic" in found:  # the kinetic limit acts on a block that slides
         sliding = found["D_kinetic"] * _lever(rig)
         return [
-            f"D = {d:.3g} is below 1, so that the block slips; with the kinetic coefficient {_sliding(sliding)}"
+            f"D = {d:.3g} is below 1, so that the block slips; with the kinetic coefficient {_describe_sliding(sliding)}"
         ]
-    return [_sliding(d)]
+    return [_describe_sliding(d)]
 
 
-def _sliding(d: float) -> str:
-    """Return the sentence on a block that slips at D < 1."""
+def _describe_sliding(d: float) -> str:
+    """Return the sentence on a block that slips; d: D of equation (2.3), below 1."""
     if d > pi / 4:
         return f"D = {d:.3g} lies between pi/4 and 1: at resonance the block alternates between stick and slip"
     return f"D = {d:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"
@@ -386,26 +386,24 @@ def bond_sum_sentences(model: Model, numerics) -> list:
     """Return sentences on the sum over bonds of law 'nonlocal', or on the engine of elements."""
     if not law_has_trait(model.friction.law, "bonds"):
         return [] if PIECES.lacks(model) else exact_words(model, numerics.engine)
-    found = lists.choose_quadrature(model, numerics)
-    out = ["method of the sum over bonds: " + found.describe()]
-    if found.engine == "recursion":
-        return out
+    choice = lists.choose_quadrature(model, numerics)
+    sentences = ["method of the sum over bonds: " + choice.describe()]
+    if choice.engine == "recursion":
+        return sentences
     if lists.lists_grow(model):
-        stiff = (
-            "set friction.order above 0 to give the block a stiffness"
-            if lists.is_held_without_stiffness(model)
-            else 'set friction.reading = "stretch" to give the block a finite stiffness'
-        )
-        out.append(
+        remedy = 'set friction.reading = "stretch" to give the block a finite stiffness'
+        if lists.is_held_without_stiffness(model):
+            remedy = "set friction.order above 0 to give the block a stiffness"
+        sentences.append(
             f"{_held_words(model)}, so that the computing time is known within a factor of about 12 only; "
-            f"{stiff}"
+            f"{remedy}"
         )
     elif (seconds := lists.list_cost(model, numerics)[1]) > parameters.MAX_LIST_SECONDS:
-        out.append(
+        sentences.append(
             "`run` will refuse this scene: the sum over the list of bonds would need a computing time of about "
             f"{seconds:.0f} s, more than the limit of {parameters.MAX_LIST_SECONDS:.0f} s"
         )
-    return out
+    return sentences
 
 
 def _held_words(model: Model) -> str:
@@ -438,15 +436,12 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
     finder = choose_steady_method(model)
     places = max(1, len(rig.drive.levels.amplitudes))
     if rig.drive.waveform.is_swept:
-        places = CURVE[finder.name == "balance"]
-    soft = []
+        places = N_BALANCE_POINTS if finder.name == "balance" else N_MAPPED_POINTS
+    n_soft = 0
     if finder.name == "yields":
-        soft = [
-            interface
-            for interface in rig.friction.interfaces
-            if interface.partial_slip or model.partial_slip
-        ]
-    passes = 1.0 + 0.5 * len(soft)  # the coarser mesh of each interface has half the elements
+        laws = rig.friction.interfaces
+        n_soft = sum(bool(law.partial_slip or model.partial_slip) for law in laws)
+    passes = 1.0 + 0.5 * n_soft  # the coarser mesh of each interface has half the elements
     seconds = places * passes * _steady_point(model, finder.name)
     if rig.structure.richer_rig is not None:
         seconds += places * _steady_point(replace(model, rig=rig.structure.richer_rig), finder.name)
@@ -490,10 +485,8 @@ def _smooth_law_seconds(rig) -> float:
     constant for most of it.
     """
     laws = {interface.numbers.law for interface in rig.friction.interfaces}
-    flowing = any(
-        "pieces" not in LAWS[law].supports.split() and not law_has_trait(law, "memoryless")
-        for law in laws
-    )
+    with_memory = [law for law in laws if not law_has_trait(law, "memoryless")]
+    flowing = any("pieces" not in LAWS[law].supports.split() for law in with_memory)
     smooth = (
         flowing or rig.springs.is_nonlinear or any(law_has_trait(law, "creeps") for law in laws)
     )

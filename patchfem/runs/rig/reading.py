@@ -58,7 +58,7 @@ class Reader:
         """Return the measures that the engine integrated over the last cycles of a run."""
         return IntegratedMeasures()
 
-    def further_fields(self, run, drive, stuck: bool) -> dict:
+    def further_fields(self, run, drive, *, stuck: bool) -> dict:
         """Return further fields of `response.rows.LastCycles` that the engine knows, by name.
 
         Parameters
@@ -72,7 +72,7 @@ class Reader:
         """
         return {}
 
-    def values(self, run, drive=None, stuck: bool = False, ledger=None) -> dict:
+    def values(self, run, drive=None, ledger=None, *, stuck: bool = False) -> dict:
         """Return the measures of the last cycles of a run, or of a mark of it, by name.
 
         Parameters
@@ -81,10 +81,10 @@ class Reader:
             Run or mark.
         drive : optional
             Drive, if it is not that of the model.
-        stuck : bool
-            Whether the interface sticks.
         ledger : (4, k), optional
             See `LastCycles`.
+        stuck : bool
+            Whether the interface sticks.
         """
         model = self.model
         drive = drive or model.rig.drive.signal
@@ -96,7 +96,7 @@ class Reader:
         }
         if self.rubs:
             fields |= {"by": reversal_evaluation(model), "ledger": ledger}
-        fields |= self.further_fields(run, drive, stuck)
+        fields |= self.further_fields(run, drive, stuck=stuck)
         window = fields["window"]
         n_cycles = min(self.numerics.window, len(run.amplitudes))
         last_cycles = LastCycles(
@@ -167,7 +167,7 @@ class Reader:
         if not self.integrated_measures(run, drive).loops and not hasattr(drive, "band"):
             return {}
         ledger = run.response.extra.get("ledger")
-        coarse_values = self.values(self.with_half_the_samples(run), drive, ledger=ledger)
+        coarse_values = self.values(self.with_half_the_samples(run), drive, ledger)
         errors = {}
         for name, change in absolute_change(values, coarse_values).items():
             if change > 0 and name not in ERROR_MEASURES:
@@ -234,7 +234,7 @@ class Reader:
         n_cycles = self.numerics.window
         stuck = self.sticks(run)
         rings, ring_errors = self.rings(run, drive)
-        values = self.values(run, drive, stuck, run.response.extra.get("ledger")) | rings
+        values = self.values(run, drive, run.response.extra.get("ledger"), stuck=stuck) | rings
         ends = window_end_values(run.amplitudes, run.phasors, n_cycles)
         fields = {
             "message": getattr(run, "message", ""),

@@ -1,7 +1,7 @@
 """Coupled run of a rig: the refined solution, then a list of passes that complete its result.
 
-In: the inputs of a run, i.e. its plan and its pressed patch. Out: a Result. `refined` is the run at
-the first numerical settings whose displacement is known to the tolerance; `coupled` applies
+In: the inputs of a run, i.e. its plan and its pressed patch. Out: a Result. `run_refined` makes the run at
+the first numerical settings whose displacement is known to the tolerance; `run_coupled` applies
 `passes.PASSES` to it.
 """
 
@@ -45,7 +45,7 @@ class RefinedRun(NamedTuple):
     measures: dict
 
 
-def coupled(inputs: RunInputs) -> Result:
+def run_coupled(inputs: RunInputs) -> Result:
     """Run a plan of kind rig or linear.
 
     Parameters
@@ -68,7 +68,7 @@ def coupled(inputs: RunInputs) -> Result:
         )
     numerics = choose(model)
     refuse_long_run(model, numerics)
-    run = Coupled(inputs, *refined(inputs, numerics))
+    run = Coupled(inputs, *run_refined(inputs, numerics))
     for complete in PASSES:
         run = complete(run)
     solution = run.solution
@@ -89,7 +89,7 @@ def coupled(inputs: RunInputs) -> Result:
     )
 
 
-def refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
+def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
     """Run a rig at the first settings whose displacement is known to the tolerance.
 
     Settings that the scene does not fix are refined from run to run. All coarser runs stand in
@@ -128,7 +128,7 @@ def refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
             solution.values, *errors, min_relative_error=engine.min_relative_error, size=size
         )
         if numerics.pairs and not errors_met(measures, model.accuracy.tolerance):
-            return refined(inputs, numerics.finer())
+            return run_refined(inputs, numerics.finer())
         coarser_runs = [*time_runs, *space_runs]
         if solution.levels or model.rig.drive.kind == "free":
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)

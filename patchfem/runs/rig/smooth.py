@@ -82,7 +82,7 @@ class SmoothReader(Reader):
         works = FrictionWorks(book["sampled"], book["booked"], book["passed"])
         return replace(integrated, friction_works=works)
 
-    def further_fields(self, run, drive, stuck: bool) -> dict:
+    def further_fields(self, run, drive, *, stuck: bool) -> dict:
         """Return the samples including the reversals, and the equally spaced ones.
 
         Parameters

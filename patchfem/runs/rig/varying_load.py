@@ -36,11 +36,12 @@ def varying_load_model(model: Model, numerics: Numerics, patch):
     patch : Patch or None
         None under [normal].
     """
-    load, sets = (
-        (model.point.evaluate, None)
-        if patch is None
-        else (None, march.make_contact_sets(patch, model.patch.loading.rotational_stiffness))
-    )
+    load = None
+    sets = None
+    if patch is None:
+        load = model.point.evaluate
+    else:
+        sets = march.make_contact_sets(patch, model.patch.loading.rotational_stiffness)
     law = make_rubbing(model, numerics)
     shear = None
     if model.partial_slip:

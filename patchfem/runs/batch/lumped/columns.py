@@ -41,7 +41,7 @@ from ....response.settling import (
 )
 from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
 from ...accuracy_warnings import Finding, tolerance_warnings
-from ...results.notes import BOOKS
+from ...results.notes import MAX_WORK_CHECK
 from ...results.result import shorten_file_names
 from ...rig.engines import unused_settings
 from ...rig.motion_warnings import law_warnings
@@ -183,7 +183,7 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     alone = (
         runs.lost
         | (values["energy_balance"] > runs.max_balance_error)
-        | (values["work_check"] > BOOKS)
+        | (values["work_check"] > MAX_WORK_CHECK)
     )
     grows = np.array([one is Outcome.GROWS for one in outcome])
     with np.errstate(invalid="ignore"):

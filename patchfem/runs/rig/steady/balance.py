@@ -6,6 +6,7 @@ frequency through its folds (`dynamics.harmonic`).
 
 from dataclasses import replace
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,25 +46,53 @@ class Balanced(Reader):
         return IntegratedMeasures(
             drift=0.0,
             friction_works=friction_works(run.response, run.ledger["friction"]),
-            reversals=(tuple(one[:2] for one in self.turns),) if self.turns else (),
+            reversals=(tuple(turn[:2] for turn in self.turns),) if self.turns else (),
         )
 
-    def further_fields(self, run, drive, stuck: bool) -> dict:
-        """Return the loop, computed by the trapezoidal rule, and the peaks of force and slip."""
+    def further_fields(self, run, drive, *, stuck: bool) -> dict:
+        """Return the loop, computed by the trapezoidal rule, and the peaks of force and slip.
+
+        Parameters
+        ----------
+        run, drive, stuck
+            See `Reader.further_fields`.
+        """
         loop = sampled_loop(run.window, drive, run.ledger["friction"])
         if not self.rubs or not self.turns:
             return {"loop": loop}
-        _, forces, slips = (
-            np.append(beside, own)
-            for beside, own in zip(zip(*self.turns), (0.0, run.window.force, run.window.slip))
-        )
-        return {
-            "loop": loop,
-            "known": {
-                "friction_force_peak": float(np.abs(forces).max()),
-                "slip_amplitude": float(np.ptp(slips)) / 2,
-            },
+        _, turn_forces, turn_slips = zip(*self.turns)
+        forces = np.append(turn_forces, run.window.force)
+        slips = np.append(turn_slips, run.window.slip)
+        known = {
+            "friction_force_peak": float(np.abs(forces).max()),
+            "slip_amplitude": float(np.ptp(slips)) / 2,
         }
+        return {"loop": loop, "known": known}
+
+
+class CycleMeasures(NamedTuple):
+    """Measures of one cycle of a balance.
+
+    - values: measures by name.
+    - response: Response of the cycle.
+    - book: energies [J] and counters by name.
+    """
+
+    values: dict
+    response: object
+    book: dict
+
+
+class StableMotion(NamedTuple):
+    """Motion that is shown, its stability, and notes on others.
+
+    - motion, stability: SteadyMotion without and with its multipliers.
+    - notes: sentences on other motions at the same drive.
+    """
+
+    motion: object
+    stability: object
+    notes: tuple = ()
 
 
 class BalanceFinder:
@@ -108,13 +137,13 @@ class BalanceFinder:
         found = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
         )
-        stable = add_stability(found, self.modes)
-        notes = ()
-        if not stable.stable:
-            found, stable, notes = self._lasting(drive, found, stable)
+        found, stable, notes = self._find_stable(drive, found)
         values, response, book = self._compute_measures(found, drive)
         errors = self._errors(
-            values, found, drive, lambda *of: self._compute_measures(*of, 2 * SAMPLES)[0]
+            values,
+            found,
+            drive,
+            lambda motion, sine: self._compute_measures(motion, sine, 2 * SAMPLES).values,
         )
         if "slip_start_phase" in errors:
             errors["slip_start_phase"] = max(
@@ -165,41 +194,44 @@ class BalanceFinder:
         read : callable
             Function (SteadyMotion, drive) that returns measures by name.
         """
-        out = {name: abs(v) * min(found.error, 1.0) for name, v in values.items()}
+        errors = {name: abs(v) * min(found.error, 1.0) for name, v in values.items()}
         try:
-            better = refine_point(found, self.modes, drive)
+            finer = refine_point(found, self.modes, drive)
         except NotConverged:
-            return out
-        left = max(found.left, better.left)
-        better = read(better, drive) if np.isfinite(better.error) else {}
-        return out | {
-            name: error + abs(values[name]) * left
-            for name, error in finer_errors(values, better).items()
-        }
+            return errors
+        residual = max(found.left, finer.left)
+        finer_values = read(finer, drive) if np.isfinite(finer.error) else {}
+        for name, error in finer_errors(values, finer_values).items():
+            errors[name] = error + abs(values[name]) * residual
+        return errors
 
-    def _lasting(self, drive, found, stable) -> tuple:
-        """Return the smallest stable SteadyMotion under the same drive, its multipliers, and a note.
+    def _find_stable(self, drive, motion) -> StableMotion:
+        """Return a SteadyMotion, or the smallest stable one under the same drive if it is unstable.
 
-        If none is found, the unstable one that was given is returned.
+        If none is stable, the one that was given is returned.
         """
-        every = branches.find_branches(self.modes, drive, self.group, self.tolerance)
-        lasts = [one for one in every if one.stable]
-        if not lasts:
-            return found, stable, ()
-        found = periodic_point(
-            self.modes, drive, self.group, self.harmonics, self.tolerance, start=lasts[0]
+        stability = add_stability(motion, self.modes)
+        if stability.stable:
+            return StableMotion(motion, stability)
+        motions = branches.find_branches(self.modes, drive, self.group, self.tolerance)
+        stable_motions = [branch for branch in motions if branch.stable]
+        if not stable_motions:
+            return StableMotion(motion, stability)
+        motion = periodic_point(
+            self.modes, drive, self.group, self.harmonics, self.tolerance, start=stable_motions[0]
         )
-        sizes = ", ".join(format_length(one.amplitude(self.modes.output), 3) for one in every)
+        output = self.modes.output
+        sizes = ", ".join(format_length(branch.amplitude(output), 3) for branch in motions)
         note = (
-            f"at this drive {len(every)} steady motions exist (amplitudes {sizes}), {len(lasts)} of them stable"
-            + (
-                ""
-                if len(lasts) == 1
-                else "; the stable motion of smallest amplitude is shown; accuracy.method = "
+            f"at this drive {len(motions)} steady motions exist (amplitudes {sizes}), "
+            f"{len(stable_motions)} of them stable"
+        )
+        if len(stable_motions) > 1:
+            note += (
+                "; the stable motion of smallest amplitude is shown; accuracy.method = "
                 '"march" gives the motion that is reached from rest'
             )
-        )
-        return found, add_stability(found, self.modes), (note,)
+        return StableMotion(motion, add_stability(motion, self.modes), (note,))
 
     def curve_point(self, drive, near=None) -> CurvePoint:
         """Return a point of a curve without its errors."""
@@ -235,8 +267,8 @@ class BalanceFinder:
         }
         return {name: value for name, value in values.items() if value is not None}
 
-    def _compute_measures(self, found, drive, samples: int = SAMPLES) -> tuple:
-        """Return the measures by name, the Response of a cycle, and its energies [J]."""
+    def _compute_measures(self, found, drive, samples: int = SAMPLES) -> CycleMeasures:
+        """Compute the measures of a cycle of a SteadyMotion from samples."""
         response = make_cycle_response(found, self.modes, drive, samples)
         book = find_cycle_energies(found, self.modes) | {
             "stored": 0.0,
@@ -253,7 +285,7 @@ class BalanceFinder:
         run = EngineResult(response, response, extremes, np.zeros(1), book)
         reader = Balanced(self.model, self.numerics, self.patch, steps=samples)
         reader.turns = found.turns()
-        return reader.values(run, drive), response, book
+        return CycleMeasures(reader.values(run, drive), response, book)
 
     def curve(self, drive) -> tuple:
         """Return the points of the curve over frequency, through its folds, and the folds [Hz]."""
@@ -267,7 +299,7 @@ class BalanceFinder:
             harmonics=self.harmonics,
             tolerance=self.tolerance,
         )
-        return [self._of_branch(point, first) for point in branch.points], branch.folds
+        return [self._point_of_branch(point, first) for point in branch.points], branch.folds
 
     def curve_distance(self, one: CurvePoint, other: CurvePoint) -> float:
         """Return the arc length along a curve between two of its points.
@@ -280,14 +312,18 @@ class BalanceFinder:
         """Return the point of a curve at a fraction of the arc length between two of its points.
 
         It is solved in the plane normal to the line between them.
+
+        Parameters
+        ----------
+        one, other : CurvePoint
+        share : float
+            Fraction of the arc length from the first to the second.
         """
         drive = replace(one.drive, omega=one.near.omega)
-        return self._of_branch(
-            branches.find_point_between(
-                self.modes, drive, one.near, other.near, share, self._range
-            ),
-            drive,
+        motion = branches.find_point_between(
+            self.modes, drive, one.near, other.near, share, self._range
         )
+        return self._point_of_branch(motion, drive)
 
     @property
     def _range(self) -> float:
@@ -295,17 +331,13 @@ class BalanceFinder:
         drive = self.model.rig.drive.signal
         return 2 * np.pi * abs(drive.high - drive.low)
 
-    def _of_branch(self, found, drive) -> CurvePoint:
+    def _point_of_branch(self, found, drive) -> CurvePoint:
         """Return a SteadyMotion of a branch as a point of a curve with its errors."""
         found = add_stability(found, self.modes) if found.stable is None else found
         point = self._curve_point(found)._replace(regime="stable" if found.stable else "unstable")
         errors = self._errors(point.values, point.near, point.drive, self._read)
-        least = {
-            "acceleration_distortion": HARMONIC_ROUND_OFF
-        }  # error in addition to that relative to the value
-        return point._replace(
-            errors={
-                name: error + HARMONIC_ROUND_OFF * abs(point.values[name]) + least.get(name, 0.0)
-                for name, error in errors.items()
-            }
-        )
+        for name in errors:
+            errors[name] += HARMONIC_ROUND_OFF * abs(point.values[name])
+        if "acceleration_distortion" in errors:
+            errors["acceleration_distortion"] += HARMONIC_ROUND_OFF
+        return point._replace(errors=errors)

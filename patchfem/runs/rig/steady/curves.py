@@ -27,14 +27,10 @@ HARMONIC_ROUND_OFF = (
     1e-12  # round-off of the third harmonic of the acceleration relative to the first
 )
 POINTS = 121  # points of a curve over frequency before its refinement
-# The neighbourhood of a peak ends at this fraction of the peak, and no other peak may be higher
-# than this fraction. It is computed alone if it is at most this fraction of the curve. Its curve
-# starts with this many points.
-PEAK_END_RATIO, MAX_PEAK_FRACTION, N_START_POINTS = (
-    0.8,
-    0.75,
-    7,
-)
+# The neighbourhood of a peak ends at this fraction of the peak, and no other peak may be higher.
+PEAK_END_RATIO = 0.8
+MAX_PEAK_FRACTION = 0.75  # largest fraction of the curve that is computed as a neighbourhood alone
+N_START_POINTS = 7  # points with which the curve of a neighbourhood starts
 SHARE = 0.01  # largest relative error of the linear interpolation between the points of a curve
 
 
@@ -62,29 +58,28 @@ class CurvePoint(NamedTuple):
     @property
     def level(self) -> Level:
         """The point as a Level of the drive; its amplitude is NaN without a bounded motion."""
-        values = (
-            {name: self.values.get(name) for name in LEVEL_MEASURES}
-            if self.values
-            else {COLUMN_MEASURES["amplitude"]: np.nan}
-        )
-        kept = {name: value for name, value in values.items() if value is not None}
-        errors = {name: self.errors[name] for name in kept if name in self.errors}
+        values = {COLUMN_MEASURES["amplitude"]: np.nan}
+        if self.values:
+            values = {name: self.values.get(name) for name in LEVEL_MEASURES}
+            values = {name: value for name, value in values.items() if value is not None}
+        errors = {name: self.errors[name] for name in values if name in self.errors}
         return Level(
             self.drive.acceleration,
             self.outcome is Outcome.STUCK,
-            kept,
+            values,
             errors,
             outcome=str(self.outcome),
         )
 
 
-def exact_errors(values: dict, left: float) -> dict:
-    """Return the errors of a motion that repeats up to the relative error `left`, by name."""
-    return {
-        name: abs(v) * (READ + left) + HARMONIC_ROUND_OFF * (name == "acceleration_distortion")
-        for name, v in values.items()
-        if v is not None
-    }
+def exact_errors(values: dict, residual: float) -> dict:
+    """Return the errors of a motion that repeats up to the relative error `residual`, by name."""
+    errors = {}
+    for name, value in values.items():
+        if value is not None:
+            round_off = HARMONIC_ROUND_OFF * (name == "acceleration_distortion")
+            errors[name] = abs(value) * (READ + residual) + round_off
+    return errors
 
 
 def describe_instability(multipliers) -> str:
@@ -138,7 +133,14 @@ class Followed:
         return abs(other.drive.omega - one.drive.omega)
 
     def point_between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
-        """Return the point of the curve at a fraction of the distance between two of its points."""
+        """Return the point of the curve at a fraction of the distance between two of its points.
+
+        Parameters
+        ----------
+        one, other : CurvePoint
+        share : float
+            Fraction of the distance from the first to the second.
+        """
         omega = one.drive.omega + share * (other.drive.omega - one.drive.omega)
         return self.curve_point(replace(one.drive, omega=omega), one.near)
 
@@ -159,15 +161,14 @@ def trace_curve(modes, drive, find) -> list:
         None.
     """
 
-    def found(frequency, before):
+    def sample(frequency, before):
         """Return the amplitude [m] at a frequency [Hz], and the point."""
-        one = find(
-            SineDrive(drive.acceleration, 2 * np.pi * frequency, drive.moving),
-            before and before[1].near,
-        )
-        return one.values.get(COLUMN_MEASURES["amplitude"], np.nan), one
+        sine = SineDrive(drive.acceleration, 2 * np.pi * frequency, drive.moving)
+        point = find(sine, before and before[1].near)
+        return point.values.get(COLUMN_MEASURES["amplitude"], np.nan), point
 
-    return [one for _, one in sample_adaptively(found, start_frequencies(modes, drive), SHARE)[1]]
+    samples = sample_adaptively(sample, start_frequencies(modes, drive), SHARE)[1]
+    return [point for _, point in samples]
 
 
 def start_frequencies(modes, drive) -> np.ndarray:

@@ -95,41 +95,36 @@ class Maps(Followed):
     def point(self, drive, near=None) -> tuple:
         """Return the Solution of two cycles of the steady motion, and a start for a motion nearby."""
         begin = perf_counter()
-        one = self.repeating(drive, near)
-        reader = PieceReader(
-            self.model, replace(self.numerics, cycles=2.0, window=1), self.patch, self.found
+        motion = self.repeating(drive, near)
+        numerics = replace(self.numerics, cycles=2.0, window=1)
+        reader = PieceReader(self.model, numerics, self.patch, self.found)
+        run = histories.simulate(
+            self.modes,
+            drive,
+            self.groups,
+            2.0,
+            1,
+            np.inf,
+            self.frames,
+            None,
+            motion.start,
+            self.start_memory(motion.memory),
         )
-        done = reader.over_strips(
-            histories.simulate(
-                self.modes,
-                drive,
-                self.groups,
-                2.0,
-                1,
-                np.inf,
-                self.frames,
-                None,
-                one.start,
-                self.start_memory(one.memory),
-            )
-        )
-        raw = reader.solution(done, perf_counter() - begin, drive)
-        beyond = float(np.abs(done.amplitudes).max()) > self.model.rig.springs.travel
-        outcome = (
-            Outcome.GROWS
-            if not one.bounded
-            else Outcome.EXCEEDS_TRAVEL
-            if beyond
-            else raw.outcome or Outcome.STEADY
-        )
+        run = reader.average_over_strips(run)
+        raw = reader.solution(run, perf_counter() - begin, drive)
+        outcome = raw.outcome or Outcome.STEADY
+        if not motion.bounded:
+            outcome = Outcome.GROWS
+        elif float(np.abs(run.amplitudes).max()) > self.model.rig.springs.travel:
+            outcome = Outcome.EXCEEDS_TRAVEL
         message = raw.message
-        if not one.lasting:
+        if not motion.lasting:
             outcome = Outcome.NOT_CONVERGED
-            message = describe_instability(one.multipliers)
+            message = describe_instability(motion.multipliers)
         extra = {
-            "regime": one.words,
-            "multipliers": one.multipliers,
-            "residual": one.residual,
+            "regime": motion.words,
+            "multipliers": motion.multipliers,
+            "residual": motion.residual,
             "map": self.name,
         }
         return replace(
@@ -138,9 +133,9 @@ class Maps(Followed):
             message=message,
             steady=(None, None),
             extra=extra,
-            errors=exact_errors(raw.values, one.error),
-            book=raw.book | {"iterations": float(one.iterations)},
-        ), one.near
+            errors=exact_errors(raw.values, motion.error),
+            book=raw.book | {"iterations": float(motion.iterations)},
+        ), motion.near
 
     def start_memory(self, memory):
         """Return the memory of elements at the start of a run, whose energies count from there."""
@@ -148,35 +143,31 @@ class Maps(Followed):
 
     def curve_point(self, drive, near=None) -> CurvePoint:
         """Return a point of a curve."""
-        one = self.repeating(drive, near)
-        if not one.bounded:
-            return CurvePoint(drive, {}, {}, one.words, one.size, False, Outcome.GROWS)
-        done = histories.simulate(
-            self.modes, drive, self.groups, 1, 1, start=one.start, memory=one.memory
+        motion = self.repeating(drive, near)
+        if not motion.bounded:
+            return CurvePoint(drive, {}, {}, motion.words, motion.size, False, Outcome.GROWS)
+        run = histories.simulate(
+            self.modes, drive, self.groups, 1, 1, start=motion.start, memory=motion.memory
         )
-        window = done.window
+        window = run.window
         gauge = self.modes.gauge
-        extremes = done.amplitudes
-        amplitude = (
-            float(extremes[:, 1].max() - extremes[:, 0].min()) / 2
-            if gauge is None
-            else measure_half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge)
-        )
-        values = _curve_measures(
-            amplitude,
-            done.acceleration,
-            wave_measures(*map(float, done.reading.waves), find_max_acceleration(drive)),
-        )
-        holds = PieceReader(self.model, self.numerics, self.patch, self.found).sticks(done)
+        amplitude = float(run.amplitudes[:, 1].max() - run.amplitudes[:, 0].min()) / 2
+        if gauge is not None:
+            amplitude = measure_half_swing(
+                window.time, window.modal @ gauge, window.modal_rate @ gauge
+            )
+        waves = wave_measures(*map(float, run.reading.waves), find_max_acceleration(drive))
+        values = _curve_measures(amplitude, run.acceleration, waves)
+        is_stuck = PieceReader(self.model, self.numerics, self.patch, self.found).sticks(run)
         return CurvePoint(
-            drive,
-            values,
-            exact_errors(values, one.error),
-            one.words,
-            one.size,
-            one.lasting,
-            Outcome.STUCK if holds else Outcome.STEADY,
-            one.near,
+            drive=drive,
+            values=values,
+            errors=exact_errors(values, motion.error),
+            regime=motion.words,
+            multiplier=motion.size,
+            stable=motion.lasting,
+            outcome=Outcome.STUCK if is_stuck else Outcome.STEADY,
+            near=motion.near,
         )
 
     def curve(self, drive) -> tuple:
@@ -213,18 +204,18 @@ class YieldFinder(Maps):
 
     def repeating(self, drive, near) -> PeriodicMotion:
         """Return the PeriodicMotion under a sine, found from the Point `near` or from rest."""
-        one = steady.solve_steady(self.modes, drive, self.groups, near)
+        state = steady.solve_steady(self.modes, drive, self.groups, near)
         return PeriodicMotion(
-            one.start,
-            one.memory,
-            one.point,
-            one.regime,
-            one.multipliers,
-            one.residual,
-            one.error,
-            one.iterations,
-            True,
-            is_stable(one.multipliers),
+            start=state.start,
+            memory=state.memory,
+            near=state.point,
+            regime=state.regime,
+            multipliers=state.multipliers,
+            residual=state.residual,
+            error=state.error,
+            iterations=state.iterations,
+            bounded=True,
+            lasting=is_stable(state.multipliers),
         )
 
 
@@ -247,26 +238,21 @@ class EventFinder(Maps):
         they are not used.
         """
         falls = bool(np.any(self.forces[0] > self.forces[1]))
-        one = stick_steady.solve_steady(
-            self.modes, drive, self.groups, start=near if falls else None
-        )
-        bounded = one.regime != "unbounded"
+        start = near if falls else None
+        state = stick_steady.solve_steady(self.modes, drive, self.groups, start=start)
+        bounded = state.regime != "unbounded"
         return PeriodicMotion(
-            one.start,
-            None,
-            one.start,
-            one.regime,
-            one.multipliers,
-            one.residual,
-            one.residual,
-            one.iterations,
-            bounded,
-            not bounded or not one.alone or is_stable(one.multipliers),
+            start=state.start,
+            memory=None,
+            near=state.start,
+            regime=state.regime,
+            multipliers=state.multipliers,
+            residual=state.residual,
+            error=state.residual,
+            iterations=state.iterations,
+            bounded=bounded,
+            lasting=not bounded or not state.alone or is_stable(state.multipliers),
         )
-
-    def curve(self, drive) -> tuple:
-        """Return the curve as `Maps.curve` does; without friction it is known in closed form."""
-        return trace_curve(self.modes, drive, self.curve_point), ()
 
     def curve_point(self, drive, near=None) -> CurvePoint:
         """Return a point of a curve; without friction it is known in closed form.
@@ -278,16 +264,13 @@ class EventFinder(Maps):
         modes = self.modes
         gauge = self.modes.output if self.modes.gauge is None else self.modes.gauge
         try:
-            seen, felt = (
-                compute_receptance(modes, drive.omega, [gauge, modes.output], modes.base)[0, :, 0]
-                * modes.mass
-            )
+            receptance = compute_receptance(modes, drive.omega, [gauge, modes.output], modes.base)
         except PatchfemError:
             return super().curve_point(drive)
-        size = drive.acceleration * float(abs(drive.moving + drive.omega**2 * felt))
-        values = _curve_measures(
-            drive.acceleration * float(abs(seen)), size, wave_measures(size, 0.0)
-        )
+        at_gauge, at_output = receptance[0, :, 0] * modes.mass
+        acceleration = drive.acceleration * float(abs(drive.moving + drive.omega**2 * at_output))
+        amplitude = drive.acceleration * float(abs(at_gauge))
+        values = _curve_measures(amplitude, acceleration, wave_measures(acceleration, 0.0))
         return CurvePoint(
             drive,
             values,

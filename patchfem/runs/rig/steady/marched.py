@@ -6,6 +6,7 @@ the curve of such motions over frequency (`dynamics.harmonic.orbits`).
 
 from dataclasses import replace
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +21,8 @@ from ..march import MarchReader
 from ..solution import Solution
 from .curves import CurvePoint, Followed, curve_point, describe_instability, trace_curve
 
-START_STEPS, MAX_STEPS = 256, 4096  # steps per cycle at the start, and at most
+START_STEPS = 256  # steps per cycle of the first march
+MAX_STEPS = 4096  # largest number of steps per cycle
 EXACT = 1024  # samples per cycle for a law without memory, whose steps are chosen by their error
 LEAD = 30  # cycles after which a lifted mass counts as staying in its grooves
 READ = 1e-9  # relative error of the end of a step
@@ -48,7 +50,7 @@ def solution_beyond_grooves(model, numerics, patch, drive, contact) -> Solution 
     if not model.grooves.lifted_mass:
         return None
     begin = perf_counter()
-    found = []
+    solutions = []
     rig = model.rig.with_signal(drive, levels=DriveLevels(), waveform=SINE_WAVEFORM)
     for steps in (START_STEPS, START_STEPS // 2):
         done = engine.march(
@@ -57,15 +59,29 @@ def solution_beyond_grooves(model, numerics, patch, drive, contact) -> Solution 
         if done.outcome is not Outcome.LEAVES_GROOVES:
             return None
         few = replace(numerics, cycles=LEAD, steps=steps, window=1)
-        read = MarchReader(replace(model, rig=rig), few, patch, contact)
-        found.append(read.solution(done, perf_counter() - begin, None))
-    fine, half = (one.values for one in found)
-    errors = {
-        name: abs(value - half.get(name, 0.0)) + READ * abs(value) for name, value in fine.items()
-    }
-    return replace(
-        found[0], errors=errors, extra={"regime": "leaves its grooves", "multipliers": np.zeros(0)}
-    )
+        reader = MarchReader(replace(model, rig=rig), few, patch, contact)
+        solutions.append(reader.solution(done, perf_counter() - begin, None))
+    fine, half = solutions
+    errors = {}
+    for name, value in fine.values.items():
+        errors[name] = abs(value - half.values.get(name, 0.0)) + READ * abs(value)
+    extra = {"regime": "leaves its grooves", "multipliers": np.zeros(0)}
+    return replace(fine, errors=errors, extra=extra)
+
+
+class CycleReading(NamedTuple):
+    """One cycle of a motion that repeats.
+
+    - values: measures by name.
+    - mark: Mark at its end.
+    - snapshots: states of the interface.
+    - is_stuck: whether the interface sticks.
+    """
+
+    values: dict
+    mark: object
+    snapshots: list
+    is_stuck: bool
 
 
 class MarchFinder(Followed):
@@ -105,15 +121,14 @@ class MarchFinder(Followed):
             )
         return run, left
 
-    def _read(self, run, steps: int, frames: int = 0) -> tuple:
-        """Return the measures, the Mark of a cycle, snapshots, and whether the interface sticks."""
+    def _read(self, run, steps: int, frames: int = 0) -> CycleReading:
+        """Read one cycle of a Run that repeats."""
         mark, snapshots = orbits.march_cycle(run, frames)
-        read = MarchReader(
-            self.model, replace(self.numerics, steps=steps), self.patch, self.contact
-        )
-        stuck = bool(np.ptp(mark.window.slip) <= read.held) and not read.creeps
-        values = read.values(mark, run.drive, stuck)
-        return values | {"drift_per_cycle": 0.0}, mark, snapshots, stuck
+        numerics = replace(self.numerics, steps=steps)
+        reader = MarchReader(self.model, numerics, self.patch, self.contact)
+        is_stuck = bool(np.ptp(mark.window.slip) <= reader.held) and not reader.creeps
+        values = reader.values(mark, run.drive, stuck=is_stuck)
+        return CycleReading(values | {"drift_per_cycle": 0.0}, mark, snapshots, is_stuck)
 
     def point(self, drive, near=None) -> tuple:
         """Return the Solution of the steady motion under a sine, and the Run that continues it.
@@ -141,38 +156,41 @@ class MarchFinder(Followed):
         begin = perf_counter()
         name = "relative_displacement_amplitude"
         run, left = self._run(drive, near, self.steps)
-        half = self._read(self._run(drive, run, self.steps // 2)[0], self.steps // 2)[0]
+        half = self._read(self._run(drive, run, self.steps // 2)[0], self.steps // 2).values
         steps = self.steps
-        read = self._read(run, self.steps, self.frames)
-        while self._rough(read[0][name], half[name]) and run.outcome is None:
+        reading = self._read(run, self.steps, self.frames)
+        while self._rough(reading.values[name], half[name]) and run.outcome is None:
             if 2 * steps > MAX_STEPS or self.model.accuracy.steps_per_cycle is not None:
                 break
             steps = 2 * steps
-            half = read[0]
+            half = reading.values
             run, left = self._run(drive, run, steps)
-            read = self._read(run, steps, self.frames)
-        values, mark, snapshots, stuck = read
-        between = peak_sampling_errors(mark.window, True)
-        found = orbits.estimate_multipliers(run) if run.outcome is None else np.zeros(0)
-        regime = "stuck" if stuck else "stick-slip" if values.get("stick_fraction") else "sliding"
-        outcome = run.outcome or (Outcome.STUCK if stuck else Outcome.STEADY)
+            reading = self._read(run, steps, self.frames)
+        values, mark, snapshots, is_stuck = reading
+        peak_errors = peak_sampling_errors(mark.window, True)
+        multipliers = orbits.estimate_multipliers(run) if run.outcome is None else np.zeros(0)
+        regime = "stick-slip" if values.get("stick_fraction") else "sliding"
+        outcome = run.outcome or Outcome.STEADY
+        if is_stuck:
+            regime = "stuck"
+            outcome = run.outcome or Outcome.STUCK
         message = run.message
-        if not stuck and np.abs(found).max(initial=0.0) > 1 + ROUGH:
+        if not is_stuck and np.abs(multipliers).max(initial=0.0) > 1 + ROUGH:
             outcome = Outcome.NOT_CONVERGED
-            message = describe_instability(found)
+            message = describe_instability(multipliers)
             regime = f"{regime}, unstable"
-        errors = {
-            key: abs(v - half.get(key, v)) + abs(v) * (left + READ) + between.get(key, 0.0)
-            for key, v in values.items()
-            if v is not None
-        }
+        errors = {}
+        for key, value in values.items():
+            if value is not None:
+                error = abs(value - half.get(key, value)) + abs(value) * (left + READ)
+                errors[key] = error + peak_errors.get(key, 0.0)
         if "slip_start_phase" in errors:
             errors["slip_start_phase"] = (
                 min(errors["slip_start_phase"], np.pi / 2) + 2 * np.pi / steps
             )
         extra = {
             "regime": regime,
-            "multipliers": found,
+            "multipliers": multipliers,
             "residual": left,
             "map": "march",
             "steps_per_cycle": steps,

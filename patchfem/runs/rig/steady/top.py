@@ -67,7 +67,8 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
         s = np.cumsum([0.0, *(finder.curve_distance(a, b) for a, b in pairwise(points))])
         y = _heights(points)
         lasting = np.array([point.stable for point in points])
-        best, (reach, at) = index_of_largest(points), concave_bounds(s, y)
+        best = index_of_largest(points)
+        reach, at = concave_bounds(s, y)
         if not y[best] > 0 or not reach.size:
             return RefinedPeak(points, best, 0.0)
         if lasting.any():
@@ -79,12 +80,11 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
         reach[np.diff(s) <= NEAREST * s[-1]] = 0.0
         k = int(np.argmax(reach))
         if reach[k] <= y[best] * (1 + finder.leaves[0] * tolerance):
-            k, at[k] = _choose_added_point(
-                s, y, best, max(finder.leaves[1] * tolerance, POSITION_TOL)
-            ) or (
-                -1,
-                0.0,
-            )
+            share = max(finder.leaves[1] * tolerance, POSITION_TOL)
+            added = _choose_added_point(s, y, best, share)
+            k = -1
+            if added is not None:
+                k, at[k] = added
         if not left or k < 0:
             return RefinedPeak(points, best, above)
         try:
@@ -103,7 +103,8 @@ def _choose_added_point(s, y, best: int, share: float) -> tuple | None:
     value is at an end. The point is the vertex of the parabola through the three points, or a tenth
     of the way to the farther neighbour.
 
-    Returns the index of the interval and the fraction of it.
+    Returns the index of the interval and the fraction of it. s, y: positions along the curve, and
+    values (n,).
     """
     if not 0 < best < len(s) - 1:
         return None
@@ -183,6 +184,14 @@ def solve_peak(points: list, folds, finder) -> Solution:
     """Return the Solution of the largest motion of a curve, with the curve.
 
     Its errors include those by the position of the peak.
+
+    Parameters
+    ----------
+    points : list of CurvePoint
+    folds : sequence of float
+        Frequencies [Hz] at which the curve turns back.
+    finder
+        See `refine_peak`.
     """
     points, best, above = refine_peak(points, finder, finder.model.accuracy.tolerance)
     top = points[best]
