@@ -66,7 +66,7 @@ def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     """
     march = march_model(model, numerics, patch, frames, say, progress)
     reader = MarchReader(model, numerics, patch, march.contact)
-    return reader.solution(march.result, march.seconds, march.prepare)
+    return reader.solution(march.result, march.seconds, prepare=march.prepare)
 
 
 def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None) -> March:
@@ -123,31 +123,12 @@ class MarchReader(Reader):
             held = 1e-3 * contact.length
         super().__init__(model, numerics, patch, contact, held)
 
-    def solution(self, run, seconds: float, prepare: dict | None, drive=None, **more) -> Solution:
-        """Return the Solution of a MarchResult.
-
-        Parameters
-        ----------
-        run : MarchResult
-        seconds : float
-            CPU seconds of the march.
-        prepare : dict or None
-            CPU seconds of its preparation.
-        drive : optional
-            Drive, if it is not that of the model.
-        """
-        levels, probe = self._levels(run) if self.model.rig.drive.levels.amplitudes else ((), None)
-        return super().solution(
-            run,
-            seconds,
-            drive,
-            prepare=prepare,
-            levels=levels,
-            probe=probe,
-            summed=self.choose_bond_sum(),
-            extra={"late": self.late(run.window)},
-            **more,
-        )
+    def solution_fields(self, run, drive) -> dict:
+        """Return the levels, the sum over bonds, and the errors due to the end of the run."""
+        fields = {"summed": self.choose_bond_sum(), "extra": {"late": self.late(run.window)}}
+        if self.model.rig.drive.levels.amplitudes:
+            fields["levels"], fields["probe"] = self._levels(run)
+        return fields
 
     def stated_errors(self, run, drive, values: dict) -> dict:
         """Return the errors due to peaks between samples and due to the end of the run, by name.

@@ -289,34 +289,25 @@ class PieceReader(Reader):
         faster = max(1.0, float(modes.omega.max()) / find_drive_omega(drive)) ** 2
         return left | {"drift_per_cycle": 1e-13 * faster * float(np.ptp(window.slide))}
 
-    def solution(self, run, seconds: float, drive=None, **more) -> Solution:
-        """Return the Solution of a PieceRun, with its steady motion if its windows still change.
-
-        Parameters
-        ----------
-        run : PieceRun
-        seconds, drive, more
-            See `Reader.solution`.
-        """
-        drive = drive or self.model.rig.drive.signal
+    def solution_fields(self, run, drive) -> dict:
+        """Return the ringing of a release, and the steady motion if the windows still change."""
+        fields = {}
+        if tail := self.tail(run, drive):
+            fields["extra"] = tail
         numerics = self.numerics
-        more |= {"extra": more.get("extra", {}) | tail} if (tail := self.tail(run, drive)) else {}
+        modes = self.model.rig.modes
         unsettled = still_changes(
             run.amplitudes,
             numerics.window,
             self.model.accuracy.tolerance,
-            find_min_decay_rate(self.model.rig.modes) * drive.period,
+            find_min_decay_rate(modes) * drive.period,
         )
-        if (
-            numerics.whole
-            and run.outcome is None
-            and not self.rigid
-            and not self.sticks(run)
-            and unsettled
-        ):
-            steady = find_steady_motion(self.model.rig.modes, drive, self.groups, run)
-            more |= {} if steady is None else {"steady": steady, "bounded": True}
-        return super().solution(run, seconds, drive, **more)
+        may_settle = numerics.whole and run.outcome is None and not self.rigid
+        if may_settle and unsettled and not self.sticks(run):
+            steady = find_steady_motion(modes, drive, self.groups, run)
+            if steady is not None:
+                fields |= {"steady": steady, "bounded": True}
+        return fields
 
 
 def _strips_loop(run, drive) -> InterfaceLoop:

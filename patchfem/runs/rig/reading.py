@@ -216,6 +216,10 @@ class Reader:
                 errors[row.name] += error_of_change(change, order=row.order)
         return errors
 
+    def solution_fields(self, run, drive) -> dict:
+        """Return the fields of a Solution that only this engine has, by name."""
+        return {}
+
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """Return the Solution of a run.
 
@@ -242,6 +246,7 @@ class Reader:
             "snapshots": getattr(run, "snapshots", []),
             "steady": estimate_steady(drive, *ends),
         }
+        fields |= self.solution_fields(run, drive)
         return Solution(
             values=values,
             response=run.response,

@@ -48,12 +48,28 @@ class Runner:
         self.error_seconds = 0.0
         self.progress = RunProgress(inputs.progress, _expected_steps(inputs, numerics))
 
-    def solve(self, numerics: Numerics) -> Solution:
-        """Return the Solution of the model with its fields."""
-        model = self.model
-        has_fields = self.inputs.patch is not None and not model.patch.mesh.can_gather_points
-        frames = FRAMES if has_fields or model.rig.friction.has_partial_slip else 0
-        return self._solve(model, numerics, frames, self.inputs.say)
+    def solve(self, numerics: Numerics, coarser_model=None) -> Solution:
+        """Return the Solution at given settings, and count its steps as completed.
+
+        Parameters
+        ----------
+        numerics : Numerics
+        coarser_model : Model, optional
+            Model of a coarser run, which needs no fields; None: the run itself.
+        """
+        model = coarser_model or self.model
+        frames = 0
+        say = None
+        if coarser_model is None:
+            say = self.inputs.say
+            has_fields = self.inputs.patch is not None and not model.patch.mesh.can_gather_points
+            if has_fields or model.rig.friction.has_partial_slip:
+                frames = FRAMES
+        patch = self.inputs.coarse[0] if numerics.coarse_patch else self.inputs.patch
+        report = self.progress.make_callback(numerics.steps)
+        solution = solve(model, numerics, patch, frames, say, report)
+        self.progress.done += numerics.steps
+        return solution
 
     def estimate(self, coarser_runs: list, solution: Solution) -> list:
         """Return the errors of a run by measure name, one dict per entry of `coarser_runs`."""
@@ -74,7 +90,7 @@ class Runner:
         # the decay curve and some measures need the histories of the whole run
         needs_whole = self.model.rig.drive.kind == "free" or bool(NEEDS_RUN)
         numerics = replace(numerics, whole=needs_whole)
-        return self._solve_around_peak(model, numerics, fine) or self._solve(model, numerics)
+        return self._solve_around_peak(model, numerics, fine) or self.solve(numerics, model)
 
     def _solve_around_peak(self, model, numerics: Numerics, fine: Solution) -> Solution | None:
         """Return the coarser run of a curve, computed only around its largest amplitude.
@@ -90,7 +106,7 @@ class Runner:
         if drive is None:
             return None
         try:
-            solution = self._solve(replace(model, rig=rig.with_signal(drive)), numerics)
+            solution = self.solve(numerics, replace(model, rig=rig.with_signal(drive)))
         except NotConverged:  # the whole curve may start where a motion is found
             return None
         name = "relative_displacement_amplitude"
@@ -101,14 +117,6 @@ class Runner:
             return None
         change = abs(solution.values[name] / fine.values[name] - 1)
         return solution if change <= OTHER_PEAK_RATIO else None
-
-    def _solve(self, model, numerics: Numerics, frames: int = 0, say=None) -> Solution:
-        """Return the Solution of a model at given settings, and count its steps as completed."""
-        patch = self.inputs.coarse[0] if numerics.coarse_patch else self.inputs.patch
-        report = self.progress.make_callback(numerics.steps)
-        solution = solve(model, numerics, patch, frames, say, report)
-        self.progress.done += numerics.steps
-        return solution
 
 
 class RunProgress:

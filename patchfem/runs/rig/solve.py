@@ -8,15 +8,6 @@ from . import costs, lists, march, pieces, smooth
 from .solution import Solution, seen_by_gauge
 from .steady import steady
 
-# function of each engine: (model, numerics, patch, frames, say, progress) -> Solution
-SOLVERS = {
-    "exact": lambda *arguments: pieces.run_exact(*arguments),
-    "piecewise": lambda *arguments: pieces.run_piecewise(*arguments),
-    "smooth": lambda *arguments: smooth.run_smooth(*arguments),
-    "march": lambda *arguments: march.run_march(*arguments),
-    "harmonic": lambda *arguments: steady.run_steady(*arguments),
-}
-
 
 def solve(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """Solve a rig, and return the Solution as its gauge sees it.
@@ -36,7 +27,19 @@ def solve(model, numerics, patch, frames: int = 0, say=None, progress=None) -> S
     -------
     Solution
     """
-    solution = SOLVERS[numerics.engine](model, numerics, patch, frames, say, progress)
+    if numerics.engine == "exact":
+        run = pieces.run_exact
+    elif numerics.engine == "piecewise":
+        run = pieces.run_piecewise
+    elif numerics.engine == "smooth":
+        run = smooth.run_smooth
+    elif numerics.engine == "march":
+        run = march.run_march
+    else:
+        run = steady.run_steady
+    solution = run(model, numerics, patch, frames, say, progress)
+    if model.rig.modes.gauge is None:
+        return solution
     return seen_by_gauge(model, solution)
 
 

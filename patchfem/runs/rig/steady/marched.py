@@ -60,7 +60,7 @@ def solution_beyond_grooves(model, numerics, patch, drive, contact) -> Solution 
             return None
         few = replace(numerics, cycles=LEAD, steps=steps, window=1)
         reader = MarchReader(replace(model, rig=rig), few, patch, contact)
-        solutions.append(reader.solution(done, perf_counter() - begin, None))
+        solutions.append(reader.solution(done, perf_counter() - begin))
     fine, half = solutions
     errors = {}
     for name, value in fine.values.items():

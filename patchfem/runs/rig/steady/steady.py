@@ -14,14 +14,6 @@ from . import balance, maps, marched
 from .curves import motion_at_levels
 from .top import solve_peak
 
-# finder of each method of `engines.FINDERS`; its module is loaded when it is made
-FINDERS = {
-    "events": lambda *arguments: maps.EventFinder(*arguments),
-    "yields": lambda *arguments: maps.YieldFinder(*arguments),
-    "march": lambda *arguments: marched.MarchFinder(*arguments),
-    "balance": lambda *arguments: balance.BalanceFinder(*arguments),
-}
-
 
 def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """Solve the steady motion under a sine, or the largest one of a sweep or of levels.
@@ -44,8 +36,16 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
     Solution
     """
     method = choose_steady_method(model)
+    if method.name == "events":
+        finder_class = maps.EventFinder
+    elif method.name == "yields":
+        finder_class = maps.YieldFinder
+    elif method.name == "march":
+        finder_class = marched.MarchFinder
+    else:
+        finder_class = balance.BalanceFinder
     try:
-        return _solve_drive(FINDERS[method.name](model, numerics, patch, frames, say), model)
+        return _solve_drive(finder_class(model, numerics, patch, frames, say), model)
     except NotConverged:
         if method.engine != PIECES.name or len(model.rig.friction.interfaces) > 1:
             raise
