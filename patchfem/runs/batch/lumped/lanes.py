@@ -43,7 +43,7 @@ from ....response.settling import extrapolate_steady_amplitudes, window_amplitud
 from ....scene.rules.accuracy import list_fixed_settings
 from ....structure.drive_sizes import find_max_acceleration
 from ...rig.motion_warnings import creeping_note
-from ...rig.pieces import CHANGES, measures_from_reading
+from ...rig.pieces import MAX_CHANGE_RATIO, measures_from_reading
 from .. import one_by_one
 from ..case_results import CaseResults
 from . import lumped
@@ -882,7 +882,9 @@ def _march_until_settled(law: str, cases, found, steps: int, amplitudes, free) -
     out = np.full((2, len(free)), np.nan)
     part = found.history.shape[1]
     if amplitudes.shape[1] > 2:
-        free = free & (np.ptp(amplitudes[:, -3:], axis=1) > CHANGES * TIGHTEST * amplitudes[:, -1])
+        free = free & (
+            np.ptp(amplitudes[:, -3:], axis=1) > MAX_CHANGE_RATIO * TIGHTEST * amplitudes[:, -1]
+        )
     lost = free.copy()
     where = np.flatnonzero(free)
     motion = found.motion[free]
