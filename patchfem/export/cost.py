@@ -250,6 +250,15 @@ def write_picture(folder: Path, knob: str, runs: list, tolerance: float) -> Path
     """Write the picture of a curve into a folder that exists, and return its path.
 
     Its name is cost.svg, or cost_KNOB.svg.
+
+    Parameters
+    ----------
+    folder : Path
+    knob : str
+        TOLERANCE or a numerical setting.
+    runs : list of Cost
+    tolerance : float
+        That of the scene.
     """
     picture = Path(folder) / ("cost.svg" if knob == TOLERANCE else f"cost_{knob}.svg")
     write_text(picture, pictures.draw_charts([cost_chart(knob, runs, tolerance)], height=TALL))
@@ -264,6 +273,14 @@ def cost_data(knob: str, runs: list, tolerance: float) -> dict:
     `meets_tolerance`. `cheapest`: by measure the label of the fastest run within the tolerance.
     `sentence`: the cost of all measures. The last two are None for TOLERANCE, because its runs have
     different tolerances.
+
+    Parameters
+    ----------
+    knob : str
+        TOLERANCE or a numerical setting.
+    runs : list of Cost
+    tolerance : float
+        That of the scene.
     """
     parts = (
         "label",

@@ -178,6 +178,13 @@ def save_run(result: Result, folder: Path, page: bool = True) -> None:
     """Write the results folder of a finished run, by default with its page.
 
     An older results folder is replaced.
+
+    Parameters
+    ----------
+    result : Result
+    folder : Path
+    page : bool
+        Whether report.html is written.
     """
     with Folder(folder) as claimed:
         written = write_results(result, claimed.path)

@@ -100,7 +100,15 @@ class Contents:
         coordinates: dict | None = None,
         attributes: dict | None = None,
     ) -> "Contents":
-        """Return this content with additional entries."""
+        """Return this content with additional entries.
+
+        Parameters
+        ----------
+        variables, coordinates : dict, optional
+            {name: (dimensions, values, attributes)}
+        attributes : dict, optional
+            Attributes of the file.
+        """
         return Contents(
             self.variables | (variables or {}),
             self.coordinates | (coordinates or {}),

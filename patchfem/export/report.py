@@ -619,7 +619,17 @@ def _levels_section(levels: list) -> Section:
 
 
 def measure_entry(value: float, unit: str, error: float | None) -> dict:
-    """Return a measure as an object of the summary, from a value and an error in SI."""
+    """Return a measure as an object of the summary.
+
+    Parameters
+    ----------
+    value : float
+        In SI.
+    unit : str
+        SI unit.
+    error : float or None
+        In SI.
+    """
     return {"value": value, "unit": unit, "error": error, "floor": 0.0}
 
 

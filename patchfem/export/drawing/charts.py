@@ -15,8 +15,8 @@ import numpy as np
 from ...core import G_N
 from ...formatting import choose_axis_unit, format_number, needs_log_scale
 
-MAX_LINE_POINTS = 6000  # a line with more points is reduced to this number
-MIN_LINE_POINTS = 200  # a reduced line keeps at least this number of points
+MAX_LINE_POINTS = 6000  # A line with more points is reduced to this number.
+MIN_LINE_POINTS = 200  # A reduced line keeps at least this number of points.
 MAX_FRAMES = 24  # number of frames of the shear stress that are drawn faintly
 FAINT_FRAME_POINTS = 400  # number of points of a frame that is drawn faintly
 GRID = 6000  # cells of a piece in a picture
@@ -24,8 +24,8 @@ NUMBER = 13  # characters of a number in a page
 REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded": "dotted"}
 COLOURS = ("accent", "warm", "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86")
 MIL = 25.4e-6
-MIN_SAMPLES_PER_CYCLE = 20  # a line through fewer samples per cycle does not show the motion
-MAX_ENVELOPE_CYCLES = 1500  # an envelope over more cycles joins neighbouring cycles
+MIN_SAMPLES_PER_CYCLE = 20  # A line through fewer samples per cycle does not show the motion.
+MAX_ENVELOPE_CYCLES = 1500  # An envelope over more cycles joins neighbouring cycles.
 # Measures over the cycles of wear, and their labels.
 WEAR_LABELS = {
     "pressure_peak": "peak pressure",
@@ -42,27 +42,79 @@ MAX_FRAME_WIDTH = 300
 
 
 def make_axis(label: str, unit: str = "", log: bool = False) -> dict:
-    """Return an axis of a chart."""
+    """Return an axis of a chart.
+
+    Parameters
+    ----------
+    label : str
+    unit : str
+        Unit of the values; "" without one.
+    log : bool
+        Whether the axis is logarithmic.
+    """
     return {"label": label, "unit": unit, "log": log}
 
 
 def make_chart(title: str, x: dict, y: dict, marks: list) -> dict:
-    """Return a chart of marks; None among them is left out."""
+    """Return a chart of marks.
+
+    Parameters
+    ----------
+    title : str
+    x, y : dict
+        Axes of `make_axis`.
+    marks : list
+        Marks of `make_mark`; None is left out.
+    """
     return {"title": title, "x": x, "y": y, "marks": [mark for mark in marks if mark]}
 
 
 def make_mark(kind: str, colour: str, name: str = "", **numbers) -> dict:
-    """Return a mark; `numbers` contains its arrays and its style."""
+    """Return a mark.
+
+    Parameters
+    ----------
+    kind : str
+        Such as line, band, dots, cells, rule, span, arrow.
+    colour : str
+        Name of a colour of the page, or a hexadecimal colour.
+    name : str
+        Entry of the legend; "" for none.
+    **numbers
+        Arrays and style of the mark.
+    """
     return {"kind": kind, "colour": colour, "name": name, **numbers}
 
 
 def make_dots(x, y, colour: str, name: str = "", **style) -> dict:
-    """Return points; style: errors (n,), shape, size [points]."""
+    """Return points.
+
+    Parameters
+    ----------
+    x, y : (n,) array
+    colour : str
+    name : str
+        Entry of the legend; "" for none.
+    **style
+        errors (n,), shape, size [points].
+    """
     return make_mark("dots", colour, name, x=x, y=y, **style)
 
 
 def make_line(x, y, colour: str, name: str = "", most: int = MAX_LINE_POINTS, **style) -> dict:
-    """Return a line of at most `most` points; a longer line is reduced by `sample_indices`."""
+    """Return a line; a line with many points is reduced by `sample_indices`.
+
+    Parameters
+    ----------
+    x, y : (n,) array
+    colour : str
+    name : str
+        Entry of the legend; "" for none.
+    most : int
+        Largest number of points.
+    **style
+        width, dash, alpha.
+    """
     x = np.asarray(x, float)
     y = np.asarray(y, float)
     keep = sample_indices(x, y, most)
@@ -70,9 +122,18 @@ def make_line(x, y, colour: str, name: str = "", most: int = MAX_LINE_POINTS, **
 
 
 def sample_indices(x, y, max_points: int) -> np.ndarray:
-    """Return the indices of at most `most` points of a line.
+    """Return the indices of at most `max_points` points of a line.
 
     From every stretch of the line these are the lowest and the highest x and y.
+
+    Parameters
+    ----------
+    x, y : (n,) array
+    max_points : int
+
+    Returns
+    -------
+    (k,) array of int
     """
     if x.size <= max_points:
         return np.arange(x.size)
@@ -90,7 +151,7 @@ def sample_indices(x, y, max_points: int) -> np.ndarray:
 
 
 def limit_characters(all_charts: list, max_characters: int) -> list:
-    """Reduce lines and bands so that all charts take about `room` characters.
+    """Reduce lines and bands so that all charts take about `max_characters` characters.
 
     A number takes NUMBER characters.
     """
@@ -194,7 +255,7 @@ def interface_charts(x, fields: dict, name: str = "") -> list:
 def faces_charts(faces: list) -> list:
     """Return the charts of all interfaces that have a patch.
 
-    Each entry of `found` contains the arguments of `interface_charts`.
+    Each entry of `faces` contains the arguments of `interface_charts`.
     """
     return [interface_chart for face in faces for interface_chart in interface_charts(*face)]
 
@@ -288,7 +349,15 @@ def stress_charts(x, depths, mises, sigma) -> list:
 
 
 def worn_map_chart(x, width: float, depth) -> list:
-    """Return a map of the worn depth (s, m) [m] of strips over x (m,) [m] and the width [m]."""
+    """Return a map of the worn depth of strips over x and the width.
+
+    Parameters
+    ----------
+    x : (m,) array [m]
+    width : float [m]
+    depth : (s, m) array [m]
+        Worn depth of each strip.
+    """
     edges = np.linspace(-width / 2, width / 2, len(depth) + 1)
     (unit, scale), (name, size) = (
         choose_axis_unit(depth, "m"),
@@ -320,7 +389,7 @@ def worn_map_chart(x, width: float, depth) -> list:
 
 
 def reduce_grid(x, depth, cells, max_cells: int) -> tuple:
-    """Reduce a grid to about `most` cells, each with the mean over its area.
+    """Reduce a grid to about `max_cells` cells, each with the mean over its area.
 
     Parameters
     ----------
@@ -385,7 +454,7 @@ def loop_chart(slide, force, title: str, measured: tuple | None = None) -> list:
 
 
 def loop_charts(loops: list) -> list:
-    """Return the friction loop of every interface; found: (name, slide [m], force [N]) each."""
+    """Return the friction loop of every interface; loops: (name, slide [m], force [N]) each."""
     return [
         chart
         for name, slide, force in loops

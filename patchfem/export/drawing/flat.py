@@ -84,7 +84,16 @@ class Picture:
         self._head(head, shown)
 
     def show(self, frame: Frame, head: str, shown: tuple) -> None:
-        """Change the pieces and the curves to those of another frame."""
+        """Change the pieces and the curves to those of another frame.
+
+        Parameters
+        ----------
+        frame : Frame
+        head : str
+            First line of the title.
+        shown : tuple of Panel
+            The whole pieces and the contact.
+        """
         for bodies, panel in zip(self.bodies, shown):
             bodies.show(frame, panel)
         for line, (_, values) in zip(self.lines, interface_curves(frame, self.reach)[1]):

@@ -199,7 +199,7 @@ def _make_panel(
 
 
 def _weighted_quantile(values, weight, fraction: float) -> float:
-    """Return the value below which the fraction `share` of the weight lies."""
+    """Return the value below which the fraction `fraction` of the weight lies."""
     if not values.size:
         return 0.0
     order = np.argsort(values)
@@ -287,7 +287,7 @@ def surface_shape_motion(points, up, x, surface) -> np.ndarray:
 
 
 def round_down_factor(factor: float, minimum: float = 1.0) -> float:
-    """Return a factor > 0 rounded down to 1, 2 or 5 times a power of ten, but at least `least`."""
+    """Return a factor > 0 rounded down to 1, 2 or 5 times a power of ten, but at least `minimum`."""
     if factor < minimum:
         return minimum
     power = 10.0 ** np.floor(np.log10(factor))

@@ -136,7 +136,17 @@ def explain_missing_opengl() -> str | None:
 
 
 def make_plotter(one: Frame, head: str, magnify: float | None, off_screen: bool = False):
-    """Return the pyvista Plotter of the window: both pieces, their contact, and the stresses."""
+    """Return the pyvista Plotter of the window: both pieces, their contact, and the stresses.
+
+    Parameters
+    ----------
+    one : Frame
+    head : str
+        First line of the title.
+    magnify : float or None
+        Factor of the motion; None for one that makes it visible.
+    off_screen : bool
+    """
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
 

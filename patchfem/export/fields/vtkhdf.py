@@ -287,7 +287,7 @@ def _write_block(group, block: Block, times, settings: tuple) -> None:
 
 
 def _write_arrays(group, steps, kind: str, data: dict, settings: tuple) -> None:
-    """Write the arrays of a block; about: as for `_write_block`, without the text."""
+    """Write the arrays of a block; settings: as for `_write_block`, without the text."""
     (units, later, rounding), target, offsets = (
         settings,
         group[kind],

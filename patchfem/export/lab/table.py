@@ -6,7 +6,15 @@ from .series import Column
 
 
 def write_columns(path: Path, time, columns: list) -> None:
-    """Write columns with headers such as `force [N]`, the time (k,) [s] first if there is one."""
+    """Write columns with headers such as `force [N]`.
+
+    Parameters
+    ----------
+    path : Path
+    time : (k,) array [s] or None
+        First column, if there is one.
+    columns : list of Column
+    """
     all_columns = [*([] if time is None else [Column("time", "s", time, 0)]), *columns]
     lines = [",".join(f"{column.label} [{column.unit}]" for column in all_columns)]
     lines += [

@@ -71,13 +71,41 @@ def _thinning_note(histories) -> str:
 
 
 def write_table(out: Path, values: dict, units: dict) -> None:
-    """Write arrays of equal length as CSV with their units; Missing if `out` cannot be written."""
+    """Write arrays of equal length as CSV with their units.
+
+    Parameters
+    ----------
+    out : Path
+    values : dict
+        {name: (k,) array}
+    units : dict
+        {name: unit}
+
+    Raises
+    ------
+    Missing
+        If `out` cannot be written.
+    """
     columns = [table.Column(name, units[name], column, 0) for name, column in values.items()]
     with write_atomically(out) as partial:
         table.write_columns(partial, None, columns)
 
 
 def write_response(out: Path, estimate, drive: str, response: str) -> None:
-    """Write a frequency response as a universal file; Missing if `out` cannot be written."""
+    """Write a frequency response as a universal file.
+
+    Parameters
+    ----------
+    out : Path
+    estimate : object
+        As for `modes.write_response`.
+    drive, response : str
+        Kinds of input and output.
+
+    Raises
+    ------
+    Missing
+        If `out` cannot be written.
+    """
     with write_atomically(out) as partial:
         modes.write_response(partial, estimate, drive, response)

@@ -12,7 +12,7 @@ from .document import to_json
 
 # Bytes of the data that are drawn; packed with the library, a page then stays below 1.5 MB.
 MAX_BYTES = 1_200_000
-MIN_CASES = 64  # at least this number of cases is drawn
+MIN_CASES = 64  # At least this number of cases is drawn.
 N_SAMPLED = 32  # number of cases from which the bytes per case are measured
 # Significant digits in a page that does not draw all cases.
 VALUE_DIGITS = 7
@@ -71,7 +71,7 @@ def _select_rows(table: dict, max_cases: int) -> DrawnCases:
 
 
 def _evenly_spaced(number: int, max_number: int) -> np.ndarray:
-    """Return at most `most` of `number` indices, evenly spaced and including both ends."""
+    """Return at most `max_number` of `number` indices, evenly spaced and including both ends."""
     return (
         np.arange(number)
         if number <= max_number

@@ -220,7 +220,7 @@ def _find_minimum(
     Parameters
     ----------
     square : (m,) array
-        Squares of the frequencies minus that of the case `top` [Hz2].
+        Squares of the frequencies minus that of the case `peak_index` [Hz2].
     g : (m,) array
         (y_top / y)^2.
     peak_index : int
@@ -232,7 +232,7 @@ def _find_minimum(
     -------
     tuple or None
         Position and value of the minimum; None if there is no minimum above 0 between the
-        neighbours of `top`.
+        neighbours of `peak_index`.
     """
     polynomial = np.polynomial.Polynomial.fit(square[low:high], g[low:high], high - low - 1)
     slope = polynomial.deriv()

@@ -176,7 +176,7 @@ def _contact_range(x, sigma) -> tuple | None:
 def _read_piece(
     series: Series, side: str, numbers: list, max_cells: int, fine_range: tuple | None
 ) -> dict:
-    """Read a piece and reduce it to about `most` cells.
+    """Read a piece and reduce it to about `max_cells` cells.
 
     Parameters
     ----------

@@ -122,6 +122,18 @@ def format_value_and_error(name: str, measure: dict, scale: float | None = None)
     """Return value and error of a measure as strings.
 
     They are in the first unit of the measure, or in SI times `scale`.
+
+    Parameters
+    ----------
+    name : str
+    measure : dict
+        As in summary.json.
+    scale : float, optional
+
+    Returns
+    -------
+    tuple of str
+        The error is "" if it is unknown.
     """
     value = measure["value"]
     error = measure["error"]
@@ -662,7 +674,16 @@ def _plain_value(name: str, value: float, unit: str) -> str:
 
 
 def measure_link(text: str, name: str, more: str = "") -> str:
-    """Return a text as a link to the definition of a measure on the same page."""
+    """Return a text as a link to the definition of a measure on the same page.
+
+    Parameters
+    ----------
+    text : str
+    name : str
+        The measure.
+    more : str
+        Further attributes of the link, with a leading space.
+    """
     return f"<a{more} href='#measure-{escape(name)}'>{escape(text)}</a>"
 
 

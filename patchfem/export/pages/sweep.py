@@ -30,7 +30,7 @@ MAX_COLUMNS = 8  # largest number of keys and measures together
 PAGE = "report.html"
 SUMMARY = "summary.json"
 MAX_LISTED_CASES = 400  # the table has at most this number of cases, sweep.csv has all of them
-MIN_SCROLLED_ROWS = 24  # a table with more rows scrolls in its frame
+MIN_SCROLLED_ROWS = 24  # A table with more rows scrolls in its frame.
 
 
 def page_html(table: dict, summary: SweepHeadline | None = None) -> str:
@@ -100,7 +100,7 @@ def page_html(table: dict, summary: SweepHeadline | None = None) -> str:
 
 
 def _script_data(table: dict, first: str | None, cases: np.ndarray, is_exact: bool) -> dict:
-    """Return the data of some cases for the scripts; whole: with all digits."""
+    """Return the data of some cases for the scripts; is_exact: with all digits."""
     keys = [_key_data(item, cases) for item in table["keys"]]
     measures = [
         _measure_data(name, item, cases, table.get("tolerance", np.nan))
@@ -360,7 +360,7 @@ def _is_varied(values) -> bool:
 
 
 def _format_number(value: float, error: float, floor: float) -> str:
-    """Write a value with its error, rounded by this error; least: its floor in the same unit."""
+    """Write a value with its error, rounded by this error; floor: its floor in the same unit."""
     if not np.isfinite(value):
         return "&ndash;"
     return " ± ".join(

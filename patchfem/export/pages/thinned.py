@@ -45,7 +45,7 @@ class ReducedMesh:
 def reduce_mesh(
     points, cells, material, max_cells: int, fine_range: tuple | None = None
 ) -> ReducedMesh:
-    """Reduce a mesh to about `most` cells.
+    """Reduce a mesh to about `max_cells` cells.
 
     In a grid, every so many lines are kept, including the outer lines and those between two
     materials, so that the outline stays the same. In any other mesh all points of a box between
@@ -129,7 +129,7 @@ def _line_bins(points, cells, material, max_cells: int, fine_range: tuple | None
 def select_lines(lines, count: int, fine_range: tuple | None = None) -> np.ndarray:
     """Return the indices of at most `count` + 1 sorted lines (n,), evenly spaced.
 
-    The first and the last line are included. near: (left, right) between which half of the lines
+    The first and the last line are included. fine_range: (left, right) between which half of the lines
     are taken, if there are so many.
     """
     weight = np.ones(lines.size - 1)

@@ -178,7 +178,16 @@ def _full_axis(label: str, unit: str, x) -> dict:
 
 
 def depth_axis(unit: str, depth, scale: float) -> dict:
-    """Return an axis of depths [m] that points down."""
+    """Return an axis of depths that points down.
+
+    Parameters
+    ----------
+    unit : str
+    depth : sequence of float [m]
+        Depths that the axis covers.
+    scale : float
+        From metres to the unit.
+    """
     room = 0.05 * float(np.ptp(depth))
     return make_axis("worn depth", unit) | {
         "range": [(np.max(depth) + room) * scale, (np.min(depth) - room) * scale]

@@ -62,7 +62,7 @@ class SummaryWriter:
         model : Model or PatchfemError
         results : CaseResults
         case : int
-            Index of the case in `found`.
+            Index of the case in `results`.
         """
         values = {axis.key: text for axis, text in zip(self.cases.axes, self.cases.texts(number))}
         has_model = isinstance(model, Model)
@@ -153,7 +153,21 @@ class Writer:
             return False
 
     def put(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> None:
-        """Write the results of cases, their folders first; Missing if this fails."""
+        """Write the results of cases, their folders first.
+
+        Parameters
+        ----------
+        numbers : sequence of int
+            Numbers of the cases in the sweep.
+        results : CaseResults
+        texts : sequence of str
+            Content of summary.json of each case.
+
+        Raises
+        ------
+        Missing
+            If a case cannot be written.
+        """
         for case, (number, text) in enumerate(zip(numbers, texts)):
             # Other cases have a results folder already.
             if self.keep == "summaries" or case in results.messages:

@@ -33,7 +33,15 @@ SHORT_SUMMARY = "summary.json"
 
 
 def write_page(table: dict, lead: SweepHeadline, folder: Path) -> None:
-    """Write the page of all cases into the folder of their tables."""
+    """Write the page of all cases into the folder of their tables.
+
+    Parameters
+    ----------
+    table : dict
+        As for `pages.sweep.page_html`.
+    lead : SweepHeadline
+    folder : Path
+    """
     write_text(folder / FULL_PAGE, sweep.page_html(table, lead))
 
 
@@ -108,7 +116,7 @@ def key_columns(cases: Cases) -> list:
 def _shared_facts(facts: dict, columns: list) -> dict:
     """Return tolerance, patch size [m] and ends [Hz] of the swept frequencies of all cases.
 
-    They are those of the scene (`held`), or swept values (`columns`).
+    They are those of the scene (`facts`), or swept values (`columns`).
     """
     swept = {column["name"]: column["values"] for column in columns}
     return {
@@ -415,7 +423,17 @@ def join_tables(tables: list, names: list) -> dict:
 
 
 def relink_cases(table: dict, folder: Path, page: Path) -> dict:
-    """Return the table with links of its cases that are relative to another page."""
+    """Return the table with links of its cases that are relative to another page.
+
+    Parameters
+    ----------
+    table : dict
+        As for `pages.sweep.page_html`.
+    folder : Path
+        Folder of the sweep.
+    page : Path
+        The page.
+    """
     if table["folders"] is None:
         return table
     path_to_folder = os.path.relpath(folder, page.parent)

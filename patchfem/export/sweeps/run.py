@@ -81,7 +81,7 @@ def sweep_into(
     say : callable, optional
         Takes a line of text.
     report_progress : callable, optional
-        told(done, total, seconds left or None) is called as cases are done, first with those that
+        report_progress(done, total, seconds left or None) is called as cases are done, first with those that
         existed.
 
     Returns
@@ -198,7 +198,7 @@ def _compute_cases(
     executor : object
     say : callable or None
     report_progress : callable or None
-        told(done, seconds left or None) is called as cases are done.
+        report_progress(done, seconds left or None) is called as cases are done.
     """
     keep = jobs.keep
     folder = jobs.folder
@@ -238,7 +238,16 @@ def compute_in_memory(
 ) -> CaseResults:
     """Compute the cases in memory only.
 
-    estimate: whether errors are computed for cases that run one by one.
+    Parameters
+    ----------
+    sweep_scene : SweepScene
+    cases : Cases
+    executor : object
+        From `campaigns.sweeps.executors`.
+    say : callable, optional
+        Takes a line of text.
+    estimate : bool
+        Whether errors are computed for cases that run one by one.
     """
     total = CaseResults.blank(len(cases))
     for numbers, results, *_ in iterate_chunks(
@@ -255,7 +264,18 @@ def collect_shards(
 ) -> CaseResults:
     """Write all tables of a sweep whose shards are complete, from its folder.
 
-    Missing if cases have no result yet.
+    Parameters
+    ----------
+    sweep_scene : SweepScene
+    cases : Cases
+    target : Path
+    page : bool
+        Whether report.html is written.
+
+    Raises
+    ------
+    Missing
+        If cases have no result yet.
     """
     with Folder(target, cases.names(sweep_scene)) as folder:
         results = folder.answers(CaseResults.blank(len(cases), folder.target))
@@ -274,6 +294,14 @@ def hash_tables(sweep_scene: SweepScene, cases: Cases, folder: Folder, page: boo
     """Return a hash of all that the tables of a complete sweep depend on.
 
     If sweep.json contains this hash, the tables exist.
+
+    Parameters
+    ----------
+    sweep_scene : SweepScene
+    cases : Cases
+    folder : Folder
+    page : bool
+        Whether report.html is written.
     """
     content = [
         environment_versions()["patchfem"],

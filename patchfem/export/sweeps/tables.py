@@ -69,7 +69,15 @@ def measure_columns(results: CaseResults, name: str) -> list[Column]:
 
 
 def column_names(cases: Cases, results: CaseResults, keys: Sequence[str] = ()) -> list[str]:
-    """Return the column names of `csv_lines`."""
+    """Return the column names of `csv_lines`.
+
+    Parameters
+    ----------
+    cases : Cases
+    results : CaseResults
+    keys : sequence of str
+        Folders of the cases, if they have any.
+    """
     measures = [
         column.name for name in sort_measures(results) for column in measure_columns(results, name)
     ]
@@ -87,6 +95,13 @@ def csv_lines(cases: Cases, results: CaseResults, keys: Sequence[str] = ()) -> I
 
     A line contains the swept keys as written, the outcome, every measure with its error in SI, the
     message of a failed case, and the name of its folder if `keys` are given.
+
+    Parameters
+    ----------
+    cases : Cases
+    results : CaseResults
+    keys : sequence of str
+        Folders of the cases, if they have any.
     """
     columns = [
         column for name in sort_measures(results) for column in measure_columns(results, name)
@@ -114,7 +129,17 @@ def csv_lines(cases: Cases, results: CaseResults, keys: Sequence[str] = ()) -> I
 
 
 def write_csv(cases: Cases, results: CaseResults, keys: Sequence[str], path: Path) -> Path:
-    """Write sweep.csv to `path`."""
+    """Write sweep.csv.
+
+    Parameters
+    ----------
+    cases : Cases
+    results : CaseResults
+    keys : sequence of str
+        Folders of the cases, if they have any.
+    path : Path
+        The file.
+    """
     write_rows(path, chain([column_names(cases, results, keys)], csv_lines(cases, results, keys)))
     return path
 
