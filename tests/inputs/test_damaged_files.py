@@ -9,6 +9,9 @@ import pyuff
 from lab_files import SI, loop, record, written
 from scipy import sparse
 from scipy.io import mmwrite, savemat
+from test_matlab import written as write_version_5
+from test_matlab73 import RUN, by_scipy
+from test_matlab73 import written as write_version_73
 
 from patchfem.core import PatchfemError
 from patchfem.inputs import matlab5, matlab73, matrices, nastran
@@ -86,6 +89,40 @@ def test_always_a_damaged_matrix_is_read_or_refused_by_name(tmp_path, name):
             assert str(path) in str(error)
             n_refused += 1
     assert n_refused > 20
+
+
+SMALL = ("full", "scattered", "cells", "letters", "scalar")
+VARIABLES = {  # a MATLAB file, and the first byte that may be damaged
+    "packed": (write_version_5(True, SMALL), 128),
+    "unpacked": (write_version_5(False, SMALL), 128),
+    "structures": (by_scipy({"run": RUN}, False), 128),
+    "version 7.3": (write_version_73({"run": RUN, "g": 9.81}), 520),
+}
+COUNTS = [word.to_bytes(4, "little") for word in (0xFFFFFFFF, 0x80000000, 0x7FFFFFFF, 1, 14)]
+
+
+@pytest.mark.parametrize("name", VARIABLES)
+def test_always_damaged_variables_are_read_or_refused_by_name(name):
+    """One to three bytes, or counts of four bytes, become others; some of these files make SciPy's reader crash."""
+    content, first = VARIABLES[name]
+    rng = random.Random(5)
+    n_refused = 0
+    for _ in range(150):
+        changed = bytearray(content)
+        for _ in range(rng.randint(1, 3)):
+            place = rng.randrange(first, len(content) - 4)
+            if rng.random() < 0.5:
+                changed[place] = rng.randrange(256)
+            else:
+                changed[place & ~3 : (place & ~3) + 4] = rng.choice(COUNTS)
+        try:
+            for variable in read_variables("a.mat", bytes(changed)).values():
+                values = variable.values()
+                assert variable.kind == "text" or values.shape == variable.shape
+        except PatchfemError as error:
+            assert str(error).startswith("a.mat: ") and len(str(error)) < 400
+            n_refused += 1
+    assert n_refused > 10
 
 
 @pytest.mark.parametrize("layout", ["coordinates", "full"])

@@ -136,14 +136,8 @@ def campaign(name: str, count: int, use_interpreter) -> Counter:
     return told
 
 
+@pytest.mark.parametrize("count", [40, pytest.param(1000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", SEEDS)
-def test_always_damaged_files_are_read_or_refused_by_name(name, use_interpreter):
-    assert campaign(name, 40, use_interpreter).total() == 40
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SEEDS)
-def test_always_a_thousand_damaged_files_of_a_format(name, use_interpreter):
-    told = campaign(name, 1000, use_interpreter)
-    print(name, dict(told))
-    assert told.total() == 1000 and told["refused"] > 50
+def test_always_damaged_files_are_read_or_refused_by_name(name, count, use_interpreter):
+    outcomes = campaign(name, count, use_interpreter)
+    assert outcomes.total() == count and outcomes["refused"] > count // 20 - 2

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patchfem.surface.areal import Areal
-from patchfem.surface.profile import Profile, level
+from patchfem.surface.files.read import read_surface
+from patchfem.surface.profile import level
 from patchfem.surface.roughness.filter import filter_trace
 from patchfem.surface.roughness.parameters import Heights, fit_core
 from patchfem.surface.roughness.report import make_report
@@ -36,16 +36,8 @@ def truth(data) -> dict:
 
 @pytest.fixture(scope="module")
 def traces(data) -> dict:
-    """Both traces at their true steps, read here by hand."""
-    rows = (data / "dektak-1.csv").read_bytes().partition(b"Raw Micrometer,")[2].split()
-    stylus = np.array([float(row.split(b",")[1]) for row in rows if row.strip(b",")])
-    x, z = np.loadtxt(data / "mitutoyo-2.csv.gz", delimiter=",").T
-    return {
-        "dektak-1.csv": Profile(
-            np.arange(stylus.size) * 1500 / 9600 * UM, stylus * UM, "dektak-1.csv"
-        ),
-        "mitutoyo-2.csv.gz": Profile(x * UM, z * UM, "mitutoyo-2.csv.gz"),
-    }
+    """Both traces as they are read."""
+    return {name: read_surface(data / name) for name in TRACES}
 
 
 def test_exact_the_instruments_own_results_between_its_cursors(traces, truth):
@@ -118,8 +110,7 @@ def test_exact_the_core_of_another_code(traces, truth, name):
 
 @pytest.mark.parametrize("name", ["nanovea-test1.txt.gz", "nanovea-test2.txt.gz"])
 def test_exact_areal_parameters_of_three_codes(data, truth, name):
-    z = np.loadtxt(data / name, delimiter=",")[:, 2].reshape(101, 101) * UM
-    report = make_report(Areal(np.arange(101) * 5 * UM, np.arange(101) * 5 * UM, z, name))
+    report = make_report(read_surface(data / name, ("mm", "um")))
     known = truth[name]
     for key, unit in (("Sa", UM), ("Sq", UM), ("Sz", UM), ("Ssk", 1), ("Sku", 1)):
         assert report[key].value == pytest.approx(known[key] * unit, rel=1e-6)
@@ -128,23 +119,20 @@ def test_exact_areal_parameters_of_three_codes(data, truth, name):
 
 
 def test_exact_a_digitised_uneven_trace(data):
-    x, z = np.loadtxt(data / "xy-1.txt").T * UM
-    report = make_report(Profile(x, z, "xy-1.txt"))
+    trace = read_surface(data / "xy-1.txt", ("um", "um"))
+    report = make_report(trace)
     assert "the trace is resampled at every" in report.notes[0]
-    dense = np.linspace(x[0], x[-1], 100_001)
-    flat = np.interp(dense, x, z)
+    dense = np.linspace(trace.x[0], trace.x[-1], 100_001)
+    flat = np.interp(dense, trace.x, trace.z)
     flat -= np.polyval(np.polyfit(dense, flat, 1), dense)
     assert report["Pq"].value == pytest.approx(np.sqrt((flat**2).mean()), rel=0.01)
 
 
 def test_exact_the_core_of_the_report_is_that_of_the_roughness(traces):
-    report = make_report(traces["mitutoyo-2.csv.gz"], 800 * UM)
-    roughness = filter_trace(traces["mitutoyo-2.csv.gz"], 800 * UM)[1]
+    trace = traces["mitutoyo-2.csv.gz"]
+    report = make_report(trace, 800 * UM)
+    roughness = filter_trace(trace, 800 * UM)[1]
     assert report.heights.core == pytest.approx(fit_core(Heights(roughness.z, 1.0)))
     assert report["Rk"].value == report.heights.core.height
-    trace = traces["mitutoyo-2.csv.gz"]
-    step = trace.length / (trace.x.size - 1)
-    assert (
-        report.surface.spectrum.dominant_wavelength
-        == estimate_spectrum(level(trace).z, step).dominant_wavelength
-    )
+    spectrum = estimate_spectrum(level(trace).z, trace.length / (trace.x.size - 1))
+    assert report.surface.spectrum.dominant_wavelength == spectrum.dominant_wavelength
