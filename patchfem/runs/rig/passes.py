@@ -1,7 +1,7 @@
-"""Passes that complete a coupled run after its solution is known, in their order.
+"""Passes that complete a coupled run after its solution is known, in the order of `rig.run_coupled`.
 
-In: `Coupled`, a run between two of its passes. Out: the same with further measures, its outcome,
-its warnings and its notes. `PASSES` lists them.
+In: `Coupled`, a run between two of its passes. Out: the same with further measures, its outcome and
+its notes; at the end its warnings and the other data of its Result.
 """
 
 from dataclasses import dataclass, replace
@@ -14,10 +14,9 @@ from ...model.rig import MAX_TRAVEL
 from ...response import reasons, run_events, stationary
 from ...response.decay_curve import DecayCurve
 from ...response.outcome import judge_outcome, remove_errors
-from ...response.rows import set_final_floors
 from ...structure.drive_sizes import find_decay_rate
 from ..patch import faces
-from ..results.result import RunInputs, has_known_mesh_error, remove_unknown_errors
+from ..results.result import RunInputs, has_known_mesh_error
 from ..results.travel import outcome_on_piece
 from . import decays, flutter, levels, motion_warnings
 from .engines import ENGINES, describe_balance_error
@@ -34,7 +33,7 @@ class Coupled:
     - measures: by name.
     - outcome: None before the pass that determines it.
     - decay: decay curve of a release, or None.
-    - warnings, notes: sentences.
+    - notes: sentences on the decay and on limit cycles.
     """
 
     inputs: RunInputs
@@ -43,7 +42,6 @@ class Coupled:
     measures: dict
     outcome: Outcome | None = None
     decay: DecayCurve | None = None
-    warnings: tuple = ()
     notes: tuple = ()
 
     @property
@@ -77,60 +75,11 @@ class Coupled:
             and (not model.rig.friction.has_partial_slip or faces.has_error_meshes(model))
         )
 
-    @property
-    def extra(self) -> dict:
-        """Other data of the Result: settings, levels, events, energies and notes."""
-        solution = self.solution
-        numerics = self.numerics
-        rig = self.model.rig
-        numbers = {
-            "steps_per_cycle": numerics.steps,
-            "iterations": solution.book.get("iterations"),
-        }
-        extra = {"engine": numerics.engine, "cycles": numerics.cycles}
-        extra |= solution.extra | {"window": numerics.window}
-        extra |= {name: numbers[name] for name in ENGINES[numerics.engine].summary_numbers}
-        for name in ("at", "at_error", "tail"):
-            extra.pop(name, None)
-        if solution.levels:
-            extra["levels"] = levels.in_scene_units(rig, solution.levels)
-        snapshots = solution.snapshots
-        if rig.friction.has_partial_slip and snapshots and "faces" in snapshots[0]:
-            extra["shots"] = snapshots
-        if self.has_friction:
-            extra["events"] = run_events.list_events(
-                solution.window, self.drive, solution.log, solution.held
-            )
-        reduced = getattr(solution.contact, "reduction", None)
-        if reduced is not None:
-            name = "elements" if hasattr(reduced, "yield_displacement") else "shear_modes"
-            extra[name] = int(np.size(reduced.stiffness))
-        if solution.summed is not None:
-            extra["quadrature"] = solution.summed.engine
-        notes = list(self.notes)
-        if rig.drive.waveform.is_random:
-            extra["spectra"] = stationary.compute_spectra(solution.window, rig.drive.signal)
-            notes += stationary.warn_if_short(self.measures, solution.window)
-        extra |= {"book": solution.book, "period": self.drive.period, "notes": notes}
-        return extra if self.decay is None else extra | {"decay": self.decay}
-
-
-def check_energy_balance(run: Coupled) -> Coupled:
-    """Return the run as not converged if its energy balance has too large an error."""
-    text = describe_balance_error(ENGINES[run.numerics.engine], run.measures)
-    if not text:
-        return run
-    solution = run.solution
-    message = solution.message or text
-    return replace(run, solution=replace(solution, outcome=Outcome.NOT_CONVERGED, message=message))
-
 
 def add_level_measures(run: Coupled) -> Coupled:
     """Return the run with the measures over all levels of its drive."""
     solution = run.solution
     model = run.model
-    if not solution.levels:
-        return run
     measures = levels.level_measures(
         model.rig,
         solution.levels,
@@ -143,12 +92,22 @@ def add_level_measures(run: Coupled) -> Coupled:
 
 
 def add_outcome(run: Coupled) -> Coupled:
-    """Return the run with its outcome, and errors that include those the run itself states."""
+    """Return the run with its outcome, and errors that include those the run itself states.
+
+    A run whose energy balance has too large an error has not converged.
+    """
+    solution = run.solution
+    if text := describe_balance_error(ENGINES[run.numerics.engine], run.measures):
+        message = solution.message or text
+        solution = replace(solution, outcome=Outcome.NOT_CONVERGED, message=message)
+        run = replace(run, solution=solution)
     rig = run.model.rig
-    measures = run_events.add_uncertainty(run.measures, run.solution.stated_errors)
+    measures = run_events.add_uncertainty(run.measures, solution.stated_errors)
+    if not run.has_errors:
+        measures = remove_errors(measures)
     outcome, measures = judge_outcome(
-        run.solution,
-        remove_unknown_errors(measures, run.has_errors),
+        solution,
+        measures,
         run.model.accuracy.tolerance,
         run.drive,
         rig.drive.levels.cycles,
@@ -188,8 +147,6 @@ def add_decay(run: Coupled) -> Coupled:
     errors the mesh is not included.
     """
     model = run.model
-    if model.rig.drive.kind != "free" or not run.has_errors:
-        return run
     solution = run.solution
     run = replace(run, decay=decays.compute_decay(solution))
     if not (model.partial_slip or model.rig.friction.has_partial_slip):
@@ -240,52 +197,69 @@ def _half_swing_of_ringing(run: Coupled) -> float:
     return np.ptp(window.output[window.time >= sticks[-1][0]]) / 2
 
 
-def add_warnings(run: Coupled) -> Coupled:
-    """Return the run with its warnings, and its notes before those on its decay."""
-    plan = run.inputs.plan
-    warnings = [
-        *motion_warnings.collect_warnings(run),
-        *motion_warnings.peak_at_an_end(run, lambda: plan.modes(plan.chain)),
-    ]
-    notes = [*motion_warnings.collect_notes(run), *run.notes]
-    return replace(run, warnings=tuple(warnings), notes=tuple(notes))
-
-
 def add_limit_cycles(run: Coupled) -> Coupled:
     """Return the run with the unstable limit cycle of a mode that gains energy."""
-    if not run.has_friction or find_decay_rate(run.model.rig.modes) >= 0:
-        return run
     measures, notes = flutter.find_limit_cycles(run)
     return replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
 
 
-def set_floors(run: Coupled) -> Coupled:
-    """Return the run with final floors of its measures, and no values of an unbounded motion."""
-    measures = set_final_floors(run.measures, run.model.accuracy.tolerance)
-    if ENGINES[run.numerics.engine].finds_periodic_motion and run.outcome is Outcome.GROWS:
-        measures = reasons.find_missing_unbounded(measures)
-    return replace(run, measures=measures)
+def collect_warnings(run: Coupled) -> list:
+    """Return the warnings of a run."""
+    plan = run.inputs.plan
+    return [
+        *motion_warnings.collect_warnings(run),
+        *motion_warnings.peak_at_an_end(run, lambda: plan.modes(plan.chain)),
+    ]
 
 
-def check_travel(run: Coupled) -> Coupled:
-    """Return the run with the outcome LEAVES_CONTACT if a piece slides off the other one."""
+def outcome_on_pieces(run: Coupled) -> Outcome:
+    """Return the outcome of a run; LEAVES_CONTACT if a piece slides off the other one."""
     model = run.model
     response = run.solution.response
     outcome = outcome_on_piece(run.outcome, model.patch, run.patch, response.slide)
     if model.has_interface_patches:
         for face in faces.press_faces(model):
             outcome = outcome_on_piece(outcome, face.model.patch, face.patch, face.slide(response))
-    return replace(run, outcome=outcome)
+    return outcome
 
 
-PASSES = (
-    check_energy_balance,
-    add_level_measures,
-    add_outcome,
-    add_reasons,
-    add_decay,
-    add_warnings,
-    add_limit_cycles,
-    set_floors,
-    check_travel,
-)
+def collect_extra(run: Coupled, measures: dict, notes: list) -> dict:
+    """Return the other data of a Result: settings, levels, events, energies and notes.
+
+    Parameters
+    ----------
+    run : Coupled
+    measures : dict
+        Final measures by name.
+    notes : list
+        Sentences.
+    """
+    solution = run.solution
+    numerics = run.numerics
+    rig = run.model.rig
+    numbers = {"steps_per_cycle": numerics.steps, "iterations": solution.book.get("iterations")}
+    extra = {"engine": numerics.engine, "cycles": numerics.cycles}
+    extra |= solution.extra | {"window": numerics.window}
+    extra |= {name: numbers[name] for name in ENGINES[numerics.engine].summary_numbers}
+    for name in ("at", "at_error", "tail"):
+        extra.pop(name, None)
+    if solution.levels:
+        extra["levels"] = levels.in_scene_units(rig, solution.levels)
+    snapshots = solution.snapshots
+    if rig.friction.has_partial_slip and snapshots and "faces" in snapshots[0]:
+        extra["shots"] = snapshots
+    if run.has_friction:
+        extra["events"] = run_events.list_events(
+            solution.window, run.drive, solution.log, solution.held
+        )
+    reduced = getattr(solution.contact, "reduction", None)
+    if reduced is not None:
+        name = "elements" if hasattr(reduced, "yield_displacement") else "shear_modes"
+        extra[name] = int(np.size(reduced.stiffness))
+    if solution.summed is not None:
+        extra["quadrature"] = solution.summed.engine
+    if rig.drive.waveform.is_random:
+        extra["spectra"] = stationary.compute_spectra(solution.window, rig.drive.signal)
+        notes = [*notes, *stationary.warn_if_short(measures, solution.window)]
+    extra |= {"book": solution.book, "period": run.drive.period, "notes": notes}
+    return extra if run.decay is None else extra | {"decay": run.decay}

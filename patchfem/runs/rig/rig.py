@@ -1,8 +1,8 @@
 """Coupled run of a rig: the refined solution, then a list of passes that complete its result.
 
-In: the inputs of a run, i.e. its plan and its pressed patch. Out: a Result. `run_refined` makes the run at
-the first numerical settings whose displacement is known to the tolerance; `run_coupled` applies
-`passes.PASSES` to it.
+In: the inputs of a run, i.e. its plan and its pressed patch. Out: a Result. `run_refined` makes the
+run at the first numerical settings whose displacement is known to the tolerance; `run_coupled`
+applies the functions of `passes` to it.
 """
 
 from dataclasses import replace
@@ -14,15 +14,18 @@ import numpy as np
 from ...core import Outcome, PatchfemError
 from ...response.coarser import find_open_kinds
 from ...response.errors import add_errors
+from ...response.reasons import find_missing_unbounded
+from ...response.rows import set_final_floors
 from ...response.settling import slip_period
-from ...structure.drive_sizes import is_periodic
+from ...structure.drive_sizes import find_decay_rate, is_periodic
 from ..results.result import Result, RunInputs
-from . import levels, lists
+from . import levels, lists, passes
 from .costs import MOST_STEPS
 from .engines import ENGINES
 from .fields import collect_frames
+from .motion_warnings import collect_notes
 from .numerics import Numerics, choose
-from .passes import PASSES, Coupled
+from .passes import Coupled
 from .runner import Runner
 from .solution import Solution, curve_measures
 from .solve import refuse_long_run
@@ -69,23 +72,34 @@ def run_coupled(inputs: RunInputs) -> Result:
     numerics = choose(model)
     refuse_long_run(model, numerics)
     run = Coupled(inputs, *run_refined(inputs, numerics))
-    for complete in PASSES:
-        run = complete(run)
+    if run.solution.levels:
+        run = passes.add_level_measures(run)
+    run = passes.add_outcome(run)
+    run = passes.add_reasons(run)
+    if rig.drive.kind == "free" and run.has_errors:
+        run = passes.add_decay(run)
+    if run.has_friction and find_decay_rate(rig.modes) < 0:
+        run = passes.add_limit_cycles(run)
+    warnings = passes.collect_warnings(run)
+    notes = [*collect_notes(run), *run.notes]
+    measures = set_final_floors(run.measures, model.accuracy.tolerance)
+    if ENGINES[run.numerics.engine].finds_periodic_motion and run.outcome is Outcome.GROWS:
+        measures = find_missing_unbounded(measures)
     solution = run.solution
     fields = {}
     if inputs.patch is not None:
         fields = collect_frames(model, run.numerics, inputs.patch, solution)
     return Result(
         plan=inputs.plan,
-        outcome=run.outcome,
-        measures=run.measures,
+        outcome=passes.outcome_on_pieces(run),
+        measures=measures,
         response=solution.response,
         window=solution.window,
         patch=inputs.patch,
         fields=fields,
         seconds=inputs.seconds,
-        warnings=[*inputs.warnings, *run.warnings],
-        extra=run.extra,
+        warnings=[*inputs.warnings, *warnings],
+        extra=passes.collect_extra(run, measures, notes),
     )
 
 
@@ -143,7 +157,11 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         inputs.seconds["march"] = solution.seconds
     if runner.error_seconds:
         inputs.seconds["error"] = runner.error_seconds
-    return _add_error_parts(run, coarser_runs, errors, runner.solutions)
+    extra = solution.extra
+    left_open = _error_parts(solution, coarser_runs, errors, runner.solutions)
+    solution = replace(solution, extra=extra | {"left_open": left_open})
+    measures |= curve_measures(extra, runner.solutions.values())
+    return RefinedRun(numerics, solution, measures)
 
 
 def _cycles_of_slip_period(model, numerics, solution) -> int:
@@ -216,31 +234,23 @@ def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -
     return replace(solution, levels=level_results, coarser=tuple(pairs))
 
 
-def _add_error_parts(
-    run: RefinedRun, coarser_runs: list, errors: list, solutions: dict
-) -> RefinedRun:
-    """Return a run with the parts of its errors by kind, and the peak of its curve.
+def _error_parts(solution: Solution, coarser_runs: list, errors: list, solutions: dict) -> dict:
+    """Return the parts of the errors by kind, and the orders at which they fall with the steps.
 
     Parameters
     ----------
-    run : RefinedRun
+    solution : Solution
     coarser_runs : list of CoarserRuns
     errors : list of dict
         Errors by measure name of each of them.
     solutions : dict
         Solution of each coarser run by its Numerics.
     """
-    numerics, solution, measures = run
     kinds = [kind.of for kind in coarser_runs]
     if late := solution.extra.get("late"):
         kinds.append("end")
         errors = [*errors, late]
     step_runs = [solution.values]
-    if coarser_runs and not numerics.local and coarser_runs[0].of == "steps":
+    if coarser_runs and coarser_runs[0].of == "steps":
         step_runs += [solutions[halved].values for halved in coarser_runs[0].runs]
-    left_open = find_open_kinds(kinds, errors, step_runs)
-    return RefinedRun(
-        numerics,
-        replace(solution, extra=solution.extra | {"left_open": left_open}),
-        measures | curve_measures(solution.extra, solutions.values()),
-    )
+    return find_open_kinds(kinds, errors, step_runs)
