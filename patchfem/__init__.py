@@ -45,6 +45,7 @@ from .lazy_imports import make_getattr
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from .api import (
+        FitOptions,
         Measure,
         Missing,
         Model,
@@ -78,6 +79,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.4.0"
 __all__ = [
+    "FitOptions",
     "Measure",
     "Missing",
     "Model",

@@ -14,7 +14,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from difflib import get_close_matches
 from functools import wraps
 from pathlib import Path
@@ -36,6 +36,7 @@ from .export import reports as page_of_several
 from .export import summary as summaries
 from .export.drawing import pictures, swept
 from .export.fits import request as fits
+from .export.fits.options import FitOptions
 from .export.pages import headline, released, sentences
 from .export.surfaces import compare as compared_data
 from .export.surfaces import pairs as pairs_data
@@ -79,6 +80,7 @@ if TYPE_CHECKING:
     from .runs.batch.case_results import CaseResults
 
 __all__ = [
+    "FitOptions",
     "Measure",
     "Missing",
     "Model",
@@ -499,7 +501,9 @@ def backbone(
     values = None
     if amplitudes is not None:
         values = axes.read_lengths(_format_lengths(amplitudes), "amplitudes")
-    curves = backbones.backbone(model, _require_text(mode, "backbone: mode"), values, methods)
+    curves = backbones.compute_backbone(
+        model, _require_text(mode, "backbone: mode"), values, methods
+    )
     return backbone_files.backbone_contents(curves, model.source.title).to_xarray()
 
 
@@ -735,24 +739,14 @@ def run_many(
 
 def fit(
     scene: str | Path | Scene,
+    data: str | Path = "",
+    options: FitOptions | None = None,
     /,
     *,
-    to: str | Path = "",
     free: Mapping[str, Any] | None = None,
-    from_patch: bool = False,
-    amplitudes: str | Iterable | None = None,
-    hold: Iterable[str] = (),
-    offset: Iterable[str] = (),
-    warm_up: bool = False,
-    leave_out: str = "",
-    starts: int | None = None,
-    seed: int = 0,
-    unstable: str = "bound",
-    placebo: Iterable[str] = (),
-    resume: bool = False,
     out: str | Path | None = None,
     say: Callable[[str], None] | None = None,
-    **sets: Any,
+    **keywords: Any,
 ) -> dict[str, Any]:
     r"""Find values of keys of a scene from measurements, with intervals.
 
@@ -760,42 +754,20 @@ def fit(
     ----------
     scene : path, str, dict or Scene
         As for `load`.
-    to : path
+    data : path
         File of the measurements: a friction loop for a bench; rows of responses, or frequency and damping against
-        amplitude, for a rig; a worn depth for a scene with [wear].
+        amplitude, for a rig; a worn depth for a scene with [wear]. Left out with ``options.from_patch``.
+    options : FitOptions, optional
+        Rows to hold or leave out, offsets of a loop, and settings of the search.
     free : dict
-        Key -> (low, high) or a text such as "0.1..0.6".
-    from_patch : bool
-        Instead of `to` and `free`, replace the patch of the scene by laws of a single point, fitted to the patch's own
-        loops.
-    amplitudes : str or list, optional
-        Amplitudes of the slide for `from_patch`, in m or as a text such as "0.1 um..10 um:25".
-    hold : list of str
-        Rows to predict without fitting them, such as "frequency=135 Hz,150 Hz".
-    offset : list of str
-        For a loop: offsets to fit as well, "force" (a constant force over the whole record) or "displacement" (distance
-        of the first row from the stress-free position).
-    warm_up : bool
-        For a loop: compute the whole cycles of the record once, as a run-in, before the fitted cycles.
-    leave_out : str
-        A column; each of its values is left out in turn.
-    starts : int, optional
-        Number of random starting points inside the ranges; the best result is used. Default: 8, or 6 for a
-        curve of frequency and damping against amplitude.
-    seed : int
-        Seed of the starting points.
-    unstable : str
-        Treatment of rows with the flag U (unstable): "bound", "out" or "read".
-    placebo : list of str
-        Values such as "structure.mode.yaw.frequency=110 Hz,138 Hz", for each of which the whole fit is repeated.
-    resume : bool
-        Continue the fit in the folder `out`.
+        Key -> (low, high) or a text such as "0.1..0.6". Left out with ``options.from_patch``.
     out : path, optional
         Folder to write, as `patchfem fit -o` does.
     say : callable, optional
         Function that takes a line of text before steps that take long. Default: print to stderr.
-    **sets
-        Keys with new values, as for `load`.
+    **keywords
+        Keys with new values, as for `load`. A field of `FitOptions`, such as ``starts=4``, replaces that of `options`;
+        ``to`` is another name for `data`.
 
     Returns
     -------
@@ -817,35 +789,44 @@ def fit(
     >>> rows = zip(run.time.tolist(), run.slide.tolist(), run.force.tolist())
     >>> lines = ["time [s],displacement [m],force [N]", *(f"{t},{x},{f}" for t, x, f in rows)]
     >>> _ = Path("loop.csv").write_text("\n".join(lines))
-    >>> found = pf.fit(pf.new("bench"), to="loop.csv", free={"friction.static": (0.1, 0.6)})
+    >>> found = pf.fit(pf.new("bench"), "loop.csv", free={"friction.static": (0.1, 0.6)})
     >>> round(found["values"]["friction.static"]["value"], 6)
     0.3
     """
+    names = {field.name for field in fields(FitOptions)}
+    changes = {name: value for name, value in keywords.items() if name in names}
+    sets = {key: value for key, value in keywords.items() if key not in names | {"to"}}
     loaded = load(scene, **sets)
     if not isinstance(free, Mapping | None):
         raise PatchfemError(
             f"fit: `free` must be a dict of keys and their ranges (low, high), not {free!r:.60}"
         )
     ranges = [f"{key}={_format_ends(key, ends)}" for key, ends in (free or {}).items()]
-    slides = "" if amplitudes is None else _format_lengths(amplitudes)
-    options = fits.Options(
-        _require_texts(hold, "fit: hold"),
-        _require_texts(offset, "fit: offset"),
-        warm_up,
-        leave_out,
-        starts,
-        seed,
-        unstable,
-        _require_texts(placebo, "fit: placebo"),
-        resume,
-        from_patch,
-        slides,
-    )
-    measured = "" if isinstance(to, str) and not to else str(_require_path(to, "fit: to"))
+    options = _check_fit_options(FitOptions() if options is None else options, changes)
+    data = keywords.get("to", data)
+    measured = "" if isinstance(data, str) and not data else str(_require_path(data, "fit: to"))
     with TemporaryDirectory() as temporary_folder:
         target = Path(temporary_folder) / "fit" if out is None else Path(out)
         listener = fits.Listener(_print_to_stderr if say is None else say)
         return fits.fit_into(loaded, measured, ranges, options, target, listener).answer
+
+
+def _check_fit_options(options: Any, changes: dict) -> FitOptions:
+    """Return options with some fields replaced, in the form in which the command line gives them.
+
+    Raises PatchfemError for values of another type.
+    """
+    if not isinstance(options, FitOptions):
+        raise PatchfemError(f"fit: options: FitOptions are needed, not {options!r:.60}")
+    options = replace(options, **changes)
+    amplitudes = options.amplitudes
+    return replace(
+        options,
+        hold=_require_texts(options.hold, "fit: hold"),
+        offset=_require_texts(options.offset, "fit: offset"),
+        placebo=_require_texts(options.placebo, "fit: placebo"),
+        amplitudes="" if amplitudes is None else _format_lengths(amplitudes),
+    )
 
 
 def _format_ends(key: str, ends: Any) -> str:

@@ -35,7 +35,7 @@ SCENE_ALSO = (
     "export.fits.wear",
     "export.fits.patch",  # the fitted scene, which they write
     "campaigns.sweeps.case_models",
-    "campaigns.rows.asked",
+    "campaigns.rows.condition_models",
 )
 OUTSIDE = {
     "numba": ("*kernels", "compiled", "compiled.*"),

@@ -83,12 +83,12 @@ class SurfaceRuns(NamedTuple):
 
         They are tuples (name, text, measure before, measure after), where a measure may be None.
         """
-        sides = [one.measures if one is not None else {} for one in (self.before, self.after)]
-        return [
-            (name, words, *(side.get(name) for side in sides))
-            for name, (words, _) in COMPARED_MEASURES.items()
-            if any(_is_known(side.get(name)) for side in sides)
-        ]
+        before, after = (getattr(side, "measures", {}) for side in (self.before, self.after))
+        rows = []
+        for name, (text, _) in COMPARED_MEASURES.items():
+            if _is_known(before.get(name)) or _is_known(after.get(name)):
+                rows.append((name, text, before.get(name), after.get(name)))
+        return rows
 
 
 def _is_known(measure: Measure | None) -> bool:
@@ -124,23 +124,15 @@ def run_both_surfaces(
         except (PatchfemError, NotConverged) as error:
             sides.append(None)
             failed.append(f"the surface {name}: {error}")
-    known = {
-        name
-        for side in sides
-        if side is not None
-        for name, m in side.measures.items()
-        if _is_known(m)
-    }
-    lacking = (
-        tuple(
-            f"{words}: not computed, because the scene lacks {need}"
-            for name, (words, need) in COMPARED_MEASURES.items()
-            if name not in known
-        )
-        if any(sides)
-        else ()
-    )
-    return SurfaceRuns(title, *sides, tuple(failed), lacking)
+    runs = SurfaceRuns(title, *sides, tuple(failed), ())
+    if not any(sides):
+        return runs
+    known = {name for name, *_ in runs.rows()}
+    lacking = []
+    for name, (text, need) in COMPARED_MEASURES.items():
+        if name not in known:
+            lacking.append(f"{text}: not computed, because the scene lacks {need}")
+    return runs._replace(lacking=tuple(lacking))
 
 
 def _run_side(model: Model, say) -> SurfaceResult:
@@ -158,30 +150,28 @@ def _run_side(model: Model, say) -> SurfaceResult:
     )
 
 
-def surface_runs_data(found: SurfaceRuns) -> dict:
+def surface_runs_data(runs: SurfaceRuns) -> dict:
     """Return the runs as plain data in SI."""
-
-    def side(one: Measure | None):
-        """Return value, error and unit of a measure; None for None."""
-        return None if one is None else {"value": one.value, "error": one.error, "unit": one.unit}
-
-    out = {
-        name: {"before": side(first), "after": side(second)}
-        for name, _, first, second in found.rows()
-    }
+    measures = {}
+    for name, _, before, after in runs.rows():
+        measures[name] = {"before": _measure_data(before), "after": _measure_data(after)}
+    sides = {"before": runs.before, "after": runs.after}
+    warnings = []
+    for name, side in sides.items():
+        if side is not None:
+            warnings += [f"{name}: {text}" for text in side.warnings]
     return {
-        "scene": found.title,
-        "measures": out,
-        "failed": list(found.failed),
-        "lacking": list(found.lacking),
-        "outcome": {
-            name: None if one is None else one.outcome
-            for name, one in (("before", found.before), ("after", found.after))
-        },
-        "warnings": [
-            f"{name}: {text}"
-            for name, one in (("before", found.before), ("after", found.after))
-            if one is not None
-            for text in one.warnings
-        ],
+        "scene": runs.title,
+        "measures": measures,
+        "failed": list(runs.failed),
+        "lacking": list(runs.lacking),
+        "outcome": {name: getattr(side, "outcome", None) for name, side in sides.items()},
+        "warnings": warnings,
     }
+
+
+def _measure_data(measure: Measure | None) -> dict | None:
+    """Return value, error and unit of a measure; None for None."""
+    if measure is None:
+        return None
+    return {"value": measure.value, "error": measure.error, "unit": measure.unit}

@@ -13,6 +13,7 @@ change them.
 
 import os
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from time import perf_counter, process_time
@@ -26,7 +27,7 @@ from ..model.source import locate_errors
 from ..runs.patch.ladder import solve_split
 from ..runs.patch.measures import measures
 from ..runs.plan import plan
-from ..runs.run import run
+from ..runs.run import run as run_plan
 from .numerical_settings import (
     NUMERICAL_SETTINGS,
     Setting,
@@ -119,17 +120,14 @@ class Cost:
 
     def meets_tolerance(self) -> bool:
         """Return whether every stated error is within the tolerance that was set for the run."""
-        return all(
-            error <= compute_allowed_error(self.tolerance, self.values[name], self.floors[name])
-            for name, error in self.errors.items()
-        )
+        return all(self._allows(name, error, self.tolerance) for name, error in self.errors.items())
 
     def known_error(self, name: str) -> float | None:
         """Return the error of a measure; None if it is not known.
 
         It is the larger of the error that the run states and its distance to the best run.
         """
-        known = [part[name] for part in (self.errors, self.distances) if name in part]
+        known = [errors[name] for errors in (self.errors, self.distances) if name in errors]
         return max(known, default=None)
 
     def has_waited(self) -> bool:
@@ -138,17 +136,25 @@ class Cost:
 
     def is_same_run(self, other) -> bool:
         """Return whether two settings that are numbers gave the same run bit for bit."""
-        return None not in (self.value, other.value) and (self.values, self.errors) == (
-            other.values,
-            other.errors,
-        )
+        if None in (self.value, other.value):
+            return False
+        return (self.values, self.errors) == (other.values, other.errors)
 
     def is_within(self, name: str, tolerance: float) -> bool:
         """Return whether the error of a measure is at most tolerance * |value| + floor."""
-        off = self.known_error(name)
-        return off is not None and off <= compute_allowed_error(
-            tolerance, self.values[name], self.floors[name]
-        )
+        error = self.known_error(name)
+        return error is not None and self._allows(name, error, tolerance)
+
+    def _is_changed(self, name: str, relative_change: float, floor_fraction: float) -> bool:
+        """Return whether a measure is further from the best run than a change that is allowed."""
+        if name not in self.values:
+            return False
+        size = relative_change * abs(self.values[name])
+        return self.distances.get(name, 0.0) > max(size, floor_fraction * self.floors[name])
+
+    def _allows(self, name: str, error: float, tolerance: float) -> bool:
+        """Return whether an error of a measure is at most tolerance * |value| + floor."""
+        return error <= compute_allowed_error(tolerance, self.values[name], self.floors[name])
 
 
 def tolerance_curve(model: Model, say=None) -> list:
@@ -172,37 +178,38 @@ def tolerance_curve(model: Model, say=None) -> list:
         If no run succeeds.
     """
     with locate_errors(model.source):
-        wanted = with_tolerance(model)
+        settings = with_tolerance(model)
         # The first run includes imports and compilation, which the timings must not contain.
-        _run_setting(wanted[0], "first run, not timed", None)
+        _run_setting(settings[0], "first run, not timed", None)
         runs = []
-        spent = 0.0
-        for setting in wanted:
-            one = _time_setting(setting, True, say)
-            while one is not None:
-                # The runs are identical, so the faster timing holds for both.
-                if runs and one.is_same_run(runs[-1]):
-                    quick = min(runs[-1], one, key=lambda each: each.seconds)
-                    runs[-1], one = (
-                        replace(each, seconds=quick.seconds, wall_seconds=quick.wall_seconds)
-                        for each in (runs[-1], one)
-                    )
-                runs.append(one)
-                setting = (
-                    None
-                    if one.meets_tolerance()
-                    else _proposed_setting(setting, one, MAX_TRIAL_SECONDS - spent)
-                )
+        trial_seconds = 0.0
+        for setting in settings:
+            cost = _time_setting(setting, say)
+            while cost is not None:
+                if runs and cost.is_same_run(runs[-1]):
+                    # The runs are identical, so the faster timing holds for both.
+                    faster = min(runs[-1], cost, key=lambda run: run.seconds)
+                    runs[-1] = _with_timing(runs[-1], faster)
+                    cost = _with_timing(cost, faster)
+                runs.append(cost)
+                if cost.meets_tolerance():
+                    break
+                setting = _proposed_setting(setting, cost, MAX_TRIAL_SECONDS - trial_seconds)
                 if setting is None:
                     break
-                one = _time_setting(setting, True, say)
-                spent += one.seconds if one is not None else 0.0
+                cost = _time_setting(setting, say)
+                trial_seconds += cost.seconds if cost is not None else 0.0
     if not runs:
         raise NotConverged("cost: no run of this scene succeeded", "")
     return runs
 
 
-def _proposed_setting(setting: Setting, one: Cost, seconds: float) -> Setting | None:
+def _with_timing(cost: Cost, other: Cost) -> Cost:
+    """Return a cost with the seconds of another run."""
+    return replace(cost, seconds=other.seconds, wall_seconds=other.wall_seconds)
+
+
+def _proposed_setting(setting: Setting, cost: Cost, seconds: float) -> Setting | None:
     """Return the setting that the warnings of a run propose, or None.
 
     None if no warning proposes a setting that is larger than the present one, or if the run with it
@@ -212,29 +219,26 @@ def _proposed_setting(setting: Setting, one: Cost, seconds: float) -> Setting | 
     ----------
     setting : Setting
         Setting of the run.
-    one : Cost
+    cost : Cost
         The run.
     seconds : float
         CPU seconds that the next run may take.
     """
-    for remedy in one.remedies:
-        if found := _PROPOSED_SETTING.match(remedy):
-            key = found[1]
-            count = int(found[2])
-            before = (
-                getattr(setting.model.accuracy, key)
-                or (one.steps if key == "steps_per_cycle" else 1)
-                or 1
-            )
-            # The time of a run grows about in proportion to its steps, modes or harmonics.
-            if before < count and one.seconds * count / before <= seconds:
-                label = f"{one.tolerance:g}, {count} {key.replace('_', ' ')}"
-                return Setting(
-                    label,
-                    one.tolerance,
-                    f"tolerance {label}",
-                    with_setting(setting.model, key, count),
-                )
+    for remedy in cost.remedies:
+        proposal = _PROPOSED_SETTING.match(remedy)
+        if proposal is None:
+            continue
+        key = proposal[1]
+        count = int(proposal[2])
+        present = getattr(setting.model.accuracy, key)
+        if not present and key == "steps_per_cycle":
+            present = cost.steps
+        present = present or 1
+        # The time of a run grows about in proportion to its steps, modes or harmonics.
+        if present < count and cost.seconds * count / present <= seconds:
+            label = f"{cost.tolerance:g}, {count} {key.replace('_', ' ')}"
+            model = with_setting(setting.model, key, count)
+            return Setting(label, cost.tolerance, f"tolerance {label}", model)
     return None
 
 
@@ -263,37 +267,38 @@ def setting_curve(model: Model, knob: str, say=None) -> list:
     if knob == TOLERANCE:
         return tolerance_curve(model, say)
     with locate_errors(model.source):
-        mine = applicable_settings(model)
-        if knob not in mine:
+        possible = applicable_settings(model)
+        if knob not in possible:
             raise PatchfemError(
                 f"cost --over {knob}: the cost of this setting cannot be measured for this scene; "
-                f"possible settings: {', '.join(mine) or 'none'}",
+                f"possible settings: {', '.join(possible) or 'none'}",
                 "",
             )
-        wanted = list_settings(model, knob)
+        settings = list_settings(model, knob)
         # The first run includes imports and compilation, which the timings must not contain.
-        _run_setting(wanted[0], "first run, not timed", None)
-        runs = []
-        done = 0
-        for one in wanted:
-            found = _time_setting(one, one is not wanted[-1], say, runs[-1:])
-            if found is not None:
-                done += 1
-                runs[-1:] = (
-                    [_merge_identical_runs(runs[-1], found)]
-                    if runs and found.is_same_run(runs[-1])
-                    else [*runs[-1:], found]
-                )
-        if done < 3:
+        _run_setting(settings[0], "first run, not timed", None)
+        runs: list = []
+        n_succeeded = 0
+        for setting in settings:
+            is_last = setting is settings[-1]
+            cost = _time_setting(setting, say, runs[-1:], can_split=not is_last)
+            if cost is None:
+                continue
+            n_succeeded += 1
+            if runs and cost.is_same_run(runs[-1]):
+                runs[-1] = _merge_identical_runs(runs[-1], cost)
+            else:
+                runs.append(cost)
+        if n_succeeded < 3:
             raise PatchfemError(
                 f"cost --over {knob}: runs with fewer than three values of this setting succeeded",
                 "",
             )
     best = _best_run(runs)
-    return [
-        one if one is best else replace(one, distances=_distances_to_best(one, best))
-        for one in runs
-    ]
+    curve = []
+    for cost in runs:
+        curve.append(cost if cost is best else replace(cost, distances=_distances(cost, best)))
+    return curve
 
 
 def _best_run(runs: list) -> Cost:
@@ -301,25 +306,19 @@ def _best_run(runs: list) -> Cost:
 
     Of these two it is the run whose stated errors are the smaller ones for most measures.
     """
-    *_, last = runs
+    last = runs[-1]
     if last.value is not None:
         return last
-    fine = runs[-2]
-    shared = last.errors.keys() & fine.errors.keys()
-    return (
-        last
-        if 2 * sum(last.errors[name] <= fine.errors[name] for name in shared) >= len(shared)
-        else fine
-    )
+    finest = runs[-2]
+    shared = last.errors.keys() & finest.errors.keys()
+    n_smaller = sum(last.errors[name] <= finest.errors[name] for name in shared)
+    return last if 2 * n_smaller >= len(shared) else finest
 
 
-def _distances_to_best(one: Cost, best: Cost) -> dict:
+def _distances(cost: Cost, best: Cost) -> dict:
     """Return the distances of the values of a run from those of the best run, by measure."""
-    return {
-        name: abs(value - best.values[name])
-        for name, value in one.values.items()
-        if name in best.values
-    }
+    shared = [name for name in cost.values if name in best.values]
+    return {name: abs(cost.values[name] - best.values[name]) for name in shared}
 
 
 def _merge_identical_runs(first: Cost, second: Cost) -> Cost:
@@ -328,18 +327,16 @@ def _merge_identical_runs(first: Cost, second: Cost) -> Cost:
     In a sentence it is named by the shorter text, which is that of the setting without a number,
     chosen by the scene.
     """
-    quick = min(first, second, key=lambda one: one.seconds)
+    faster = min(first, second, key=lambda run: run.seconds)
     return replace(
-        first,
+        _with_timing(first, faster),
         label=f"{first.label}, {second.label.removeprefix('tolerance ')}",
         words=min(first.words, second.words, key=len),
-        seconds=quick.seconds,
-        wall_seconds=quick.wall_seconds,
         timings=first.timings + second.timings,
     )
 
 
-def _time_setting(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
+def _time_setting(setting: Setting, say, before=(), *, can_split: bool = True) -> Cost | None:
     """Run a setting several times and return its cost; None if it cannot be run.
 
     It is timed TIMINGS times, or once if the run is long and nothing was compiled, or if it repeats
@@ -348,52 +345,75 @@ def _time_setting(setting: Setting, coarse: bool, say, before=()) -> Cost | None
     Parameters
     ----------
     setting : Setting
-    coarse : bool
-        Whether the mesh of a file may be split once more for its error estimate.
     say : callable or None
         Takes a line of text.
     before : sequence of Cost
         Runs with which this one may be identical.
+    can_split : bool
+        Whether the mesh of a file may be split once more for its error estimate.
     """
     timings = []
-    one = None
-    while one is None or (
-        len(timings) < TIMINGS and not any(one.is_same_run(other) for other in before)
-    ):
-        kept = _count_compiled()
+    cost = None
+    same: list = []
+    while cost is None or (len(timings) < TIMINGS and not same):
+        n_compiled = _count_compiled()
         begin = (_measure_cpu(), perf_counter())
-        found = _run_setting(setting, setting.label, say, coarse)
-        if found is None:
+        finished = _run_setting(setting, setting.label, say, can_split=can_split)
+        if finished is None:
             return None
         timings.append((_measure_cpu() - begin[0], perf_counter() - begin[1]))
-        measured, warnings, steps = found
-        known = {name: m for name, m in measured.items() if m.value is not None}
-        one = Cost(
-            setting.label,
-            setting.value,
-            setting.words,
-            *min(timings),
-            len(timings),
-            {name: m.value for name, m in known.items()},
-            {name: m.error for name, m in known.items() if m.error is not None},
-            {name: m.floor for name, m in known.items()},
-            {},
-            setting.model.accuracy.tolerance,
-            tuple(remedy[1] for text in warnings if (remedy := _REMEDY_TEXT.search(text))),
-            steps,
-        )
-        if one.seconds >= MIN_SECONDS_TIMED_ONCE and _count_compiled() == kept:
+        cost = _make_cost(setting, timings, finished)
+        same = [run for run in before if cost.is_same_run(run)]
+        if cost.seconds >= MIN_SECONDS_TIMED_ONCE and _count_compiled() == n_compiled:
             break
-    again = "".join(
-        f", the same run as with {other.words}" for other in before if one.is_same_run(other)
-    )
     if say is not None:
-        say(
-            f"{one.words}: {one.seconds:.2f} CPU s"
-            + f" ({one.wall_seconds:.2f} s elapsed)" * one.has_waited()
-            + (again or ", timed once" * (one.timings == 1))
-        )
-    return one
+        text = f"{cost.words}: {cost.seconds:.2f} CPU s"
+        if cost.has_waited():
+            text += f" ({cost.wall_seconds:.2f} s elapsed)"
+        for run in same:
+            text += f", the same run as with {run.words}"
+        if not same and cost.timings == 1:
+            text += ", timed once"
+        say(text)
+    return cost
+
+
+class _FinishedRun(NamedTuple):
+    """Measures by name, warnings, and time steps per cycle (None if it has none) of a run."""
+
+    measures: dict
+    warnings: Sequence
+    steps: int | None
+
+
+def _make_cost(setting: Setting, timings: list, finished: _FinishedRun) -> Cost:
+    """Return the cost of a setting from its timings (CPU seconds, elapsed seconds)."""
+    values = {}
+    errors = {}
+    floors = {}
+    for name, measure in finished.measures.items():
+        if measure.value is not None:
+            values[name] = measure.value
+            floors[name] = measure.floor
+            if measure.error is not None:
+                errors[name] = measure.error
+    remedies = [remedy[1] for remedy in map(_REMEDY_TEXT.search, finished.warnings) if remedy]
+    seconds, wall_seconds = min(timings)
+    return Cost(
+        label=setting.label,
+        value=setting.value,
+        words=setting.words,
+        seconds=seconds,
+        wall_seconds=wall_seconds,
+        timings=len(timings),
+        values=values,
+        errors=errors,
+        floors=floors,
+        distances={},
+        tolerance=setting.model.accuracy.tolerance,
+        remedies=tuple(remedies),
+        steps=finished.steps,
+    )
 
 
 def _measure_cpu() -> float:
@@ -413,22 +433,20 @@ def _count_compiled() -> int:
         return 0
 
 
-def _run_setting(setting: Setting, label: str, say, coarse: bool = True) -> tuple | None:
-    """Return (measures, warnings, steps per cycle) of a setting; None if the run fails.
+def _run_setting(
+    setting: Setting, label: str, say, *, can_split: bool = True
+) -> _FinishedRun | None:
+    """Run a setting; None if it does not converge or needs more memory than there is.
 
-    The pieces are condensed again. The run fails if it does not converge or needs more memory
-    than there is.
+    The pieces are condensed again.
     """
     try:
         if setting.level:
-            fine, *more = solve_split(setting.model.patch, setting.level, coarse)
-            return measures(fine, *more), (), None
-        done = run(plan(setting.model), fresh=True)
-        return (
-            done.measures,
-            done.warnings,
-            done.extra.get("steps_per_cycle") or done.extra.get("steps"),
-        )
+            fine, *coarser = solve_split(setting.model.patch, setting.level, can_split)
+            return _FinishedRun(measures(fine, *coarser), (), None)
+        result = run_plan(plan(setting.model), fresh=True)
+        steps = result.extra.get("steps_per_cycle") or result.extra.get("steps")
+        return _FinishedRun(result.measures, result.warnings, steps)
     except (NotConverged, MemoryError) as error:
         if say is not None:
             say(f"{label}: left out ({error or 'out of memory'})")
@@ -441,16 +459,11 @@ def changed_measures(runs: list) -> list:
     A measure counts as changed if it differs by more than UNCHANGED_TOL times its value and by more than
     the round-off of its floor.
     """
-    return [
-        name
-        for name in runs[0].values
-        if any(
-            one.distances.get(name, 0.0)
-            > max(UNCHANGED_TOL * abs(one.values[name]), ROUND_OFF_FRACTION * one.floors[name])
-            for one in runs
-            if name in one.values
-        )
-    ]
+    names = []
+    for name in runs[0].values:
+        if any(run._is_changed(name, UNCHANGED_TOL, ROUND_OFF_FRACTION) for run in runs):
+            names.append(name)
+    return names
 
 
 def fastest_by_measure(runs: list, tolerance: float) -> dict:
@@ -461,27 +474,38 @@ def fastest_by_measure(runs: list, tolerance: float) -> dict:
     """
     out = {}
     for name in changed_measures(runs):
-        good = _select_confirmed_runs(runs, lambda one, name=name: one.is_within(name, tolerance))
-        out[name] = min(good, key=lambda one: one.seconds).label if good else None
+        confirmed = _select_confirmed_runs(runs, [name], tolerance)
+        fastest = min(confirmed, key=lambda run: run.seconds, default=None)
+        out[name] = None if fastest is None else fastest.label
     return out
 
 
-def _select_confirmed_runs(runs: list, good) -> list:
-    """Return the runs that fulfil a condition, as do all finer runs whose error is known.
+def _select_confirmed_runs(runs: list, names: Sequence, tolerance: float) -> list:
+    """Return the runs that have measures within a tolerance, as do all finer runs with known errors.
 
     What the tolerance chooses is judged on its own.
+
+    Parameters
+    ----------
+    runs : list of Cost
+    names : sequence of str
+        Measures; a run may lack some of them.
+    tolerance : float
     """
-    chain = [one for one in runs if one.value is not None]
-    alone = [one for one in runs if one.value is None]
-    out = []
-    for one in reversed(chain):
+
+    def is_good(run: Cost) -> bool:
+        """Return whether a run has the measures within the tolerance."""
+        return all(run.is_within(name, tolerance) for name in names if name in run.values)
+
+    confirmed = []
+    for run in reversed([run for run in runs if run.value is not None]):
         # The best run has no error if it only serves as the reference of the others.
-        if not one.errors and not one.distances:
+        if not run.errors and not run.distances:
             continue
-        if not good(one):
+        if not is_good(run):
             break
-        out.append(one)
-    return out + [one for one in alone if good(one)]
+        confirmed.append(run)
+    return confirmed + [run for run in runs if run.value is None and is_good(run)]
 
 
 def fastest_run(runs: list, tolerance: float) -> Cost | None:
@@ -490,103 +514,101 @@ def fastest_run(runs: list, tolerance: float) -> Cost | None:
     Of runs that are equally expensive it is the one that comes first, with the coarsest setting.
     None if there is no such run.
     """
-    names = measures_with_error(runs)
-    good = _select_confirmed_runs(
-        runs,
-        lambda one: all(one.is_within(name, tolerance) for name in names if name in one.values),
-    )
-    least = min((one.seconds for one in good), default=inf)
-    return next(
-        (
-            one
-            for one in runs
-            if one in good and one.seconds <= EQUAL_COST_RATIO * least + TIMING_SCATTER
-        ),
-        None,
-    )
+    confirmed = _select_confirmed_runs(runs, measures_with_error(runs), tolerance)
+    shortest = min((run.seconds for run in confirmed), default=inf)
+    for run in runs:
+        if run in confirmed and run.seconds <= EQUAL_COST_RATIO * shortest + TIMING_SCATTER:
+            return run
+    return None
 
 
 def cost_sentence(runs: list, tolerance: float) -> str:
     """Return which setting meets a tolerance in the least time, or which measure misses it."""
     names = measures_with_error(runs)
-    if one := fastest_run(runs, tolerance):
+    fastest = fastest_run(runs, tolerance)
+    if fastest is not None:
         return (
-            f"{one.words}: {_format_seconds(one)} per run, with every measure within the tolerance {tolerance:g}"
-            + _effect_sentence(runs, tolerance)
+            f"{fastest.words}: {_format_seconds(fastest)} per run, with every measure within the "
+            f"tolerance {tolerance:g}{_effect_sentence(runs, tolerance)}"
         )
-    known = [one for one in runs if one.errors or one.distances]
-    worst, least = min(
-        ((worst_error(one, names, tolerance), one) for one in known), key=lambda found: found[0]
-    )
-    share = format_number(worst.share, 2)
-    if worst.share >= NO_EFFECT_RATIO * max(
-        worst_error(one, [worst.name], tolerance).share for one in known if worst.name in one.values
-    ):
+    known = [run for run in runs if run.errors or run.distances]
+    best = min(known, key=lambda run: worst_error(run, names, tolerance))
+    worst = worst_error(best, names, tolerance)
+    size = format_number(worst.fraction, 2)
+    sizes = []
+    for run in known:
+        if worst.name in run.values:
+            sizes.append(worst_error(run, [worst.name], tolerance).fraction)
+    if worst.fraction >= NO_EFFECT_RATIO * max(sizes):
         return (
             f"no setting meets the tolerance {tolerance:g}: with every setting the error of {worst.name} is "
-            f"{share}"
+            f"{size}"
         )
     return (
-        f"no setting meets the tolerance {tolerance:g}: the best run, with {least.words}, has an error of "
-        f"{share} in {worst.name} and takes {_format_seconds(least)}"
+        f"no setting meets the tolerance {tolerance:g}: the best run, with {best.words}, has an error of "
+        f"{size} in {worst.name} and takes {_format_seconds(best)}"
     )
 
 
 def _effect_sentence(runs: list, tolerance: float) -> str:
     """Return a clause about settings that change nothing relevant; "" if they change something."""
-    turned = changed_measures(runs)
-    if len(runs) < 2 or any(
-        one.distances.get(name, 0.0)
-        > compute_allowed_error(tolerance, abs(one.values[name]), one.floors[name])
-        for one in runs
-        for name in turned
-        if name in one.values
-    ):
+    names = changed_measures(runs)
+    if len(runs) < 2:
         return ""
-    return "; the other settings change no result" + (
-        " by more than the tolerance" if turned else " of this scene"
-    )
+    for run in runs:
+        for name in names:
+            distance = run.distances.get(name, 0.0)
+            if name in run.values and not run._allows(name, distance, tolerance):
+                return ""
+    extent = " by more than the tolerance" if names else " of this scene"
+    return f"; the other settings change no result{extent}"
 
 
-def _format_seconds(one: Cost) -> str:
+def _format_seconds(run: Cost) -> str:
     """Format CPU seconds with two digits."""
-    return f"{format_number(one.seconds, 2)} CPU s"
+    return f"{format_number(run.seconds, 2)} CPU s"
 
 
 class WorstError(NamedTuple):
     """The measure of a run whose error is largest compared with its tolerance.
 
-    share: error / error that a tolerance of 1 would allow, to be compared with the tolerance; name:
-    of the measure, "" if no error is known.
+    fraction: error / error that a tolerance of 1 would allow, to be compared with the tolerance;
+    name: of the measure, "" if no error is known.
     """
 
-    share: float
+    fraction: float
     name: str
 
 
-def worst_error(one: Cost, names: list, tolerance: float) -> WorstError:
-    """Find the measure, of `names`, whose error in a run is largest compared with a tolerance."""
-    sizes = {
-        name: abs(one.values[name]) + one.floors[name] / tolerance
-        for name in names
-        if one.known_error(name)
-    }
-    return max(
-        (
-            WorstError(one.known_error(name) / size if size else inf, name)
-            for name, size in sizes.items()
-        ),
-        default=WorstError(0.0, ""),
-    )
+def worst_error(run: Cost, names: Sequence, tolerance: float) -> WorstError:
+    """Find the measure whose error in a run is largest compared with a tolerance.
+
+    Parameters
+    ----------
+    run : Cost
+    names : sequence of str
+        Measures that are compared.
+    tolerance : float
+
+    Returns
+    -------
+    WorstError
+    """
+    worst = WorstError(0.0, "")
+    for name in names:
+        error = run.known_error(name)
+        if error:
+            size = abs(run.values[name]) + run.floors[name] / tolerance
+            worst = max(worst, WorstError(error / size if size else inf, name))
+    return worst
 
 
-def worst_of_run(one: Cost) -> WorstError:
+def worst_of_run(run: Cost) -> WorstError:
     """Return `worst_error` of all measures of a run for the tolerance that was set for it."""
-    return worst_error(one, list(one.values), one.tolerance)
+    return worst_error(run, list(run.values), run.tolerance)
 
 
 def measures_with_error(runs: list) -> list:
     """Return the measures whose error is stated by any run; all measures if no run states one."""
-    return [name for name in runs[-1].values if any(name in one.errors for one in runs)] or list(
-        runs[-1].values
-    )
+    names = list(runs[-1].values)
+    return [name for name in names if any(name in run.errors for run in runs)] or names

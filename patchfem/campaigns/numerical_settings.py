@@ -14,12 +14,7 @@ NUMERICAL_SETTINGS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
 N_VALUES = 5  # number of values of a setting; each is twice as fine as the one before
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)  # tolerances of a mesh that is chosen automatically
 # Tolerances of a whole scene; smaller ones take long, and few scenes meet them.
-SCENE_TOLERANCES = (
-    1e-1,
-    1e-2,
-    1e-3,
-    1e-4,
-)
+SCENE_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)
 MAX_CELLS = 1600  # columns of the finest uniform mesh
 MAX_STEPS = 12800
 DEFAULT_MIDDLES = {"shear_modes": 8, "jumps": 8}  # middle value, if the scene does not set the key
@@ -53,22 +48,17 @@ def applicable_settings(model: Model) -> list:
 
     They are its element size, time steps, shear modes, and the jumps over cycles of wear.
     """
-    out = ["element_size"] if model.patch is not None else []
-    engine = plan(model).engine
+    settings = ["element_size"] if model.patch is not None else []
     # The sum over the bonds takes the same steps as a bench.
-    engine = "bench" if model.kind == "bench" else engine
-    out += [
-        knob
-        for knob in ("steps_per_cycle", "shear_modes")
-        if has_effect(knob, model.kind, engine)
-        and (
-            knob != "shear_modes"
-            or (model.partial_slip and law_has_trait(model.friction.law, "bonds"))
-        )
-    ]
+    engine_name = "bench" if model.kind == "bench" else plan(model).engine
+    if has_effect("steps_per_cycle", model.kind, engine_name):
+        settings.append("steps_per_cycle")
+    has_shear_modes = model.partial_slip and law_has_trait(model.friction.law, "bonds")
+    if has_shear_modes and has_effect("shear_modes", model.kind, engine_name):
+        settings.append("shear_modes")
     if model.wear is not None and model.patch is not None:
-        out.append("jumps")
-    return out
+        settings.append("jumps")
+    return settings
 
 
 def list_settings(model: Model, knob: str) -> list:
@@ -76,25 +66,22 @@ def list_settings(model: Model, knob: str) -> list:
 
     A value that the tolerance chooses comes last if the others are numbers.
     """
-    if knob == "element_size":
-        if model.patch.mesh.file is not None:
-            return [
-                Setting(
-                    f"file, edges / {2**level}", float(2**-level), _split_words(level), model, level
-                )
-                for level in range(3)
-            ]
-        return _by_tolerance(model) if model.patch.mesh.is_automatic else _uniform_meshes(model)
-    return _integer_values(model, knob)
+    if knob != "element_size":
+        return _integer_values(model, knob)
+    if model.patch.mesh.file is not None:
+        return _split_meshes(model)
+    return _by_tolerance(model) if model.patch.mesh.is_automatic else _uniform_meshes(model)
 
 
-def _split_words(level: int) -> str:
-    """Describe a mesh file whose edges are halved `level` times."""
-    return (
-        f"contact.mesh with every element edge halved {level} times"
-        if level
-        else "contact.mesh as it is"
-    )
+def _split_meshes(model: Model) -> list:
+    """Return the mesh of a file, and meshes in which its edges are halved."""
+    settings = []
+    for level in range(3):
+        words = "contact.mesh as it is"
+        if level:
+            words = f"contact.mesh with every element edge halved {level} times"
+        settings.append(Setting(f"file, edges / {2**level}", float(2**-level), words, model, level))
+    return settings
 
 
 def with_tolerance(model: Model) -> list:
@@ -102,49 +89,60 @@ def with_tolerance(model: Model) -> list:
 
     The tolerance of the scene is one of them.
     """
-    own = model.accuracy.tolerance
-    models = {one: with_setting(model, "tolerance", one) for one in SCENE_TOLERANCES} | {own: model}
-    return [
-        Setting(f"{one:g}", one, f"tolerance {one:g}", models[one])
-        for one in sorted(models, reverse=True)
-    ]
+    models = {value: with_setting(model, "tolerance", value) for value in SCENE_TOLERANCES}
+    models[model.accuracy.tolerance] = model
+    settings = []
+    for value in sorted(models, reverse=True):
+        settings.append(Setting(f"{value:g}", value, f"tolerance {value:g}", models[value]))
+    return settings
 
 
 def with_setting(model: Model, key: str, value: float) -> Model:
-    """Return a model with another value of a key of [accuracy]."""
+    """Return a model with another value of a key of [accuracy].
+
+    Parameters
+    ----------
+    model : Model
+    key : str
+        Key of the table, such as "tolerance".
+    value : float
+
+    Returns
+    -------
+    Model
+    """
     return replace(model, accuracy=model.accuracy.model_copy(update={key: value}))
 
 
 def _by_tolerance(model: Model) -> list:
     """Return meshes that several tolerances choose; the label of the scene's mesh has no number."""
-    own = model.accuracy.tolerance
-    return [
-        Setting(
-            f"tolerance {one:g}",
-            one,
-            "element size set by the tolerance" + f" {one:g}" * (one != own),
-            replace(model, patch=model.patch.with_mesh(tolerance=one)),
-        )
-        for one in sorted({*TOLERANCES, own}, reverse=True)
-    ]
+    scene_tolerance = model.accuracy.tolerance
+    settings = []
+    for value in sorted({*TOLERANCES, scene_tolerance}, reverse=True):
+        words = "element size set by the tolerance"
+        if value != scene_tolerance:
+            words += f" {value:g}"
+        meshed = replace(model, patch=model.patch.with_mesh(tolerance=value))
+        settings.append(Setting(f"tolerance {value:g}", value, words, meshed))
+    return settings
 
 
 def _uniform_meshes(model: Model) -> list:
     """Return uniform meshes, and for a static patch also the mesh that its tolerance chooses."""
     length = model.patch.pieces.length
-    out = []
+    settings = []
     middle = round(length / model.patch.uniform_element_size)
     for power in range(-3, N_VALUES - 3):
         cells = round(middle * 2.0**power)
         if 8 <= cells <= MAX_CELLS or not power:
             label = f"{1e6 * length / cells:.4g} um"
             size = length / cells
-            turned = replace(model, patch=model.patch.with_element_size(size)) if power else model
-            out.append(Setting(label, size, f"element size {label}", turned))
+            meshed = replace(model, patch=model.patch.with_element_size(size)) if power else model
+            settings.append(Setting(label, size, f"element size {label}", meshed))
     if model.kind == "patch":
         chosen = replace(model, patch=model.patch.with_element_size(None))
-        out.append(Setting("by tolerance", None, "element size set by the tolerance", chosen))
-    return out
+        settings.append(Setting("by tolerance", None, "element size set by the tolerance", chosen))
+    return settings
 
 
 def _integer_values(model: Model, knob: str) -> list:
@@ -154,22 +152,23 @@ def _integer_values(model: Model, knob: str) -> list:
     shear modes.
     """
     pinned = _scene_value(model, knob)
+    has_steps = knob == "steps_per_cycle"
     middle = _middle_value(model, knob)
-    words = "{} " + knob.replace("_", " ")
+    unit = knob.replace("_", " ")
     models = {}
     for power in range(-2, N_VALUES - 2):
         value = max(1, round(middle * 2.0**power))
-        own = not power and (pinned or knob == "steps_per_cycle")
-        if own or knob != "steps_per_cycle" or 4 <= value <= MAX_STEPS:
-            models[value] = model if own else _with_integer(model, knob, value)
-    out = []
-    for value, turned in models.items():
-        out.append(Setting(str(value), float(value), words.format(value), turned))
-    if not pinned and knob != "steps_per_cycle":
-        out.append(
-            Setting("by tolerance", None, words.format("").strip() + " set by the tolerance", model)
-        )
-    return out
+        is_scene_value = not power and (pinned or has_steps)
+        if is_scene_value:
+            models[value] = model
+        elif not has_steps or 4 <= value <= MAX_STEPS:
+            models[value] = _with_integer(model, knob, value)
+    settings = []
+    for value, changed in models.items():
+        settings.append(Setting(str(value), float(value), f"{value} {unit}", changed))
+    if not pinned and not has_steps:
+        settings.append(Setting("by tolerance", None, f"{unit} set by the tolerance", model))
+    return settings
 
 
 def _scene_value(model: Model, knob: str) -> int | None:
@@ -183,7 +182,6 @@ def _middle_value(model: Model, knob: str) -> int:
         return _scene_value(model, knob) or DEFAULT_MIDDLES[knob]
     if model.kind == "bench":
         return engine.steps_per_cycle(model)
-
     return numerics.choose(model).steps
 
 

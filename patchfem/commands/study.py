@@ -13,6 +13,7 @@ from ..export import backbone as backbone_files
 from ..export import cost as cost_files
 from ..export import results
 from ..export.fits import request as fits
+from ..export.fits.options import FitOptions
 from ..runs import joint
 from ..scene import axes
 from .shared import (
@@ -116,7 +117,7 @@ def backbone(
     lengths = axes.read_lengths(amplitudes, "--amplitudes") if amplitudes else None
     target = choose_folder(out, f"{free_model.source.path.stem}-backbone")
     with results.Folder(target) as folder:
-        backbone_result = backbones.backbone(
+        backbone_result = backbones.compute_backbone(
             free_model,
             mode,
             lengths,
@@ -219,7 +220,7 @@ def fit(
     """
     loaded_scene = load_scene(scene, set_)
     target = choose_folder(out, f"{scene.stem}-fit")
-    options = fits.Options(
+    options = FitOptions(
         hold, offset, warm_up, from_patch=from_patch, amplitudes=amplitudes, **vars(rows)
     )
     with progress_bar(

@@ -83,7 +83,7 @@ def format_cost(knob: str, runs: list, tolerance: float) -> list[str]:
     width = max(len(knob), *(len(one.label) for one, *_ in rows))
     out = [f"{knob:<{width}}  {'CPU s':>6}  {'error':>8}  worst measure"]
     for one, worst, comment in rows:
-        error = format_number(worst.share, 2) if worst.share > ROUND_OFF else "exact"
+        error = format_number(worst.fraction, 2) if worst.fraction > ROUND_OFF else "exact"
         text = f"{one.label:<{width}}  {format_number(one.seconds, 2):>6}  {error:>8}  {worst.name}"
         out.append(f"{text.rstrip()}{comment}")
     return [*out, *last]
@@ -115,7 +115,7 @@ def _format_outcome(group: list) -> str:
     if last.meets_tolerance():
         return f"{missed}, but with {seconds}"
     worst = worst_of_run(last)
-    return f"{missed}, nor with {seconds}: {format_number(worst.share, 2)} in {worst.name}"
+    return f"{missed}, nor with {seconds}: {format_number(worst.fraction, 2)} in {worst.name}"
 
 
 def format_details(knob: str, runs: list, tolerance: float) -> list[str]:
@@ -299,7 +299,7 @@ def cost_data(knob: str, runs: list, tolerance: float) -> dict:
         out.append(
             {name: getattr(run, name) for name in parts}
             | {
-                "worst": {"measure": worst.name, "error": worst.share},
+                "worst": {"measure": worst.name, "error": worst.fraction},
                 "meets_tolerance": run.meets_tolerance(),
                 "remedies": list(run.remedies),
             }
@@ -332,9 +332,9 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
         for run in runs
     ]
     points = [
-        Point(one, measure_error.share)
+        Point(one, measure_error.fraction)
         for one, measure_error in zip(runs, worst, strict=True)
-        if measure_error.share > ROUND_OFF
+        if measure_error.fraction > ROUND_OFF
     ]
     marks = [
         charts.make_line(

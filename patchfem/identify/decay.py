@@ -86,11 +86,11 @@ def fit_decay(time, value) -> Decay:
     best = _RefinedPoles(np.empty(0), value - value.mean())
     size = best.rms
     while best.poles.size < 2 * MAX_SINUSOIDS and best.rms > MIN_MISFIT * size:
-        attempts = [
-            _refine_poles(time, value, np.append(best.poles, start))
-            for start in _find_starts(time, best)
-        ]
-        attempts = [attempt for attempt in attempts if _are_distinct(time, attempt.poles)]
+        attempts = []
+        for start in _find_starts(time, best):
+            attempt = _refine_poles(time, value, np.append(best.poles, start))
+            if _are_distinct(time, attempt.poles):
+                attempts.append(attempt)
         if not attempts:
             break
         attempt = min(attempts, key=lambda attempt: np.linalg.norm(attempt.residual))

@@ -130,18 +130,18 @@ class _ModeProblem:
             by_damping.append(self._derivatives(motion, damping, -w * z * z * w / damped_omega))
         return _Columns(np.stack(columns, axis=1), by_frequency, by_damping)
 
-    def _derivatives(self, motion: tuple, by_pole, by_omega) -> tuple:
+    def _derivatives(self, motion: tuple, by_pole, by_omega) -> list:
         """Compute the derivatives of the three columns of a mode with respect to ln w or ln zeta.
 
         `motion` holds its pole, decay rate, cosine and sine. `by_pole` and `by_omega` are the derivatives
         of 1/pole and of the damped frequency.
         """
         pole, rate, cosine, sine = motion
-        return (
+        return [
             self._transform_back(-self.input * pole**2 * by_pole),
             -self.time * (rate * cosine + by_omega * sine),
             -self.time * (rate * sine - by_omega * cosine),
-        )
+        ]
 
     def solve(self, theta) -> Projection:
         """Solve the linear problem for given modes."""
@@ -160,7 +160,16 @@ class _ModeProblem:
         return linear.jacobian(np.stack(slopes, axis=1))
 
     def refine(self, theta, max_evaluations: int = 100, tolerance: float = 1e-13) -> _ModeFit:
-        """Minimize the residual from a start, until its relative change is below a tolerance."""
+        """Minimize the residual from a start.
+
+        Parameters
+        ----------
+        theta : (2n,) ndarray
+            Start.
+        max_evaluations : int
+        tolerance : float
+            Relative change at which the iteration ends.
+        """
         n = theta.size // 2
         low = np.repeat(np.log([self.omega[1] / 2, MIN_ZETA]), n)
         high = np.repeat(np.log([np.pi / self.step, MAX_ZETA]), n)
@@ -244,10 +253,10 @@ def _add_modes(record: _ModeProblem, estimate: Estimate) -> _ModeFit:
     min_reduction = MIN_RMS_RATIO**2 * fit.residual.size * record.size**2
     min_square = (MIN_MISFIT * record.size) ** 2 * fit.residual.size
     while fit.theta.size < 2 * MAX_MODES and fit.sum_of_squares > min_square:
-        attempts = [
-            record.refine(add_mode(fit.theta, *start), MAX_START_EVALUATIONS, 1e-3)
-            for start in _find_starts(record, estimate, fit.residual)
-        ]
+        attempts = []
+        for start in _find_starts(record, estimate, fit.residual):
+            theta = add_mode(fit.theta, *start)
+            attempts.append(record.refine(theta, MAX_START_EVALUATIONS, 1e-3))
         best = min(attempts, key=lambda attempt: attempt.sum_of_squares)
         reduction = fit.sum_of_squares - best.sum_of_squares
         if reduction < max(MIN_RESIDUAL_DECREASE * fit.sum_of_squares, min_reduction):

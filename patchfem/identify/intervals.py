@@ -123,7 +123,8 @@ def compute_intervals(
     has_effect = size > MIN_RESIDUAL_EFFECT * model.largest * np.sqrt(model.rows)
     inner = [i for i in range(n) if 0 < u[i] < 1 and has_effect[i]]
     inverse, null = _invert_normal_matrix(jacobian[:, inner], size[inner])
-    unknown = {inner[k] for row in null for k in np.flatnonzero(row**2 > MIN_DIRECTION_COMPONENT)}
+    is_unknown = (null**2 > MIN_DIRECTION_COMPONENT).any(axis=0)
+    unknown = set(np.array(inner, int)[is_unknown].tolist())
     quantile = student.ppf(0.975, dof)
     covariance = np.full((n, n), np.nan)
     covariance[np.ix_(inner, inner)] = inverse * cost / dof

@@ -7,7 +7,7 @@ residual is not linear over an interval, and at a bound, the interval follows fr
 squares.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 
 from ..core import NotConverged, Outcome, frozen_array
 from .intervals import FitIntervals, compute_intervals, make_unknown_intervals
-from .space import CubeResidual, make_space, make_space_filling_points
+from .space import CubeResidual, SearchSpace, make_space, make_space_filling_points
 
 COST_TOL = 1e-10  # relative change of the sum of squares in a step at which a descent ends
 QUICK_COST_TOL = 1e-4  # COST_TOL of a residual that is expensive to evaluate
@@ -88,56 +88,59 @@ class Descent(NamedTuple):
         return float(np.sqrt(self.cost / self.rows)) if np.isfinite(self.cost) else np.nan
 
 
-def fit(
-    residual: Callable,
-    low,
-    high,
-    log=None,
-    start=None,
-    max_descents: int = 3,
-    interval_kind: str = "rows",
-) -> Fit:
-    """Minimize the sum of squares of a residual within bounds.
+@dataclass(frozen=True, eq=False, slots=True)
+class Problem:
+    """Least-squares problem: a residual as a function of n bounded values.
 
-    Parameters
-    ----------
-    residual : callable
-        Function of values (n,) that returns the residual (r,). If it raises a PatchfemError or is not
-        finite, the evaluation is counted as failed.
-    low, high : (n,) array_like
-        Bounds.
-    log : (n,) array_like of bool, optional
-        Whether each value is searched in logarithms (see `space.make_space`).
-    start : (n,) array_like, optional
-        Values from which the first descent starts.
-    max_descents : int
-        Largest number of descents; with 1 only that from `start`, if it works.
-    interval_kind : str
-        ``"rows"`` takes rows as independent, ``"series"`` counts correlated neighbours as fewer. ``""``
-        leaves the intervals NaN, and tries no value on its bound; ``"bounds"`` only leaves the intervals.
-
-    Returns
-    -------
-    Fit
-
-    Raises
-    ------
-    ValueError
-        If the bounds are wrong, or if there are fewer rows than values.
-    NotConverged
-        If all starts fail.
+    - residual: function of values (n,) that returns the residual (r,), each row divided by its weight. If it
+      raises a PatchfemError or is not finite, the evaluation is counted as failed.
+    - low, high: bounds (n,).
+    - log: whether each value is searched in logarithms (n,); by default as `space.make_space` chooses.
+    - start: values (n,) from which the first descent starts, or None.
     """
-    box = make_space(low, high, log)
-    model = CubeResidual(residual, box)
-    n = box.low.size
-    starting_points = choose_starting_points(
-        model, None if start is None else box.unit(start), max_descents
-    )
-    if model.rows < n:
-        raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
-    return assemble_fit(
-        model, run_descents(model, starting_points, stops_when_exact=True), interval_kind
-    )
+
+    residual: Callable
+    low: Sequence
+    high: Sequence
+    log: Sequence | None = None
+    start: Sequence | None = None
+
+    @property
+    def space(self) -> SearchSpace:
+        """The space of the values; ValueError if the bounds are wrong."""
+        return make_space(self.low, self.high, self.log)
+
+    def solve(self, max_descents: int = 3, interval_kind: str = "rows") -> Fit:
+        """Minimize the sum of squares of the residual within the bounds.
+
+        Parameters
+        ----------
+        max_descents : int
+            Largest number of descents; with 1 only that from `start`, if it works.
+        interval_kind : str
+            ``"rows"`` takes rows as independent, ``"series"`` counts correlated neighbours as fewer. ``""``
+            leaves the intervals NaN, and tries no value on its bound; ``"bounds"`` only leaves the intervals.
+
+        Returns
+        -------
+        Fit
+
+        Raises
+        ------
+        ValueError
+            If the bounds are wrong, or if there are fewer rows than values.
+        NotConverged
+            If all starts fail.
+        """
+        space = self.space
+        model = CubeResidual(self.residual, space)
+        n = space.low.size
+        start = None if self.start is None else space.unit(self.start)
+        starting_points = choose_starting_points(model, start, max_descents)
+        if model.rows < n:
+            raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
+        ends = run_descents(model, starting_points, stops_when_exact=True)
+        return assemble_fit(model, ends, interval_kind)
 
 
 def run_descents(
@@ -162,7 +165,7 @@ def run_descents(
         ``saved(k)`` returns the descent from point k of an earlier search, or None; ``saved(k,
         descent)`` stores it.
     before_descent : callable, optional
-        Is called before_descent each descent.
+        Is called before each descent.
     report : callable, optional
         Is called with 1 after each descent.
 
@@ -196,7 +199,7 @@ def assemble_fit(
     model : CubeResidual
     ends : list of Descent
     interval_kind : str
-        As in `fit`.
+        As in `Problem.solve`.
     first_descents : list of Descent, optional
         Descents that show whether several found the same valley, if `ends` continues the best of them.
 
@@ -270,6 +273,33 @@ def choose_starting_points(model: CubeResidual, own, count: int, trials: int = 0
     return best[: max(1, count)]
 
 
+class _CubeSlice(NamedTuple):
+    """Residual over some coordinates of the unit cube; the others keep their values.
+
+    - model: residual over the whole cube.
+    - u: point (n,) of the cube.
+    - free: indices of the coordinates (f,) that may change.
+    """
+
+    model: CubeResidual
+    u: np.ndarray
+    free: list
+
+    def point(self, part) -> np.ndarray:
+        """Return the point (n,) with the values `part` (f,) of the free coordinates."""
+        moved = self.u.copy()
+        moved[self.free] = part
+        return moved
+
+    def residual(self, part) -> np.ndarray:
+        """Return the residual (r,), with a penalty where it fails."""
+        return self.model.with_penalty(self.point(part))
+
+    def jacobian(self, part) -> np.ndarray:
+        """Return the derivatives (r, f) of the residual."""
+        return self.model.jacobian(self.point(part), self.free)
+
+
 def descend(model: CubeResidual, u, free) -> Descent:
     """Descend from a point of the unit cube by SciPy's trust-region reflective method.
 
@@ -296,32 +326,28 @@ def descend(model: CubeResidual, u, free) -> Descent:
     if not free:
         return start
 
-    def point(part) -> np.ndarray:
-        moved = u.copy()
-        moved[free] = part
-        return moved
-
-    # the trust region starting_points inside the bounds
+    slice_of_cube = _CubeSlice(model, u, free)
+    # the trust region starts inside the bounds
     for margin in (1e-3, 1e-9):
         begin = np.clip(u[free], margin, 1 - margin)
-        if model(point(begin)) is not None:
+        if model(slice_of_cube.point(begin)) is not None:
             break
     else:
         return start._replace(is_converged=False)
-    size = max(float(np.abs(model.with_penalty(point(begin))).max()), 1e-300)
+    size = max(float(np.abs(slice_of_cube.residual(begin)).max()), 1e-300)
     ftol = QUICK_COST_TOL if model.is_quick else COST_TOL
     result = least_squares(
-        lambda p: model.with_penalty(point(p)) / size,
+        lambda part: slice_of_cube.residual(part) / size,
         begin,
         bounds=(0, 1),
         method="trf",
-        jac=lambda p: model.jacobian(point(p), free) / size,
+        jac=lambda part: slice_of_cube.jacobian(part) / size,
         ftol=ftol,
         xtol=10 * ftol,
         gtol=1e-15,
         max_nfev=MAX_EVALUATIONS,
     )
-    end = point(result.x)
+    end = slice_of_cube.point(result.x)
     residual = model(end)
     is_converged = result.status > 0
     if residual is None or residual @ residual > start.cost:

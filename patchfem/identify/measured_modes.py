@@ -171,11 +171,12 @@ def _convert_force_residues(modes: DrivenModes) -> _ModeRows:
             "not at the same point, or one of the two has the wrong sign, so the modal mass is unknown"
         )
     motion = np.sqrt(np.abs(modes.residue) / first)
-    notes = [
-        f"the mode at {f:.5g} Hz moves against the force, which is impossible if force and response are at the "
-        "same point; the sign of this mode is ignored"
-        for f in modes.frequency[modes.residue < 0]
-    ]
+    notes = []
+    for frequency in modes.frequency[modes.residue < 0]:
+        notes.append(
+            f"the mode at {frequency:.5g} Hz moves against the force, which is impossible if force and response are "
+            "at the same point; the sign of this mode is ignored"
+        )
     return _ModeRows({"slide": motion, "output": motion}, 1 / float(first), notes)
 
 
@@ -296,10 +297,11 @@ def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
 def identify_decay_modes(values: dict, begin: float | None = None) -> ListedModes:
     """Identify modes from a free decay that begins at `begin` [s], by default at the maximum."""
     decay = fit_decay(*_select_decay(values, begin))
-    descriptions = [
-        f"damping {zeta:.4g} +- {error:.1g}, logarithmic decrement {decrement:.4g}"
-        for zeta, error, decrement in zip(decay.damping, decay.error, decay.decrement())
-    ]
+    descriptions = []
+    for zeta, error, decrement in zip(decay.damping, decay.error, decay.decrement()):
+        descriptions.append(
+            f"damping {zeta:.4g} +- {error:.1g}, logarithmic decrement {decrement:.4g}"
+        )
     notes = [
         "a free decay gives neither the modal mass nor the mode shapes: set moving_mass, slide, base and output"
     ]

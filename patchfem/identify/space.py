@@ -125,12 +125,12 @@ class CubeResidual:
         return self._last_residual
 
     def _remember(self, u, residual) -> None:
-        """Keep the last residual, because the next evaluation is often at the same point."""
+        """Keep the residual at u (n,), because the next evaluation is often at the same point."""
         self._last_point = np.array(u)
         self._last_residual = residual
 
     def _evaluate(self, u) -> np.ndarray | None:
-        """Evaluate the residual and count it."""
+        """Evaluate the residual at u (n,) and count it."""
         self.evaluations += 1
         reason = ""
         try:
@@ -150,7 +150,7 @@ class CubeResidual:
         return residual
 
     def with_penalty(self, u) -> np.ndarray:
-        """Evaluate the residual (r,); if it fails, return rows larger than all others so far."""
+        """Evaluate the residual (r,) at u (n,); where it fails, return rows larger than all so far."""
         residual = self(u)
         if residual is None:
             return np.full(self.rows, PENALTY_FACTOR * max(self.largest, 1e-300))
@@ -173,7 +173,7 @@ class CubeResidual:
         return np.column_stack(columns) if columns else np.zeros((self.rows, 0))
 
     def _neighbours(self, u, i: int) -> dict:
-        """Evaluate the residual at points beside u, by their number of steps along a coordinate."""
+        """Evaluate the residual at points beside u, by their number of steps along coordinate i."""
         neighbours = {}
         for n_steps in (1, -1, 2, -2):
             if self.is_quick and neighbours:

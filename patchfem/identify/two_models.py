@@ -96,12 +96,9 @@ class TwoModels:
                 errors.append(error)
         if not points:
             raise errors[0]
-        least = min(point.sum_of_squares for point in points)
-        refined = [
-            self._search_with_slopes(point)
-            for point in points
-            if point.sum_of_squares <= MAX_RIVAL_COST_RATIO * least
-        ]
+        limit = MAX_RIVAL_COST_RATIO * min(point.sum_of_squares for point in points)
+        rivals = [point for point in points if point.sum_of_squares <= limit]
+        refined = list(map(self._search_with_slopes, rivals))
         best = min(refined, key=lambda point: point.sum_of_squares)
         return best.model, self.space.values(best.u)
 
@@ -133,7 +130,7 @@ class TwoModels:
     def _search_with_value(self, u) -> _SearchPoint:
         """Minimize with the cheap model, corrected to the expensive one at the last minimum.
 
-        Both steps are repeated until the models agree. Returns the best point.
+        Both steps are repeated from u (n,) until the models agree. Returns the best point.
         """
         expensive = self.expensive(self.space.values(u))
         best = _SearchPoint(self._sum_of_squares(expensive), u)

@@ -24,14 +24,15 @@ def describe_fit(fit: Fit, names) -> list:
     -------
     list of str
     """
-    sentences = [
-        f"{names[i]} is at its {side} bound {fit.values[i]:.6g}: widen the range, or try another law"
-        for i, side in enumerate(fit.at_bound)
-        if side
-    ]
+    sentences = []
+    for name, side, value in zip(names, fit.at_bound, fit.values):
+        if side:
+            sentences.append(
+                f"{name} is at its {side} bound {value:.6g}: widen the range, or try another law"
+            )
     intervals = fit.intervals
     sentences += [_describe_combination(row, names) for row in intervals.unknown]
-    in_combination = {i for row in intervals.unknown for i in np.flatnonzero(row)}
+    in_combination = intervals.unknown.any(axis=0)
     min_sensitivity = MIN_SENSITIVITY * max(float(np.max(intervals.sensitivity)), fit.rms)
     for i, name in enumerate(names):
         if np.isfinite(intervals.ends[i]).all():
@@ -42,7 +43,7 @@ def describe_fit(fit: Fit, names) -> list:
             sentences.append(
                 f"{name} has no effect on the computed data, so its value is not determined"
             )
-        elif i not in in_combination:
+        elif not in_combination[i]:
             sentences.append(
                 f"{name} is not determined: its interval of 95 % reaches both ends of its range"
             )

@@ -32,7 +32,7 @@ from figure_27 import POINT
 from modal_test import marched
 from told import told
 
-from patchfem.campaigns.rows.asked import FitRequest
+from patchfem.campaigns.rows.condition_models import FitRequest
 from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.inputs.measured import read_table
@@ -139,7 +139,7 @@ def fitted(gauge: bool):
     assert not wrong
     return fit_rows(
         FitRequest(scene, wanted, TABLE),
-        RowsOptions((HOLD,), how=SearchSettings(STARTS, SEED, "bound")),
+        RowsOptions((HOLD,), search=SearchSettings(STARTS, SEED, "bound")),
     )
 
 
@@ -205,15 +205,15 @@ def main(path: Path | None = HERE / "steps.svg", fits: bool = True) -> tuple:
         )
     fit = {gauge: fitted(gauge) for gauge in ((False, True) if fits else ())}
     for one in fit.values():
-        names = [free.key.rpartition(".")[2] for free in one.asked.wanted]
+        names = [free.key.rpartition(".")[2] for free in one.models.ranges]
         values = ", ".join(
             f"{name} {value:.4g} [{low:.4g}, {high:.4g}]"
             for name, value, (low, high) in zip(
                 names, one.keys.fit.values, one.keys.fit.intervals.ends
             )
         )
-        best = int((one.found.rms < 1.01 * np.nanmin(one.found.rms)).sum())
-        scored = one.scored(one.logs, one.left)
+        best = int((one.search.rms < 1.01 * np.nanmin(one.search.rms)).sum())
+        scored = one.score(one.logs, one.left_out_logs)
         print(
             f"{values}; fitted {shown(scored['fitted'])}, predicted {shown(scored['held_out'])}; {best} of {STARTS} "
             "starts end there"

@@ -9,8 +9,8 @@ from math import pi
 
 import numpy as np
 
-from patchfem.campaigns.rows.asked import ConditionModels, FitRequest
 from patchfem.campaigns.rows.computed import ModelReadings
+from patchfem.campaigns.rows.condition_models import ConditionModels, FitRequest
 from patchfem.core import frozen_array
 from patchfem.model.model import build
 
@@ -44,7 +44,7 @@ class Derived(FitRequest):
         self.derive = derive
 
     def condition_models(self, conditions, *sets: str) -> ConditionModels:
-        return DerivedAsked(self.scene, conditions, self.wanted, self.measured, self.derive)
+        return DerivedAsked(self.scene, conditions, self.ranges, self.measured, self.derive)
 
 
 class DerivedAsked(ConditionModels):
@@ -56,10 +56,10 @@ class DerivedAsked(ConditionModels):
 
     def strings(self, values) -> list:
         """--set strings of values (n,)."""
-        keys = [k for k in self.inner if not isinstance(self.wanted[k], Number)]
+        keys = [k for k in self.inner if not isinstance(self.ranges[k], Number)]
         numbers = [float(values[k]) for k in self.inner if k not in keys]
         return [
-            *(self.wanted[k].format_assignment(values[k]) for k in keys),
+            *(self.ranges[k].format_assignment(values[k]) for k in keys),
             *(self.derive(*numbers) if self.derive else ()),
         ]
 
@@ -118,11 +118,11 @@ class Worn(ModelReadings):
         first = float(values[0])
         depth = 0.0
         found = {}
-        load = self.asked.scene.normal.load
+        load = self.models.scene.normal.load
         for row in range(max(conditions) + 1):
             static = first * max(1 + (values[-1] - 1) * depth / DEPTH, 0.05)
             found |= super()._run([static, *values[1:]], [row])
             swing = found[row][1]
-            cycles = self.asked.sine(row).omega / (2 * pi) * 60 * MINUTES
+            cycles = self.models.sine(row).omega / (2 * pi) * 60 * MINUTES
             depth += COEFFICIENT * load / AREA * 4 * max(min(swing, 1e-3) - BOND, 0.0) * cycles
         return found

@@ -90,7 +90,7 @@ def fitted(
     cells = cells_for(rung)
     seen = training(cells, protocol)
     computed = computed_for(rung, reading, cells, seen, placebo)
-    begins = [] if placebo else contained(rung, reading, protocol, computed.asked.wanted, known())
+    begins = [] if placebo else contained(rung, reading, protocol, computed.models.ranges, known())
     first = starts or (one.starts if protocol in ("143", "without 143") else (one.starts + 1) // 2)
     values, ends, valleys = best_of(
         cells, computed, seen, first, most or starts or one.most, begins
@@ -103,9 +103,9 @@ def fitted(
         "reading": reading,
         "protocol": protocol,
         "placebo": placebo,
-        "keys": [free.key for free in computed.asked.wanted],
+        "keys": [free.key for free in computed.models.ranges],
         "values": rounded(values, 6),
-        "at_bound": bounds(computed.asked.wanted, values),
+        "at_bound": bounds(computed.models.ranges, values),
         "gain": gain(computed, reading, values),
         "fitted": rounded(scores(cells, logs, seen)),
         "others": rounded(scores(cells, logs, ~seen)),
@@ -114,7 +114,7 @@ def fitted(
         "cells": rounded(answer / np.array([[G_N], [MIL]])),
         "valleys": valleys,
         "starts": rounded(ends),
-        "motions": computed.runs,
+        "motions": computed.n_motions,
         "seconds": round(time.process_time() - begin, 1),
     }
 
@@ -155,7 +155,7 @@ def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
     valleys: {"starts", "best": how many of them ended in the best valley, "tied": of every other valley within TIED of
     the best training score its training score and the scores of the readings that were not fitted}.
     """
-    wanted = computed.asked.wanted
+    wanted = computed.models.ranges
     residual = make_residual(cells, computed, seen, "bound")
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
     quick = CubeResidual(residual, box, is_quick=True)
@@ -204,7 +204,7 @@ def screened(quick, points, forget) -> np.ndarray:
 def valleys_of(cells, computed, seen, last, ends) -> tuple:
     """(number of ends in the best valley, the other valleys near it) of (values, rms) at the ends of the starts; last:
     the Descent to the bottom of the best."""
-    wanted = computed.asked.wanted
+    wanted = computed.models.ranges
     residual = make_residual(cells, computed, seen, "bound")
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
 

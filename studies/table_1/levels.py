@@ -68,7 +68,7 @@ def row(rung: str, reading: str, values, frequency: float) -> dict:
     question = RUNGS[rung].question(reading)
     asked = question.condition_models([(frequency, 5 * G_N)])
     scene = asked.base.override(
-        [one.format_assignment(value) for one, value in zip(asked.wanted, values)]
+        [one.format_assignment(value) for one, value in zip(asked.ranges, values)]
     )
     place = bisect_left(
         ONSETS,

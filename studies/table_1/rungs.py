@@ -27,7 +27,7 @@ from pathlib import Path
 
 from derived import Derived, Number, rods
 
-from patchfem.campaigns.rows.asked import FitRequest
+from patchfem.campaigns.rows.condition_models import FitRequest
 from patchfem.scene.ranges import read_ranges
 from patchfem.scene.scene import Scene, load, loads
 

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from patchfem.campaigns.rows.asked import FitRequest
 from patchfem.campaigns.rows.cells import read_readings, scores
 from patchfem.campaigns.rows.computed import ModelReadings
+from patchfem.campaigns.rows.condition_models import FitRequest
 from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.scene.ranges import read_ranges
 from patchfem.scene.scene import load, loads
@@ -74,7 +74,7 @@ def as_it_stands(point: bool = False) -> dict:
 
 def fitted(point: bool = False, starts: int = 8):
     """The numbers fitted to 143 Hz from random starts, as FittedRows."""
-    return fit_rows(question(point), RowsOptions(hold=(HELD,), how=SearchSettings(starts)))
+    return fit_rows(question(point), RowsOptions(hold=(HELD,), search=SearchSettings(starts)))
 
 
 def main(starts: int = 8) -> dict:
@@ -86,7 +86,7 @@ def main(starts: int = 8) -> dict:
         found = fitted(name == "point", starts)
         seconds = time.process_time() - begin
         each = {
-            "model": found.scored(found.logs, found.left),
+            "model": found.score(found.logs, found.left_out_logs),
             "constant": found.scored(*found.nulls["constant"][:2]),
         }
         for what, scored in each.items():
@@ -102,7 +102,7 @@ def main(starts: int = 8) -> dict:
             + ", ".join(
                 f"{one.key} {value:.4g}" for one, value in zip(keys.ranges, keys.fit.values)
             )
-            + f"; {np.sum(found.found.rms < 1.01 * keys.fit.rms)} of {starts} starts end here; {seconds:.0f} s"
+            + f"; {np.sum(found.search.rms < 1.01 * keys.fit.rms)} of {starts} starts end here; {seconds:.0f} s"
         )
         out[name] = {**each["model"], "values": keys.fit.values, "seconds": seconds}
     return out

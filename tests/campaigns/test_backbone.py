@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 import patchfem as pf
 from patchfem.campaigns.backbone.bench_loops import run_loop, settle_loop
-from patchfem.campaigns.backbone.curves import backbone
+from patchfem.campaigns.backbone.curves import compute_backbone
 from patchfem.campaigns.backbone.joint import build_joint
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
@@ -28,7 +28,7 @@ def segalman(u):
 
 def test_exact_the_static_curve_of_an_iwan_joint_is_segalmans():
     a = np.array([1e-5, 1e-4, 1e-3, 2.5e-3])
-    found = backbone(model(IWAN), "", a, ("quasi-static",))
+    found = compute_backbone(model(IWAN), "", a, ("quasi-static",))
     one, (force, loss) = found.curves["quasi-static"], segalman(a)
     omega = np.sqrt(OMEGA**2 + force / (0.5 * a))
     assert one.frequency == pytest.approx(omega / (2 * np.pi), rel=1e-12)
@@ -44,7 +44,7 @@ def test_the_balance_of_an_iwan_joint_keeps_its_bars_and_the_decay_follows_it():
     """In micro-slip one harmonic carries all: the balance has the static curve's loss. The decay is within its bar and
     what the damping changes over one of its swings."""
     a = np.geomspace(2e-5, 2e-3, 6)
-    found = backbone(model(IWAN), "", a)
+    found = compute_backbone(model(IWAN), "", a)
     static, balance, decay = (found.curves[way] for way in ("quasi-static", "balance", "decay"))
     assert balance.damping[0] == pytest.approx(static.damping[0], rel=1e-3)
     inside = np.isin(a, decay.amplitude)
@@ -56,7 +56,7 @@ def test_the_balance_of_an_iwan_joint_keeps_its_bars_and_the_decay_follows_it():
 
 def test_exact_a_motion_of_the_amplitude_asked_for_comes_back_after_a_cycle():
     """The largest of 4096 samples was taken for the amplitude, 3e-7 of it too small: the motion fell within a cycle."""
-    found = backbone(
+    found = compute_backbone(
         model('law = "tanh"\nreference_speed = "0.5 m/s"'),
         "",
         a := [6e-4, 8e-4, 1.2e-3],
@@ -82,7 +82,7 @@ def test_exact_rigid_friction_by_balance_and_by_decay():
     """A block loses 2 h of every half swing, h = F/k: the decay reads ln(S/(S - 4 h)) at the mean of both swings, and
     the balance has loss over 2 pi m omega^2 A^2 but for what one harmonic leaves out, of the order of the ratio."""
     h = 30 / (0.5 * OMEGA**2)
-    found = backbone(model('law = "coulomb"'), "", np.geomspace(20 * h, 80 * h, 4))
+    found = compute_backbone(model('law = "coulomb"'), "", np.geomspace(20 * h, 80 * h, 4))
     decay = found.curves["decay"]
     balance = found.curves["balance"]
     assert (
@@ -102,7 +102,7 @@ def test_exact_a_cubic_spring_has_duffings_backbone():
     scene = shaken(PLASTIC)
     scene = scene[scene.index("[structure]") :] + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n'
     a = np.array([1e-5, 1e-4])
-    found = backbone(pf.build(scene), "", a, ("balance", "quasi-static"))
+    found = compute_backbone(pf.build(scene), "", a, ("balance", "quasi-static"))
     omega = np.sqrt(OMEGA**2 + 0.75e9 * a**2 / 0.5)
     assert found.curves["balance"].frequency == pytest.approx(omega / (2 * np.pi), rel=1e-6)
     static = np.sqrt(OMEGA**2 + 1e9 * a**2 / 0.5)
@@ -113,7 +113,7 @@ def test_exact_a_cubic_spring_has_duffings_backbone():
 def test_a_mode_that_gains_energy_has_the_amplitude_of_flutter():
     """Where the balance falls through 0 is the limit cycle that does not last."""
     one = pf.build(shaken(PLASTIC), **{"structure.mode.axial.damping": -0.01})
-    found = backbone(one, "", np.geomspace(2e-3, 2e-2, 25), ("balance",))
+    found = compute_backbone(one, "", np.geomspace(2e-3, 2e-2, 25), ("balance",))
     free = shaken(PLASTIC).replace(
         'kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"',
         'kind = "free"\ndisplacement = "1 mm"',
@@ -134,28 +134,28 @@ slide = 0.1
 [drive]""",
     )
     one = pf.build(scene)
-    found = backbone(one, "axial", [1e-8], ("balance",))
+    found = compute_backbone(one, "axial", [1e-8], ("balance",))
     k = np.diag([OMEGA**2, (160 * np.pi) ** 2]) + 30e6 / 0.5 * np.outer([1, 0.1], [1, 0.1])
     assert found.frequencies.stuck == pytest.approx(
         np.sqrt(np.linalg.eigvalsh(k)[-1]) / (2 * np.pi)
     )
     assert found.curves["balance"].frequency == pytest.approx(found.frequencies.stuck, rel=1e-6)
-    low = backbone(one, "yaw", [1e-9], ("quasi-static",))
+    low = compute_backbone(one, "yaw", [1e-9], ("quasi-static",))
     first = np.sqrt(np.linalg.eigvalsh(k)[0]) / (2 * np.pi)
     assert low.curves["quasi-static"].frequency == pytest.approx(first, rel=1e-6)
     with pytest.raises(pf.PatchfemError, match="the modes of the rig are axial, yaw"):
-        backbone(one, "pitch")
+        compute_backbone(one, "pitch")
 
 
 def test_refuses_what_has_no_backbone():
     with pytest.raises(pf.PatchfemError, match="needs the scene of a rig"):
-        backbone(
+        compute_backbone(
             pf.build(
                 '[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\n'
                 'amplitude = "1 mm"\nfrequency = "10 Hz"\n'
             )
         )
-    found = backbone(model('law = "tanh"\nreference_speed = "1 mm/s"'), "", [1e-2, 2e-2])
+    found = compute_backbone(model('law = "tanh"\nreference_speed = "1 mm/s"'), "", [1e-2, 2e-2])
     assert "sliding speed" in found.missing["quasi-static"] and set(found.curves) >= {"balance"}
 
 
@@ -181,7 +181,7 @@ def test_refuses_what_has_no_backbone():
 )
 def test_refuses_a_mode_without_an_answer(scene, said):
     with pytest.raises(pf.PatchfemError, match=said):
-        backbone(pf.build(scene))
+        compute_backbone(pf.build(scene))
 
 
 @pytest.mark.parametrize(
@@ -192,7 +192,7 @@ def test_refuses_a_mode_without_an_answer(scene, said):
     ],
 )
 def test_exact_a_rig_in_which_no_friction_acts_has_level_curves(scene):
-    found = backbone(pf.build(scene))
+    found = compute_backbone(pf.build(scene))
     for way, f in (("balance", 100.0), ("decay", 100 * np.sqrt(1 - 4e-6)), ("quasi-static", 100.0)):
         assert found.curves[way].frequency == pytest.approx(f, rel=1e-12)
         assert found.curves[way].damping == pytest.approx(0.002, rel=1e-9)
@@ -217,7 +217,7 @@ stiffness = "100 kN/m"
 between = [1, 0]
 coefficient = "40 N s/m"
 """ + shaken(PLASTIC)[shaken(PLASTIC).index("[drive]") :]
-    one = backbone(pf.build(scene), "2", [1e-4]).curves
+    one = compute_backbone(pf.build(scene), "2", [1e-4]).curves
     k = np.array([[3e5, -1e5], [-1e5, 1e5]])
     m = np.diag([0.5, 0.3])
     c = np.diag([40.0, 0])
@@ -233,7 +233,7 @@ coefficient = "40 N s/m"
 
 def test_a_decay_behind_a_stiff_contact_lasts_some_swings_in_slip():
     """50 cycles of the held mode, 76 times as fast as the free one, were no swing in slip: the curve had no value."""
-    found = backbone(pf.build(CROWNED), "", [2e-2, 3e-2], ("decay",)).curves["decay"]
+    found = compute_backbone(pf.build(CROWNED), "", [2e-2, 3e-2], ("decay",)).curves["decay"]
     assert (
         found.amplitude.tolist() == [2e-2, 3e-2]
         and (found.frequency_error < 1e-3 * found.frequency).all()
@@ -245,13 +245,13 @@ def test_a_decay_behind_a_stiff_contact_lasts_some_swings_in_slip():
 
 def test_amplitudes_stay_within_the_stop():
     stopped = pf.build(shaken(IWAN).replace("moving_mass", 'travel = "0.2 mm"\nmoving_mass'))
-    found = backbone(stopped, methods=("decay", "quasi-static"))
+    found = compute_backbone(stopped, methods=("decay", "quasi-static"))
     assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(0.2e-3 / 1.15)
     assert 1.5e-4 < found.curves["decay"].amplitude[-1] < 0.2e-3
     with pytest.raises(
         pf.PatchfemError, match=r"structure\.travel: the largest amplitude, 300 um, is larger than"
     ):
-        backbone(stopped, "", [1e-4, 3e-4])
+        compute_backbone(stopped, "", [1e-4, 3e-4])
 
 
 def test_a_curve_that_bends_back_is_kept_as_far_as_it_goes():
@@ -272,7 +272,7 @@ load = "100 N"
 """
     rig = shaken(PLASTIC)
     a = np.array([2e-6, 9e-6, 12e-6, 30e-6])
-    found = backbone(
+    found = compute_backbone(
         pf.build("[structure]\n" + structure + rig[rig.index("[drive]") :]), "", a, ("balance",)
     )
     one = found.curves["balance"]
@@ -316,7 +316,7 @@ def test_beyond_a_fold_the_curve_goes_on():
     alone, the motions beyond have the same frequency, damping and loss."""
     a = np.array([25e-6, 28e-6, 40e-6])
     found, alone = (
-        backbone(pf.build(FOLDED, **{"accuracy.tolerance": 0.1}), "", one, ("balance",))
+        compute_backbone(pf.build(FOLDED, **{"accuracy.tolerance": 0.1}), "", one, ("balance",))
         for one in (a, a[1:])
     )
     whole = found.curves["balance"]
@@ -345,7 +345,7 @@ def test_two_modes_in_gross_slip_lose_the_same_by_decay_and_by_balance():
     """The decay of two modes is that of the output: 4 F/(2 pi k A) and the structure's own, less than 2 % apart where
     the damping is small; the static curve is at the amplitudes asked for."""
     a = np.array([2e-3, 4e-3])
-    curves = backbone(pf.build(TWO), "", a).curves
+    curves = compute_backbone(pf.build(TWO), "", a).curves
     plain = 0.002 + 4 * 30 / (2 * np.pi * 0.5 * OMEGA**2 * a)
     assert curves["balance"].damping == pytest.approx(plain, rel=0.02)
     assert curves["decay"].damping == pytest.approx(
@@ -362,7 +362,7 @@ def test_exact_a_decay_goes_on_where_the_contact_holds(two):
     omega/omega_held of one mode. Of 13 points there were 7, of two modes 3."""
     a = np.geomspace(1e-7, 2e-3, 13)
     text = TWO.replace("1 um", "0.1 mm") if two else shaken(PLASTIC.replace("1 mm", "10 um"))
-    found = backbone(pf.build(text), "", a, ("decay",))
+    found = compute_backbone(pf.build(text), "", a, ("decay",))
     one = found.curves["decay"]
     assert one.amplitude.size == 13 and not any("have a result" in note for note in found.notes)
     # the other mode rings there: up to 2e-4 of the damping ratio
@@ -403,13 +403,15 @@ slide = 0.4
 def test_a_decay_in_which_another_mode_rings_is_not_given_as_that_of_this_mode():
     """Of two modes 2 % apart that slide together, a release of one turns into the other: 32 times the damping ratio of
     the free motion stood there, with an error of 15 %, and only the loss of a cycle was given as the reason."""
-    found = backbone(pf.build(NEAR), "axial", np.geomspace(1e-3, 1e-2, 5), ("balance", "decay"))
+    found = compute_backbone(
+        pf.build(NEAR), "axial", np.geomspace(1e-3, 1e-2, 5), ("balance", "decay")
+    )
     assert (
         "decay" not in found.curves
         and "no longer a motion of this mode alone" in found.missing["decay"]
     )
     assert found.curves["balance"].damping[:3] == pytest.approx(0.002, rel=1e-3)
-    found = backbone(
+    found = compute_backbone(
         pf.build(NEAR), "axial", a := np.geomspace(2e-3, 6e-2, 7), ("balance", "decay")
     )
     balance = found.curves["balance"]
@@ -444,7 +446,7 @@ static = 0.3
 def test_always_the_mesh_is_in_the_bars_of_micro_slip():
     """Below the yield slide of its first node neither a mesh nor one of half its nodes slips; the finer mesh does."""
     coarse, fine = (
-        backbone(
+        compute_backbone(
             pf.build(CROWNED, **{"accuracy.tolerance": one}),
             "",
             np.geomspace(1e-9, 1e-5, 25),
@@ -481,7 +483,7 @@ def test_errors_say_what_they_leave_out_of_the_mesh():
     there is none, no error of the mesh."""
     a = [1e-6, 2e-6]
     found, few = (
-        backbone(pf.build(one), "", a, ("decay",))
+        compute_backbone(pf.build(one), "", a, ("decay",))
         for one in (BEHIND_BONDS, BEHIND_BONDS.replace(*FEW))
     )
     (said,), (unmeshed, bare) = (
@@ -498,12 +500,14 @@ def test_errors_say_what_they_leave_out_of_the_mesh():
         "the errors of method decay include no error of the mesh, because the hysteresis loop of"
     )
     assert (found.curves["decay"].frequency_error > few.curves["decay"].frequency_error).all()
-    plain = backbone(pf.build(JOINT_SHAKEN.replace("kinetic = 0.2\n", "")), "", a, ("balance",))
+    plain = compute_backbone(
+        pf.build(JOINT_SHAKEN.replace("kinetic = 0.2\n", "")), "", a, ("balance",)
+    )
     assert plain.curves and not any("the errors of" in note for note in plain.notes)
 
 
 def test_the_stuck_frequency_follows_from_the_stiffness_of_a_run():
-    found = backbone(pf.build(CROWNED), "", [1e-6], ("quasi-static",))
+    found = compute_backbone(pf.build(CROWNED), "", [1e-6], ("quasi-static",))
     told = pf.run(
         CROWNED[: CROWNED.index("[structure]")] + '[slide]\nkind = "sine"\namplitude = "1 um"\n'
         'frequency = "1 Hz"\n'
@@ -519,7 +523,7 @@ def test_amplitudes_unless_given_end_where_the_mode_is_nearly_free(slide):
     """A contact that slides by a hundredth of the output: the default ended at 7 m, not 0.7 mm, where `travel` did not
     stop it."""
     one = pf.build(shaken(IWAN).replace("slide = 1.0", f"slide = {slide}\noutput = 1.0"))
-    found = backbone(one, "", None, ("quasi-static",))
+    found = compute_backbone(one, "", None, ("quasi-static",))
     deflected = 30 * slide / (0.5 * OMEGA**2)  # by the largest friction
     top = max(deflected, 1.5e-3 / slide)
     assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(15 * top, rel=1e-6)
@@ -541,9 +545,9 @@ def test_a_loop_that_remembers_is_read_when_it_has_settled():
 
 def test_bonds_without_a_closed_loop_name_the_method_that_works():
     bonds = model('law = "nonlocal"\nreading = "stretch"\norder = 2\nbond_length = "1 um"')
-    (said,) = backbone(bonds, "", [3e-7], ("balance",)).missing.values()
+    (said,) = compute_backbone(bonds, "", [3e-7], ("balance",)).missing.values()
     assert said.endswith("; use --method quasi-static")
-    assert not backbone(bonds, "", [3e-7], ("quasi-static",)).missing
+    assert not compute_backbone(bonds, "", [3e-7], ("quasi-static",)).missing
 
 
 def test_a_static_curve_ends_where_its_force_falls():
@@ -552,7 +556,9 @@ def test_a_static_curve_ends_where_its_force_falls():
     scene = shaken(PLASTIC)[shaken(PLASTIC).index("[structure]") :].replace(
         "[[structure.mode]]", bonded, 1
     )
-    found = backbone(pf.build(scene), "", np.array([5e-6, 1e-5, 1.5e-5, 5e-5]), ("quasi-static",))
+    found = compute_backbone(
+        pf.build(scene), "", np.array([5e-6, 1e-5, 1.5e-5, 5e-5]), ("quasi-static",)
+    )
     assert (
         found.curves["quasi-static"].amplitude.size == 3
         and "curve does not reach these" in found.notes[0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
-from patchfem.campaigns.backbone.curves import backbone
+from patchfem.campaigns.backbone.curves import compute_backbone
 from patchfem.export import backbone as backbone_files
 from patchfem.export.drawing import pictures
 from patchfem.runs import joint
@@ -59,7 +59,7 @@ def written(found) -> str:
 
 def check_ends_well(law: str, damping: float, way: str, other_mode: str) -> None:
     """Check that a method gives a curve with errors, or a sentence, and that both can be written."""
-    found = backbone(rig(law, damping, other_mode), "", AMPLITUDES, (way,))
+    found = compute_backbone(rig(law, damping, other_mode), "", AMPLITUDES, (way,))
     assert "<html" in written(found)
     assert (way in found.curves) != (way in found.missing)
     for curve in found.curves.values():
@@ -79,7 +79,7 @@ def test_exact_viscous_damping_adds_to_that_of_friction(law):
     """The free motion that a damping keeps up does not depend on the viscous part of one mode: zeta_s f_0/f is
     added."""
     negative, positive = (
-        backbone(rig(law, damping), "", AMPLITUDES, ("balance",)).curves["balance"]
+        compute_backbone(rig(law, damping), "", AMPLITUDES, ("balance",)).curves["balance"]
         for damping in (-0.011, 0.005)
     )
     assert negative.frequency == pytest.approx(positive.frequency, rel=1e-7)
@@ -90,7 +90,7 @@ def test_exact_viscous_damping_adds_to_that_of_friction(law):
 @pytest.mark.parametrize("law", FAST_LAWS)
 def test_the_damping_is_zero_at_the_limit_cycle_of_a_run(law):
     """A run without a drive finds the unstable limit cycle from its own equations, without a backbone."""
-    found = backbone(rig(law, -0.02), "", AMPLITUDES, ("balance",))
+    found = compute_backbone(rig(law, -0.02), "", AMPLITUDES, ("balance",))
     free = pf.run(rig(law, -0.02, drive='kind = "free"\ndisplacement = "0.1 mm"'))
     assert found.flutter == pytest.approx(free.measures["flutter_amplitude"].value, rel=1e-4)
     assert "the mode gains energy" in written(found)
@@ -101,7 +101,7 @@ def test_a_decay_below_the_limit_cycle_is_read_where_larger_releases_grow():
 
     One swing loses up to 40 % of the amplitude here, so both agree to a few percent only.
     """
-    found = backbone(
+    found = compute_backbone(
         rig("elastic-plastic", -0.02), "", np.geomspace(1e-3, 8e-3, 4), ("balance", "decay")
     )
     decay = found.curves["decay"]

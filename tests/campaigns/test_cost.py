@@ -249,13 +249,13 @@ def test_always_a_setting_of_one_has_each_value_once(monkeypatch):
     labels = [one.label for one in numerical_settings.list_settings(worn, "jumps")]
     assert labels == ["1", "2", "4"]
     assert [one.label for one in setting_curve(worn, "jumps")] == labels
-    run_plan = cost.run
+    run_plan = cost.run_plan
 
     def run_one_jump(planned, **options):
         if planned.model.wear.jumps > 1:
             raise NotConverged("more than one jump")
         return run_plan(planned, **options)
 
-    monkeypatch.setattr(cost, "run", run_one_jump)
+    monkeypatch.setattr(cost, "run_plan", run_one_jump)
     with pytest.raises(PatchfemError, match="fewer than three values"):
         setting_curve(worn, "jumps")

@@ -347,7 +347,7 @@ def test_exact_rows_held_out_are_driven_through_but_not_fitted(tmp_path):
     )
     assert found.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and found.rms < 1e-6
     assert found.held_rms == pytest.approx(np.sqrt(np.mean(force[cycle == 2] ** 2)), rel=1e-6)
-    assert found.held.sum() == 40
+    assert found.held_out.sum() == 40
     first = fit_loop(
         scene,
         table(tmp_path / "late.csv", time, slide, np.where(cycle == 1, 5.0, force), cycle),

@@ -8,7 +8,8 @@ from command_line import cli
 from scene_texts import DRIVE, KILOGRAM, PIECE, POINT, friction_of
 
 import patchfem as pf
-from patchfem.campaigns.fits.patch import Curves, fit_law, fit_patch
+from patchfem.campaigns.fits.patch import fit_patch
+from patchfem.campaigns.fits.patch_laws import Curves, LawProblem
 from patchfem.formatting import format_number, format_quantity
 from patchfem.friction.record import steady_loop
 from patchfem.scene.keys.tables import Friction
@@ -50,7 +51,8 @@ tangential_ratio = 0.8
 def test_exact_a_law_finds_itself_in_its_own_loops(law, keys):
     own = Friction.model_construct(law=law, static=0.3, **keys)
     slides = np.geomspace(2e-7, 6e-5, 20)
-    found = fit_law(law, 0.3, 100.0, slides, Curves(*steady_loop(own, 100.0, slides)), 5e6)
+    target = Curves(*steady_loop(own, 100.0, slides))
+    found = LawProblem(law, 0.3, 100.0, slides, target, 5e6).solve()
     assert found.values == pytest.approx(keys, rel=1e-6)
     assert np.abs(found.deviations).max() < 1e-6
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.identify.correlation import estimate_effective_rows
-from patchfem.identify.least_squares import fit
+from patchfem.identify.least_squares import Problem
 
 
 def process(count, tie, seed):
@@ -49,14 +49,9 @@ def covered(bars, seeds, tie):
     inside = []
     for seed in seeds:
         y = 0.35 + 0.2 * x + 0.05 * process(200, tie, seed)
-        found = fit(
-            lambda v, y=y: v[0] + v[1] * x - y,
-            [0.0, -1.0],
-            [1.0, 1.0],
-            start=[0.5, 0.0],
-            max_descents=1,
-            interval_kind=bars,
-        )
+        found = Problem(
+            lambda v, y=y: v[0] + v[1] * x - y, [0.0, -1.0], [1.0, 1.0], start=[0.5, 0.0]
+        ).solve(max_descents=1, interval_kind=bars)
         inside.append(
             (found.intervals.ends[:, 0] <= [0.35, 0.2])
             & ([0.35, 0.2] <= found.intervals.ends[:, 1])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import t as student
 
 from patchfem.core import Missing, NotConverged, Outcome, PatchfemError
-from patchfem.identify.least_squares import fit
+from patchfem.identify.least_squares import Problem
 from patchfem.identify.space import make_space
 from patchfem.identify.words import describe_fit
 
@@ -29,7 +29,7 @@ def linear(design, data):
 
 def test_exact_a_linear_problem_has_the_closed_form_intervals():
     values, half, covariance, rest = linear(DESIGN, NOISY)
-    found = fit(lambda v: DESIGN @ v - NOISY, [-5, -5, -5], [5, 5, 5])
+    found = Problem(lambda v: DESIGN @ v - NOISY, [-5, -5, -5], [5, 5, 5]).solve()
     assert found.values == pytest.approx(values, abs=1e-9)
     assert found.intervals.ends == pytest.approx(
         np.stack([values - half, values + half], axis=1), abs=1e-9
@@ -59,12 +59,12 @@ def test_always_scaling_rows_and_values_changes_nothing(seed, shift, power):
     values, half, *_ = linear(design, data)
     low = values - 20 * half + shift * half
     high = values + 20 * half + shift * half
-    found = fit(
+    found = Problem(
         lambda v: scale * (design @ (v / scale) - data),
         scale * low,
         scale * high,
         log=[False, False],
-    )
+    ).solve()
     assert found.values / scale == pytest.approx(values, abs=1e-6 * half.max())
     assert np.ptp(found.intervals.ends, axis=1) / scale == pytest.approx(2 * half, rel=1e-4)
 
@@ -77,7 +77,7 @@ def test_exact_a_value_pressed_on_its_bound_has_the_profile_of_the_plane():
     free = covariance[1, 1] / (rest / 38)
     pressed = rest + (0.3 - values[1]) ** 2 / free
     end = values[1] + np.sqrt(free * (pressed * (1 + student.ppf(0.975, 38) ** 2 / 38) - rest))
-    found = fit(lambda v: design @ v - data, [0, 0.3], [3, 5])
+    found = Problem(lambda v: design @ v - data, [0, 0.3], [3, 5]).solve()
     assert (
         found.values[1] == 0.3
         and found.at_bound == ("", "low")
@@ -98,7 +98,7 @@ def test_exact_the_profile_of_a_bent_value_is_that_of_what_it_stands_for():
     half = student.ppf(0.975, 11) * data.std(ddof=1) / np.sqrt(12)
     low = data.mean() - half
     high = data.mean() + half
-    found = fit(lambda v: v[0] ** 3 - data, [-4], [4])
+    found = Problem(lambda v: v[0] ** 3 - data, [-4], [4]).solve()
     assert found.intervals.methods == ("profile",)
     assert found.values[0] == pytest.approx(np.cbrt(data.mean()), rel=1e-6)
     assert found.intervals.ends[0] == pytest.approx(np.cbrt([low, high]), rel=2e-3)
@@ -110,7 +110,7 @@ def test_exact_two_values_known_by_their_product_are_named():
     def residual(v):
         return v[0] * v[1] * np.sin(3 * LINE) + v[2] * LINE - truth + 0.0 * v[3]
 
-    found = fit(residual, [0.1, 0.1, 0, 0], [10, 100, 5, 1])
+    found = Problem(residual, [0.1, 0.1, 0, 0], [10, 100, 5, 1]).solve()
     assert found.values[0] * found.values[1] == pytest.approx(2, rel=1e-8) and found.values[
         2
     ] == pytest.approx(1)
@@ -130,16 +130,18 @@ def test_exact_two_values_known_by_their_product_are_named():
 
 def test_exact_a_ratio_is_named_and_the_rest_keeps_its_interval():
     noise = 0.01 * RNG.normal(size=40)
-    found = fit(lambda v: v[0] / v[1] * LINE + v[2] - 2 * LINE - 1 - noise, [1, 1, -3], [9, 9, 3])
-    alone = fit(lambda v: v[0] * LINE + v[1] - 2 * LINE - 1 - noise, [1, -3], [9, 3])
+    found = Problem(
+        lambda v: v[0] / v[1] * LINE + v[2] - 2 * LINE - 1 - noise, [1, 1, -3], [9, 9, 3]
+    ).solve()
+    alone = Problem(lambda v: v[0] * LINE + v[1] - 2 * LINE - 1 - noise, [1, -3], [9, 3]).solve()
     assert found.intervals.ends[2] == pytest.approx(alone.intervals.ends[1], rel=2e-2)
     assert "only their ratio is known" in describe_fit(found, "abc")[0]
 
 
 def test_exact_a_value_that_the_rows_do_not_rule_out_anywhere_has_no_interval():
     data = RNG.normal(size=20)
-    found = fit(lambda v: v[0] - data + 1e-3 * v[1], [-5, 0], [5, 1])
-    alone = fit(lambda v: v[0] - data + 1e-3 * v[1] * LINE[:20], [-5, 0], [5, 1])
+    found = Problem(lambda v: v[0] - data + 1e-3 * v[1], [-5, 0], [5, 1]).solve()
+    alone = Problem(lambda v: v[0] - data + 1e-3 * v[1] * LINE[:20], [-5, 0], [5, 1]).solve()
     assert "cannot be determined separately" in describe_fit(found, "ab")[0]
     assert np.isnan(alone.intervals.ends[1]).all() and alone.intervals.methods[1] == "none"
     assert (
@@ -149,22 +151,22 @@ def test_exact_a_value_that_the_rows_do_not_rule_out_anywhere_has_no_interval():
 
 
 def test_exact_the_best_of_several_valleys_is_found_from_a_bad_start():
-    found = fit(
+    found = Problem(
         lambda v: np.sin(v[0] * 9 * LINE) - np.sin(13.7 * 9 * LINE / 9),
         [0.05],
         [3],
         [False],
         start=[0.3],
-    )
+    ).solve()
     assert found.values[0] == pytest.approx(13.7 / 9, rel=1e-8)
 
 
 def test_exact_a_wide_positive_range_is_searched_in_logarithms():
-    found = fit(
+    found = Problem(
         lambda v: np.log(v[0]) * np.ones(5) - np.log([2.9e-6, 3e-6, 3.1e-6, 3e-6, 3e-6]),
         [1e-9],
         [1.0],
-    )
+    ).solve()
     spread = np.log([2.9e-6, 3e-6, 3.1e-6, 3e-6, 3e-6])
     half = student.ppf(0.975, 4) * spread.std(ddof=1) / np.sqrt(5)
     assert np.log(found.values[0]) == pytest.approx(spread.mean(), abs=1e-9)
@@ -180,7 +182,7 @@ def test_always_failures_are_counted_and_passed_over():
             raise PatchfemError("too long")
         return np.full(5, np.nan) if v[0] < 0.5 else v[0] - np.array([1.0, 1.1, 0.9, 1.0, 1.0])
 
-    found = fit(residual, [0.0], [6.0], start=[5.0])
+    found = Problem(residual, [0.0], [6.0], start=[5.0]).solve()
     assert found.values[0] == pytest.approx(1, abs=1e-9) and found.counts.failures >= 5
     assert found.counts.reason in ("too long", "the residual is not finite")
     assert (
@@ -193,13 +195,13 @@ def test_refuses_what_cannot_be_fitted():
     with pytest.raises(
         NotConverged, match="failed at all 9 starting points of the search: nothing works"
     ):
-        fit(raising(PatchfemError("nothing works")), [0.0], [1.0], start=[0.5])
+        Problem(raising(PatchfemError("nothing works")), [0.0], [1.0], start=[0.5]).solve()
     with pytest.raises(Missing, match="no file"):
-        fit(raising(Missing("no file")), [0.0], [1.0])
+        Problem(raising(Missing("no file")), [0.0], [1.0]).solve()
     with pytest.raises(KeyError):
-        fit(raising(KeyError("a fault of ours")), [0.0], [1.0])
+        Problem(raising(KeyError("a fault of ours")), [0.0], [1.0]).solve()
     with pytest.raises(ValueError, match="2 rows of data cannot determine 3 values"):
-        fit(lambda v: v[:2], [0, 0, 0], [1, 1, 1])
+        Problem(lambda v: v[:2], [0, 0, 0], [1, 1, 1]).solve()
     for low, high, log in (
         ([1.0], [1.0], None),
         ([2.0], [1.0], None),
@@ -210,7 +212,7 @@ def test_refuses_what_cannot_be_fitted():
         ([np.nan], [1.0], None),
     ):
         with pytest.raises(ValueError):
-            fit(lambda v: v, low, high, log)
+            Problem(lambda v: v, low, high, log).solve()
 
 
 def raising(error):
@@ -226,6 +228,8 @@ def test_exact_intervals_of_a_decay_cover_its_truth_in_19_of_20():
     inside = 0
     for seed in range(1000):
         data = np.exp(-3 * LINE) + 0.15 * np.random.default_rng(seed).normal(size=40)
-        found = fit(lambda v, data=data: v[0] * np.exp(-v[1] * LINE) - data, [0.01, 0.01], [30, 50])
+        found = Problem(
+            lambda v, data=data: v[0] * np.exp(-v[1] * LINE) - data, [0.01, 0.01], [30, 50]
+        ).solve()
         inside += sum(a <= x <= b for (a, b), x in zip(found.intervals.ends, (1.0, 3.0)))
     assert 0.935 < inside / 2000 < 0.965

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
-from patchfem.identify.least_squares import fit
+from patchfem.identify.least_squares import Problem
 from patchfem.identify.space import make_space
 from patchfem.identify.two_models import TwoModels
 
@@ -30,8 +30,8 @@ def off(one) -> np.ndarray:
 
 def test_exact_the_least_squares_are_those_of_the_expensive_model():
     """With much left over; the share alone, without slopes, ends 1 % above."""
-    best = fit(
-        lambda values: off(dear(values)), BOX.low, BOX.high, max_descents=4, interval_kind=""
+    best = Problem(lambda values: off(dear(values)), BOX.low, BOX.high).solve(
+        max_descents=4, interval_kind=""
     )
     models = TwoModels(cheap, dear, off, BOX)
     model, values = models.search([4.0, 0.2], 4)

@@ -7,7 +7,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import patchfem as pf
-from patchfem.campaigns.backbone.curves import backbone
+from patchfem.campaigns.backbone.curves import compute_backbone
 from patchfem.response.decay_curve import (
     compute_swing_curve,
     find_turning_points,
@@ -276,7 +276,7 @@ def mindlins(amplitude, stuck: float, slide: float):
 def test_a_decay_holds_mindlins_damping_where_nodes_stick(slide):
     """Of (6.3632 +- 0.0076)e-5 at 9.13 nm, where neither mesh slips, Mindlin's 2.3e-4 was no part."""
     a = np.array([9.13e-9, 6e-8]) / slide
-    found = backbone(
+    found = compute_backbone(
         pf.build(CROWNED.replace("slide = 1.0", f"slide = {slide}")), "", a, ("decay",)
     )
     one = found.curves["decay"]

@@ -122,7 +122,7 @@ def test_steps_the_sentence(tmp_path, capsys):
         ("held_out", "other frequencies ({:.3f} instead of {:.3f})"),
     ):
         scores = [
-            fits[free].scored(fits[free].logs, fits[free].left)[part]["all"]
+            fits[free].score(fits[free].logs, fits[free].left_out_logs)[part]["all"]
             for free in (True, False)
         ]
         assert_contains(steps.ANSWER, words.format(*scores))

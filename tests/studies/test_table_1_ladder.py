@@ -26,8 +26,8 @@ def test_always_every_rung_can_be_asked_under_every_reading(fitting):
             assert len(asked.rigs) == 20 and asked.read.reading == (
                 "fundamental" if "fund" in reading else "peak"
             )
-            assert all(one.low < one.high for one in asked.wanted)
-            ends = {one.key: one.low for one in asked.wanted}
+            assert all(one.low < one.high for one in asked.ranges)
+            ends = {one.key: one.low for one in asked.ranges}
             assert not any(ends.get(f"structure.bonded.{key}") for key in ("stiffness", "damping"))
 
 
@@ -191,7 +191,7 @@ def test_always_a_record_tells_its_valleys_gain_bounds_and_bootstrap(fitting, re
     cells = read_readings(fitting.TABLE)
     for (rung, reading, protocol, placebo), row in records.items():
         question = fitting.RUNGS[rung].question(reading, *([placebo] if placebo else []))
-        assert row["at_bound"] == fitting.bounds(question.wanted, row["values"])
+        assert row["at_bound"] == fitting.bounds(question.ranges, row["values"])
         left = (rung, reading, protocol) in (  # the last descent left all starts
             ("spring and yaw", fitting.STUCK, "all"),
             ("rods, spring and yaw", ROOT2, "without 143"),

@@ -21,7 +21,7 @@ import numpy as np
 from campaigns import Row
 
 import patchfem as pf
-from patchfem.campaigns.backbone.curves import backbone
+from patchfem.campaigns.backbone.curves import compute_backbone
 from patchfem.campaigns.fits.curve import fit_curve, read_curve
 from patchfem.core import PatchfemError
 from patchfem.export.lab import imported
@@ -164,9 +164,9 @@ def least(one: Made, place: Path, wanted: list) -> float:
                 [key.format_assignment(float(value)) for key, value in zip(wanted, values)]
             )
         )
-        curve = backbone(model, "", np.unique(amplitude), ("balance",), errors=False).curves[
-            "balance"
-        ]
+        curve = compute_backbone(
+            model, "", np.unique(amplitude), ("balance",), errors=False
+        ).curves["balance"]
         return ((np.array([curve.frequency, curve.damping]) - measured) / error).ravel()
 
     box = make_space([key.low for key in wanted], [key.high for key in wanted])

@@ -17,20 +17,12 @@ from ...dynamics.harmonic.point import find_peak, make_balance
 from ...formatting import format_length
 from ...response.errors import error_of_change
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
-from .records import Curve
+from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve
 
-# They are tried in turn, each with four times the samples per cycle of the one before.
-HARMONICS = (
-    9,
-    19,
-    39,
-)
+# Numbers of harmonics that are tried in turn, each with four times the samples of the one before.
+HARMONICS = (9, 19, 39)
 MAX_SAMPLES = 65536  # Samples per cycle: more take too long, and 39 harmonics need fewer.
 N_SAMPLES = 4096  # Samples of a cycle from which the largest motion is read.
-ROUND_OFF_ERROR = 1e-9  # Relative error of a value due to round-off.
-AMPLITUDE_TOL = (
-    1e-7  # Relative tolerance of an amplitude, if the steps do not reach ROUND_OFF_ERROR.
-)
 MAX_STEPS = 8  # Maximum number of secant steps to the motion that has the requested amplitude at the output.
 # Smallest slope of the logarithms of both amplitudes with which a secant step is taken.
 MIN_SLOPE = 0.1
@@ -55,33 +47,34 @@ def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
         return _compute_rigid_curve(joint, amplitudes)
     laws = joint.steady_laws()
     tolerance = joint.model.accuracy.tolerance
-    found = _read_motions(laws, joint, amplitudes, HARMONICS[0])
+    values = _read_motions(laws, joint, amplitudes, HARMONICS[0])
     for harmonics in HARMONICS[1:]:
-        count = 1 + int(np.isfinite(found[0]).nonzero()[0].max(initial=-1))
+        count = 1 + int(np.isfinite(values[0]).nonzero()[0].max(initial=-1))
         if not count:
             raise NotConverged("no free motion of these amplitudes was found")
         better = _read_motions(laws, joint, amplitudes, harmonics, count)
-        error = error_of_change(better - found) + ROUND_OFF_ERROR * np.abs(better)
-        found = better
+        error = error_of_change(better - values) + ROUND_OFF_ERROR * np.abs(better)
+        values = better
         known = np.isfinite(error[0])
-        if (error[:2] <= tolerance * np.abs(found[:2]))[:, known].all():
+        if (error[:2] <= tolerance * np.abs(values[:2]))[:, known].all():
             break
     error += joint.space_errors(lambda group: _read_motions(group, joint, amplitudes, HARMONICS[0]))
-    known = np.isfinite(found + error).all(axis=0)
+    known = np.isfinite(values + error).all(axis=0)
     if not known.any():
         raise NotConverged("no free motion of these amplitudes was found")
-    oscillates = known & (found[1] < 1)
+    frequency, damping, loss = values
+    oscillates = known & (damping < 1)
     if not oscillates.any():
         raise NotConverged(
             "the mode does not oscillate at these amplitudes: its damping ratio is above 1"
         )
     curve = Curve(
         amplitude=amplitudes,
-        frequency=found[0],
+        frequency=frequency,
         frequency_error=error[0],
-        damping=found[1],
+        damping=damping,
         damping_error=error[1],
-        loss=found[2],
+        loss=loss,
     )
     return curve.at(oscillates)
 
@@ -140,10 +133,9 @@ def find_free_motions(group: LawGroup, joint: Joint, amplitudes, harmonics: int)
     out: list = [None] * len(amplitudes)
     for k, amplitude in enumerate(amplitudes):
         before = out[k - 1] if k else None
-        is_first = not any(out)
-        out[k] = search.continue_motion(before, amplitude) or search.start_motion(
-            amplitude, is_first
-        )
+        out[k] = search.continue_motion(before, amplitude)
+        if out[k] is None:
+            out[k] = search.start_motion(amplitude, is_first=not any(out))
     for k in range(len(amplitudes) - 2, -1, -1):
         out[k] = out[k] or search.continue_motion(out[k + 1], amplitudes[k])
     return [motion and motion.free for motion in out]
@@ -189,7 +181,7 @@ class _FreeMotionSearch:
         except NotConverged:
             return None
 
-    def start_motion(self, amplitude: float, is_first: bool) -> FreeMotion | None:
+    def start_motion(self, amplitude: float, *, is_first: bool) -> FreeMotion | None:
         """Return the motion at an amplitude [m], starting from the sticking mode; None if it fails.
 
         is_first: whether a search via a small amplitude is tried as well.
@@ -298,15 +290,17 @@ def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:
     if friction.kinetic is not None:
         kinetic = static * friction.kinetic / friction.static
     row = modes.interfaces[0]
-    found = limit_cycles.trace_relay_backbone(modes, row, (kinetic, static), amplitudes, joint.mode)
-    known = np.array([motion is not None for motion in found])
+    motions = limit_cycles.trace_relay_backbone(
+        modes, row, (kinetic, static), amplitudes, joint.mode
+    )
+    known = np.array([motion is not None for motion in motions])
     if not known.any():
         raise NotConverged(
             "at these amplitudes rigid friction stops the motion in each cycle, and only a motion "
             "that always slides can be computed; give larger amplitudes"
         )
     amplitude = np.asarray(amplitudes)[known]
-    cycles, ratios = zip(*(motion for motion in found if motion is not None))
+    cycles, ratios = zip(*filter(None, motions))
     frequency = np.array([cycle.omega / (2 * np.pi) for cycle in cycles])
     damping = np.array(ratios)
     loss = np.full(amplitude.size, np.nan)
@@ -315,8 +309,8 @@ def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:
     relative_error = np.array([cycle.error / cycle.amplitude for cycle in cycles])
     # The damping of the structure does not depend on the amplitude, so only that of friction takes
     # its error.
-    own_rate = modes.damping_matrix[joint.mode, joint.mode]
-    friction_damping = damping - own_rate / (4 * np.pi * frequency)
+    structure_rate = modes.damping_matrix[joint.mode, joint.mode]
+    friction_damping = damping - structure_rate / (4 * np.pi * frequency)
     return Curve(
         amplitude=amplitude,
         frequency=frequency,

@@ -54,9 +54,9 @@ def run_loop(model: Model, patch, slide: float, frequency: float, cycles: float)
     BenchLoop
     """
     path = SlidePath("sine", slide, frequency, None, 0.0, cycles, None, None)
-    alone = replace(decays.with_automatic_method(model), kind="bench", rig=None, slide=path)
-    steps = steps_per_cycle(alone)
-    return BenchLoop(bench.run(alone, patch, steps), alone, steps)
+    contact = replace(decays.with_automatic_method(model), kind="bench", rig=None, slide=path)
+    steps = steps_per_cycle(contact)
+    return BenchLoop(bench.run(contact, patch, steps), contact, steps)
 
 
 def settle_loop(model: Model, patch, slide: float, frequency: float) -> SettledLoop:
@@ -79,14 +79,14 @@ def settle_loop(model: Model, patch, slide: float, frequency: float) -> SettledL
     """
     tolerance = model.accuracy.tolerance
     cycles = FIRST_CYCLES
-    found = run_loop(model, patch, slide, frequency, cycles)
+    loop = run_loop(model, patch, slide, frequency, cycles)
     while True:
         cycles *= 2
-        before = found.run.values
-        found = run_loop(model, patch, slide, frequency, cycles)
-        values = found.run.values
+        before = loop.run.values
+        loop = run_loop(model, patch, slide, frequency, cycles)
+        values = loop.run.values
         change = [abs(values[name] - before[name]) for name in LOOP_MEASURES]
         limits = [tolerance * abs(values[name]) for name in LOOP_MEASURES]
-        is_steady = all(off <= limit for off, limit in zip(change, limits))
+        is_steady = all(step <= limit for step, limit in zip(change, limits))
         if cycles >= MAX_CYCLES or is_steady:
-            return SettledLoop(*found, change)
+            return SettledLoop(*loop, change)

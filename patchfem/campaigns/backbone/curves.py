@@ -18,21 +18,28 @@ from .decay import compute_decay_curve
 from .joint import Joint, build_joint
 from .linear import compute_level_curve
 from .quasi_static import compute_static_curve
-from .records import METHODS, Backbone, Curve, LossExponents, ModeFrequencies
+from .records import (
+    AMPLITUDE_TOL,
+    METHODS,
+    ROUND_OFF_ERROR,
+    Backbone,
+    Curve,
+    LossExponents,
+    ModeFrequencies,
+)
 
-ROUND_OFF_ERROR = 1e-9  # Relative error of a value due to round-off.
-AMPLITUDE_TOL = 1e-7  # Relative tolerance of the first and last amplitudes of two curves.
 # Amplitude / amplitude at which the whole contact begins to slip; above this ratio a point counts as gross slip.
 GROSS_SLIP_BEGIN = 3.0
 FLUTTER_TOL = 1e-8  # Relative error of the amplitude of flutter, below the digits that are printed.
 
 
-def backbone(
+def compute_backbone(
     model: Model,
     mode: str = "",
     amplitudes=None,
     methods=METHODS,
     progress=None,
+    *,
     errors: bool = True,
 ) -> Backbone:
     """Compute frequency and damping of a mode of a rig against amplitude.
@@ -66,13 +73,13 @@ def backbone(
     """
     with locate_errors(model.source):
         joint = build_joint(model, mode)._replace(has_errors=errors)
-        wanted = joint.default_amplitudes()
-        if amplitudes is not None:
-            wanted = np.unique(np.asarray(amplitudes, float))
-        if wanted[-1] > joint.model.rig.springs.travel:
+        if amplitudes is None:
+            amplitudes = joint.default_amplitudes()
+        amplitudes = np.unique(np.asarray(amplitudes, float))
+        if amplitudes[-1] > joint.model.rig.springs.travel:
             raise PatchfemError(
-                f"the largest amplitude, {format_length(wanted[-1], 3)}, is larger than the travel "
-                "of the flexure; give smaller amplitudes with --amplitudes",
+                f"the largest amplitude, {format_length(amplitudes[-1], 3)}, is larger than the "
+                "travel of the flexure; give smaller amplitudes with --amplitudes",
                 "structure.travel",
             )
         richer = None
@@ -84,14 +91,14 @@ def backbone(
             if progress is not None:
                 progress(method)
             try:
-                curve = compute_curve(joint, wanted, method, progress)
+                curve = compute_curve(joint, amplitudes, method, progress)
                 if richer is not None:
-                    other = compute_curve(richer, wanted, method, progress)
-                    curve = _widen_by_missing_modes(curve, other)
+                    richer_curve = compute_curve(richer, amplitudes, method, progress)
+                    curve = _widen_by_missing_modes(curve, richer_curve)
                 curves[method] = curve
             except (NotConverged, PatchfemError) as reason:
                 missing[method] = str(reason).removeprefix("backbone: ")
-    return _make_backbone(joint, wanted, curves, missing)
+    return _make_backbone(joint, amplitudes, curves, missing)
 
 
 def compute_curve(joint: Joint, amplitudes, method: str, progress=None) -> Curve:
@@ -137,30 +144,29 @@ def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
             "the check by a computation with more modes of the structure found no free motion at "
             "these amplitudes; raise structure.reduced.modes"
         )
-    own = curve.interpolate(curve.amplitude)
-    added = finer_errors(own, richer.interpolate(curve.amplitude))
+    values = curve.interpolate(curve.amplitude)
+    added = finer_errors(values, richer.interpolate(curve.amplitude))
     return curve._replace(
         frequency_error=curve.frequency_error + added["frequency"],
         damping_error=curve.damping_error + added["damping"],
     )
 
 
-def _make_backbone(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone:
+def _make_backbone(joint: Joint, amplitudes, curves: dict, missing: dict) -> Backbone:
     """Return the backbone of the curves at the requested amplitudes (k,) [m]."""
     exponents = LossExponents()
     first = curves.get("quasi-static", curves.get("balance"))
-    remarks = [*notes.note_linear_rig(joint), *notes.note_gaps(wanted, curves)]
+    sentences = [*notes.note_linear_rig(joint), *notes.note_gaps(amplitudes, curves)]
     if not joint.is_linear:
         exponents = _fit_exponents(joint, first)
-        remarks += notes.note_differences(curves)
+        sentences += notes.note_differences(curves)
         if exponents.micro_theory is not None and exponents.micro is None:
-            remarks += notes.note_micro_slip(joint, wanted)
-    remarks += notes.note_missing_mesh(joint)
-    remarks += [note for curve in curves.values() for note in curve.notes]
-    remarks += [
-        *notes.note_secant_stiffness(joint, wanted, curves),
-        *notes.note_wear(joint.model),
-    ]
+            sentences += notes.note_micro_slip(joint, amplitudes)
+    sentences += notes.note_missing_mesh(joint)
+    for curve in curves.values():
+        sentences += curve.notes
+    sentences += notes.note_secant_stiffness(joint, amplitudes, curves)
+    sentences += notes.note_wear(joint.model)
     flutter = None
     for method, curve in curves.items():
         if flutter is None:
@@ -172,7 +178,7 @@ def _make_backbone(joint: Joint, wanted, curves: dict, missing: dict) -> Backbon
         missing=missing,
         exponents=exponents,
         flutter=flutter,
-        notes=tuple(remarks),
+        notes=tuple(sentences),
     )
 
 
@@ -199,22 +205,24 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
     if spring is not None:
         free = modes.compute_stuck_mode(modes.interfaces[:1], np.array([spring[0]]), joint.mode)[0]
     free = free / (2 * np.pi)
-    if joint.held[0] is None:
+    stuck = joint.stuck_mode.omega
+    if stuck is None:
         return ModeFrequencies(free, None)
     measure = stuck_patch_stiffness(model, joint.patch, joint.coarser)
     # Modes that were measured with the joint have the stiffness of the joint in them.
-    if (
-        measure is None
-        or len(modes.interfaces) > 1
-        or model.rig.structure.joint_stiffness is not None
-    ):
-        return ModeFrequencies(free, joint.held[0] / (2 * np.pi))
-    stuck, high = (
-        modes.compute_stuck_mode(modes.interfaces, np.array([stiffness]), joint.mode)[0]
-        / (2 * np.pi)
-        for stiffness in (measure.value, measure.value + measure.error)
-    )
+    has_joint = len(modes.interfaces) > 1 or model.rig.structure.joint_stiffness is not None
+    if measure is None or has_joint:
+        return ModeFrequencies(free, stuck / (2 * np.pi))
+    stuck = _stuck_frequency(joint, measure.value)
+    high = _stuck_frequency(joint, measure.value + measure.error)
     return ModeFrequencies(free, stuck, high - stuck)
+
+
+def _stuck_frequency(joint: Joint, stiffness: float) -> float:
+    """Return the frequency [Hz] with a contact of a stiffness [N/m] that sticks."""
+    modes = joint.modes
+    omega, _ = modes.compute_stuck_mode(modes.interfaces, np.array([stiffness]), joint.mode)
+    return omega / (2 * np.pi)
 
 
 def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
@@ -236,16 +244,17 @@ def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
     slip = joint.slip_amplitude
     micro = np.flatnonzero(known & (amplitude < notes.MICRO_SLIP_END * slip))
     gross = np.flatnonzero(known & (amplitude > GROSS_SLIP_BEGIN * slip))[-2:]
+    return LossExponents(_loss_slope(curve, micro), _loss_slope(curve, gross), theory)
 
-    def slope(points) -> float | None:
-        """Return the slope from the first to the last of some points; None for fewer than two."""
-        if points.size < 2:
-            return None
-        i = points[0]
-        j = points[-1]
-        return float(np.log(loss[j] / loss[i]) / np.log(amplitude[j] / amplitude[i]))
 
-    return LossExponents(slope(micro), slope(gross), theory)
+def _loss_slope(curve: Curve, points) -> float | None:
+    """Return the slope from the first to the last of some points; None for fewer than two."""
+    if points.size < 2:
+        return None
+    ends = points[[0, -1]]
+    low_loss, high_loss = curve.loss[ends]
+    low, high = curve.amplitude[ends]
+    return float(np.log(high_loss / low_loss) / np.log(high / low))
 
 
 def _theoretical_exponent(joint: Joint) -> float | None:
@@ -291,5 +300,5 @@ def _flutter_amplitude(joint: Joint, method: str, curve: Curve) -> float | None:
     except (NotConverged, PatchfemError):
         # No further point is known, so the root is that of the chord between the two points.
         amplitudes = curve.amplitude[bracket]
-        share = loss_low / (loss_low - loss_high)
-        return float(amplitudes[0] + share * (amplitudes[1] - amplitudes[0]))
+        fraction = loss_low / (loss_low - loss_high)
+        return float(amplitudes[0] + fraction * (amplitudes[1] - amplitudes[0]))

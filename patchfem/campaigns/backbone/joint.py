@@ -40,6 +40,16 @@ NO_CLOSED_FORM = (
 )
 
 
+class StuckMode(NamedTuple):
+    """Mode with the contact stuck.
+
+    omega: circular frequency [rad/s], None if nothing is elastic; shape: (n,).
+    """
+
+    omega: float | None
+    shape: np.ndarray
+
+
 class Joint(NamedTuple):
     """A mode of a rig with its contact.
 
@@ -52,9 +62,7 @@ class Joint(NamedTuple):
         Patches on coarser meshes, or None.
     mode : int
         Index of the coordinate of the mode.
-    held : tuple
-        Angular frequency [rad/s], or None if nothing is elastic, and shape (n,) of the mode with
-        the contact stuck.
+    stuck_mode : StuckMode
     stiffness : (i,) array
         Tangential stiffness [N/m] of each interface while nothing slips.
     has_errors : bool
@@ -65,7 +73,7 @@ class Joint(NamedTuple):
     patch: object
     coarser: tuple
     mode: int
-    held: tuple
+    stuck_mode: StuckMode
     stiffness: np.ndarray
     has_errors: bool = True
 
@@ -82,7 +90,12 @@ class Joint(NamedTuple):
     @property
     def shape(self) -> np.ndarray:
         """Shape (n,) of the mode with the contact stuck."""
-        return self.held[1]
+        return self.stuck_mode.shape
+
+    @property
+    def omega(self) -> float:
+        """Circular frequency [rad/s] with the contact stuck; without it if nothing is elastic."""
+        return self.stuck_mode.omega or self.modes.omega[self.mode]
 
     @property
     def reach(self) -> float:
@@ -117,26 +130,26 @@ class Joint(NamedTuple):
     def is_linear(self) -> bool:
         """Whether no friction acts and no spring is nonlinear."""
         interfaces = self.model.rig.friction.interfaces
-        others = 0.0
+        has_friction = bool(self.friction_limit)
         if len(interfaces) > 1:
-            others = sum(
-                interface.numbers.static * (interface.load or 0.0) for interface in interfaces
-            )
-        return not (self.friction_limit or others or self.model.rig.springs.is_nonlinear)
+            limits = [face.numbers.static * (face.load or 0.0) for face in interfaces]
+            has_friction = has_friction or any(limits)
+        return not (has_friction or self.model.rig.springs.is_nonlinear)
 
     @property
     def is_rigid(self) -> bool:
         """Whether friction sticks without any elastic displacement."""
-        interfaces = self.model.rig.friction.interfaces
-        return not self.model.partial_slip and any(
-            law_has_trait(interface.numbers.law, "set-valued") and not interface.partial_slip
-            for interface in interfaces
-        )
+        if self.model.partial_slip:
+            return False
+        for interface in self.model.rig.friction.interfaces:
+            if law_has_trait(interface.numbers.law, "set-valued") and not interface.partial_slip:
+                return True
+        return False
 
     @property
     def spring(self) -> float:
         """Stiffness of the mode without the contact [N/m], per unit of its coordinate."""
-        return self.modes.mass * float(self.modes.omega[self.mode] or self.held[0]) ** 2
+        return self.modes.mass * float(self.modes.omega[self.mode] or self.stuck_mode.omega) ** 2
 
     @property
     def deflection(self) -> float:
@@ -198,8 +211,9 @@ class Joint(NamedTuple):
         if not rig.springs.cubic:
             return travel
         output = abs(float(modes.output[self.mode])) or self.reach
-        own = np.sqrt(self.spring / abs(rig.springs.cubic)) / output
-        return min(travel, own * (SOFTENING_END if rig.springs.cubic < 0 else HARDENING_END))
+        doubling = np.sqrt(self.spring / abs(rig.springs.cubic)) / output
+        end = SOFTENING_END if rig.springs.cubic < 0 else HARDENING_END
+        return min(travel, doubling * end)
 
     def steady_laws(self) -> LawGroup:
         """Return the steady loops of all laws.
@@ -209,10 +223,8 @@ class Joint(NamedTuple):
         try:
             return decays.laws_on(self.model, self.patch)
         except PatchfemError:
-            has_bench = (
-                not self.model.rig.springs.is_nonlinear
-                and len(self.model.rig.friction.interfaces) < 2
-            )
+            rig = self.model.rig
+            has_bench = not rig.springs.is_nonlinear and len(rig.friction.interfaces) < 2
             cure = ALL_METHODS_CURE if has_bench else ""
             raise PatchfemError(NO_CLOSED_FORM + cure) from None
 
@@ -234,23 +246,21 @@ class Joint(NamedTuple):
     def space_errors(self, read: Callable) -> np.ndarray | float:
         """Return the errors of read(LawGroup) due to the mesh and to the discrete sliders of a law."""
         model = self.model
-        has_cells = any(
-            law_has_trait(interface.numbers.law, "cells")
-            for interface in model.rig.friction.interfaces
-        )
-        slips_in_parts = model.partial_slip or model.rig.friction.has_partial_slip
+        laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
+        has_cells = any(law_has_trait(law, "cells") for law in laws)
+        has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
         error = 0.0
-        if not self.has_errors or not (has_cells or slips_in_parts):
+        if not self.has_errors or not (has_cells or has_partial_slip):
             return error
-        fine = self.steady_laws()
-        if slips_in_parts:
-            error = error + decays.mesh_error(fine, decays.coarse_laws(model, self.coarse), read)
+        group = self.steady_laws()
+        if has_partial_slip:
+            error = error + decays.mesh_error(group, decays.coarse_laws(model, self.coarse), read)
         if has_cells:
-            best = read(fine)
-            changes = [
-                np.abs(read(fine.with_elements(partial(join_cells, *cells))) - best)
-                for cells in CELL_MERGES
-            ]
+            best = read(group)
+            changes = []
+            for cells in CELL_MERGES:
+                merged = group.with_elements(partial(join_cells, *cells))
+                changes.append(np.abs(read(merged) - best))
             error = error + error_of_change(np.max(changes, axis=0), ratio=4.0, order=2.0)
         return error
 
@@ -278,23 +288,21 @@ def build_joint(model: Model, name: str) -> Joint:
     modes = model.rig.modes
     number = _find_mode(model.rig, name)
     if modes.lateral_faces is not None:
-        key = next(
-            interface.key for interface in model.rig.friction.interfaces if interface.lateral
-        )
+        lateral = [face for face in model.rig.friction.interfaces if face.lateral]
         refusal = describe_unsupported("a backbone with interfaces that slide in a plane", "out")
-        raise PatchfemError(refusal, f"{key}.lateral")
+        raise PatchfemError(refusal, f"{lateral[0].key}.lateral")
     patch = None
     coarser: tuple = (None,)
     if model.patch is not None:
         patch, *others = patch_result.solve_all(model.patch, model.accuracy.tolerance)
         coarser = (*others, None)
-    own = np.eye(modes.omega.size)[number]
-    joint = Joint(model, patch, coarser, number, (None, own), np.zeros(len(modes.interfaces)))
+    free_mode = StuckMode(None, np.eye(modes.omega.size)[number])
+    joint = Joint(model, patch, coarser, number, free_mode, np.zeros(len(modes.interfaces)))
     if not joint.is_linear:
         planned = joint._replace(stiffness=stuck_stiffness(model.rig, plan(model).chain))
         stiffness = _stuck_stiffness(planned)
-        held = modes.compute_stuck_mode(modes.interfaces, stiffness, number)
-        joint = joint._replace(held=held, stiffness=stiffness)
+        stuck_mode = modes.compute_stuck_mode(modes.interfaces, stiffness, number)
+        joint = joint._replace(stuck_mode=StuckMode(*stuck_mode), stiffness=stiffness)
     _refuse_mode(joint)
     return joint
 
@@ -311,7 +319,7 @@ def _refuse_mode(joint: Joint) -> None:
             "without friction leave out [friction] and the normal load",
             "friction.static",
         )
-    if not (modes.omega[joint.mode] or joint.held[0]):
+    if not (modes.omega[joint.mode] or joint.stuck_mode.omega):
         raise PatchfemError(
             "this mode has 0 Hz and rigid friction acts on it, so the mode has no natural frequency"
         )
@@ -371,5 +379,5 @@ def _stuck_stiffness(joint: Joint) -> np.ndarray:
         if planned.size > 1:
             return planned
         small = STUCK_FRACTION * joint.friction_limit / planned[0]
-        settled = settle_loop(model, joint.patch, small, model.rig.first_mode.frequency)
-        return np.array([settled.run.values["secant_stiffness"]])
+        loop = settle_loop(model, joint.patch, small, model.rig.first_mode.frequency)
+        return np.array([loop.run.values["secant_stiffness"]])

@@ -4,9 +4,8 @@ import numpy as np
 
 from ...core import NotConverged
 from .joint import Joint
-from .records import Curve
+from .records import ROUND_OFF_ERROR, Curve
 
-ROUND_OFF_ERROR = 1e-9  # Relative error of a value due to round-off.
 # Fixed-point steps to the negative damping that maintains the motion; they converge fast.
 N_STEPS = 8
 
@@ -30,13 +29,13 @@ def compute_level_curve(joint: Joint, amplitudes, method: str) -> Curve:
     for _ in range(N_STEPS):
         negative_damping -= 2 * _find_root(joint, negative_damping).real
     omega = abs(_find_root(joint, negative_damping))
-    own = _find_root(joint, 0.0)
-    if not (own.imag and negative_damping < 2 * omega):
+    damped_root = _find_root(joint, 0.0)
+    if not (damped_root.imag and negative_damping < 2 * omega):
         raise NotConverged("the mode does not oscillate: its damping ratio is 1 or more")
     damping = negative_damping / (2 * omega)
     if method == "decay":
-        omega = abs(own.imag)
-        damping = -own.real / abs(own)
+        omega = abs(damped_root.imag)
+        damping = -damped_root.real / abs(damped_root)
     frequency = np.full(amplitudes.size, omega / (2 * np.pi))
     damping = np.full(amplitudes.size, damping)
     return Curve(

@@ -6,6 +6,7 @@ from ...formatting import format_length
 from ...model.model import Model
 from ...runs.patch import faces
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
+from .records import Curve
 
 # Amplitude / amplitude at which the whole contact begins to slip; below this ratio it is in micro-slip.
 MICRO_SLIP_END = 0.3
@@ -58,13 +59,13 @@ def note_missing_mesh(joint: Joint) -> list:
     return [f"{MISSING_ERRORS}the interface has too few elements for a coarser mesh; {cure}"]
 
 
-def note_micro_slip(joint: Joint, wanted) -> list:
+def note_micro_slip(joint: Joint, amplitudes) -> list:
     """Return a sentence about amplitudes (k,) [m] that do not determine the exponent of micro-slip."""
     edge = MICRO_SLIP_END * joint.slip_amplitude
-    if wanted[0] > edge:
+    if amplitudes[0] > edge:
         begin = format_length(MIN_AMPLITUDE_FACTOR / MICRO_SLIP_END * edge, 2)
         return [
-            f"the smallest amplitude, {format_length(wanted[0], 3)}, lies above the range of "
+            f"the smallest amplitude, {format_length(amplitudes[0], 3)}, lies above the range of "
             f"micro-slip, which ends at about {format_length(edge, 2)}; to get the exponent of "
             f"micro-slip, begin --amplitudes at {begin}"
         ]
@@ -76,31 +77,40 @@ def note_micro_slip(joint: Joint, wanted) -> list:
     ]
 
 
-def note_gaps(wanted, curves: dict) -> list:
+def note_gaps(amplitudes, curves: dict) -> list:
     """Return sentences about the requested amplitudes (k,) [m] at which a curve has no value."""
     out = []
     for method, curve in curves.items():
-        lacks = wanted[~np.isin(wanted, curve.amplitude)]
+        missing = amplitudes[~np.isin(amplitudes, curve.amplitude)]
         count = curve.amplitude.size
-        if not lacks.size or count == wanted.size:
+        if not missing.size or count == amplitudes.size:
             continue
-        if lacks.size > MAX_LISTED:
-            ends = [format_length(lacks[k], 3) for k in (0, -1)]
+        if missing.size > MAX_LISTED:
+            ends = [format_length(missing[k], 3) for k in (0, -1)]
             places = f"lie from {ends[0]} to {ends[1]}"
         else:
-            places = f"are {', '.join(format_length(one, 3) for one in lacks)}"
+            places = f"are {', '.join(format_length(amplitude, 3) for amplitude in missing)}"
         out.append(
-            f"method {method}: {count} of {wanted.size} amplitudes have a result; the amplitudes "
+            f"method {method}: {count} of {amplitudes.size} amplitudes have a result; the amplitudes "
             f"without a result {places}: {REASONS_OF_GAPS[method]}"
         )
     return out
 
 
-def note_secant_stiffness(joint: Joint, wanted, curves: dict) -> list:
-    """Return a note about the secant stiffness of a quasi-static curve in slip, without a curve by balance."""
+def note_secant_stiffness(joint: Joint, amplitudes, curves: dict) -> list:
+    """Return a note about the secant stiffness of a static curve in slip, without one by balance.
+
+    Parameters
+    ----------
+    joint : Joint
+    amplitudes : (k,) array
+        Requested amplitudes [m].
+    curves : dict of Curve
+        By method.
+    """
     if joint.is_linear or not joint.friction_limit:
         return []
-    slips = wanted[-1] > MICRO_SLIP_END * joint.slip_amplitude
+    slips = amplitudes[-1] > MICRO_SLIP_END * joint.slip_amplitude
     if not slips or "quasi-static" not in curves or "balance" in curves:
         return []
     return [
@@ -116,7 +126,7 @@ def note_differences(curves: dict) -> list:
     if "balance" not in curves:
         return []
     balance = curves["balance"]
-    out = []
+    sentences = []
     for method, reason in REASONS_OF_DIFFERENCES.items():
         if method not in curves:
             continue
@@ -126,27 +136,44 @@ def note_differences(curves: dict) -> list:
         curve = curves[method].at(here)
         other = balance.at(there)
         for name in ("frequency", "damping"):
-            value = getattr(curve, name)
-            beside = getattr(other, name)
-            errors = getattr(curve, f"{name}_error") + getattr(other, f"{name}_error")
-            difference = np.abs(value - beside)
-            share = np.where(difference > errors, difference / np.abs(beside), 0.0)
-            if not share.size or not share.max() > 0:
-                continue
-            k = int(np.argmax(share))
-            ratio = value[k] / beside[k]
-            size = f"by {100 * share[k]:.2g} %"
-            if ratio >= MIN_RATIO:
-                size = f"where the value by {method} is {ratio:.2g} times the value by balance"
-            also = ""
-            if curve.other_modes is not None and curve.other_modes[k] > REPORT_OTHER_MODES:
-                also = (
-                    "; the motion of other modes in the decay is "
-                    f"{100 * curve.other_modes[k]:.2g} % of its amplitude"
-                )
-            lost = -np.expm1(-2 * np.pi * curve.damping[k])
-            out.append(
-                f"the values of {name} by {method} and by balance differ most at the amplitude "
-                f"{format_length(curve.amplitude[k], 3)}, {size}: {reason.format(lost)}{also}"
-            )
-    return out
+            sentences += _note_largest_difference(method, name, curve, other, reason)
+    return sentences
+
+
+def _note_largest_difference(
+    method: str, name: str, curve: Curve, balance: Curve, reason: str
+) -> list:
+    """Return a sentence about the largest difference of two curves at the same amplitudes.
+
+    Parameters
+    ----------
+    method : str
+        Method of the curve.
+    name : {"frequency", "damping"}
+    curve, balance : Curve
+    reason : str
+        Reason of the difference, with a place for the fraction that a cycle loses.
+    """
+    value = getattr(curve, name)
+    balance_value = getattr(balance, name)
+    errors = getattr(curve, f"{name}_error") + getattr(balance, f"{name}_error")
+    difference = np.abs(value - balance_value)
+    relative = np.where(difference > errors, difference / np.abs(balance_value), 0.0)
+    if not relative.size or not relative.max() > 0:
+        return []
+    k = int(np.argmax(relative))
+    ratio = value[k] / balance_value[k]
+    size = f"by {100 * relative[k]:.2g} %"
+    if ratio >= MIN_RATIO:
+        size = f"where the value by {method} is {ratio:.2g} times the value by balance"
+    others = ""
+    if curve.other_modes is not None and curve.other_modes[k] > REPORT_OTHER_MODES:
+        others = (
+            "; the motion of other modes in the decay is "
+            f"{100 * curve.other_modes[k]:.2g} % of its amplitude"
+        )
+    lost_fraction = -np.expm1(-2 * np.pi * curve.damping[k])
+    return [
+        f"the values of {name} by {method} and by balance differ most at the amplitude "
+        f"{format_length(curve.amplitude[k], 3)}, {size}: {reason.format(lost_fraction)}{others}"
+    ]

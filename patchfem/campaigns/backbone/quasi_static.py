@@ -10,10 +10,8 @@ from ...runs.bench.errors import estimate_pass_errors
 from ...runs.rig import decays
 from .bench_loops import LOOP_MEASURES, settle_loop
 from .joint import Joint
-from .records import Curve
+from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve
 
-ROUND_OFF_ERROR = 1e-9  # Relative error of a value due to round-off.
-AMPLITUDE_TOL = 1e-7  # Relative tolerance of an amplitude.
 N_SAMPLES = 4096  # Samples of a cycle of a loop; half as many give the error.
 MAX_STEPS = 60  # Maximum number of corrections of the displacement until the amplitude is the requested one.
 MIN_FLOOR = 1e-10  # Smallest relative error of a loop on a bench.
@@ -30,9 +28,9 @@ def compute_static_curve(joint: Joint, amplitudes) -> Curve:
             "rigid friction has no finite stiffness, so a static curve cannot be computed for the "
             "mode of the sticking contact"
         )
-    known = _by_closed_form(joint, amplitudes)
-    if known is not None:
-        return known
+    curve = _by_closed_form(joint, amplitudes)
+    if curve is not None:
+        return curve
     try:
         laws = joint.steady_laws()
     except PatchfemError:
@@ -63,8 +61,8 @@ def _rising_part(best, error) -> Curve:
         Amplitude [m], frequency [Hz], damping ratio, loss [J], and their errors.
     """
     force = best[1] ** 2 * best[0]
-    whole = np.isfinite(best + error).all(axis=0) & (np.diff(force, prepend=0.0) > 0)
-    count = whole.size if whole.all() else int(np.argmin(whole))
+    rises = np.isfinite(best + error).all(axis=0) & (np.diff(force, prepend=0.0) > 0)
+    count = rises.size if rises.all() else int(np.argmin(rises))
     if not count:
         raise NotConverged(
             "no static force with the shape of the mode holds the rig in equilibrium at these "
@@ -113,7 +111,7 @@ def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
     """Return amplitude, frequency, damping and loss (4, k) by loops at displacements (k,) [m]."""
     modes = joint.modes
     statics = quasi_static.find_static_motions_from_loops(
-        modes, modes.interfaces[0], joint.held, slides, loops
+        modes, modes.interfaces[0], joint.stuck_mode, slides, loops
     )
     return decays.decay_rows(modes, statics)
 
@@ -124,24 +122,23 @@ def _by_bench_loops(joint: Joint, amplitudes) -> Curve:
     patches = [joint.patch]
     if joint.coarse is not None:
         patches.append(joint.coarse)
+    frequency = joint.stuck_mode.omega / (2 * np.pi)
     loops = []
-    errors = []
+    moved_tips = []
+    moved_areas = []
     for slide in slides:
-        frequency = joint.held[0] / (2 * np.pi)
         settled = settle_loop(joint.model, joint.patch, float(slide), frequency)
         changes = estimate_pass_errors(settled.model, patches, settled.run, settled.steps)[0]
         measures = add_errors(settled.run.values, *changes, min_relative_error=MIN_FLOOR)
         stiffness, area = (settled.run.values[name] for name in LOOP_MEASURES)
-        stiffness_error, area_error = (
-            measures[name].error + change for name, change in zip(LOOP_MEASURES, settled.change)
-        )
-        loops.append(quasi_static.StaticLoops(stiffness * slide, area))
-        errors.append(quasi_static.StaticLoops(stiffness_error * slide, area_error))
+        errors = [measures[name].error for name in LOOP_MEASURES]
+        stiffness_error, area_error = np.add(errors, settled.change)
+        loop = quasi_static.StaticLoops(stiffness * slide, area)
+        loops.append(loop)
+        moved_tips.append(loop._replace(tip=loop.tip + stiffness_error * slide))
+        moved_areas.append(loop._replace(area=loop.area + area_error))
     best = _read_loops(joint, slides, loops)
     error = ROUND_OFF_ERROR * np.abs(best)
-    pairs = list(zip(loops, errors))
-    moved_tips = [loop._replace(tip=loop.tip + off.tip) for loop, off in pairs]
-    moved_areas = [loop._replace(area=loop.area + off.area) for loop, off in pairs]
     for moved in (moved_tips, moved_areas):
         error += np.abs(_read_loops(joint, slides, moved) - best)
     return _rising_part(best, error)

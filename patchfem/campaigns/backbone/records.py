@@ -5,6 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 METHODS = ("balance", "decay", "quasi-static")
+ROUND_OFF_ERROR = 1e-9  # Relative error of a value due to round-off.
+AMPLITUDE_TOL = 1e-7  # Relative difference below which two amplitudes are equal.
+COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error", "loss")
 
 
 class Curve(NamedTuple):
@@ -35,26 +38,17 @@ class Curve(NamedTuple):
     notes: tuple = ()
     other_modes: np.ndarray | None = None
 
-    def at(self, pick) -> "Curve":
+    def at(self, points) -> "Curve":
         """Return the curve at some of its points, selected by bools (k,) or by a slice."""
-        others = None if self.other_modes is None else self.other_modes[pick]
-        return Curve(
-            amplitude=self.amplitude[pick],
-            frequency=self.frequency[pick],
-            frequency_error=self.frequency_error[pick],
-            damping=self.damping[pick],
-            damping_error=self.damping_error[pick],
-            loss=self.loss[pick],
-            notes=self.notes,
-            other_modes=others,
-        )
+        columns = {name: getattr(self, name)[points] for name in COLUMNS}
+        if self.other_modes is not None:
+            columns["other_modes"] = self.other_modes[points]
+        return self._replace(**columns)
 
     def interpolate(self, amplitudes) -> dict:
         """Return frequency and damping at other amplitudes (k,) [m] by name."""
-        return {
-            name: np.interp(amplitudes, self.amplitude, getattr(self, name))
-            for name in ("frequency", "damping")
-        }
+        names = ("frequency", "damping")
+        return {name: np.interp(amplitudes, self.amplitude, getattr(self, name)) for name in names}
 
 
 class ModeFrequencies(NamedTuple):

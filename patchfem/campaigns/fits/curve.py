@@ -18,7 +18,7 @@ import numpy as np
 
 from ...core import NotConverged, PatchfemError, frozen_array
 from ...formatting import format_length
-from ...identify.least_squares import Fit
+from ...identify.least_squares import Fit, Problem
 from ...identify.space import make_space_filling_points
 from ...identify.two_models import TwoModels
 from ...inputs.cells import TableFormat, read_text
@@ -27,8 +27,8 @@ from ...model.source import locate_errors
 from ...response.errors import error_of_change
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene
-from ..backbone.curves import backbone
-from .problem import FittedKeys, Problem, model_without_joint, parse_ranges
+from ..backbone.curves import compute_backbone
+from .problem import FittedKeys, FreeKeys, format_assignments, model_without_joint, parse_ranges
 
 UNITS = {
     "amplitude": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
@@ -36,8 +36,8 @@ UNITS = {
     "damping": {"": 1.0, "1": 1.0},
 }
 HEADER = "decay_amplitude [m],decay_frequency [Hz],decay_damping [1]"
-# Default relative errors of frequency and damping, for rows without errors.
-DEFAULT_ERRORS = np.array([1e-3, 5e-2])
+DEFAULT_FREQUENCY_ERROR = 1e-3  # Relative error of a frequency in a row without its error.
+DEFAULT_DAMPING_ERROR = 5e-2  # Relative error of a damping ratio in a row without its error.
 # Smallest relative standard deviation of a value, because an error of 0 has no weight.
 MIN_SPREAD = 1e-6
 METHODS = ("balance", "quasi-static")  # The first method is the reference, the last one is fast.
@@ -46,7 +46,8 @@ DEFAULT_STARTS = 6  # Starts of a search by the fast method.
 MAX_TRIALS = 8
 PROGRESS_SECONDS = 10.0  # Time from one line of progress to the next.
 MAX_LISTED = 6  # Amplitudes that a sentence lists one by one.
-N_KEPT_CURVES = 8  # Cached curves: a step of the search needs the last ones again.
+N_CACHED_CURVES = 8  # Curves that are kept, because a step of the search needs the last ones again.
+NO_MODE_ERROR = "the intervals do not contain the error of the modes left out of the structure"
 
 
 class MeasuredCurve(NamedTuple):
@@ -65,6 +66,10 @@ class MeasuredCurve(NamedTuple):
     amplitude: np.ndarray
     value: np.ndarray
     error: np.ndarray
+
+    def residual(self, curve) -> np.ndarray:
+        """Return the residual (2k,) of a computed curve (2, k) over the standard deviations."""
+        return ((curve - self.value) / self.error).ravel()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -112,14 +117,13 @@ def read_curve(path) -> MeasuredCurve:
         )
     columns = {name.removeprefix("decay_"): column for name, column in table.values.items()}
     value = np.array([columns["frequency"], columns["damping"]])
-    # An error is half the width of a 95 % interval: two standard deviations.
-    spread = np.array(
+    error = np.array(
         [
-            columns.get(f"{name}_error", default * np.abs(row)) / 2
-            for name, default, row in zip(("frequency", "damping"), DEFAULT_ERRORS, value)
+            columns.get("frequency_error", DEFAULT_FREQUENCY_ERROR * np.abs(value[0])),
+            columns.get("damping_error", DEFAULT_DAMPING_ERROR * np.abs(value[1])),
         ]
     )
-    if (spread < 0).any():
+    if (error < 0).any():
         raise PatchfemError(
             f"{path}: errors must be 0 or more; of a value with a confidence interval, give half "
             "the width of this interval as the error, or leave out the column of errors"
@@ -128,19 +132,20 @@ def read_curve(path) -> MeasuredCurve:
     if not (amplitude > 0).all() or not (value[0] > 0).all():
         raise PatchfemError(f"{path}: amplitudes and frequencies must be above 0")
     order = np.argsort(amplitude, kind="stable")
-    spread = np.maximum(spread, MIN_SPREAD * np.abs(value))
-    return MeasuredCurve(amplitude[order], value[:, order], spread[:, order])
+    # An error is half the width of a 95 % interval: two standard deviations.
+    deviation = np.maximum(error / 2, MIN_SPREAD * np.abs(value))
+    return MeasuredCurve(amplitude[order], value[:, order], deviation[:, order])
 
 
 def _read_table(path):
-    units = {
-        f"{prefix}{name}{suffix}": unit
-        for prefix in ("decay_", "")
-        for name, unit in UNITS.items()
-        for suffix in ("", "_error")
-    }
-    wanted = tuple(f"decay_{name} {name}" for name in UNITS)
-    return read_columns(path, TableFormat(units, wanted, HEADER, "a decay", has_label_units=True))
+    """Read the columns of a curve, with or without the prefix "decay_"."""
+    units = {}
+    for prefix in ("decay_", ""):
+        for name, unit in UNITS.items():
+            units[f"{prefix}{name}"] = unit
+            units[f"{prefix}{name}_error"] = unit
+    required = tuple(f"decay_{name} {name}" for name in UNITS)
+    return read_columns(path, TableFormat(units, required, HEADER, "a decay", has_label_units=True))
 
 
 class CurveModel:
@@ -151,7 +156,7 @@ class CurveModel:
     Parameters
     ----------
     scene : Scene
-    wanted : list of Range
+    ranges : list of Range
         Bounds of the free keys.
     amplitude : (k,) array
         Measured amplitudes [m].
@@ -159,38 +164,36 @@ class CurveModel:
         Takes a line of progress.
     """
 
-    def __init__(self, scene: Scene, wanted: list, amplitude: np.ndarray, say=None):
+    def __init__(self, scene: Scene, ranges: list, amplitude: np.ndarray, say=None):
         self.base = BaseScene(scene)
-        self.wanted = wanted
+        self.ranges = ranges
         self.amplitude = amplitude
         self.distinct, self.rows = np.unique(amplitude, return_inverse=True)
         self.say = say
         self.begin = perf_counter()
-        self.last_said = self.begin
-        self.count = 0
+        self.last_progress = self.begin
+        self.n_computed = 0
         self.methods = list(METHODS)
-        self._cached = lru_cache(N_KEPT_CURVES)(self._compute)
+        self._cached_curve = lru_cache(N_CACHED_CURVES)(self._compute)
 
-    def curve_by(self, method: str, values) -> np.ndarray:
+    def compute(self, method: str, values) -> np.ndarray:
         """Return the curve by a method, NaN at amplitudes at which the mode does not oscillate."""
-        return self._cached(tuple(map(float, values)), method)
+        return self._cached_curve(tuple(map(float, values)), method)
 
     def model(self, values):
         """Build the rig with these values, with the modes that it has without the joint."""
-        return model_without_joint(
-            self.base, [bound.format_assignment(value) for bound, value in zip(self.wanted, values)]
-        )
+        return model_without_joint(self.base, format_assignments(self.ranges, values))
 
     def compute_model_curve(self, model, method: str) -> np.ndarray:
         """Compute the curve of any model at the measured amplitudes."""
         return _compute_curve(model, self.distinct, method)[:, self.rows]
 
     def _compute(self, values: tuple, method: str) -> np.ndarray:
-        if self.say and perf_counter() - self.last_said >= PROGRESS_SECONDS:
-            self.last_said = perf_counter()
-            elapsed = self.last_said - self.begin
-            self.say(f"{self.count} curves of the model computed in {elapsed:.0f} s")
-        self.count += 1
+        if self.say and perf_counter() - self.last_progress >= PROGRESS_SECONDS:
+            self.last_progress = perf_counter()
+            elapsed = self.last_progress - self.begin
+            self.say(f"{self.n_computed} curves of the model computed in {elapsed:.0f} s")
+        self.n_computed += 1
         return self.compute_model_curve(self.model(values), method)
 
     def choose_methods(self, trials: list) -> None:
@@ -198,14 +201,14 @@ class CurveModel:
         reasons: list = []
         best: list = []
         for values in trials:
-            known = []
+            possible = []
             for method in METHODS:
                 try:
-                    self.curve_by(method, values)
-                    known.append(method)
+                    self.compute(method, values)
+                    possible.append(method)
                 except PatchfemError as reason:
                     reasons.append(f"{method}: {reason}")
-            best = max(best, known, key=len)
+            best = max(best, possible, key=len)
             if len(best) == len(METHODS):
                 break
         if not best:
@@ -218,16 +221,16 @@ class CurveModel:
 
     def reference(self, values) -> np.ndarray:
         """Return the curve by the reference method, NaN if the mode does not oscillate."""
-        return self.curve_by(self.methods[0], values)
+        return self.compute(self.methods[0], values)
 
     def quick(self, values) -> np.ndarray:
         """Return the curve by the fast method; PatchfemError if the mode does not oscillate."""
-        curve = self.curve_by(self.methods[-1], values)
-        lost = self.amplitude[np.isnan(curve[0])]
-        if lost.size:
+        curve = self.compute(self.methods[-1], values)
+        missing = self.amplitude[np.isnan(curve[0])]
+        if missing.size:
             raise PatchfemError(
                 "the mode of the model does not oscillate at the amplitudes "
-                f"{_list_amplitudes(lost)}; leave out these rows, or narrow the ranges of --free"
+                f"{_list_amplitudes(missing)}; leave out these rows, or narrow the ranges of --free"
             )
         return curve
 
@@ -238,7 +241,7 @@ class CurveModel:
         ratio of both methods in the row that is nearest in amplitude.
         """
         curve = self.reference(values)
-        quick = self.curve_by(self.methods[-1], values)
+        quick = self.compute(self.methods[-1], values)
         known = np.flatnonzero(~np.isnan(curve[0]))
         nearest = known[_nearest_rows(self.amplitude[known], self.amplitude)]
         return np.where(np.isnan(curve), quick * (curve / quick)[:, nearest], curve)
@@ -276,50 +279,43 @@ def fit_curve(
         If no search converges.
     """
     begin = perf_counter()
-    wanted = parse_ranges(free)
+    ranges = parse_ranges(free)
     measured = read_curve(to)
     count = measured.amplitude.size
-    if 2 * count <= len(wanted):
+    if 2 * count <= len(ranges):
         raise PatchfemError(
-            f"{to}: {count} amplitudes are too few to determine {len(wanted)} values; at least "
-            f"{len(wanted) // 2 + 1} are needed"
+            f"{to}: {count} amplitudes are too few to determine {len(ranges)} values; at least "
+            f"{len(ranges) // 2 + 1} are needed"
         )
-    curves = CurveModel(scene, wanted, measured.amplitude, say)
-
-    def misfit(curve) -> np.ndarray:
-        """Return the weighted residual of a curve (2, k)."""
-        return ((curve - measured.value) / measured.error).ravel()
-
-    problem = Problem(scene, wanted, lambda values: misfit(curves.quick(values)))
-    start = problem.own_values()
-    box = problem.box
-    trials = [start, *map(box.values, make_space_filling_points(MAX_TRIALS, len(start)))]
-    curves.choose_methods(trials)
+    curves = CurveModel(scene, ranges, measured.amplitude, say)
+    keys = FreeKeys(scene, ranges)
+    problem = keys.make_problem(lambda values: measured.residual(curves.quick(values)))
+    space = problem.space
+    other_trials = map(space.values, make_space_filling_points(MAX_TRIALS, len(ranges)))
+    curves.choose_methods([problem.start, *other_trials])
     if say:
         say(f"{count} amplitudes computed by {' and '.join(curves.methods)}")
     model = curves.quick
     if len(curves.methods) > 1:
-        models = TwoModels(curves.quick, curves.complete_reference, misfit, box)
-        model, start = _search_two_models(models, start, starts, measured.amplitude)
+        models = TwoModels(curves.quick, curves.complete_reference, measured.residual, space)
+        model, start = _search_two_models(models, problem.start, starts, measured.amplitude)
         model = model or curves.complete_reference
+        problem = replace(problem, start=start)
         starts = 1
-    problem = replace(problem, residual=lambda values: misfit(model(values)))
-    found = problem.solve(start, starts)
-    notes = _compare_methods(to, curves.methods[0], measured)
-
-    def refit(change) -> np.ndarray:
-        """Return the change of the fitted values if the curve of the model changes."""
-        changed = replace(problem, residual=lambda values: misfit(model(values) + change))
-        return np.abs(changed.solve(found.values, starts=1, bars="").values - found.values)
-
-    widened = _include_missing_modes(problem, found, curves, refit)
-    best = model(found.values)
-    lost = measured.amplitude[np.isnan(curves.reference(found.values)[0])]
-    if lost.size:
-        problem = replace(problem, notes=[_describe_substitutes(lost)])
-    keys = problem.conclude(widened.fit, begin)
-    notes += widened.notes
-    return FittedCurve(keys, Path(to), measured, best, curves.methods[0], notes)
+    problem = replace(problem, residual=lambda values: measured.residual(model(values)))
+    fit = problem.solve(starts, "series")
+    widened = _include_missing_modes(keys.ranges, problem, fit, curves, measured, model)
+    missing = measured.amplitude[np.isnan(curves.reference(fit.values)[0])]
+    if missing.size:
+        keys = replace(keys, notes=[_describe_substitutes(missing)])
+    return FittedCurve(
+        keys=keys.conclude(widened.fit, begin),
+        path=Path(to),
+        measured=measured,
+        model=model(fit.values),
+        method=curves.methods[0],
+        notes=_compare_methods(to, curves.methods[0], measured) + widened.notes,
+    )
 
 
 def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tuple:
@@ -336,10 +332,10 @@ def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tupl
         ) from None
 
 
-def _describe_substitutes(lost) -> str:
+def _describe_substitutes(amplitudes) -> str:
     """Return the warning about amplitudes (k,) [m] at which the balance has no result."""
     return (
-        f"harmonic balance found no oscillation at the amplitudes {_list_amplitudes(lost)}; there, "
+        f"harmonic balance found no oscillation at the amplitudes {_list_amplitudes(amplitudes)}; there, "
         "the values of the static curve are used, multiplied by the ratio of the two methods at "
         "the nearest amplitude at which both have a value"
     )
@@ -370,53 +366,68 @@ class WidenedFit(NamedTuple):
 
 
 def _include_missing_modes(
-    problem: Problem, found: Fit, curves: CurveModel, refit: Callable
+    ranges: list,
+    problem: Problem,
+    fit: Fit,
+    curves: CurveModel,
+    measured: MeasuredCurve,
+    model: Callable,
 ) -> WidenedFit:
-    """Widen the intervals by the effect of modes that a reduced structure lacks."""
+    """Widen the intervals by the effect of modes that a reduced structure lacks.
+
+    Parameters
+    ----------
+    ranges : list of Range
+        The free keys.
+    problem : Problem
+    fit : Fit
+        Its solution.
+    curves : CurveModel
+    measured : MeasuredCurve
+    model : callable
+        Curve (2, k) that the problem compares with the measured one, as a function of the values.
+    """
     method = curves.methods[0]
-    model = curves.model(found.values)
-    if model.rig.structure.richer_rig is None:
-        return WidenedFit(found, ())
+    rig = curves.model(fit.values)
+    if rig.rig.structure.richer_rig is None:
+        return WidenedFit(fit, ())
     try:
-        richer = curves.compute_model_curve(
-            replace(model, rig=model.rig.structure.richer_rig), method
-        )
+        richer = curves.compute_model_curve(replace(rig, rig=rig.rig.structure.richer_rig), method)
     except PatchfemError as reason:
-        return WidenedFit(
-            found,
-            (
-                "the intervals do not contain the error of the modes left out of the structure: "
-                f"{reason}",
-            ),
-        )
-    own = curves.reference(found.values)
-    change = np.nan_to_num(richer - own)
-    moved = refit(error_of_change(change, ratio=0.5, order=2.0))
-    box = problem.box
-    ends = found.intervals.ends + moved[:, None] * [-1, 1]
-    ends = frozen_array(np.clip(ends, box.low[:, None], box.high[:, None]))
-    parts = [
-        f"{bound.key} by {_format_fraction(part, value)}"
-        for bound, part, value in zip(problem.ranges, moved, found.values)
-    ]
-    frequency, damping = 100 * np.nanmax(np.abs(change / own), axis=1)
+        return WidenedFit(fit, (f"{NO_MODE_ERROR}: {reason}",))
+    reference = curves.reference(fit.values)
+    change = np.nan_to_num(richer - reference)
+    error = error_of_change(change, ratio=0.5, order=2.0)
+    shifted = replace(
+        problem,
+        residual=lambda values: measured.residual(model(values) + error),
+        start=fit.values,
+    )
+    moved = np.abs(shifted.solve(1, "").values - fit.values)
+    space = problem.space
+    ends = fit.intervals.ends + moved[:, None] * [-1, 1]
+    ends = frozen_array(np.clip(ends, space.low[:, None], space.high[:, None]))
+    moves = []
+    for bound, move, value in zip(ranges, moved, fit.values):
+        moves.append(f"{bound.key} by {_format_fraction(move, value)}")
+    frequency, damping = 100 * np.nanmax(np.abs(change / reference), axis=1)
     note = (
         "the intervals contain the error of the modes left out of the structure; a computation "
         f"with more modes changes frequencies by up to {frequency:.2g} % and damping ratios by up "
-        f"to {damping:.2g} %, and moves {', '.join(parts)}"
+        f"to {damping:.2g} %, and moves {', '.join(moves)}"
     )
-    intervals = replace(found.intervals, ends=ends)
-    return WidenedFit(replace(found, intervals=intervals), (note,))
+    intervals = replace(fit.intervals, ends=ends)
+    return WidenedFit(replace(fit, intervals=intervals), (note,))
 
 
-def _format_fraction(part: float, value: float) -> str:
-    """Format a change as a percentage of a value."""
-    return f"{100 * part / abs(value):.2g} %" if value else f"{part:.2g}"
+def _format_fraction(change: float, value: float) -> str:
+    """Format a change as a percentage of a value, or as it is if the value is 0."""
+    return f"{100 * change / abs(value):.2g} %" if value else f"{change:.2g}"
 
 
-def _nearest_rows(amplitudes, wanted) -> np.ndarray:
+def _nearest_rows(amplitudes, others) -> np.ndarray:
     """Find the amplitudes (k,) [m] that are nearest to others (m,) [m] by their ratio."""
-    return np.abs(np.log(np.asarray(wanted)[:, None] / amplitudes)).argmin(axis=1)
+    return np.abs(np.log(np.asarray(others)[:, None] / amplitudes)).argmin(axis=1)
 
 
 def _list_amplitudes(amplitudes) -> str:
@@ -430,10 +441,10 @@ def _compute_curve(model, amplitudes, method: str) -> np.ndarray:
     They are NaN if the mode does not oscillate; PatchfemError if it oscillates at no amplitude.
     """
     with locate_errors(model.source):
-        found = backbone(model, "", amplitudes, (method,), errors=False)
-    if method not in found.curves:
-        raise PatchfemError(found.missing[method])
-    curve = found.curves[method]
-    out = np.full((2, amplitudes.size), np.nan)
-    out[:, _nearest_rows(amplitudes, curve.amplitude)] = curve.frequency, curve.damping
-    return out
+        backbone = compute_backbone(model, "", amplitudes, (method,), errors=False)
+    if method not in backbone.curves:
+        raise PatchfemError(backbone.missing[method])
+    curve = backbone.curves[method]
+    values = np.full((2, amplitudes.size), np.nan)
+    values[:, _nearest_rows(amplitudes, curve.amplitude)] = curve.frequency, curve.damping
+    return values

@@ -15,13 +15,13 @@ import numpy as np
 
 from ...core import NotConverged, PatchfemError
 from ...effects import law_has_trait
-from ...identify.least_squares import Fit, SearchCounts
+from ...identify.least_squares import Fit, Problem, SearchCounts
 from ...inputs.loops import Loop, read_loop
 from ...scene.keys.quantities import UNIT_FACTORS
 from ...scene.scene import Scene, SceneError
 from .loop_model import BenchModel
 from .loop_path import DEFAULT_OPTIONS, LoopOptions, read_offsets
-from .problem import FittedKeys, Problem, parse_ranges
+from .problem import FittedKeys, FreeKeys, parse_ranges
 
 MAX_PIECES = 64  # Time steps between two rows, above which the steps are not halved any more.
 # Fraction of the tolerance; a smaller change of the force has no effect on a fit.
@@ -49,7 +49,7 @@ class FittedLoop:
     loop : Loop
         The measured loop.
     offsets : list of Offset
-    held : (k,) bool
+    held_out : (k,) bool
         Rows that were only predicted.
     model : (k,) array
         Fitted force or friction ratio at the rows of `loop`.
@@ -62,7 +62,7 @@ class FittedLoop:
     keys: FittedKeys
     loop: Loop
     offsets: list
-    held: np.ndarray
+    held_out: np.ndarray
     model: np.ndarray
     step_error: float
     pieces: int
@@ -70,12 +70,12 @@ class FittedLoop:
     @property
     def rms(self) -> float:
         """Root mean square of the residual in the fitted rows, in the unit of the reading."""
-        return self._rms(~self.held)
+        return self._rms(~self.held_out)
 
     @property
     def held_rms(self) -> float | None:
         """Root mean square of the residual in the rows held out; None if there are none."""
-        return self._rms(self.held) if self.held.any() else None
+        return self._rms(self.held_out) if self.held_out.any() else None
 
     def _rms(self, rows) -> float:
         residual = self.model - self.loop.reading
@@ -125,40 +125,48 @@ def fit_loop(
                 f"with [slide], but this is a {scene.kind} scene; add [slide]"
             ]
         )
-    wanted = parse_ranges(free)
+    ranges = parse_ranges(free)
     loop = read_loop(to, LOAD_UNITS)
-    held = np.zeros(loop.reading.size, bool)
-    for text in hold:
-        held |= loop.select_rows(text)
+    held_out = np.zeros(loop.reading.size, bool)
+    for selector in hold:
+        held_out |= loop.select_rows(selector)
     offsets = read_offsets(options.offsets, loop)
-    count = len(wanted) + len(offsets)
-    used = np.count_nonzero(~held)
-    if used <= count:
+    n_values = len(ranges) + len(offsets)
+    n_used = np.count_nonzero(~held_out)
+    if n_used <= n_values:
         raise PatchfemError(
-            f"{to}: only {used} rows are used for the fit (rows that are held out do not count), "
-            f"too few to determine {count} values and their intervals"
+            f"{to}: only {n_used} rows are used for the fit (rows that are held out do not count), "
+            f"too few to determine {n_values} values and their intervals"
         )
-    bench = BenchModel(scene, loop, wanted, offsets, warm=options.warm, say=say)
-    scale = float(np.abs(loop.reading[~held]).max())
+    bench = BenchModel(scene, loop, ranges, offsets, warm=options.warm, say=say)
+    scale = float(np.abs(loop.reading[~held_out]).max())
 
     def residual(values) -> np.ndarray:
         """Return the residual / largest force (r,) in the fitted rows."""
-        return (bench(values) - loop.reading)[~held] / scale
+        return (bench(values) - loop.reading)[~held_out] / scale
 
     offset_ranges = [offset.range for offset in offsets]
-    problem = Problem(scene, wanted, residual, offset_ranges, bench.sets, bench.notes)
+    keys = FreeKeys(scene, ranges, offset_ranges, bench.sets, bench.notes)
     try:
-        refined = _solve_with_refined_steps(problem, bench, say)
+        refined = _solve_with_refined_steps(keys.make_problem(residual), bench, say)
     except NotConverged as error:
-        if bench.made == 0:
-            raise bench.refused or error from None
+        if bench.n_computed == 0:
+            raise bench.first_error or error from None
         raise
     model = bench(refined.fit.values)
-    keys = problem.conclude(refined.fit, begin)
-    fitted = FittedLoop(keys, loop, offsets, held, model, refined.step_error, bench.pieces)
+    fitted = FittedLoop(
+        keys=keys.conclude(refined.fit, begin),
+        loop=loop,
+        offsets=offsets,
+        held_out=held_out,
+        model=model,
+        step_error=refined.step_error,
+        pieces=bench.pieces,
+    )
     has_lead_in = bool(offsets) or options.warm
-    warnings = [*keys.warnings, *_doubt_warnings(fitted, scene, has_lead_in)]
-    return replace(fitted, keys=replace(keys, warnings=warnings))
+    doubts = _doubt_warnings(fitted, scene, has_lead_in=has_lead_in)
+    warnings = [*fitted.keys.warnings, *doubts]
+    return replace(fitted, keys=replace(fitted.keys, warnings=warnings))
 
 
 class RefinedFit(NamedTuple):
@@ -171,64 +179,65 @@ class RefinedFit(NamedTuple):
 def _solve_with_refined_steps(problem: Problem, bench: BenchModel, say) -> RefinedFit:
     """Solve with time steps that are halved until the change of the force is negligible."""
     if bench.exact:
-        return RefinedFit(problem.solve(problem.own_values()), 0.0)
-    found = problem.solve(problem.own_values(), bars="")
-    agreed = found.agreed
+        return RefinedFit(problem.solve(interval_kind="series"), 0.0)
+    fit = problem.solve(interval_kind="")
+    agreed = fit.agreed
     while True:
-        coarse = bench(found.values)
+        coarse = bench(fit.values)
         bench.pieces *= 2
-        fine = bench(found.values)
+        fine = bench(fit.values)
         change = float(np.abs(fine - coarse).max())
         peak = float(np.abs(fine).max())
         tolerance = STEP_FRACTION * bench.scene.accuracy.tolerance * peak
+        problem = replace(problem, start=fit.values)
         if bench.pinned or change <= tolerance or bench.pieces >= MAX_PIECES:
             bench.pieces //= 2
-            last = _add_counts(problem.solve(found.values, starts=1), found)
+            last = _add_counts(problem.solve(1, "series"), fit)
             return RefinedFit(replace(last, agreed=agreed), change)
         if say:
             say(f"{bench.pieces} time steps between neighbouring rows of the record")
-        found = _add_counts(problem.solve(found.values, starts=1, bars=""), found)
+        fit = _add_counts(problem.solve(1, ""), fit)
 
 
-def _add_counts(found: Fit, before: Fit) -> Fit:
+def _add_counts(fit: Fit, before: Fit) -> Fit:
     """Add the evaluations and failures of an earlier fit."""
     counts = SearchCounts(
-        found.counts.evaluations + before.counts.evaluations,
-        found.counts.failures + before.counts.failures,
-        before.counts.reason or found.counts.reason,
+        fit.counts.evaluations + before.counts.evaluations,
+        fit.counts.failures + before.counts.failures,
+        before.counts.reason or fit.counts.reason,
     )
-    return replace(found, counts=counts)
+    return replace(fit, counts=counts)
 
 
-def _doubt_warnings(fitted: FittedLoop, scene: Scene, has_lead_in: bool) -> list:
+def _doubt_warnings(fitted: FittedLoop, scene: Scene, *, has_lead_in: bool) -> list:
     """Return warnings if the rows differ from the model by more than independent noise.
 
     `has_lead_in`: the model does not start without stress in the first row.
     """
     loop = fitted.loop
     peak = float(np.abs(loop.reading).max())
-    used = np.count_nonzero(~fitted.held)
+    n_used = np.count_nonzero(~fitted.held_out)
     rows = fitted.keys.fit.intervals.rows
-    out = []
-    if fitted.rms > MIN_RMS * peak and rows < MIN_INDEPENDENT * used:
-        out.append(
+    warnings = []
+    if fitted.rms > MIN_RMS * peak and rows < MIN_INDEPENDENT * n_used:
+        warnings.append(
             "the deviations of neighbouring rows are correlated, so the intervals are computed as "
-            f"if the {used} rows were {max(rows, 1):.3g} independent rows; a part of the deviation "
+            f"if the {n_used} rows were {max(rows, 1):.3g} independent rows; a part of the deviation "
             "is systematic"
         )
     first = abs(loop.reading[0])
     starts_at_rest = (
-        fitted.held[0] or has_lead_in or law_has_trait(scene.friction.law, "memoryless")
+        fitted.held_out[0] or has_lead_in or law_has_trait(scene.friction.law, "memoryless")
     )
     if first > MAX_FIRST_FORCE * peak and not starts_at_rest:
-        out.append(
+        warnings.append(
             f"the force in the first row is {first / peak:.0%} of the largest force, but the model "
             "starts without force: use --warm-up, hold out the first cycle, or give a record that "
             "begins at rest"
         )
     if fitted.step_error > scene.accuracy.tolerance * peak:
-        out.append(
+        warnings.append(
             "if the time steps are halved, the force of the model changes by "
             f"{fitted.step_error / peak:.1g} of its peak, more than the tolerance"
         )
-    return out
+    return warnings

@@ -16,8 +16,8 @@ from ...runs.bench.engine import choose_smooth_bond_sum
 from ...runs.bench.ledger import PassOptions
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError
-from .loop_path import count_whole_cycles, prepend_lead_in
-from .problem import press_patch
+from .loop_path import count_whole_cycles, extend_start
+from .problem import format_assignments, press_patch
 
 # Number of free keys of [contact] whose bounds and middles choose the shared meshes: 3**3 models.
 MAX_MESH_KEYS = 3
@@ -34,8 +34,8 @@ class BenchModel:
         With its [slide].
     loop : Loop
         The measured loop.
-    wanted : list of Range
-        The free keys.
+    ranges : list of Range
+        Bounds of the free keys.
     offsets : sequence of Offset
         Their values follow those of the keys.
     warm : bool
@@ -45,11 +45,11 @@ class BenchModel:
     """
 
     def __init__(
-        self, scene: Scene, loop: Loop, wanted: list, offsets=(), *, warm: bool = False, say=None
+        self, scene: Scene, loop: Loop, ranges: list, offsets=(), *, warm: bool = False, say=None
     ):
         self.scene = scene
         self.loop = loop
-        self.wanted = wanted
+        self.ranges = ranges
         self.say = say
         self.base = BaseScene(scene)  # The text is parsed once, not at every evaluation.
         self.offsets = [offset.name for offset in offsets]
@@ -67,10 +67,10 @@ class BenchModel:
         self.pieces = 1
         if self.pinned and not self.exact:
             self.pieces = max(1, -(-steps // (loop.reading.size - 1)))
-        self.refused = None
-        self.made = 0
+        self.first_error = None
+        self.n_computed = 0
         self.patch = None
-        self.moves_contact = any(bound.key.startswith("contact.") for bound in wanted)
+        self.moves_contact = any(bound.key.startswith("contact.") for bound in ranges)
         # They are shared by all values, and chosen when a patch is first pressed.
         self.meshes = None
 
@@ -81,7 +81,7 @@ class BenchModel:
         """
         law = self.scene.friction
         grows = law_has_trait(law.law, "bonds") and law.rest_growth is not None
-        is_free = "friction.rest_speed" in {bound.key for bound in self.wanted}
+        is_free = "friction.rest_speed" in {bound.key for bound in self.ranges}
         if not grows or law.rest_speed is not None or is_free:
             return []
         speeds = np.abs(np.diff(self.loop.displacement) / np.diff(self.time))
@@ -102,10 +102,10 @@ class BenchModel:
 
     def __call__(self, values) -> np.ndarray:
         """Return the reading (k,) at the rows; PatchfemError for values that make no scene."""
-        count = len(self.wanted)
+        count = len(self.ranges)
         offsets = dict(zip(self.offsets, values[count:]))
         model = self._model(self.build_scene(values[:count]))
-        self.made += 1
+        self.n_computed += 1
         with locate_errors(model.source):
             reading = self._reading(model, offsets.get("displacement", 0.0))
         return reading + offsets.get("force", 0.0)
@@ -116,41 +116,39 @@ class BenchModel:
             with locate_errors(scene):
                 return build(scene)
         except PatchfemError as error:
-            # Building reads files of the scene; other values of the free keys would not avoid
-            # the error.
-            self.refused = self.refused or error
+            # Building reads files of the scene, and its errors do not depend on the free keys.
+            self.first_error = self.first_error or error
             raise
 
     def _reading(self, model: Model, offset: float) -> np.ndarray:
         """Return the force or friction ratio (k,) of a model, whose first row is offset [m]."""
         patch = self._patch(model)
-        driven = prepend_lead_in(self.time, self.loop.displacement, self.warm, offset)
-        corner = np.arange(driven.time.size) * self.pieces
+        path = extend_start(self.time, self.loop.displacement, self.warm, offset)
+        corner = np.arange(path.time.size) * self.pieces
         number = np.arange(corner[-1] + 1)
-        time = np.interp(number, corner, driven.time)
-        displacement = np.interp(number, corner, driven.displacement)
-        watch = PassOptions(choose_smooth_bond_sum(model, displacement), self.say)
-        run = law_bench.run(model, patch, 4, 0, (time, displacement, 0, 0.0), watch)
+        time = np.interp(number, corner, path.time)
+        displacement = np.interp(number, corner, path.displacement)
+        options = PassOptions(choose_smooth_bond_sum(model, displacement), self.say)
+        run = law_bench.run(model, patch, 4, 0, (time, displacement, 0, 0.0), options)
         if not run.load[0] > 0:
             raise PatchfemError(
                 "the normal load is 0 or less; give a load that presses the pieces together", ""
             )
-        out = run.force[corner]
+        reading = run.force[corner]
         if self.force_jumps:
             # The force jumps at a row between two straight segments; the reading is the mean of
             # both sides.
             after = run.force[np.minimum(corner + 1, number[-1])]
-            out = np.where(corner == 0, after, (out + after) / 2)
-        out = out[driven.n_before :]
-        return out / run.load[0] if self.loop.quantity == "friction_ratio" else out
+            reading = np.where(corner == 0, after, (reading + after) / 2)
+        reading = reading[path.n_before :]
+        return reading / run.load[0] if self.loop.quantity == "friction_ratio" else reading
 
     def build_scene(self, values) -> Scene:
         """Return the scene with values of the free keys."""
-        assigned = [bound.format_assignment(value) for bound, value in zip(self.wanted, values)]
         try:
-            return self.base.override([*self.sets, *assigned])
+            return self.base.override([*self.sets, *format_assignments(self.ranges, values)])
         except SceneError as error:
-            self.refused = self.refused or error
+            self.first_error = self.first_error or error
             raise PatchfemError(error.mistakes[0]) from None
 
     def _patch(self, model: Model):
@@ -167,21 +165,22 @@ class BenchModel:
         """Return the meshes for the bounds and the middle of each range of a key of [contact]."""
         if self.meshes is not None:
             return self.meshes
-        middle = [(bound.low + bound.high) / 2 for bound in self.wanted]
-        moved = [k for k, bound in enumerate(self.wanted) if bound.key.startswith("contact.")]
-        moved = moved[:MAX_MESH_KEYS]
-        levels = [(self.wanted[k].low, middle[k], self.wanted[k].high) for k in moved]
+        middle = [(bound.low + bound.high) / 2 for bound in self.ranges]
+        keys = [bound.key for bound in self.ranges]
+        contact_keys = [k for k, key in enumerate(keys) if key.startswith("contact.")]
+        contact_keys = contact_keys[:MAX_MESH_KEYS]
+        levels = [(self.ranges[k].low, middle[k], self.ranges[k].high) for k in contact_keys]
         models = []
-        refused = self.refused
+        first_error = self.first_error
         for values in product(*levels):
             point = list(middle)
-            for k, value in zip(moved, values):
+            for k, value in zip(contact_keys, values):
                 point[k] = value
             try:
                 models.append(build(self.build_scene(point)))
             except PatchfemError:
                 continue  # The search meets the same error and counts it as a failed evaluation.
-        self.refused = refused
+        self.first_error = first_error
         self.meshes = meshes.Shared(models, False)
         return self.meshes
 
@@ -205,13 +204,13 @@ class BenchModel:
                 f"which does not affect the force of law '{law.law}'"
             )
             return np.arange(float(loop.reading.size))
-        move = np.abs(np.diff(loop.displacement))
-        if scene.slide.kind in ("constant", "triangle") and move.all():
+        steps = np.abs(np.diff(loop.displacement))
+        if scene.slide.kind in ("constant", "triangle") and steps.all():
             self.notes.append(
                 f"{loop.path} has no column of time: the times of its rows are computed from "
                 "slide.speed"
             )
-            return np.concatenate([[0.0], np.cumsum(move / scene.slide.speed)])
+            return np.concatenate([[0.0], np.cumsum(steps / scene.slide.speed)])
         raise PatchfemError(
             f"{loop.path}:1: law '{law.law}' needs the times of the rows of this record; add a "
             "column time [s] (the times can be computed from slide.speed only for a constant or "
@@ -221,11 +220,11 @@ class BenchModel:
     def _note_amplitude(self) -> None:
         """Add a note if the amplitude of the scene differs from that of the record."""
         slide = self.scene.slide
-        half = float(np.ptp(self.loop.displacement)) / 2
+        amplitude = float(np.ptp(self.loop.displacement)) / 2
         if slide.kind not in ("sine", "triangle"):
             return
-        if abs(slide.amplitude - half) > AMPLITUDE_TOL * half:
+        if abs(slide.amplitude - amplitude) > AMPLITUDE_TOL * amplitude:
             self.notes.append(
                 f"slide.amplitude is {slide.amplitude:.4g} m, but the amplitude of the measured "
-                f"displacement is {half:.4g} m; the model follows the measured displacement"
+                f"displacement is {amplitude:.4g} m; the model follows the measured displacement"
             )

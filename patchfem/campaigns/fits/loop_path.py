@@ -44,9 +44,11 @@ DEFAULT_OPTIONS = LoopOptions()
 
 def read_offsets(names: Sequence, loop: Loop) -> list:
     """Return the Offset of each name; PatchfemError for a name that is not in OFFSETS."""
-    parts = [part.strip() for text in names for part in text.split(",")]
-    out = []
-    for name in dict.fromkeys(parts):
+    requested = []
+    for text in names:
+        requested += [name.strip() for name in text.split(",")]
+    offsets = []
+    for name in dict.fromkeys(requested):
         if name not in OFFSETS:
             raise PatchfemError(
                 f"--offset {name}: not a possible offset; use {' or '.join(OFFSETS)}"
@@ -56,8 +58,8 @@ def read_offsets(names: Sequence, loop: Loop) -> list:
         if name == "force":
             size = float(np.abs(loop.reading).max())
             kind = "force" if loop.quantity == "force" else None
-        out.append(Offset(name, Range(f"offset.{name}", -size, size, kind)))
-    return out
+        offsets.append(Offset(name, Range(f"offset.{name}", -size, size, kind)))
+    return offsets
 
 
 def count_whole_cycles(loop: Loop) -> int:
@@ -65,10 +67,9 @@ def count_whole_cycles(loop: Loop) -> int:
 
     The first row counts. PatchfemError for a record that does not return there.
     """
-    place = loop.displacement
-    moved = np.flatnonzero(place != 0)
-    direction = np.sign(place[moved[0]])
-    behind = place * direction < -POSITION_TOL * np.ptp(place)
+    displacement = loop.displacement
+    direction = np.sign(displacement[np.flatnonzero(displacement)[0]])
+    behind = displacement * direction < -POSITION_TOL * np.ptp(displacement)
     returns = np.flatnonzero(behind[:-1] & ~behind[1:])
     if not returns.size:
         raise PatchfemError(
@@ -90,14 +91,14 @@ class DrivenPath(NamedTuple):
     n_before: int
 
 
-def prepend_lead_in(time, place, warm: int, offset: float) -> DrivenPath:
+def extend_start(time, recorded, n_warm: int, offset: float) -> DrivenPath:
     """Return a path that begins at displacement 0 and continues as recorded.
 
     Parameters
     ----------
-    time, place : (r,) array
+    time, recorded : (r,) array
         Times [s] and displacements [m] of the record; the first displacement is 0.
-    warm : int
+    n_warm : int
         Leading rows that form whole cycles and are driven once before the record; 0 for none.
     offset : float
         Displacement of the first row [m]; it is reached at the mean speed of the record.
@@ -106,22 +107,22 @@ def prepend_lead_in(time, place, warm: int, offset: float) -> DrivenPath:
     -------
     DrivenPath
     """
-    speed = np.abs(np.diff(place)).sum() / (time[-1] - time[0])
-    displacement = place + offset
-    before = []
-    begin = []
+    speed = np.abs(np.diff(recorded)).sum() / (time[-1] - time[0])
+    displacement = recorded + offset
+    lead_in = []
+    lead_in_times = []
     if offset:
-        before.append(0.0)
-        begin.append(-abs(offset) / speed)
+        lead_in.append(0.0)
+        lead_in_times.append(-abs(offset) / speed)
     start = 0.0
-    if warm:
+    if n_warm:
         # The last of these rows comes before the first displacement is reached again; the record
         # gives the time from there to the first displacement.
-        left, right = place[warm - 1 : warm + 1]
-        leg = time[warm] - time[warm - 1]
-        turn = time[warm - 1] + leg * (0.0 - left) / (right - left)
-        before = [*before, *displacement[:warm]]
-        begin = [*begin, *(time[:warm] - time[0])]
-        start = turn - time[0]
-    whole = np.concatenate([begin, time - time[0] + start])
-    return DrivenPath(whole - whole[0], np.concatenate([before, displacement]), len(before))
+        before, after = recorded[n_warm - 1 : n_warm + 1]
+        step = time[n_warm] - time[n_warm - 1]
+        return_time = time[n_warm - 1] + step * (0.0 - before) / (after - before)
+        lead_in = [*lead_in, *displacement[:n_warm]]
+        lead_in_times = [*lead_in_times, *(time[:n_warm] - time[0])]
+        start = return_time - time[0]
+    times = np.concatenate([lead_in_times, time - time[0] + start])
+    return DrivenPath(times - times[0], np.concatenate([lead_in, displacement]), len(lead_in))

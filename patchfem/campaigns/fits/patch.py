@@ -1,13 +1,11 @@
 """Friction laws of a single point, fitted to the friction loops of a patch.
 
 Points under a constant load that stick or slip are elastic-plastic elements in parallel
-(`slip.shear_modes`): their curve of first loading is exact, and Masing's rule gives the loops. Each law
-has the slip force of the patch. Its other values minimise the squares of the relative differences in
-force at the reversals and, with a fifth of the weight, in loss per cycle, over amplitudes of the slide
-that are evenly spaced in their logarithm.
+(`slip.shear_modes`): their curve of first loading is exact, and Masing's rule gives the loops.
+`patch_laws` fits each law to them, over amplitudes of the slide that are evenly spaced in their
+logarithm.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 from typing import NamedTuple
@@ -17,104 +15,25 @@ import numpy as np
 from ...core import PatchfemError
 from ...effects import LAWS, law_has_trait
 from ...friction.laws.elastic_plastic import masing_loop
-from ...friction.record import make_law, steady_loop
-from ...identify.least_squares import Fit, fit
+from ...friction.record import make_law
 from ...model.model import Model, build
 from ...model.source import locate_errors
 from ...runs.joint import stuck_patch_stiffness
-from ...runs.patch import ladder
-from ...runs.patch.jenkins_elements import elements, strip_elements
+from ...runs.patch import jenkins_elements, ladder
 from ...scene.scene import Scene
+from .patch_laws import FITTED_LAWS, MIN_LOSS, Curves, LawProblem
 
 AMPLITUDES_PER_DECADE = 8  # This density resolves every regime of a law.
 MIN_AMPLITUDES = 12  # Smallest number of amplitudes, also of a short range.
 MIN_AMPLITUDE_FACTOR = 1e-2  # Smallest amplitude / (slip force / stiffness); below, nothing slips.
 MAX_AMPLITUDE_FACTOR = 2.0  # Largest amplitude / the amplitude at which every element slips.
 MAX_FIRST_FACTOR = 0.2  # A range begins at most at this multiple of slip force / stiffness.
-MIN_LOSS = 1e-3  # Loss / (4 x force x slide), above which the patch counts as slipping.
 # While fewer than 1 of this many elements slips, the loss is dominated by the mesh.
 MESH_ELEMENTS = 16
-# Weight of the loss compared with the force, because its relative error is larger by this factor.
-LOSS_WEIGHT = 0.2
 # Change of the loss by a coarser mesh (rms), above which the mesh is refined.
 MAX_LOSS_CHANGE = 0.1
 REFINE_FACTOR = 10.0  # Tolerance of the mesh / tolerance of its refinement.
 MIN_TOLERANCE = 9e-5  # Tolerance below which a mesh is not refined, as it takes too long.
-STIFFNESS_RANGE = 20.0  # A law's stiffness is searched for from 1/20 to 20 times that of the patch.
-
-
-class LawKeys(NamedTuple):
-    """Values of a law that are fitted in addition to its stiffness.
-
-    The stiffness is fitted as a multiple of that of the patch.
-
-    Attributes
-    ----------
-    low, high : tuple
-        Bounds (n,).
-    keys : callable
-        (stiffness [N/m], slip force [N], *values) -> keys of [friction].
-    units : dict
-        Unit by key, for keys that have one.
-    """
-
-    low: tuple
-    high: tuple
-    keys: Callable
-    units: dict
-
-
-def _iwan_keys(stiffness: float, slip_force: float, chi: float, fraction: float) -> dict:
-    """Return the keys of law "iwan"."""
-    return {"stiffness": stiffness, "chi": chi, "beta": fraction / (1 - fraction)}
-
-
-def _bouc_wen_keys(stiffness: float, slip_force: float, exponent: float, shape: float) -> dict:
-    """Return the keys of law "bouc-wen"."""
-    return {"stiffness": stiffness, "exponent": exponent, "shape": shape}
-
-
-def _elastic_plastic_keys(stiffness: float, slip_force: float) -> dict:
-    """Return the keys of law "elastic-plastic"."""
-    return {"bond_length": slip_force / stiffness}
-
-
-FITTED_LAWS = {
-    "iwan": LawKeys((-0.999, 0.0), (0.0, 0.999), _iwan_keys, {"stiffness": "N/m"}),
-    "bouc-wen": LawKeys((0.02, 0.5), (50.0, 1.0), _bouc_wen_keys, {"stiffness": "N/m"}),
-    "elastic-plastic": LawKeys((), (), _elastic_plastic_keys, {"bond_length": "m"}),
-}
-
-
-class Curves(NamedTuple):
-    """Force at the reversals [N] and loss per cycle [J], (k,) each."""
-
-    force: np.ndarray
-    loss: np.ndarray
-
-    def relative_deviations(self, own: "Curves", slides) -> np.ndarray:
-        """Return the relative differences (2, k) from the curves of the patch at slides (k,) [m]."""
-        scale = np.maximum(own.loss, MIN_LOSS * 4 * slides * own.force)
-        return np.array([self.force / own.force - 1, (self.loss - own.loss) / scale])
-
-
-class FittedLaw(NamedTuple):
-    """Friction law of a point that replaces the patch.
-
-    Attributes
-    ----------
-    values : dict
-        Values by key of [friction].
-    curves : Curves
-    deviations : (2, k) array
-        Relative differences of the curves from those of the patch.
-    fit : Fit
-    """
-
-    values: dict
-    curves: Curves
-    deviations: np.ndarray
-    fit: Fit
 
 
 class Elements(NamedTuple):
@@ -206,66 +125,107 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
     """
     begin = perf_counter()
     model = build(scene)
-    tolerance = model.accuracy.tolerance
     with locate_errors(scene):
         _check_model(model)
-        while True:
-            patch, *others = ladder.solve_all(model.patch, tolerance)
-            if not patch.pressure.load > 0:
-                raise PatchfemError("the normal load is 0 or less; raise the load", "contact.load")
-            parts = _patch_elements(model, patch)
-            at = _default_slides(parts) if slides is None else np.asarray(slides, float)
-            own = parts.compute_curves(at)
-            coarse = next((other for other in others if other is not None), None)
-            mesh_change = None
-            loss_change = 0.0
-            if coarse is not None:
-                mesh_change = (
-                    _patch_elements(model, coarse).compute_curves(at).relative_deviations(own, at)
-                )
-                loss_change = float(np.sqrt(np.mean(mesh_change[1] ** 2)))
-            can_refine = model.patch.mesh.is_automatic and tolerance >= MIN_TOLERANCE
-            if loss_change <= MAX_LOSS_CHANGE or not can_refine:
-                break
-            tolerance /= REFINE_FACTOR
-        held = stuck_patch_stiffness(model, patch, tuple(others) or (None,))
+        meshed = _solve_with_refined_mesh(model, slides)
+        stuck = stuck_patch_stiffness(model, meshed.patch, meshed.coarser_patches or (None,))
+    elements = meshed.elements
     loops = PatchLoops(
-        load=patch.pressure.load,
-        slip_force=parts.slip_force,
-        stiffness=held.value if held else parts.total_stiffness,
-        stiffness_error=held.error if held else None,
-        slides=at,
-        curves=own,
-        mesh_change=mesh_change,
-        nodes=patch.x.size,
+        load=meshed.patch.pressure.load,
+        slip_force=elements.slip_force,
+        stiffness=stuck.value if stuck else elements.total_stiffness,
+        stiffness_error=stuck.error if stuck else None,
+        slides=meshed.slides,
+        curves=meshed.curves,
+        mesh_change=meshed.mesh_change,
+        nodes=meshed.patch.x.size,
     )
-    static = model.friction.static
-    laws = {
-        law: fit_law(law, static, loops.load, at, own, parts.total_stiffness) for law in FITTED_LAWS
-    }
+    friction = {"static": model.friction.static, "load": loops.load}
+    laws = {}
+    for law in FITTED_LAWS:
+        problem = LawProblem(
+            law,
+            **friction,
+            slides=loops.slides,
+            target=loops.curves,
+            stiffness=elements.total_stiffness,
+        )
+        laws[law] = problem.solve()
     best = min(laws, key=lambda law: laws[law].fit.rms)
-    warnings = _warn_of_mesh(model, patch, loss_change)
+    warnings = _warn_of_mesh(model, meshed)
     return FittedPatch(scene, loops, laws, best, warnings, perf_counter() - begin)
 
 
-def _default_slides(parts: Elements) -> np.ndarray:
+class _MeshedLoops(NamedTuple):
+    """Loops of a patch on a mesh, and their change by a coarser one.
+
+    Attributes
+    ----------
+    patch : Patch
+    coarser_patches : tuple
+        Patches on coarser meshes, or None.
+    elements : Elements
+    slides : (k,) array
+        Amplitudes of the slide [m].
+    curves : Curves
+    mesh_change : (2, k) array or None
+        Relative change of the curves by a coarser mesh; None if there is none.
+    """
+
+    patch: object
+    coarser_patches: tuple
+    elements: Elements
+    slides: np.ndarray
+    curves: Curves
+    mesh_change: np.ndarray | None
+
+    @property
+    def loss_change(self) -> float:
+        """Change of the loss by a coarser mesh, as root mean square; 0 without such a mesh."""
+        return (
+            0.0 if self.mesh_change is None else float(np.sqrt(np.mean(self.mesh_change[1] ** 2)))
+        )
+
+
+def _solve_with_refined_mesh(model: Model, slides) -> _MeshedLoops:
+    """Press the patch on finer meshes until a coarser one hardly changes the loss."""
+    tolerance = model.accuracy.tolerance
+    while True:
+        patch, *coarser = ladder.solve_all(model.patch, tolerance)
+        if not patch.pressure.load > 0:
+            raise PatchfemError("the normal load is 0 or less; raise the load", "contact.load")
+        elements = _patch_elements(model, patch)
+        amplitudes = _default_slides(elements) if slides is None else np.asarray(slides, float)
+        curves = elements.compute_curves(amplitudes)
+        coarse = next((other for other in coarser if other is not None), None)
+        change = None
+        if coarse is not None:
+            coarse_curves = _patch_elements(model, coarse).compute_curves(amplitudes)
+            change = coarse_curves.relative_deviations(curves, amplitudes)
+        meshed = _MeshedLoops(patch, tuple(coarser), elements, amplitudes, curves, change)
+        can_refine = model.patch.mesh.is_automatic and tolerance >= MIN_TOLERANCE
+        if meshed.loss_change <= MAX_LOSS_CHANGE or not can_refine:
+            return meshed
+        tolerance /= REFINE_FACTOR
+
+
+def _default_slides(elements: Elements) -> np.ndarray:
     """Return amplitudes (k,) [m] from the onset of slip to slip of the whole patch."""
-    stuck = parts.slip_force / parts.total_stiffness
-    low = MIN_AMPLITUDE_FACTOR * stuck
-    high = MAX_AMPLITUDE_FACTOR * float(parts.yield_displacement.max())
-    near = np.geomspace(low, high, 1024)
-    curves = parts.compute_curves(near)
-    slips = near[np.argmax(curves.loss > MIN_LOSS * 4 * near * curves.force)]
-    yields = np.sort(parts.yield_displacement)
-    first = yields[yields.size // MESH_ELEMENTS]
-    low = max(slips, min(first, MAX_FIRST_FACTOR * stuck))
+    stuck_limit = elements.slip_force / elements.total_stiffness
+    high = MAX_AMPLITUDE_FACTOR * float(elements.yield_displacement.max())
+    trials = np.geomspace(MIN_AMPLITUDE_FACTOR * stuck_limit, high, 1024)
+    curves = elements.compute_curves(trials)
+    slip_onset = trials[np.argmax(curves.loss > MIN_LOSS * 4 * trials * curves.force)]
+    yields = np.sort(elements.yield_displacement)
+    resolved = yields[yields.size // MESH_ELEMENTS]
+    low = max(slip_onset, min(resolved, MAX_FIRST_FACTOR * stuck_limit))
     count = 1 + int(np.ceil(AMPLITUDES_PER_DECADE * np.log10(high / low)))
     return np.geomspace(low, high, max(MIN_AMPLITUDES, count))
 
 
-def _warn_of_mesh(model: Model, patch, loss_change: float) -> tuple:
+def _warn_of_mesh(model: Model, meshed: _MeshedLoops) -> tuple:
     """Return a warning if a coarser mesh changes the loss too much."""
-    if loss_change <= MAX_LOSS_CHANGE:
+    if meshed.loss_change <= MAX_LOSS_CHANGE:
         return ()
     if model.patch.mesh.is_automatic:
         cure = "begin with larger amplitudes, at which more elements of the patch slip"
@@ -277,68 +237,10 @@ def _warn_of_mesh(model: Model, patch, loss_change: float) -> tuple:
     else:
         cure = "refine the mesh in the file"
     return (
-        f"with this mesh ({patch.x.size} interface nodes) the energy loss has an error of "
-        f"{100 * loss_change:.2g} % (rms); this error also makes `chi` of law 'iwan' uncertain, and "
+        f"with this mesh ({meshed.patch.x.size} interface nodes) the energy loss has an error of "
+        f"{100 * meshed.loss_change:.2g} % (rms); this error also makes `chi` of law 'iwan' uncertain, and "
         f"`chi` sets the exponent of micro-slip; {cure}",
     )
-
-
-def fit_law(
-    law: str, static: float, load: float, slides, own: Curves, stiffness: float
-) -> FittedLaw:
-    """Fit one law to the loops of a joint.
-
-    Parameters
-    ----------
-    law : str
-        One of FITTED_LAWS.
-    static : float
-        Coefficient of friction.
-    load : float
-        Normal load [N]; the slip force is static x load.
-    slides : (k,) array
-        Amplitudes of the slide [m].
-    own : Curves
-        Curves of the joint at these amplitudes.
-    stiffness : float
-        Stiffness of the joint [N/m], near which that of the law is searched.
-
-    Returns
-    -------
-    FittedLaw
-    """
-    asked = FITTED_LAWS[law]
-    weights = np.array([[1.0], [LOSS_WEIGHT]])
-
-    def law_keys(values) -> dict:
-        """Return the keys of [friction] at values (n,) of the fit."""
-        return asked.keys(values[0] * stiffness, static * load, *values[1:])
-
-    def law_curves(values) -> Curves:
-        """Return the curves of the law at values (n,) of the fit."""
-        return Curves(*steady_loop(_FrictionKeys(law, static, law_keys(values)), load, slides))
-
-    def residual(values) -> np.ndarray:
-        """Return the weighted relative differences at values (n,) of the fit."""
-        return (weights * law_curves(values).relative_deviations(own, slides)).ravel()
-
-    low = (1 / STIFFNESS_RANGE, *asked.low)
-    high = (STIFFNESS_RANGE, *asked.high)
-    middle = [(a + b) / 2 for a, b in zip(asked.low, asked.high)]
-    found = fit(residual, low, high, start=(1.0, *middle), max_descents=2, interval_kind="bounds")
-    curves = law_curves(found.values)
-    keys = law_keys(found.values.tolist())
-    return FittedLaw(keys, curves, curves.relative_deviations(own, slides), found)
-
-
-class _FrictionKeys:
-    """Stand-in for a table [friction] with values within the bounds of the fit.
-
-    Its values need no check.
-    """
-
-    def __init__(self, law: str, static: float, values: dict):
-        self.__dict__.update(values, law=law, static=static)
 
 
 def _patch_elements(model: Model, patch) -> Elements:
@@ -349,10 +251,10 @@ def _patch_elements(model: Model, patch) -> Elements:
     if not model.partial_slip:
         return Elements(np.array([element.limit / element.length]), np.array([element.length]))
     if patch.strips is not None:
-        strips = strip_elements(patch, friction.static, element.length)
+        strips = jenkins_elements.strip_elements(patch, friction.static, element.length)
         return Elements(*map(np.concatenate, zip(*strips)))
-    found = elements(patch, friction.static, element.length)
-    return Elements(found.stiffness, found.yield_displacement)
+    exact = jenkins_elements.elements(patch, friction.static, element.length)
+    return Elements(exact.stiffness, exact.yield_displacement)
 
 
 def _check_model(model: Model) -> None:
@@ -365,11 +267,10 @@ def _check_model(model: Model) -> None:
             "and either [slide] or [structure] with [drive]",
             "contact" if model.patch is None else "friction",
         )
-    possible = [
-        law
-        for law in LAWS
-        if law_has_trait(law, "timeless") and "shear" in LAWS[law].supports.split()
-    ]
+    possible = []
+    for law, record in LAWS.items():
+        if law_has_trait(law, "timeless") and "shear" in record.supports.split():
+            possible.append(law)
     if friction.law not in possible:
         raise PatchfemError(
             f"a patch with law '{friction.law}' cannot be represented by elements that stick or "

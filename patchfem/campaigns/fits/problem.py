@@ -1,4 +1,8 @@
-"""The least-squares problem over keys of a scene that fits to loops, curves and rows solve."""
+"""Free keys of a scene as the values of a least-squares problem, and the keys that a fit found.
+
+A fit to a loop, a curve or rows makes an `identify.least_squares.Problem` of its free keys, solves it,
+and concludes with the fitted keys and all warnings.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -7,8 +11,7 @@ from time import perf_counter
 import numpy as np
 
 from ...core import Outcome, PatchfemError
-from ...identify.least_squares import Fit, fit
-from ...identify.space import SearchSpace, make_space
+from ...identify.least_squares import Fit, Problem
 from ...identify.words import describe_fit
 from ...model.model import Model, build
 from ...runs import joint
@@ -59,8 +62,8 @@ class FittedKeys:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Problem:
-    """A residual as a function of free keys of a scene.
+class FreeKeys:
+    """Free keys of a scene, which are the values of a least-squares problem.
 
     Attributes
     ----------
@@ -68,8 +71,6 @@ class Problem:
         The scene whose keys are free.
     ranges : list of Range
         Bounds of the free keys.
-    residual : Callable
-        Values (n,) -> residual (r,). A PatchfemError is a failed evaluation.
     offsets : sequence of Range
         Bounds of values that are fitted as well and are no keys of the scene; they follow the keys.
     sets : sequence of str
@@ -80,7 +81,6 @@ class Problem:
 
     scene: Scene
     ranges: list
-    residual: Callable
     offsets: Sequence = ()
     sets: Sequence = ()
     notes: Sequence = ()
@@ -90,55 +90,38 @@ class Problem:
         """The Range of every value."""
         return [*self.ranges, *self.offsets]
 
-    @property
-    def box(self) -> SearchSpace:
-        """The space of the values."""
-        return make_space(
-            [bound.low for bound in self.bounds], [bound.high for bound in self.bounds]
-        )
+    def make_problem(self, residual: Callable) -> Problem:
+        """Return the problem of a residual as a function of the values.
 
-    def own_values(self) -> list:
-        """Return starting values: those of the scene, else the middle of each range."""
-        return [_initial_value(self.scene, bound) for bound in self.bounds]
-
-    def solve(self, start: Sequence, starts: int = 3, bars: str = "series") -> Fit:
-        """Minimise the sum of squares of the residual.
-
-        Parameters
-        ----------
-        start : sequence of float
-            Values (n,) of the first start.
-        starts : int
-            Number of starts.
-        bars : str
-            Kind of intervals, as in `identify.least_squares.fit`.
+        It starts from the values of the scene, else from the middle of each range.
         """
-        box = self.box
-        return fit(
-            self.residual, box.low, box.high, start=start, max_descents=starts, interval_kind=bars
+        return Problem(
+            residual,
+            low=[bound.low for bound in self.bounds],
+            high=[bound.high for bound in self.bounds],
+            start=[_initial_value(self.scene, bound) for bound in self.bounds],
         )
 
-    def assign(self, values: Sequence) -> list:
-        """Return the strings that set the free keys to values (n,), after those of `sets`."""
-        assigned = [bound.format_assignment(value) for bound, value in zip(self.ranges, values)]
-        return [*self.sets, *assigned]
-
-    def conclude(self, found: Fit, begin: float, doubts: Sequence = ()) -> FittedKeys:
+    def conclude(self, fit: Fit, begin: float, doubts: Sequence = ()) -> FittedKeys:
         """Return the fitted keys with all warnings.
 
         Parameters
         ----------
-        found : Fit
+        fit : Fit
         begin : float
             Time of `perf_counter` at which the fit began [s].
         doubts : sequence of str
             Warnings that only this kind of fit gives.
         """
-        told = describe_fit(found, [bound.key for bound in self.bounds])
-        warnings = [*self.scene.remarks, *self.notes, *told, *doubts]
-        sets = self.assign(found.values)
-        seconds = perf_counter() - begin
-        return FittedKeys(self.scene, self.ranges, found, sets, warnings, seconds)
+        undetermined = describe_fit(fit, [bound.key for bound in self.bounds])
+        warnings = [*self.scene.remarks, *self.notes, *undetermined, *doubts]
+        sets = [*self.sets, *format_assignments(self.ranges, fit.values)]
+        return FittedKeys(self.scene, self.ranges, fit, sets, warnings, perf_counter() - begin)
+
+
+def format_assignments(ranges: Iterable, values: Iterable) -> list:
+    """Return the ``table.key=value`` strings that set free keys to values (n,)."""
+    return [bound.format_assignment(value) for bound, value in zip(ranges, values)]
 
 
 def parse_ranges(texts: Iterable) -> list:
@@ -146,10 +129,10 @@ def parse_ranges(texts: Iterable) -> list:
 
     Raises SceneError with all mistakes.
     """
-    found, mistakes = read_ranges(texts)
+    ranges, mistakes = read_ranges(texts)
     if mistakes:
         raise SceneError(mistakes)
-    return found
+    return ranges
 
 
 def model_without_joint(base: BaseScene, sets: Iterable) -> Model:

@@ -25,10 +25,7 @@ from ...scene.ranges import Range
 from .problem import parse_ranges
 
 # Names as in compare.json; the more accurate one comes first.
-QUANTITIES = (
-    "worn_depth_mean",
-    "worn_depth_max",
-)
+QUANTITIES = ("worn_depth_mean", "worn_depth_max")
 MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two or three of them.
 MAX_FILE_BYTES = 1 << 20  # Largest file that is read; a file that compare writes is far smaller.
 DEPTH_TOL = 0.1  # Fraction of the scene's tolerance to which the depth is met.
@@ -83,9 +80,9 @@ class WearCurve(NamedTuple):
 
     def inverse(self) -> Callable:
         """Return the fraction of the cycles as a function of the depth."""
-        keep = np.concatenate([[True], np.diff(self.depth) > 0])
-        depth = self.depth[keep]
-        fraction = self.fraction[keep]
+        grows = np.concatenate([[True], np.diff(self.depth) > 0])
+        depth = self.depth[grows]
+        fraction = self.fraction[grows]
         if depth.size > 2:
             return PchipInterpolator(depth, fraction, extrapolate=False)
         return lambda value: np.interp(value, depth, fraction)
@@ -233,32 +230,37 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
             f"--free {KEY}: {target.name} = {target.value:.4g} needs a coefficient of {value:.4g} "
             f"m^2/N, which is below the low bound {bounds.low:.4g}; lower this bound"
         )
-    low, high = (
-        float(value * inverse(min(end, max_depth)) / inverse(target.value))
-        for end in (target.low, target.high)
+    low, high = inverse(np.minimum([target.low, target.high], max_depth)) / inverse(target.value)
+    return FittedCoefficient(
+        value=float(value),
+        low=float(value * low),
+        high=float(value * high),
+        measured=target,
+        model=reached,
+        bounds=bounds,
+        runs=runs,
     )
-    return FittedCoefficient(float(value), low, high, target, reached, bounds, runs)
 
 
 def _read_bounds(free) -> Range:
     """Read the range of the coefficient; PatchfemError for any other free key."""
-    found = parse_ranges(free)
-    if [bound.key for bound in found] != [KEY]:
+    ranges = parse_ranges(free)
+    if [bound.key for bound in ranges] != [KEY]:
         raise PatchfemError(
             f"--free: in a scene with [wear] only {KEY} can be fitted, for example {KEY}=1e-16 "
             "m^2/N..1e-12 m^2/N"
         )
-    return found[0]
+    return ranges[0]
 
 
 def _compute_curve(model: Model, patch, coefficient: float, name: str, progress) -> WearCurve:
     """Run the wear of a model with a coefficient [m2/N]; patch: that of the unworn pieces."""
     model = replace(model, wear=replace(model.wear, coefficient=coefficient))
-    found = evolve.evolve(model, patch, (None, None), progress)
-    if found.stopped:
-        raise PatchfemError(f"fit {KEY}: {found.stopped}")
+    worn = evolve.evolve(model, patch, (None, None), progress)
+    if worn.stopped:
+        raise PatchfemError(f"fit {KEY}: {worn.stopped}")
     area = areas(model.patch, patch.pieces.interface).ravel()
-    rows = np.array([moment.depth.ravel() for moment in found.moments])
-    depth = rows.max(axis=1) if name == "worn_depth_max" else rows @ area / area.sum()
-    fraction = np.array([moment.cycle for moment in found.moments]) / model.wear.cycles
+    depths = np.array([moment.depth.ravel() for moment in worn.moments])
+    depth = depths.max(axis=1) if name == "worn_depth_max" else depths @ area / area.sum()
+    fraction = np.array([moment.cycle for moment in worn.moments]) / model.wear.cycles
     return WearCurve(fraction, depth)

@@ -72,52 +72,42 @@ class Readings:
             )
         return [getattr(self.rows[k], name) for k in self.row]
 
-    def select(self, one: str) -> np.ndarray:
+    def select(self, selector: str) -> np.ndarray:
         """Return which readings (n,) a selector such as "column=value" selects.
 
         The text is like "frequency=135 Hz,150 Hz" or "run=143 Hz repeat". PatchfemError for a value
         without its unit, and for a value that no row has.
         """
-        name, equals, values = (part.strip() for part in one.partition("="))
+        name, equals, values = (part.strip() for part in selector.partition("="))
         if not equals or not values:
             raise PatchfemError(
-                f"--hold {one}: write column=value,value, for example frequency=135 Hz,150 Hz"
+                f"--hold {selector}: write column=value,value, for example frequency=135 Hz,150 Hz"
             )
-        here = self.column(name)
-        out = np.zeros(self.row.size, bool)
-        for text in (part.strip() for part in values.split(",")):
-            named = np.array([self._is(name, value, text) for value in here])
-            if not named.any():
-                known = ", ".join(dict.fromkeys(_format_cell(name, value) for value in here))
+        column = self.column(name)
+        selected = np.zeros(self.row.size, bool)
+        for text in map(str.strip, values.split(",")):
+            is_equal = np.array([_equals(name, value, text) for value in column])
+            if not is_equal.any():
+                known = ", ".join(dict.fromkeys(_format_cell(name, value) for value in column))
                 raise PatchfemError(
                     f"--hold {name}={text}: none of the rows of {self.path.name} that hold a reading "
                     f"has {text} in the column {name}; the values of this column are {known}"
                 )
-            out |= named
-        return out
+            selected |= is_equal
+        return selected
 
-    @staticmethod
-    def _is(name: str, value, text: str) -> bool:
-        """Return whether a value of a column equals that of a selector."""
-        if name not in KINDS:
-            return text in value if name == "flag" else text == value
-        try:
-            wanted = parse_quantity(text, KINDS[name])
-        except ValueError as error:
-            raise PatchfemError(f"--hold {name}={text}: {error}") from None
-        return abs(value - wanted) <= EQUAL_TOL * abs(wanted)
-
-    def parts(self, name: str, among) -> list:
-        """Return pairs (name, readings (n,) bool) of every distinct value of a column.
+    def group_readings(self, name: str, among) -> dict:
+        """Return the readings (n,) bool of every distinct value of a column, by the value as text.
 
         Only the readings `among` (n,) bool count; the values are in the order of the rows.
         """
-        here = self.column(name)
-        found = dict.fromkeys(value for value, there in zip(here, among) if there)
-        return [
-            (_format_cell(name, value), np.array([other == value for other in here]) & among)
-            for value in found
-        ]
+        column = self.column(name)
+        groups = {}
+        for value in dict.fromkeys(column):
+            readings = np.array([other == value for other in column]) & among
+            if readings.any():
+                groups[_format_cell(name, value)] = readings
+        return groups
 
     def logs(self, acceleration, displacement) -> np.ndarray:
         """Return ln(computed/measured) (n,) of all readings.
@@ -129,12 +119,24 @@ class Readings:
         acceleration, displacement : (c,) array
             Accelerations [m s-2] and displacement amplitudes [m] at the conditions.
         """
-        both = np.array([displacement, acceleration], float)
-        computed = both[self.felt.astype(int), self.condition]
-        least = np.where(self.felt, 1e-300, MIN_DISPLACEMENT)
+        at_conditions = np.array([displacement, acceleration], float)
+        computed = at_conditions[self.felt.astype(int), self.condition]
+        minimum = np.where(self.felt, 1e-300, MIN_DISPLACEMENT)
         with np.errstate(invalid="ignore", divide="ignore"):
-            ratio = np.log(np.maximum(computed, least)) - np.log(np.maximum(self.measured, least))
+            ratio = np.log(np.maximum(computed, minimum))
+            ratio -= np.log(np.maximum(self.measured, minimum))
         return np.clip(ratio, -MAX_LOG, MAX_LOG)
+
+
+def _equals(name: str, value, text: str) -> bool:
+    """Return whether a value of a column equals that of a selector."""
+    if name not in KINDS:
+        return text in value if name == "flag" else text == value
+    try:
+        selected = parse_quantity(text, KINDS[name])
+    except ValueError as error:
+        raise PatchfemError(f"--hold {name}={text}: {error}") from None
+    return abs(value - selected) <= EQUAL_TOL * abs(selected)
 
 
 def _format_cell(name: str, value) -> str:
@@ -150,48 +152,35 @@ def read_readings(path: Path) -> Readings:
     file.
     """
     rows = tuple(read_table(path))
-    row = []
+    row_numbers = []
     felt = []
     measured = []
-    for k, one in enumerate(rows):
-        if not (one.frequency > 0 and one.input > 0):
+    for k, row in enumerate(rows):
+        if not (row.frequency > 0 and row.input > 0):
             raise PatchfemError(f"{path}: row {k + 1}: frequency and input must be above zero")
-        if one.acceleration == 0:
+        if row.acceleration == 0:
             raise PatchfemError(
                 f"{path}: row {k + 1}: the acceleration is 0, but the fit takes its logarithm; leave "
                 "the cell empty"
             )
-        for value, is_felt in ((one.acceleration, True), (one.displacement, False)):
+        for value, is_felt in ((row.acceleration, True), (row.displacement, False)):
             if value is not None:
-                row.append(k)
+                row_numbers.append(k)
                 felt.append(is_felt)
                 measured.append(value)
-    if not row:
+    if not row_numbers:
         raise PatchfemError(
             f"{path}: no row has an acceleration or a displacement, so nothing can be fitted"
         )
-    row = np.array(row)
-    asked = sorted({(rows[k].frequency, rows[k].input) for k in row})
-    conditions = []
-    # The same input written in two units differs by round-off, but is one condition.
-    for one in asked:
-        if (
-            not conditions
-            or abs(one[0] - conditions[-1][0]) > EQUAL_TOL * one[0]
-            or abs(one[1] - conditions[-1][1]) > EQUAL_TOL * one[1]
-        ):
-            conditions.append(one)
-    conditions = np.array(conditions)
-    condition = [
-        int(np.argmin(np.abs(conditions / (rows[k].frequency, rows[k].input) - 1).max(axis=1)))
-        for k in row
-    ]
-    unstable = [("U" in rows[k].flag) for k in row]
-    runs = tuple(f"{one.frequency:.6g} Hz" + " repeat" * ("R" in one.flag) for one in rows)
+    inputs = np.array([(rows[k].frequency, rows[k].input) for k in row_numbers])
+    conditions = _distinct_conditions(inputs)
+    condition = [int(np.argmin(np.abs(conditions / pair - 1).max(axis=1))) for pair in inputs]
+    unstable = [("U" in rows[k].flag) for k in row_numbers]
+    runs = tuple(f"{row.frequency:.6g} Hz" + " repeat" * ("R" in row.flag) for row in rows)
     return Readings(
         Path(path),
         rows,
-        frozen_array(row, np.int64),
+        frozen_array(row_numbers, np.int64),
         frozen_array(felt, bool),
         frozen_array(measured),
         frozen_array(unstable, bool),
@@ -199,6 +188,18 @@ def read_readings(path: Path) -> Readings:
         frozen_array(condition, np.int64),
         runs,
     )
+
+
+def _distinct_conditions(inputs) -> np.ndarray:
+    """Return the distinct pairs (c, 2) of frequency and input, ascending.
+
+    The same input written in two units differs by round-off, but is one condition.
+    """
+    conditions: list = []
+    for pair in sorted(set(map(tuple, inputs.tolist()))):
+        if not conditions or not np.allclose(pair, conditions[-1], rtol=EQUAL_TOL, atol=0):
+            conditions.append(pair)
+    return np.array(conditions)
 
 
 def scores(cells: Readings, logs, among) -> dict | None:
@@ -221,14 +222,11 @@ def scores(cells: Readings, logs, among) -> dict | None:
     if not np.any(among):
         return None
     logs = np.asarray(logs)
-    out = {}
-    for name, which in (
-        ("acceleration", cells.felt),
-        ("displacement", ~cells.felt),
-        ("all", np.ones(len(logs), bool)),
-    ):
-        part = logs[which & among]
-        out[name] = (
-            float(np.sqrt(np.mean(part**2))) if part.size and not np.isnan(part).any() else None
-        )
+    every = np.ones(len(logs), bool)
+    kinds = {"acceleration": cells.felt, "displacement": ~cells.felt, "all": every}
+    out: dict = {}
+    for name, of_kind in kinds.items():
+        selected = logs[of_kind & among]
+        is_known = selected.size and not np.isnan(selected).any()
+        out[name] = float(np.sqrt(np.mean(selected**2))) if is_known else None
     return out

@@ -6,7 +6,7 @@ from ...model.source import locate_errors
 from ...response.spectrum import read_instrument
 from ...runs.batch.watched import MotionObserver
 from ..fits.problem import press_patch
-from .asked import READINGS, ConditionModels
+from .condition_models import GAIN_KEYS, ConditionModels
 
 
 class ModelReadings:
@@ -19,72 +19,74 @@ class ModelReadings:
     NaN at conditions that were not requested, and infinite if no bounded motion is found.
     """
 
-    def __init__(self, asked: ConditionModels, say=None):
-        self.asked = asked
+    def __init__(self, models: ConditionModels, say=None):
+        self.models = models
         self.say = say
         self.patch = None
-        self.near = {}
-        self.last = (None, {})
-        self.watcher = None
-        self.runs = 0
-        read_as = asked.read
-        self.reading = (
-            ("peak", None) if read_as is None else (read_as.reading, read_as.reading_cutoff)
-        )
-        self.gains = (
-            (1.0, 1.0)
-            if read_as is None
-            else (read_as.acceleration_gain, read_as.displacement_gain)
-        )
-        keys = [one.key for one in asked.wanted]
-        self.free_gains = [keys.index(key) if key in keys else None for key in READINGS]
-        self.warm = True
+        self.last_motions = {}
+        self.last_readings = (None, {})
+        self.observer = None
+        self.n_motions = 0
+        instrument = models.read
+        self.reading = ("peak", None)
+        self.gains = (1.0, 1.0)
+        if instrument is not None:
+            self.reading = (instrument.reading, instrument.reading_cutoff)
+            self.gains = (instrument.acceleration_gain, instrument.displacement_gain)
+        keys = [bound.key for bound in models.ranges]
+        self.free_gains = [keys.index(key) if key in keys else None for key in GAIN_KEYS]
+        self.continues_motions = True
 
     def forget(self) -> None:
         """Let the next motions start from rest."""
-        self.near = {}
-        self.last = (None, {})
+        self.last_motions = {}
+        self.last_readings = (None, {})
 
     def __call__(self, values, conditions) -> tuple:
-        count = len(self.asked.rigs)
-        inner = tuple(float(values[k]) for k in self.asked.inner)
-        known = self.last[1] if self.last[0] == inner else {}
-        if any(k not in known for k in conditions):
-            known = known | self._run(values, [k for k in conditions if k not in known])
-            self.last = inner, known
-        out = np.full((2, count), np.nan)
+        inner = tuple(float(values[k]) for k in self.models.inner)
+        last_values, last_readings = self.last_readings
+        readings = last_readings if last_values == inner else {}
+        missing = [k for k in conditions if k not in readings]
+        if missing:
+            readings = readings | self._run(values, missing)
+            self.last_readings = inner, readings
+        out = np.full((2, len(self.models.rigs)), np.nan)
         for k in conditions:
-            out[:, k] = known[k]
+            out[:, k] = readings[k]
         for row, gain, free in zip(out, self.gains, self.free_gains):
             row *= gain if free is None else values[free]
         return out
 
     def _run(self, values, conditions) -> dict:
         """Return, by condition, the acceleration reading without its gain and the displacement."""
-        model = self.asked.model(values)
-        found = {}
+        model = self.models.model(values)
+        readings = {}
         with locate_errors(model.source):
             patch = self._get_patch(model)
-            whole = self.reading[0] not in ("peak", "fundamental")
-            watcher = self.watcher = MotionObserver(model, patch, self.say, whole, self.watcher)
+            needs_cycle = self.reading[0] not in ("peak", "fundamental")
+            observer = MotionObserver(model, patch, self.say, needs_cycle, self.observer)
+            self.observer = observer
             for k in conditions:
-                self.runs += 1
-                if not watcher.by:
-                    watcher = MotionObserver(self.asked.at(model, k), patch, self.say, whole)
-                seen = watcher(self.asked.sine(k), self.near.get(k) if self.warm else None)
-                if seen is None:
-                    self.near.pop(k, None)
-                    found[k] = np.inf, np.inf
+                self.n_motions += 1
+                if not observer.by:
+                    model_at_k = self.models.at(model, k)
+                    observer = MotionObserver(model_at_k, patch, self.say, needs_cycle)
+                drive = self.models.sine(k)
+                near = self.last_motions.get(k) if self.continues_motions else None
+                motion = observer(drive, near)
+                if motion is None:
+                    self.last_motions.pop(k, None)
+                    readings[k] = np.inf, np.inf
                     continue
-                self.near[k] = seen.near
-                found[k] = self._read_accelerometer(seen, self.asked.sine(k)), seen.displacement
-        return found
+                self.last_motions[k] = motion.near
+                readings[k] = self._read_accelerometer(motion, drive), motion.displacement
+        return readings
 
-    def _read_accelerometer(self, seen, drive) -> float:
+    def _read_accelerometer(self, motion, drive) -> float:
         """Return the reading of the accelerometer [m s-2] without its gain."""
-        if self.reading[0] == "fundamental" and seen.fundamental is not None:
-            return abs(seen.fundamental)
-        return read_instrument(seen.window, drive, seen.acceleration, *self.reading)
+        if self.reading[0] == "fundamental" and motion.fundamental is not None:
+            return abs(motion.fundamental)
+        return read_instrument(motion.window, drive, motion.acceleration, *self.reading)
 
     def _get_patch(self, model):
         """Return the pressed patch of a model; None for a [normal] contact.
@@ -93,6 +95,6 @@ class ModelReadings:
         """
         if model.patch is None:
             return None
-        if self.patch is None or self.asked.moves_pieces:
+        if self.patch is None or self.models.moves_pieces:
             self.patch = press_patch(model)
         return self.patch

@@ -17,49 +17,54 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ..fits.problem import FittedKeys, Problem
-from .asked import ConditionModels, FitRequest
+from ..fits.problem import FittedKeys, FreeKeys
 from .cells import MAX_LOG, Readings, read_readings, scores
 from .computed import ModelReadings
+from .condition_models import ConditionModels, FitRequest
 from .null_models import NULL_MODELS, fit_null_model
-from .search import BestFit, SearchSettings, fit_readings, make_residual
+from .search import BestFit, SearchSettings, make_residual, search_random_starts
 
 SAME_SCORE = 1.01  # Ratio of two scores, below which two searches found the same fit.
+UNSTABLE_MEANINGS = {
+    "bound": "count in the fit as lower bounds",
+    "out": "are left out of the fit",
+    "read": "count in the fit like all other readings",
+}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fold:
     """The fit without the readings of one value of the column that is left out.
 
-    name: the value; readings: (n,) bool, those left out; found: the fit of all others.
+    name: the value; readings: (n,) bool, those left out; search: the fit of all others.
     """
 
     name: str
     readings: np.ndarray
-    found: BestFit
+    search: BestFit
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Placebo:
     """A repeated fit with a key at a value that the fit did not choose.
 
-    text: the "key=value" string; found: the fit; logs: (n,) ln(computed/measured).
+    text: the "key=value" string; search: the fit; logs: (n,) ln(computed/measured).
     """
 
     text: str
-    found: BestFit
+    search: BestFit
     logs: np.ndarray
 
 
 class NullPrediction(NamedTuple):
     """Prediction by a model without mechanics.
 
-    logs: (n,) ln(computed/measured); left: (n,) the same by fits that did not see the reading;
-    numbers: fitted values by kind of reading.
+    logs: (n,) ln(computed/measured); left_out_logs: (n,) the same by fits that did not see the
+    reading; numbers: fitted values by kind of reading.
     """
 
     logs: np.ndarray
-    left: np.ndarray
+    left_out_logs: np.ndarray
     numbers: dict
 
 
@@ -71,51 +76,51 @@ class FittedRows:
     ----------
     keys : FittedKeys
         The fit of all readings that are not held out.
-    asked : ConditionModels
+    models : ConditionModels
         The models of the scene.
     cells : Readings
         The n measured readings.
-    how : SearchSettings
-    held : (n,) bool
+    settings : SearchSettings
+    held_out : (n,) bool
         Readings held out.
-    found : BestFit
+    search : BestFit
         The searches of the fit.
     computed : (2, c) array
         Acceleration reading [m s-2] and displacement [m] of every condition.
     logs : (n,) array
         ln(computed/measured).
     folds : tuple of Fold
-    left : (n,) array
+    left_out_logs : (n,) array
         ln(computed/measured) by the fit that left the reading out; NaN if none did.
     placebos : tuple of Placebo
     nulls : dict of NullPrediction
         The models without mechanics by name.
-    runs : int
+    n_motions : int
         Number of motions computed.
     """
 
     keys: FittedKeys
-    asked: ConditionModels
+    models: ConditionModels
     cells: Readings
-    how: SearchSettings
-    held: np.ndarray
-    found: BestFit
+    settings: SearchSettings
+    held_out: np.ndarray
+    search: BestFit
     computed: np.ndarray
     logs: np.ndarray
     folds: tuple
-    left: np.ndarray
+    left_out_logs: np.ndarray
     placebos: tuple
     nulls: dict
-    runs: int
+    n_motions: int
 
-    def score(self, logs, left, *, stable: bool = False) -> dict:
+    def score(self, logs, left_out_logs, *, stable: bool = False) -> dict:
         """Return the scores of the readings that were fitted, held out and left out.
 
         Parameters
         ----------
         logs : (n,) array
             ln(computed/measured) of any prediction.
-        left : (n,) array
+        left_out_logs : (n,) array
             ln(computed/measured) of the readings left out, by a fit without them; NaN for others.
         stable : bool
             Whether to leave out the readings flagged U.
@@ -125,11 +130,12 @@ class FittedRows:
         dict
             `cells.scores` by "fitted", "held_out" and "left_out".
         """
-        among = ~self.cells.unstable if stable else np.ones(self.held.size, bool)
+        among = ~self.cells.unstable if stable else np.ones(self.held_out.size, bool)
+        is_left_out = ~np.isnan(self.left_out_logs)
         return {
-            "fitted": scores(self.cells, logs, among & ~self.held),
-            "held_out": scores(self.cells, logs, among & self.held),
-            "left_out": scores(self.cells, left, among & ~np.isnan(self.left)),
+            "fitted": scores(self.cells, logs, among & ~self.held_out),
+            "held_out": scores(self.cells, logs, among & self.held_out),
+            "left_out": scores(self.cells, left_out_logs, among & is_left_out),
         }
 
 
@@ -138,13 +144,13 @@ class RowsOptions:
     """Options of a fit: readings to hold or leave out, placebos, and settings of the search.
 
     hold: rows held out, "column=value,value"; leave_out: the column of which each value is left out in
-    turn; placebos: "key=value,value" strings; how: the SearchSettings.
+    turn; placebos: "key=value,value" strings; search: the SearchSettings.
     """
 
     hold: tuple = ()
     leave_out: str = ""
     placebos: tuple = ()
-    how: SearchSettings = field(default_factory=SearchSettings)
+    search: SearchSettings = field(default_factory=SearchSettings)
 
 
 def fit_rows(
@@ -177,74 +183,79 @@ def fit_rows(
         If all starts of a search fail.
     """
     begin = perf_counter()
-    how = options.how
-    count = len(question.wanted)
+    settings = options.search
+    n_values = len(question.ranges)
     cells = read_readings(question.measured)
-    held = np.zeros(cells.row.size, bool)
-    for text in options.hold:
-        held |= cells.select(text)
-    _require_enough_readings(cells, ~held, count, how)
-    asked = question.condition_models(cells.conditions)
-    computed = ModelReadings(asked, say)
-    parts = cells.parts(options.leave_out, ~held) if options.leave_out else []
-    if len(parts) == 1:
+    held_out = np.zeros(cells.row.size, bool)
+    for selector in options.hold:
+        held_out |= cells.select(selector)
+    fitted = ~held_out
+    _require_enough_readings(cells, fitted, n_values, settings)
+    models = question.condition_models(cells.conditions)
+    computed = ModelReadings(models, say)
+    groups = cells.group_readings(options.leave_out, fitted) if options.leave_out else {}
+    if len(groups) == 1:
         raise PatchfemError(
             f"--leave-out {options.leave_out}: all rows that are not held out have the same value "
             "in this column, so leaving this value out leaves no rows for the fit; choose another "
             "column"
         )
-    for _, part in parts:
-        _require_enough_readings(cells, ~held & ~part, count, how)
+    for group in groups.values():
+        _require_enough_readings(cells, fitted & ~group, n_values, settings)
     # The strings of placebos are checked before the search, which can take hours.
-    texts = [text for given in options.placebos for text in _split_placebo(given, question.wanted)]
-    placebos = [(text, question.condition_models(cells.conditions, text)) for text in texts]
-    tell = _count_starts(progress, how.starts * (1 + len(parts) + len(placebos)))
-    found = fit_readings(cells, computed, ~held, how, name="all", tell=tell)
-    answer = _predict_from_rest(computed, found.fit.values, range(len(cells.conditions)))
-    logs = cells.logs(*answer)
-    left = np.full(held.size, np.nan)
+    placebo_models = {}
+    for placebo in options.placebos:
+        for text in _split_placebo(placebo, question.ranges):
+            placebo_models[text] = question.condition_models(cells.conditions, text)
+    n_searches = 1 + len(groups) + len(placebo_models)
+    report = None if progress is None else _StartCounter(progress, settings.starts * n_searches)
+    keys = FreeKeys(models.scene, models.ranges, sets=models.sets, notes=models.notes)
+    every_condition = range(len(cells.conditions))
+
+    fitter = _RowsFitter(cells, keys, settings, report)
+    best = fitter.fit(computed, fitted, "all", "rows")
+    prediction = _predict_from_rest(computed, best.fit.values, every_condition)
+    logs = cells.logs(*prediction)
+    left_out_logs = np.full(held_out.size, np.nan)
     folds = []
-    for name, part in parts:
-        training = ~held & ~part
-        fold = fit_readings(cells, computed, training, how, "", f"without {name}", tell)
-        conditions = sorted(set(cells.condition[part].tolist()))
-        seen = _predict_from_rest(computed, fold.fit.values, conditions)
-        left[part] = cells.logs(*seen)[part]
-        folds.append(Fold(name, part, fold))
-    tried = []
-    for text, other in placebos:
-        model = ModelReadings(other, say)
-        refit = fit_readings(cells, model, ~held, how, "", text, tell)
-        seen = _predict_from_rest(model, refit.fit.values, range(len(cells.conditions)))
-        tried.append(Placebo(text, refit, cells.logs(*seen)))
-    nulls = {name: _predict_null(cells, name, held, parts) for name in NULL_MODELS}
-    residual = make_residual(cells, computed, ~held, how.unstable)
-    problem = Problem(asked.scene, asked.wanted, residual, sets=asked.sets, notes=asked.notes)
-    keys = problem.conclude(found.fit, begin, _doubt_warnings(cells, found, logs, how))
+    for name, group in groups.items():
+        fold = fitter.fit(computed, fitted & ~group, f"without {name}")
+        conditions = sorted(set(cells.condition[group].tolist()))
+        fold_prediction = _predict_from_rest(computed, fold.fit.values, conditions)
+        left_out_logs[group] = cells.logs(*fold_prediction)[group]
+        folds.append(Fold(name, group, fold))
+    placebos = []
+    for text, other_models in placebo_models.items():
+        readings = ModelReadings(other_models, say)
+        refit = fitter.fit(readings, fitted, text)
+        refit_prediction = _predict_from_rest(readings, refit.fit.values, every_condition)
+        placebos.append(Placebo(text, refit, cells.logs(*refit_prediction)))
     return FittedRows(
-        keys=keys,
-        asked=asked,
+        keys=keys.conclude(best.fit, begin, _doubt_warnings(cells, best, logs, settings)),
+        models=models,
         cells=cells,
-        how=how,
-        held=held,
-        found=found,
-        computed=answer,
+        settings=settings,
+        held_out=held_out,
+        search=best,
+        computed=prediction,
         logs=logs,
         folds=tuple(folds),
-        left=left,
-        placebos=tuple(tried),
-        nulls=nulls,
-        runs=computed.runs,
+        left_out_logs=left_out_logs,
+        placebos=tuple(placebos),
+        nulls={name: _predict_null(cells, name, fitted, groups) for name in NULL_MODELS},
+        n_motions=computed.n_motions,
     )
 
 
-def _require_enough_readings(cells: Readings, training, count: int, how: SearchSettings) -> None:
+def _require_enough_readings(
+    cells: Readings, training, n_values: int, settings: SearchSettings
+) -> None:
     """Raise PatchfemError if a fit has no more readings than values."""
-    used = training & ~cells.unstable if how.unstable == "out" else training
-    if used.sum() <= count:
+    used = training & ~cells.unstable if settings.unstable == "out" else training
+    if used.sum() <= n_values:
         raise PatchfemError(
             f"{cells.path}: only {int(used.sum())} readings are used for the fit (neither held out "
-            f"nor left out), too few to determine {count} values and their intervals"
+            f"nor left out), too few to determine {n_values} values and their intervals"
         )
 
 
@@ -254,21 +265,52 @@ def _predict_from_rest(computed: ModelReadings, values, conditions) -> np.ndarra
     return np.array(computed(values, list(conditions)))
 
 
-def _count_starts(progress: Callable | None, total: int) -> Callable | None:
-    """Return a function that adds finished starts and reports the fraction of `total`."""
-    if progress is None:
-        return None
-    done = [0]
+class _RowsFitter(NamedTuple):
+    """Fits of the free keys to some readings of a table.
 
-    def tell(count: int) -> None:
-        """Add the starts that are done and report their fraction."""
-        done[0] += count
-        progress(done[0] / total)
+    report: called with 1 after each start, or None.
+    """
 
-    return tell
+    cells: Readings
+    keys: FreeKeys
+    settings: SearchSettings
+    report: Callable | None
+
+    def fit(self, readings: ModelReadings, training, name: str, interval_kind: str = "") -> BestFit:
+        """Fit the free keys to the training readings (n,) bool.
+
+        Parameters
+        ----------
+        readings : ModelReadings
+            Readings of the model.
+        training : (n,) bool
+        name : str
+            Name under which the ends of the starts are stored.
+        interval_kind : str
+            As in `Problem.solve`.
+        """
+        residual = make_residual(self.cells, readings, training, self.settings.unstable)
+        problem = self.keys.make_problem(residual)
+        return search_random_starts(
+            problem, self.settings, readings.forget, interval_kind, name, self.report
+        )
 
 
-def _split_placebo(text: str, wanted) -> list:
+class _StartCounter:
+    """Counter of finished starts, which reports their fraction of `total`."""
+
+    def __init__(self, progress: Callable, total: int):
+        self.progress = progress
+        self.total = total
+        self.finished = 0
+
+    def __call__(self, count: int) -> None:
+        """Add finished starts."""
+        self.finished += count
+        self.progress(self.finished / self.total)
+
+
+def _split_placebo(text: str, ranges) -> list:
     """Return the key=value strings of a placebo.
 
     PatchfemError for a key that the fit or the rows would set to another value.
@@ -283,7 +325,7 @@ def _split_placebo(text: str, wanted) -> list:
         raise PatchfemError(
             f"--placebo {text}: the rows of the file give the drive; choose a key of the rig"
         )
-    if any(key == bound.key for bound in wanted):
+    if any(key == bound.key for bound in ranges):
         raise PatchfemError(
             f"--placebo {text}: --free already fits this key, so a placebo value would have no "
             "effect; leave the key out of --free, or choose another key"
@@ -291,51 +333,42 @@ def _split_placebo(text: str, wanted) -> list:
     return [f"{key}={value.strip()}" for value in values.split(",")]
 
 
-def _predict_null(cells: Readings, name: str, held, parts) -> NullPrediction:
+def _predict_null(cells: Readings, name: str, fitted, groups: dict) -> NullPrediction:
     """Return the prediction by a null model, also of the readings that are left out."""
-    logs, numbers = fit_null_model(cells, name, ~held)
-    left = np.full(held.size, np.nan)
-    for _, part in parts:
-        left[part] = fit_null_model(cells, name, ~held & ~part)[0][part]
-    return NullPrediction(logs, left, numbers)
+    logs, numbers = fit_null_model(cells, name, fitted)
+    left_out_logs = np.full(fitted.size, np.nan)
+    for group in groups.values():
+        left_out_logs[group] = fit_null_model(cells, name, fitted & ~group)[0][group]
+    return NullPrediction(logs, left_out_logs, numbers)
 
 
-def _doubt_warnings(cells: Readings, found: BestFit, logs, how: SearchSettings) -> list:
+def _doubt_warnings(cells: Readings, search: BestFit, logs, settings: SearchSettings) -> list:
     """Return warnings about the rows and about the search."""
-    out = []
+    warnings = []
     if cells.empty:
         numbers = ", ".join(str(k + 1) for k in cells.empty)
-        out.append(
+        warnings.append(
             f"{len(cells.empty)} of {len(cells.rows)} rows have no reading and are left out: rows "
             f"{numbers}"
         )
-    count = int(cells.unstable.sum())
-    if count:
-        meaning = {
-            "bound": "count in the fit as lower bounds",
-            "out": "are left out of the fit",
-            "read": "count in the fit like all other readings",
-        }[how.unstable]
-        out.append(
-            f"{count} readings flagged U (unstable) {meaning}; scores_stable leaves these readings "
-            "out"
+    n_unstable = int(cells.unstable.sum())
+    if n_unstable:
+        warnings.append(
+            f"{n_unstable} readings flagged U (unstable) {UNSTABLE_MEANINGS[settings.unstable]}; "
+            "scores_stable leaves these readings out"
         )
-    lost = sorted(
-        {
-            f"{cells.rows[k].frequency:.6g} Hz, {cells.rows[k].input:.4g} m/s^2"
-            for k, log in zip(cells.row, logs)
-            if abs(log) >= MAX_LOG
-        }
-    )
-    if lost:
-        out.append(
-            f"no bounded motion is found at {'; '.join(lost)}: each row at these inputs counts as "
-            f"if the model were wrong by a factor of {np.exp(MAX_LOG):.0f}"
+    unbounded = set()
+    for k in cells.row[np.abs(logs) >= MAX_LOG]:
+        unbounded.add(f"{cells.rows[k].frequency:.6g} Hz, {cells.rows[k].input:.4g} m/s^2")
+    if unbounded:
+        warnings.append(
+            f"no bounded motion is found at {'; '.join(sorted(unbounded))}: each row at these inputs "
+            f"counts as if the model were wrong by a factor of {np.exp(MAX_LOG):.0f}"
         )
-    alike = int((found.rms <= np.nanmin(found.rms) * SAME_SCORE).sum())
-    if alike == 1 and how.starts > 1:
-        out.append(
-            f"only one of {how.starts} searches ended within 1 % of the best training score, so a "
-            "better fit may exist; raise --starts"
+    n_best = int((search.rms <= np.nanmin(search.rms) * SAME_SCORE).sum())
+    if n_best == 1 and settings.starts > 1:
+        warnings.append(
+            f"only one of {settings.starts} searches ended within 1 % of the best training score, so "
+            "a better fit may exist; raise --starts"
         )
-    return out
+    return warnings

@@ -33,31 +33,31 @@ def fit_null_model(cells: Readings, name: str, training) -> tuple:
         ln(computed/measured) (n,), NaN for a kind without training readings; and by kind the fitted
         "factor", exponent of "input" and exponent of "frequency".
     """
-    out = np.full(cells.row.size, np.nan)
-    found = {}
-    at = np.log(cells.conditions[cells.condition])
-    for kind, which in (("acceleration", cells.felt), ("displacement", ~cells.felt)):
-        here = which & training
-        if not here.any():
+    logs = np.full(cells.row.size, np.nan)
+    numbers = {}
+    inputs = np.log(cells.conditions[cells.condition])
+    for kind, of_kind in (("acceleration", cells.felt), ("displacement", ~cells.felt)):
+        fitted = of_kind & training
+        if not fitted.any():
             continue
-        low = 0.0 if kind == "acceleration" else MIN_DISPLACEMENT
-        y = np.log(np.maximum(cells.measured, low if low else 1e-300)) - at[:, 1]
-        columns = [np.ones(len(at))]
-        middle = at[here].mean(axis=0)
+        minimum = 1e-300 if kind == "acceleration" else MIN_DISPLACEMENT
+        measured = np.log(np.maximum(cells.measured, minimum))
+        y = measured - inputs[:, 1]
+        columns = [np.ones(len(inputs))]
+        mean = inputs[fitted].mean(axis=0)
         if name != "constant":
-            columns.append(at[:, 1] - middle[1])
+            columns.append(inputs[:, 1] - mean[1])
         if name == "power_input_frequency":
-            columns.append(at[:, 0] - middle[0])
-        table = np.stack(columns, axis=1)
-        factor = np.linalg.lstsq(table[here], y[here], rcond=1e-10)[0]
-        powers = [float(x) for x in factor[1:]] + [0.0] * (3 - len(factor))
-        model = table @ factor + at[:, 1]
-        if low:
-            model = np.maximum(model, np.log(low))
-        out[which] = (model - np.log(np.maximum(cells.measured, low if low else 1e-300)))[which]
-        found[kind] = {
-            "factor": float(np.exp(factor[0] - powers[0] * middle[1] - powers[1] * middle[0])),
-            "input": 1 + powers[0],
-            "frequency": powers[1],
+            columns.append(inputs[:, 0] - mean[0])
+        design = np.stack(columns, axis=1)
+        coefficients = np.linalg.lstsq(design[fitted], y[fitted], rcond=1e-10)[0]
+        input_power, frequency_power = [*coefficients[1:].tolist(), 0.0, 0.0][:2]
+        computed = np.maximum(design @ coefficients + inputs[:, 1], np.log(minimum))
+        logs[of_kind] = (computed - measured)[of_kind]
+        offset = input_power * mean[1] + frequency_power * mean[0]
+        numbers[kind] = {
+            "factor": float(np.exp(coefficients[0] - offset)),
+            "input": 1 + input_power,
+            "frequency": frequency_power,
         }
-    return out, found
+    return logs, numbers

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import NotConverged
-from ...identify.least_squares import Descent, Fit, assemble_fit, run_descents
-from ...identify.space import CubeResidual, make_space
+from ...identify.least_squares import Descent, Fit, Problem, assemble_fit, run_descents
+from ...identify.space import CubeResidual
 from .cells import Readings
 from .computed import ModelReadings
 
-# how a reading flagged U counts in a fit: as a lower bound, not at all, or as any other
+# How a reading flagged U counts in a fit: as a lower bound, not at all, or as any other.
 UNSTABLE = ("bound", "out", "read")
 
 
@@ -60,7 +60,7 @@ class SearchSettings:
     starts: int = 8
     seed: int = 0
     unstable: str = "bound"
-    access_ends: Callable = lambda *given: None
+    access_ends: Callable = lambda *arguments: None
 
 
 def make_residual(cells: Readings, computed: ModelReadings, training, unstable: str) -> Callable:
@@ -88,34 +88,62 @@ def make_residual(cells: Readings, computed: ModelReadings, training, unstable: 
     return residual
 
 
-def fit_readings(
-    cells: Readings,
-    computed: ModelReadings,
-    training,
-    how: SearchSettings,
-    bars: str = "rows",
-    name: str = "",
-    tell: Callable | None = None,
-) -> BestFit:
-    """Fit the free values to some readings within their ranges.
-
-    Each start begins with motions from rest, so that its result depends only on its starting values
-    and on the training readings. The descent with the smallest training residual is continued until
-    it converges.
+class _SavedDescents:
+    """Descents from the starts of a search, which a caller can store as lists.
 
     Parameters
     ----------
-    cells : Readings
-    computed : ModelReadings
-    training : (n,) bool
-        Readings of the fit.
-    how : SearchSettings
-    bars : str
-        Kind of intervals, as in `identify.least_squares.fit`.
+    name : str
+        Name of the search.
+    access_ends : callable
+        As in `SearchSettings`.
+    """
+
+    def __init__(self, name: str, access_ends: Callable):
+        self.name = name
+        self.access_ends = access_ends
+
+    def __call__(self, start: int, *descent: Descent) -> Descent | None:
+        """Store the descent of a start, or return the stored one; None if there is none."""
+        name = f"{self.name}/{start}"
+        if descent:
+            u, cost, is_converged, rows = descent[0]
+            stored_cost = cost if np.isfinite(cost) else None
+            self.access_ends(name, [*u.tolist(), stored_cost, rows, bool(is_converged)])
+            return None
+        stored = self.access_ends(name)
+        if not stored:
+            return None
+        *u, cost, rows, is_converged = stored
+        return Descent(np.array(u), np.inf if cost is None else cost, is_converged, rows)
+
+
+def search_random_starts(
+    problem: Problem,
+    settings: SearchSettings,
+    before_descent: Callable,
+    interval_kind: str = "rows",
+    name: str = "",
+    report: Callable | None = None,
+) -> BestFit:
+    """Solve a problem whose residual is expensive, from random starts.
+
+    Each start begins with motions from rest, so that its result depends only on its starting values
+    and on the training readings. The descent with the smallest sum of squares is continued until it
+    converges.
+
+    Parameters
+    ----------
+    problem : Problem
+    settings : SearchSettings
+    before_descent : callable
+        Called before each descent, so that its first motions start from rest.
+    interval_kind : str
+        As in `Problem.solve`.
     name : str
         Name under which the ends of the starts are stored.
-    tell : callable, optional
-        Called after each start.
+    report : callable, optional
+        Called with 1 after each start.
 
     Returns
     -------
@@ -126,44 +154,33 @@ def fit_readings(
     NotConverged
         If all starts fail.
     """
-    wanted = computed.asked.wanted
-    box = make_space([one.low for one in wanted], [one.high for one in wanted])
-    residual = make_residual(cells, computed, training, how.unstable)
-    n = len(wanted)
-    quick = CubeResidual(residual, box, is_quick=True)
-    begins = np.random.default_rng(how.seed).random((how.starts, n))
-
-    def access_descent(k, *one):
-        """Store a Descent as a list that a file can contain, or return the stored one."""
-        if one:
-            u, cost, done, rows = one[0]
-            how.access_ends(
-                f"{name}/{k}", [*u.tolist(), cost if np.isfinite(cost) else None, rows, bool(done)]
-            )
-            return None
-        known = how.access_ends(f"{name}/{k}")
-        return known and Descent(
-            np.array(known[:n]),
-            np.inf if known[n] is None else known[n],
-            known[n + 2],
-            known[n + 1],
-        )
-
+    space = problem.space
+    n = space.low.size
+    quick = CubeResidual(problem.residual, space, is_quick=True)
+    starts = np.random.default_rng(settings.seed).random((settings.starts, n))
     ends = run_descents(
-        quick, begins, saved=access_descent, before_descent=computed.forget, report=tell
+        quick,
+        starts,
+        saved=_SavedDescents(name, settings.access_ends),
+        before_descent=before_descent,
+        report=report,
     )
-    rms = np.array([one.rms for one in ends])
+    rms = np.array([end.rms for end in ends])
     if np.isnan(rms).all():
         raise NotConverged(
-            f"fit: all {how.starts} searches failed; the first failed for this reason: {quick.reason}"
+            f"fit: all {settings.starts} searches failed; the first failed for this reason: {quick.reason}"
         )
     best = run_descents(
-        CubeResidual(residual, box),
+        CubeResidual(problem.residual, space),
         [ends[int(np.nanargmin(rms))].u],
-        before_descent=computed.forget,
+        before_descent=before_descent,
     )
-    found = assemble_fit(quick, best, bars, ends)
-    values = np.array(
-        [box.values(one.u) if np.isfinite(one.cost) else np.full(n, np.nan) for one in ends]
+    end_values = []
+    for end in ends:
+        end_values.append(space.values(end.u) if np.isfinite(end.cost) else np.full(n, np.nan))
+    return BestFit(
+        fit=assemble_fit(quick, best, interval_kind, ends),
+        starts=np.array([space.values(u) for u in starts]),
+        ends=np.array(end_values),
+        rms=rms,
     )
-    return BestFit(found, np.array([box.values(u) for u in begins]), values, rms)

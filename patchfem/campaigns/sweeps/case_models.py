@@ -119,11 +119,11 @@ class SweepScene:
         """
         if not values or not all(isinstance(value, float) for value in values):
             return None
-        keys = [one.partition("=")[0] for one in sets]
-        found = self.similar_models(
+        keys = [text.partition("=")[0] for text in sets]
+        models = self.similar_models(
             keys, np.array([values]), lambda _: tuple(sets), np.zeros(1, int)
         )
-        return found and found[0]
+        return models and models[0]
 
     def mistakes(self, sets: Sequence[str]) -> list[str]:
         """Return every mistake of the scene of a case; [] if it is valid."""
@@ -156,33 +156,24 @@ class SweepScene:
         It covers the version, all tables as written except [sweep], the --set strings, and the
         content of the files.
         """
-        tables = {
-            name: value for name, value in tomllib.loads(self.text).items() if name != "sweep"
-        }
+        tables = tomllib.loads(self.text)
+        tables.pop("sweep", None)
         files = hash_named_files([*iterate_texts(tables), *self.sets], self.path.parent)
-        return sha256(
-            json.dumps(
-                [__version__, tables, self.sets, files], sort_keys=True, default=str
-            ).encode()
-        ).hexdigest()
+        shared = [__version__, tables, self.sets, files]
+        return sha256(json.dumps(shared, sort_keys=True, default=str).encode()).hexdigest()
 
     def shares_meshes(self, keys: Sequence[str]) -> bool:
         """Return whether the cases have patches whose mesh is chosen for all of them together.
 
         keys: those that change from case to case.
         """
-        tables = tomllib.loads(self.text)
-        given = {
-            f"{table}.{key}"
-            for table, held in tables.items()
-            if isinstance(held, dict)
-            for key in held
-        }
-        given |= {one.partition("=")[0].strip() for one in self.sets} | set(keys)
-        return (
-            any(key.startswith("contact.") for key in given)
-            and not {"contact.element_size", "contact.mesh"} & given
-        )
+        set_keys = set(keys)
+        set_keys |= {text.partition("=")[0].strip() for text in self.sets}
+        for name, table in tomllib.loads(self.text).items():
+            if isinstance(table, dict):
+                set_keys |= {f"{name}.{key}" for key in table}
+        has_contact = any(key.startswith("contact.") for key in set_keys)
+        return has_contact and not {"contact.element_size", "contact.mesh"} & set_keys
 
     def content(self, text: str) -> str:
         """Return hashes of the contents of the files that a value names; "" if it names none."""

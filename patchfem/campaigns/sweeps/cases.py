@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
+from itertools import chain
 from math import isfinite, prod
 
 import numpy as np
@@ -14,23 +15,21 @@ import numpy as np
 from ...scene.axes import Axis
 from .case_models import SweepScene
 
-PIECE_KEYS = tuple(
-    f"contact.{name}"
-    for name in (
-        "length",
-        "width",
-        "height",
-        "pairs",
-        "plane",
-        "substrate",
-        "coating",
-        "upper",
-        "lower",
-        "mesh",
-        "element_size",
-        "step",
-        "profile",
-    )
+# Beginnings of the keys that change the pieces or their mesh.
+PIECE_KEYS = (
+    "contact.length",
+    "contact.width",
+    "contact.height",
+    "contact.pairs",
+    "contact.plane",
+    "contact.substrate",
+    "contact.coating",
+    "contact.upper",
+    "contact.lower",
+    "contact.mesh",
+    "contact.element_size",
+    "contact.step",
+    "contact.profile",
 )
 
 
@@ -94,66 +93,63 @@ class Cases:
         if not all(isinstance(axis.values[0], float) for axis in self.axes):
             return None
         places = [numbers] * len(self.axes) if self.rows else np.unravel_index(numbers, self.shape)
-        return np.array(
-            [
-                np.array([axis.values[place] for place in np.asarray(some).tolist()])
-                for axis, some in zip(self.axes, places)
-            ]
-        ).T
+        columns = []
+        for axis, axis_places in zip(self.axes, places):
+            places_list = np.asarray(axis_places).tolist()
+            columns.append(np.array([axis.values[place] for place in places_list]))
+        return np.array(columns).T
 
-    def spread_cases(self, most: int) -> list[int]:
-        """Return at most `most` case numbers, spread over all axes and including the ends of each.
+    def spread_cases(self, max_cases: int) -> list[int]:
+        """Return some case numbers, spread over all axes and including the ends of each.
 
-        All cases, if there are no more than that.
+        All cases, if there are no more than `max_cases`.
         """
-        if len(self) <= most:
+        if len(self) <= max_cases:
             return list(range(len(self)))
-        each = [1] * len(self.shape)
+        counts = [1] * len(self.shape)
         while True:
-            rising = [k for k, size in enumerate(self.shape) if each[k] < size]
-            k = min(rising, key=lambda k: each[k])
-            if prod(each) // each[k] * (each[k] + 1) > most:
+            rising = [k for k, size in enumerate(self.shape) if counts[k] < size]
+            k = min(rising, key=lambda k: counts[k])
+            if prod(counts) // counts[k] * (counts[k] + 1) > max_cases:
                 break
-            each[k] += 1
-        places = [
-            [round(j * (size - 1) / max(count - 1, 1)) for j in range(count)]
-            for size, count in zip(self.shape, each)
-        ]
-        numbers = [0]
-        for size, some in zip(self.shape, places):
-            numbers = [number * size + place for number in numbers for place in some]
-        return numbers
+            counts[k] += 1
+        numbers = np.zeros(1, int)
+        for size, count in zip(self.shape, counts):
+            places = [round(j * (size - 1) / max(count - 1, 1)) for j in range(count)]
+            numbers = np.add.outer(numbers * size, places).ravel()
+        return numbers.tolist()
 
-    def representative_cases(self, most: int) -> list[int]:
-        """Return at most `most` case numbers that represent all cases.
+    def representative_cases(self, max_cases: int) -> list[int]:
+        """Return at most `max_cases` case numbers that represent all cases.
 
         For random cases these are the first ones, because every 8th point of a Sobol sequence may
         lie in the same half of a range; otherwise those of `spread_cases`.
         """
-        return list(range(min(most, len(self)))) if self.drawn else self.spread_cases(most)
+        if self.drawn:
+            return list(range(min(max_cases, len(self))))
+        return self.spread_cases(max_cases)
 
     def neighbours(self, numbers: Sequence[int]) -> list[int]:
         """Return cases in an order in which those with the same pieces follow one another.
 
         They share most of the work. Among them, cases with the same patch follow one another.
         """
-        slow = sorted(
-            (k for k, axis in enumerate(self.axes) if axis.key.startswith("contact.")),
-            key=lambda k: not self.axes[k].key.startswith(PIECE_KEYS),
-        )
+        slow = [k for k, axis in enumerate(self.axes) if axis.key.startswith("contact.")]
         if not slow:
             return list(numbers)
-        alike = [
-            {value: place for place, value in reversed(list(enumerate(axis.values)))}
-            for axis in self.axes
-        ]
+        slow.sort(key=lambda k: not self.axes[k].key.startswith(PIECE_KEYS))
+        # Equal values of an axis count as its first one.
+        first_places = [{} for _ in self.axes]
+        for first, axis in zip(first_places, self.axes):
+            for place, value in enumerate(axis.values):
+                first.setdefault(value, place)
 
-        def patch(number: int) -> list:
+        def patch_places(number: int) -> list:
             """Return the indices of the values of a case that change its patch."""
-            places = self.places(number)
-            return [alike[k][self.axes[k].values[places[k]]] for k in slow]
+            values = self.values(number)
+            return [first_places[k][values[k]] for k in slow]
 
-        return sorted(numbers, key=patch)
+        return sorted(numbers, key=patch_places)
 
     def names(self, asked: SweepScene, numbers: Sequence[int] | None = None) -> np.ndarray:
         """Return names (n,) uint64 of cases: hashes of their keys and values and of what all cases share.
@@ -168,32 +164,47 @@ class Cases:
         numbers : sequence of int, optional
             Numbers of the cases; by default all.
         """
-        # The order of the keys is the same for all cases.
-        order = sorted(range(len(self.axes)), key=lambda k: json.dumps(self.axes[k].key))
-        keys = [json.dumps(axis.key) for axis in self.axes]
-        mark = lru_cache(0 if self.drawn else None)(
-            lambda k, place: _value_json(keys[k], self.axes[k].values[place], asked)
-        )
-
-        def signs(shared: str, of: Sequence[int]) -> np.ndarray:
-            """Return a hash (n,) of each case, from the data that all cases share and its values."""
-            placed = (self.places(number) for number in of)
-            own = ("\n".join([shared, *(mark(k, places[k]) for k in order)]) for places in placed)
-            return np.fromiter(
-                (int(sha256(one.encode()).hexdigest()[:16], 16) for one in own), np.uint64, len(of)
-            )
-
+        hasher = _CaseHasher(self, asked)
+        every_case = range(len(self))
         shared = asked.digest()
         if asked.shares_meshes([axis.key for axis in self.axes]):
-            shared = sha256(np.sort(signs(shared, range(len(self)))).tobytes()).hexdigest()
-        return signs(shared, range(len(self)) if numbers is None else numbers)
+            shared = sha256(np.sort(hasher.hash_cases(shared, every_case)).tobytes()).hexdigest()
+        return hasher.hash_cases(shared, every_case if numbers is None else numbers)
 
 
-def _value_json(key: str, value: float | str, asked: SweepScene) -> str:
-    """Return a key, given as JSON, and a value as JSON, with the hash of the file that it names."""
-    if isinstance(value, float) and isfinite(value):
-        return f'[{key}, {value!r}, ""]'
-    return f"[{key}, {json.dumps(value)}, {json.dumps(asked.content(value) if isinstance(value, str) else '')}]"
+class _CaseHasher:
+    """Hashes of cases, from what all cases share and their keys and values.
+
+    Values of random cases are not kept, because hardly any case has the value of another.
+    """
+
+    def __init__(self, cases: Cases, asked: SweepScene):
+        self.cases = cases
+        self.asked = asked
+        keys = [json.dumps(axis.key) for axis in cases.axes]
+        self.keys = keys
+        # The order of the keys is the same for all cases.
+        self.order = sorted(range(len(keys)), key=keys.__getitem__)
+        self.cached_json = lru_cache(0 if cases.drawn else None)(self._value_json)
+
+    def hash_cases(self, shared: str, numbers: Sequence[int]) -> np.ndarray:
+        """Return a hash (n,) uint64 of each case; `shared` describes what all cases share."""
+        hashes = np.empty(len(numbers), np.uint64)
+        for k, number in enumerate(numbers):
+            places = self.cases.places(number)
+            values = [self.cached_json(axis, places[axis]) for axis in self.order]
+            digest = sha256("\n".join([shared, *values]).encode()).hexdigest()
+            hashes[k] = int(digest[:16], 16)
+        return hashes
+
+    def _value_json(self, axis: int, place: int) -> str:
+        """Return key and value as JSON, with the hash of the file that the value names."""
+        key = self.keys[axis]
+        value = self.cases.axes[axis].values[place]
+        if isinstance(value, float) and isfinite(value):
+            return f'[{key}, {value!r}, ""]'
+        content = self.asked.content(value) if isinstance(value, str) else ""
+        return f"[{key}, {json.dumps(value)}, {json.dumps(content)}]"
 
 
 def combine_cases(parts: Sequence[Cases]) -> Cases:
@@ -204,20 +215,16 @@ def combine_cases(parts: Sequence[Cases]) -> Cases:
     if len(parts) == 1:
         return parts[0]
     if not any(part.rows for part in parts):
-        return Cases(tuple(axis for part in parts for axis in part.axes))
+        return Cases(tuple(chain.from_iterable(part.axes for part in parts)))
     count = prod(map(len, parts))
     axes = []
-    inner = prod(map(len, parts))
+    n_inner = count
     for part in parts:
-        inner //= len(part)
-        picked = [part.places(number // inner % len(part)) for number in range(count)]
-        for at, axis in enumerate(part.axes):
-            axes.append(
-                Axis(
-                    axis.key,
-                    tuple(axis.texts[one[at]] for one in picked),
-                    tuple(axis.values[one[at]] for one in picked),
-                    axis.unit,
-                )
-            )
+        n_inner //= len(part)
+        numbers = [number // n_inner % len(part) for number in range(count)]
+        places = list(map(part.places, numbers))
+        for k, axis in enumerate(part.axes):
+            texts = tuple(axis.texts[place[k]] for place in places)
+            values = tuple(axis.values[place[k]] for place in places)
+            axes.append(Axis(axis.key, texts, values, axis.unit))
     return Cases(tuple(axes), True, all(part.drawn for part in parts))

@@ -34,9 +34,11 @@ MAX_CASES_WITH_SUMMARY = (
 MAX_CASES_WITH_TABLES = (
     200_000  # maximum number of cases for which a sweep writes tables by default
 )
-# Bytes per case: with a summary; with tables, page and columns (10 000 cases); with only the columns
-# (a million cases).
-DISK, COLUMNS, BARE = 6000, 1600, 400
+# Bytes on disk per case with a summary; with tables, page and columns (10 000 cases); with columns
+# alone (a million cases).
+SUMMARY_BYTES = 6000
+TABLE_BYTES = 1600
+COLUMN_BYTES = 400
 
 
 def estimate_sweep(asked: SweepScene, cases: Cases) -> dict:
@@ -53,59 +55,73 @@ def estimate_sweep(asked: SweepScene, cases: Cases) -> dict:
     """
     plans = []
     numbers = []
-    wrong = None
+    first_error = None
     for number in cases.representative_cases(MAX_PLANNED_CASES):
         try:
             plans.append(plan(asked.model(cases.sets(number))))
             numbers.append(number)
         except PatchfemError as error:
-            wrong = wrong or error
+            first_error = first_error or error
     if not plans:
-        raise wrong
-    batches = [choose_batch(one.model, len(cases)) for one in plans]
-    once, alone = _split_shared_seconds(plans)
-    once += RANKING_SECONDS * (cases.drawn and len(cases.axes) > 1)
-    keys = [None if batch is None else batch.group(one.model) for one, batch in zip(plans, batches)]
-    each = [
-        one if key is None else max(BATCHED_CASE_SECONDS, batch.share * one)
-        for one, key, batch in zip(alone, keys, batches)
-    ]
-    groups = {
-        (batch.name, key if batch.share else ())
-        for batch, key in zip(batches, keys)
-        if key is not None
-    }
-    if groups:  # The first case of each group takes as long as a single run.
-        begun = np.mean(
-            [one - other for one, other, key in zip(alone, each, keys) if key is not None]
-        )
-        once += (
-            len(groups)
-            * (len(cases) / len(plans) if len(groups) > MAX_GROUPS else 1.0)
-            * max(float(begun), 0.0)
-        )
-    seconds = once + sum(each) / len(plans) * len(cases)
-    first = batches[0]
-    compiles = (
-        plans[0].compile_seconds if first is None else batch_compile_seconds(first, plans[0].model)
-    )
+        raise first_error
+    batches = [choose_batch(case_plan.model, len(cases)) for case_plan in plans]
+    seconds = _predict_seconds(plans, batches, len(cases))
+    if cases.drawn and len(cases.axes) > 1:
+        seconds += RANKING_SECONDS
+    compile_seconds = plans[0].compile_seconds
+    if batches[0] is not None:
+        compile_seconds = batch_compile_seconds(batches[0], plans[0].model)
     return plans[0].as_json() | {
-        "compile_seconds": compiles,
+        "compile_seconds": compile_seconds,
         "seconds": round(SWEEP_SECONDS + seconds, 2),
         "seconds_per_case": round(seconds / len(cases), 4),
-        "bytes": max(one.bytes for one in plans),
+        "bytes": max(case_plan.bytes for case_plan in plans),
         "cases": len(cases),
         "case": {axis.key: text for axis, text in zip(cases.axes, cases.texts(numbers[0]))},
-        "disk_bytes": (
-            DISK
-            if len(cases) <= MAX_CASES_WITH_SUMMARY
-            else COLUMNS
-            if len(cases) <= MAX_CASES_WITH_TABLES
-            else BARE
-        )
-        * len(cases),
+        "disk_bytes": _bytes_per_case(len(cases)) * len(cases),
         "values": {axis.key: _count_values(axis) for axis in cases.axes},
     }
+
+
+def _predict_seconds(plans: list, batches: list, n_cases: int) -> float:
+    """Predict the seconds of all cases on one core.
+
+    Parameters
+    ----------
+    plans : list of Plan
+        Plans of some cases.
+    batches : list of Batch or None
+        The batch of each of these cases; None for a case that is computed alone.
+    n_cases : int
+        Number of all cases.
+    """
+    shared, single_seconds = _split_shared_seconds(plans)
+    case_seconds = []
+    batch_starts = []
+    groups = set()
+    for case_plan, batch, seconds in zip(plans, batches, single_seconds):
+        key = None if batch is None else batch.group(case_plan.model)
+        if key is None:
+            case_seconds.append(seconds)
+            continue
+        in_batch = max(BATCHED_CASE_SECONDS, batch.share * seconds)
+        case_seconds.append(in_batch)
+        batch_starts.append(seconds - in_batch)
+        groups.add((batch.name, key if batch.share else ()))
+    if groups:
+        # The first case of each group takes as long as a single run.
+        n_groups = float(len(groups))
+        if len(groups) > MAX_GROUPS:
+            n_groups *= n_cases / len(plans)
+        shared += n_groups * max(float(np.mean(batch_starts)), 0.0)
+    return shared + sum(case_seconds) / len(plans) * n_cases
+
+
+def _bytes_per_case(n_cases: int) -> int:
+    """Return the bytes on disk of a case in a sweep of `n_cases`."""
+    if n_cases <= MAX_CASES_WITH_SUMMARY:
+        return SUMMARY_BYTES
+    return TABLE_BYTES if n_cases <= MAX_CASES_WITH_TABLES else COLUMN_BYTES
 
 
 def _split_shared_seconds(plans: list) -> tuple[float, list]:
@@ -114,23 +130,22 @@ def _split_shared_seconds(plans: list) -> tuple[float, list]:
     A case of a sweep needs no start and no fields. Pieces that are the same in all cases are
     condensed once.
     """
-    costs = [each.cost for each in plans]
     shared = 0.0
     left_out = {"start", "code", "fields"}
-    patches = [each.model.patch for each in plans]
+    patches = [case_plan.model.patch for case_plan in plans]
     if None not in patches:
-        from ...runs.patch.meshes import (
-            geometry_key,  # imported here, because sweeps of a point need no mesh
-        )
+        # imported here, because sweeps of a point need no mesh
+        from ...runs.patch.meshes import geometry_key
 
         if len({geometry_key(patch) for patch in patches}) == 1:
             left_out.add("condensing")
-            shared = max(cost.times["condensing"] for cost in costs)
-    own = [
-        sum(seconds for name, seconds in cost.times.items() if name not in left_out)
-        for cost in costs
-    ]
-    return shared, [seconds + CASE_SECONDS for seconds in own]
+            shared = max(case_plan.cost.times["condensing"] for case_plan in plans)
+    single_seconds = []
+    for case_plan in plans:
+        times = case_plan.cost.times
+        own_times = [seconds for name, seconds in times.items() if name not in left_out]
+        single_seconds.append(sum(own_times) + CASE_SECONDS)
+    return shared, single_seconds
 
 
 def _count_values(axis: Axis) -> int:

@@ -80,19 +80,17 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
     asked = SweepScene(Path(path), read_text(path), tuple(sets), request.of)
     cases = read_cases(asked, request)
     swept = {asked.numbered_key(axis.key): axis.key for axis in cases.axes}
-    both = [
-        (one, swept.get(asked.numbered_key(".".join(split_key(one.partition("=")[0])))))
-        for one in sets
-    ]
-    if any(key for _, key in both):
-        raise SceneError(
-            [
-                f"--set {one}: the sweep already sets {key} in every case; remove this --set, or remove the "
-                "key from the sweep"
-                for one, key in both
-                if key
-            ]
-        )
+    mistakes = []
+    for text in sets:
+        key = ".".join(split_key(text.partition("=")[0]))
+        swept_key = swept.get(asked.numbered_key(key))
+        if swept_key:
+            mistakes.append(
+                f"--set {text}: the sweep already sets {swept_key} in every case; remove this --set, "
+                "or remove the key from the sweep"
+            )
+    if mistakes:
+        raise SceneError(mistakes)
     return asked, cases
 
 
@@ -106,8 +104,6 @@ def read_cases(asked: SweepScene, request: Request) -> Cases:
     SceneError
         With the mistakes of scene and request, and if none of the cases that are checked is valid.
     """
-    parts = []
-    wrong = []
     if min(request.count, request.seed) < 0 or (request.sobol and not request.count):
         raise SceneError(
             [
@@ -115,42 +111,37 @@ def read_cases(asked: SweepScene, request: Request) -> Cases:
                 "must be whole numbers >= 0, and Sobol's sequence needs at least one case"
             ]
         )
+    parts = []
+    mistakes = []
+    file_axes: tuple = ()
     if request.file is not None:
-        listed, wrong = table.read_case_table(request.file)
-        parts += [listed] if listed is not None else []
-    wrong += _check_measure(request.of)
-    axes, mistakes = read_axes(request.over, sampled=request.count > 0)
-    wrong += [f"--over {mistake.removeprefix('--over ')}" for mistake in mistakes]
+        listed, mistakes = table.read_case_table(request.file)
+        if listed is not None:
+            parts.append(listed)
+            file_axes = listed.axes
+    mistakes += _check_measure(request.of)
+    axes, axis_mistakes = read_axes(request.over, sampled=request.count > 0)
+    mistakes += [f"--over {mistake.removeprefix('--over ')}" for mistake in axis_mistakes]
     if not request.over and request.file is None:
-        axes, mistakes = asked.axes()
-        wrong += mistakes
-        if not axes and not mistakes:
-            wrong.append(
+        axes, axis_mistakes = asked.axes()
+        mistakes += axis_mistakes
+        if not axes and not axis_mistakes:
+            mistakes.append(
                 f"{asked.path}: no key to sweep is given; add --over table.key=v1,v2,... or a table [sweep]"
             )
-    twice = {axis.key for part in parts for axis in part.axes} & {axis.key for axis in axes}
-    wrong += [
-        f"--over {key}: {request.file} sets this key already; remove the key from the file or leave out this "
-        "--over"
-        for key in sorted(twice)
-    ]
-    if not wrong:
-        wrong += _find_equal_keys(
-            asked, [axis.key for axis in (*axes, *(one for part in parts for one in part.axes))]
+    for key in sorted({axis.key for axis in file_axes} & {axis.key for axis in axes}):
+        mistakes.append(
+            f"--over {key}: {request.file} sets this key already; remove the key from the file or leave out "
+            "this --over"
         )
-    if wrong:
-        first = [
-            f"{axis.key}={axis.texts[0]}"
-            for axis in (*axes, *(one for part in parts for one in part.axes))
-            if isinstance(axis, Axis)
-        ]
-        raise SceneError([*asked.mistakes(first), *wrong])
-    count = prod(
-        [
-            *map(len, parts),
-            *([request.count] if request.count else [len(axis.texts) for axis in axes]),
-        ]
-    )
+    every_axis = [*axes, *file_axes]
+    mistakes = mistakes or _find_equal_keys(asked, [axis.key for axis in every_axis])
+    if mistakes:
+        listed_axes = [axis for axis in every_axis if isinstance(axis, Axis)]
+        first_case = [f"{axis.key}={axis.texts[0]}" for axis in listed_axes]
+        raise SceneError([*asked.mistakes(first_case), *mistakes])
+    count = prod(map(len, parts))
+    count *= request.count or prod(len(axis.texts) for axis in axes)
     if count > MAX_CASES:
         raise SceneError(
             [
@@ -159,7 +150,7 @@ def read_cases(asked: SweepScene, request: Request) -> Cases:
             ]
         )
     if request.count and axes:
-        parts.append(samples.draw_cases(axes, request.count, request.sobol, request.seed))
+        parts.append(samples.draw_cases(axes, request.count, request.seed, sobol=request.sobol))
     elif axes:
         parts.append(Cases(tuple(axes)))
     cases = combine_cases(parts)
@@ -174,20 +165,17 @@ def _repeat_words(request: Request, folder: Path) -> tuple[str, ...]:
 
     They are () if the file of cases is a pipe, which cannot be read again.
     """
-    if request.file is not None and not request.file.is_file():
-        return ()
-    file = () if request.file is None else ("--cases", os.path.relpath(request.file, folder))
-    drawn = (
-        "--sobol" if request.sobol else "--random",
-        str(request.count),
-        "--seed",
-        str(request.seed),
-    )
-    return (
-        *file,
-        *(word for one in request.over for word in ("--over", one)),
-        *(drawn if request.count else ()),
-    )
+    words = []
+    if request.file is not None:
+        if not request.file.is_file():
+            return ()
+        words += ["--cases", os.path.relpath(request.file, folder)]
+    for text in request.over:
+        words += ["--over", text]
+    if request.count:
+        words.append("--sobol" if request.sobol else "--random")
+        words += [str(request.count), "--seed", str(request.seed)]
+    return tuple(words)
 
 
 def _check_measure(measure: str) -> list[str]:
@@ -198,17 +186,14 @@ def _check_measure(measure: str) -> list[str]:
     known = [*rows.TABLE, *patch_rows.TABLE]
     if not measure or rows.remove_interface_number(measure) in known:
         return []
-    parts = [name for name in known if measure in name.split("_") and not name.endswith("_scatter")]
-    near = parts if 0 < len(parts) <= MAX_SUGGESTIONS else get_close_matches(measure, known, 1, 0.5)
-    *others, last = map(repr, near or [""])
-    return [
-        f"--of {measure}: unknown measure; "
-        + (
-            f"did you mean {', '.join(others)}{' or ' * bool(others)}{last}?"
-            if near
-            else "use a name that `patchfem run` prints, such as loop_area"
-        )
-    ]
+    names = [name for name in known if measure in name.split("_") and not name.endswith("_scatter")]
+    if not 0 < len(names) <= MAX_SUGGESTIONS:
+        names = get_close_matches(measure, known, 1, 0.5)
+    advice = "use a name that `patchfem run` prints, such as loop_area"
+    if names:
+        *others, last = map(repr, names)
+        advice = f"did you mean {', '.join(others)}{' or ' * bool(others)}{last}?"
+    return [f"--of {measure}: unknown measure; {advice}"]
 
 
 def _find_equal_keys(asked: SweepScene, keys: Sequence[str]) -> list[str]:
@@ -216,35 +201,32 @@ def _find_equal_keys(asked: SweepScene, keys: Sequence[str]) -> list[str]:
 
     Two keys do so if they name a mode by its name and by its number.
     """
-    first = {}
-    wrong = []
+    first_keys: dict = {}
+    mistakes = []
     for key in keys:
-        place = asked.numbered_key(key)
-        if first.setdefault(place, key) != key:
-            wrong.append(
-                f"--over {key}: this key is the same as {first[place]}, which is given already; remove one of "
-                "them"
+        first = first_keys.setdefault(asked.numbered_key(key), key)
+        if first != key:
+            mistakes.append(
+                f"--over {key}: this key is the same as {first}, which is given already; remove one of them"
             )
-    return wrong
+    return mistakes
 
 
 def _refuse_all(asked: SweepScene, cases: Cases) -> None:
     """Raise SceneError if none of several cases spread over the sweep is a valid scene."""
-    found = {}
+    messages: dict = {}
     for number in cases.representative_cases(N_CHECKED):
         mistakes = asked.mistakes(cases.sets(number))
         if not mistakes:
             return
-        # Random values differ from case to case, but the mistake that they cause is the same.
         for mistake in mistakes:
-            found.setdefault(
-                re.sub(NUMBER_PATTERN, "", mistake) if cases.drawn else mistake, mistake
-            )
-    lines = list(found.values())
-    raise SceneError(
-        lines[:MAX_PRINTED]
-        + ([f"and {len(lines) - MAX_PRINTED} more"] if len(lines) > MAX_PRINTED else [])
-    )
+            # Random values differ from case to case, but the mistake that they cause is the same.
+            kind = re.sub(NUMBER_PATTERN, "", mistake) if cases.drawn else mistake
+            messages.setdefault(kind, mistake)
+    lines = list(messages.values())
+    if len(lines) > MAX_PRINTED:
+        lines = [*lines[:MAX_PRINTED], f"and {len(lines) - MAX_PRINTED} more"]
+    raise SceneError(lines)
 
 
 def contradictions(asked: SweepScene, cases: Cases) -> str:
@@ -254,20 +236,16 @@ def contradictions(asked: SweepScene, cases: Cases) -> str:
     scene.
     """
     numbers = cases.representative_cases(N_CHECKED)
-    found = [one for one in map(asked.mistakes, map(cases.sets, numbers)) if one]
-    if not found:
+    failing = list(filter(None, (asked.mistakes(cases.sets(number)) for number in numbers)))
+    if not failing:
         return ""
-    first = found[0][0]
+    mistake = failing[0][0]
     swept = {asked.numbered_key(axis.key) for axis in cases.axes}
-    key = re.search(r"(?:^|: )([a-z_]+(?:\.[\w-]+)+): ", first)
-    helps = (
-        f"sweep {key[1]}, too, remove this key from the scene, or give other values in --over"
-        if key and asked.numbered_key(key[1]) not in swept
-        else "give other values in --over"
-    )
-    of = (
-        f"{len(found)} of {len(cases)} cases"
-        if len(numbers) == len(cases)
-        else f"{len(found)} of {len(numbers)} cases that were checked"
-    )
-    return f"{of} will fail: {first}; {helps}"
+    key = re.search(r"(?:^|: )([a-z_]+(?:\.[\w-]+)+): ", mistake)
+    advice = "give other values in --over"
+    if key and asked.numbered_key(key[1]) not in swept:
+        advice = f"sweep {key[1]}, too, remove this key from the scene, or {advice}"
+    extent = f"{len(failing)} of {len(numbers)} cases"
+    if len(numbers) != len(cases):
+        extent += " that were checked"
+    return f"{extent} will fail: {mistake}; {advice}"

@@ -62,53 +62,55 @@ def compute_sobol_indices(keys: Sequence[tuple], measures: dict, shape: tuple | 
     dict
         By measure a list of SobolIndex, the largest total first.
     """
-    moving = [(name, np.asarray(values)) for name, values in keys if np.unique(values).size > 1]
-    changing = {
-        name: np.asarray(values, float)
-        for name, (values, errors) in measures.items()
-        if _is_varying(np.asarray(values, float), np.asarray(errors, float))
-    }
-    if len(moving) < 2 or not changing:
+    levels = {}
+    for name, values in keys:
+        if np.unique(values).size > 1:
+            levels[name] = np.asarray(values)
+    changing = {}
+    for name, (values, errors) in measures.items():
+        column = np.asarray(values, float)
+        if _is_varying(column, np.asarray(errors, float)):
+            changing[name] = column
+    if len(levels) < 2:
         return {}
-    names = [name for name, _ in moving]
     if shape is not None:
-        whole = {name: values for name, values in changing.items() if np.isfinite(values).all()}
-        found = {name: _grid_indices(values.reshape(shape)) for name, values in whole.items()}
-        along = [place for place, (name, _) in enumerate(keys) if name in names]
-        return {
-            name: _sort_shares(names, [share[along] for share in shares])
-            for name, shares in found.items()
-        }
-    levels = np.stack([_rank_fraction(values) for _, values in moving], axis=1)
-    out = {}
-    for there in {
-        np.isfinite(values).tobytes(): np.isfinite(values) for values in changing.values()
-    }.values():
-        alike = [
-            name for name, values in changing.items() if np.array_equal(np.isfinite(values), there)
-        ]
-        if there.sum() < MIN_CASES_PER_KEY * len(moving):
+        axes = [axis for axis, (name, _) in enumerate(keys) if name in levels]
+        indices = {}
+        for name, values in changing.items():
+            if np.isfinite(values).all():
+                grid = _grid_indices(values.reshape(shape))
+                indices[name] = _sort_by_total(list(levels), [part[axes] for part in grid])
+        return indices
+    fractions = np.stack([_rank_fraction(values) for values in levels.values()], axis=1)
+    indices = {}
+    for names, known in _group_by_known_cases(changing):
+        if known.sum() < MIN_CASES_PER_KEY * len(levels):
             continue
-        found = _random_indices(
-            levels[there], np.stack([changing[name][there] for name in alike], axis=1)
-        )
-        out |= {
-            name: _sort_shares(names, shares)
-            for name, shares in zip(alike, found)
-            if shares is not None
-        }
-    return {name: out[name] for name in changing if name in out}
+        columns = np.stack([changing[name][known] for name in names], axis=1)
+        for name, parts in zip(names, _random_indices(fractions[known], columns)):
+            if parts is not None:
+                indices[name] = _sort_by_total(list(levels), parts)
+    return {name: indices[name] for name in changing if name in indices}
+
+
+def _group_by_known_cases(changing: dict) -> list:
+    """Return pairs (names of measures, cases (n,) bool that have them all)."""
+    groups: dict = {}
+    for name, values in changing.items():
+        known = np.isfinite(values)
+        names, _ = groups.setdefault(known.tobytes(), ([], known))
+        names.append(name)
+    return list(groups.values())
 
 
 def _is_varying(values: np.ndarray, errors: np.ndarray) -> bool:
     """Return whether most cases have a measure that varies by more than its errors and round-off."""
-    there = np.isfinite(values)
-    if there.mean() < 0.9:
+    known = np.isfinite(values)
+    if known.mean() < 0.9:
         return False
-    spread = np.std(values[there])
-    return spread > 1e-9 * np.abs(values[there]).max(initial=0.0) and spread > np.sqrt(
-        np.mean(np.nan_to_num(errors[there]) ** 2)
-    )
+    spread = np.std(values[known])
+    error = np.sqrt(np.mean(np.nan_to_num(errors[known]) ** 2))
+    return spread > 1e-9 * np.abs(values[known]).max(initial=0.0) and spread > error
 
 
 def _rank_fraction(values: np.ndarray) -> np.ndarray:
@@ -117,24 +119,31 @@ def _rank_fraction(values: np.ndarray) -> np.ndarray:
     return ((np.cumsum(counts) - counts / 2) / values.size)[same]
 
 
-def _grid_indices(values: np.ndarray) -> tuple:
-    """Return first-order and total Sobol indices and the interval of the total, (keys,) each, on a full grid."""
-    axes = range(values.ndim)
-    whole = values.var()
-    first = (
-        np.array(
-            [values.mean(axis=tuple(other for other in axes if other != one)).var() for one in axes]
-        )
-        / whole
-    )
-    total = np.array([values.var(axis=one).mean() for one in axes]) / whole
-    return first, total, total, total
+class _Indices(NamedTuple):
+    """First-order and total indices and the interval of the total, (keys,) each."""
+
+    first: np.ndarray
+    total: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def _grid_indices(values: np.ndarray) -> _Indices:
+    """Return the Sobol indices of values on a full grid."""
+    first = []
+    total = []
+    for axis in range(values.ndim):
+        others = tuple(other for other in range(values.ndim) if other != axis)
+        first.append(values.mean(axis=others).var())
+        total.append(values.var(axis=axis).mean())
+    total = np.array(total) / values.var()
+    return _Indices(np.array(first) / values.var(), total, total, total)
 
 
 def _random_indices(levels: np.ndarray, values: np.ndarray) -> list:
     """Return the Sobol indices of each column of values from random cases.
 
-    One entry per column: (first, total, low, high), (keys,) each; None if no surface explains it well enough.
+    One _Indices per column; None if no surface explains it well enough.
 
     Parameters
     ----------
@@ -144,76 +153,70 @@ def _random_indices(levels: np.ndarray, values: np.ndarray) -> list:
     """
     rng = np.random.default_rng(0)
     if len(levels) > MAX_SURFACE_CASES:
-        some = np.sort(rng.choice(len(levels), MAX_SURFACE_CASES, replace=False))
-        levels = levels[some]
-        values = values[some]
+        chosen = np.sort(rng.choice(len(levels), MAX_SURFACE_CASES, replace=False))
+        levels = levels[chosen]
+        values = values[chosen]
     scaled = (values - values.mean(axis=0)) / values.std(axis=0)
-    halves = [rng.permutation(len(levels)) for _ in range(N_HALF_SURFACES)]
+    orders = [rng.permutation(len(levels)) for _ in range(N_HALF_SURFACES)]
     half = len(levels) // 2
-    smooth = min(
-        SMOOTHINGS,
-        key=lambda one: np.median(_unexplained_variance(levels, scaled, halves[0], half, one)),
-    )
-    left = np.mean(
-        [_unexplained_variance(levels, scaled, order, half, smooth) for order in halves], axis=0
-    )
-    first, total = _surface_indices(levels, scaled, smooth)
-    others = np.stack(
-        [
-            total,
-            *(
-                _surface_indices(levels[order[:half]], scaled[order[:half]], smooth)[1]
-                for order in halves
-            ),
-        ]
-    )
-    low = others.min(axis=0) - left[:, None] - INDEX_ERROR
-    high = others.max(axis=0) + left[:, None] + INDEX_ERROR
-    parts = [np.clip(one, 0.0, 1.0) for one in (first, total, low, high)]
-    return [
-        tuple(part[k] for part in parts) if left[k] < 1 - MIN_EXPLAINED_FRACTION else None
-        for k in range(values.shape[1])
-    ]
+    medians = []
+    for smoothing in SMOOTHINGS:
+        medians.append(np.median(_unexplained_variance(levels, scaled, orders[0], half, smoothing)))
+    smoothing = SMOOTHINGS[int(np.argmin(medians))]
+    first, total = _surface_indices(levels, scaled, smoothing)
+    unexplained = []
+    totals = [total]
+    for order in orders:
+        unexplained.append(_unexplained_variance(levels, scaled, order, half, smoothing))
+        fitted = order[:half]
+        totals.append(_surface_indices(levels[fitted], scaled[fitted], smoothing)[1])
+    missing = np.mean(unexplained, axis=0)
+    low = np.min(totals, axis=0) - missing[:, None] - INDEX_ERROR
+    high = np.max(totals, axis=0) + missing[:, None] + INDEX_ERROR
+    indices = []
+    for k, parts in enumerate(zip(*np.clip([first, total, low, high], 0.0, 1.0))):
+        is_explained = missing[k] < 1 - MIN_EXPLAINED_FRACTION
+        indices.append(_Indices(*parts) if is_explained else None)
+    return indices
 
 
-def _fit_surface(levels: np.ndarray, values: np.ndarray, smooth: float):
+def _fit_surface(levels: np.ndarray, values: np.ndarray, smoothing: float):
     """Return a smooth surface through values (n, columns) at levels (n, keys)."""
     from scipy.interpolate import RBFInterpolator
 
-    return RBFInterpolator(levels, values, kernel="cubic", smoothing=smooth)
+    return RBFInterpolator(levels, values, kernel="cubic", smoothing=smoothing)
 
 
-def _unexplained_variance(levels, values, order, half: int, smooth: float) -> np.ndarray:
+def _unexplained_variance(levels, values, order, half: int, smoothing: float) -> np.ndarray:
     """Return the fraction of the variance (columns,) that a surface does not explain.
 
     The surface goes through the first half of the cases in an order (n,), and is compared with the
     others.
     """
-    seen = order[:half]
-    rest = order[half:]
-    off = _fit_surface(levels[seen], values[seen], smooth)(levels[rest]) - values[rest]
-    return np.mean(off**2, axis=0) / np.maximum(values[rest].var(axis=0), 1e-30)
+    fitted = order[:half]
+    others = order[half:]
+    surface = _fit_surface(levels[fitted], values[fitted], smoothing)
+    deviation = surface(levels[others]) - values[others]
+    return np.mean(deviation**2, axis=0) / np.maximum(values[others].var(axis=0), 1e-30)
 
 
-def _surface_indices(levels: np.ndarray, values: np.ndarray, smooth: float) -> tuple:
+def _surface_indices(levels: np.ndarray, values: np.ndarray, smoothing: float) -> tuple:
     """Return first-order and total Sobol indices, (columns, keys) each, of a surface through cases."""
     from scipy.stats import sobol_indices, uniform
 
-    surface = _fit_surface(levels, values, smooth)
+    surface = _fit_surface(levels, values, smoothing)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        found = sobol_indices(
+        indices = sobol_indices(
             func=lambda x: surface(x.T).T,
             n=N_SOBOL_POINTS,
             dists=[uniform()] * levels.shape[1],
             rng=np.random.default_rng(1),
         )
-    return tuple(np.atleast_2d(one) for one in (found.first_order, found.total_order))
+    return np.atleast_2d(indices.first_order), np.atleast_2d(indices.total_order)
 
 
-def _sort_shares(names: list, shares: Sequence) -> list:
+def _sort_by_total(names: list, indices: Sequence) -> list:
     """Return the SobolIndex of each key, the largest total first."""
-    return sorted(
-        (SobolIndex(name, *map(float, numbers)) for name, *numbers in zip(names, *shares)),
-        key=lambda one: -one.total,
-    )
+    by_key = [SobolIndex(name, *map(float, numbers)) for name, *numbers in zip(names, *indices)]
+    return sorted(by_key, key=lambda index: -index.total)

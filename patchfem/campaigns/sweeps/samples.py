@@ -11,7 +11,9 @@ from ...scene.axes import Axis, SampledRange
 from .cases import Cases
 
 
-def draw_cases(parts: Sequence[Axis | SampledRange], count: int, sobol: bool, seed: int) -> Cases:
+def draw_cases(
+    parts: Sequence[Axis | SampledRange], count: int, seed: int, *, sobol: bool = False
+) -> Cases:
     """Draw cases from ranges and lists of values; the same seed draws the same cases.
 
     A range is sampled uniformly between its ends, or uniformly in its logarithm; the values of a
@@ -22,25 +24,20 @@ def draw_cases(parts: Sequence[Axis | SampledRange], count: int, sobol: bool, se
     parts : sequence of Axis or SampledRange
     count : int
         Number of cases.
+    seed : int
     sobol : bool
         Whether to use the scrambled sequence of Sobol (Owen 1995), which covers the space best if
         `count` is a power of two, in place of independent samples.
-    seed : int
 
     Returns
     -------
     Cases
     """
-    shares = (
-        _sobol_points(len(parts), count, seed)
-        if sobol
-        else np.random.default_rng(seed).random((count, len(parts)))
-    )
-    return Cases(
-        tuple(map(_select_values, parts, shares.T)),
-        True,
-        True,
-    )
+    if sobol:
+        fractions = _sobol_points(len(parts), count, seed)
+    else:
+        fractions = np.random.default_rng(seed).random((count, len(parts)))
+    return Cases(tuple(map(_select_values, parts, fractions.T)), rows=True, drawn=True)
 
 
 def _sobol_points(width: int, count: int, seed: int) -> np.ndarray:
@@ -53,14 +50,12 @@ def _sobol_points(width: int, count: int, seed: int) -> np.ndarray:
         return qmc.Sobol(width, scramble=True, rng=np.random.default_rng(seed)).random(count)
 
 
-def _select_values(axis: Axis | SampledRange, shares: np.ndarray) -> Axis:
+def _select_values(axis: Axis | SampledRange, fractions: np.ndarray) -> Axis:
     """Return the values of a key that random numbers (n,) between 0 and 1 select."""
     if isinstance(axis, SampledRange):
-        return axis.make_axis(shares.tolist())
-    at = np.minimum((shares * len(axis.texts)).astype(int), len(axis.texts) - 1)
-    return Axis(
-        axis.key,
-        tuple(axis.texts[one] for one in at),
-        tuple(axis.values[one] for one in at),
-        axis.unit,
-    )
+        return axis.make_axis(fractions.tolist())
+    n_values = len(axis.texts)
+    places = np.minimum((fractions * n_values).astype(int), n_values - 1)
+    texts = tuple(axis.texts[place] for place in places)
+    values = tuple(axis.values[place] for place in places)
+    return Axis(axis.key, texts, values, axis.unit)

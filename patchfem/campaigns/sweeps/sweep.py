@@ -25,9 +25,8 @@ from ...runs.batch.meshes import Shared
 from .case_models import SweepScene
 from .cases import Cases
 
-MAX_DEATHS = (
-    3  # failures of a case, the last as the only case of a chunk, after which it is abandoned
-)
+# Failures of a case, the last as the only case of a chunk, after which it is abandoned.
+MAX_DEATHS = 3
 # Seconds that a chunk should take: long compared with its transfer to a worker, short compared with
 # a sweep.
 CHUNK_SECONDS = 1.0
@@ -81,9 +80,9 @@ def warm_up(work: Work) -> None:
     Errors are ignored, because the run of the case reports them.
     """
     try:
-        batches.choose_batch(
-            model := work.asked.model(work.cases.sets(0)), len(work.cases)
-        ) or plan.plan(model)
+        model = work.asked.model(work.cases.sets(0))
+        if batches.choose_batch(model, len(work.cases)) is None:
+            plan.plan(model)
     except Exception:
         return
 
@@ -107,40 +106,60 @@ def compute_chunk(
         CaseResults and a list of what `work.tell` returns for each case; None and [] if
         `work.write` has written them.
     """
-    models = _build_similar_models(work, numbers) or [
-        _build_case_model(work, number) for number in numbers
-    ]
+    models = _build_similar_models(work, numbers)
+    if models is None:
+        models = [_build_case_model(work, number) for number in numbers]
     keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
-    found = batches.solve_models(models, keep, say, work.estimate, len(work.cases))
-    told = (
-        []
-        if work.tell is None
-        else [
-            work.tell(number, model, found, case)
-            for case, (number, model) in enumerate(zip(numbers, models))
-        ]
-    )
-    return write_or_return(work, numbers, found, told)
+    results = batches.solve_models(models, keep, say, work.estimate, len(work.cases))
+    told = []
+    if work.tell is not None:
+        for case, (number, model) in enumerate(zip(numbers, models)):
+            told.append(work.tell(number, model, results, case))
+    return write_or_return(work, numbers, results, told)
 
 
 def compute_timed(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple:
-    """Compute a chunk with `compute_chunk`, and return its seconds and the result.
+    """Compute a chunk with `compute_chunk`, and measure the time.
 
-    The seconds do not include compilation, which no later case needs.
+    Parameters
+    ----------
+    work, numbers, say
+        As for `compute_chunk`.
+
+    Returns
+    -------
+    tuple
+        Seconds without compilation, which no later case needs, and the result of `compute_chunk`.
     """
     begin = perf_counter()
-    made = compiled.COMPILE_SECONDS[0]
-    found = compute_chunk(work, numbers, say)
-    return perf_counter() - begin - (compiled.COMPILE_SECONDS[0] - made), found
+    compile_seconds = compiled.COMPILE_SECONDS[0]
+    answer = compute_chunk(work, numbers, say)
+    compile_seconds = compiled.COMPILE_SECONDS[0] - compile_seconds
+    return perf_counter() - begin - compile_seconds, answer
 
 
 def write_or_return(
-    work: Work, numbers: Sequence[int], found: CaseResults, told: list
+    work: Work, numbers: Sequence[int], results: CaseResults, told: list
 ) -> tuple[CaseResults | None, list]:
-    """Return the results of a chunk, or (None, []) if `work.write` has written them."""
-    return (
-        (None, []) if work.write is not None and work.write(numbers, found, told) else (found, told)
-    )
+    """Write the results of a chunk to the folder of the sweep, or return them.
+
+    Parameters
+    ----------
+    work : Work
+    numbers : sequence of int
+        Numbers of the cases.
+    results : CaseResults
+    told : list
+        What `work.tell` returned for each case.
+
+    Returns
+    -------
+    tuple
+        The results and `told`, or (None, []) if `work.write` has written them.
+    """
+    if work.write is not None and work.write(numbers, results, told):
+        return None, []
+    return results, told
 
 
 def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels | None:
@@ -153,20 +172,17 @@ def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels |
     if work.keep is not None or values is None:
         return None
     try:
-        found = work.asked.similar_models(
-            [axis.key for axis in work.cases.axes], values, work.cases.sets, cases
-        )
+        keys = [axis.key for axis in work.cases.axes]
+        models = work.asked.similar_models(keys, values, work.cases.sets, cases)
     except PatchfemError:  # the first case has no model
         return None
-    if found is None or found.first.patch is None:
-        return found
-    if found.first.kind != "patch":
+    if models is None or models.first.patch is None:
+        return models
+    if models.first.kind != "patch":
         return None
-    return (
-        found
-        if work.meshes is None
-        else replace(found, first=work.meshes.with_shared_meshes(found.first))
-    )
+    if work.meshes is None:
+        return models
+    return replace(models, first=work.meshes.with_shared_meshes(models.first))
 
 
 def _build_case_model(work: Work, number: int):
@@ -212,44 +228,40 @@ class Chunks:
     numbers : sequence of int
         Numbers of the cases.
     workers : int
-    least : int
+    min_size : int
         Smallest number of cases of a chunk, if there is only one worker.
     """
 
-    def __init__(self, numbers: Sequence[int], workers: int, least: int = 1):
-        self.least = least
-        self.left = deque(numbers)
-        self.suspect = deque()
+    def __init__(self, numbers: Sequence[int], workers: int, min_size: int = 1):
+        self.min_size = min_size
+        self.remaining = deque(numbers)
+        self.suspects: deque = deque()
         self.workers = max(workers, 1)
         self.deaths: dict[int, int] = {}
-        self.each = CHUNK_SECONDS  # seconds per case, from the last chunk
+        self.seconds_per_case = CHUNK_SECONDS  # of the last chunk
 
-    def take(self, idle: bool = True) -> list | None:
+    def take(self, *, idle: bool = True) -> list | None:
         """Return the next chunk; None if there is none for now.
 
         idle: whether no chunk is being computed. Only then is a case handed out that was in a chunk
         that died, alone and after all others, because otherwise it would not be known which case
         killed a worker.
         """
-        if not self.left:
-            return self.suspect.popleft() if self.suspect and idle else None
-        # At most half of the remaining cases per worker, so that the last chunks end at the same
-        # time.
-        fair = -(-len(self.left) // (2 * self.workers))
-        fair = fair if self.workers > 1 else len(self.left)
-        count = max(
-            1,
-            min(
-                max(int(CHUNK_SECONDS / max(self.each, 1e-9)), self.least),
-                MAX_CASES_PER_CHUNK,
-                fair,
-            ),
-        )
-        return [self.left.popleft() for _ in range(min(count, len(self.left)))]
+        n_remaining = len(self.remaining)
+        if not n_remaining:
+            return self.suspects.popleft() if self.suspects and idle else None
+        max_size = n_remaining
+        if self.workers > 1:
+            # At most half of the remaining cases per worker, so that the last chunks end at the
+            # same time.
+            max_size = -(-n_remaining // (2 * self.workers))
+        size = max(int(CHUNK_SECONDS / max(self.seconds_per_case, 1e-9)), self.min_size)
+        size = max(1, min(size, MAX_CASES_PER_CHUNK, max_size))
+        return [self.remaining.popleft() for _ in range(size)]
 
     def record_time(self, numbers: Sequence[int], seconds: float) -> None:
         """Record how long a chunk took."""
-        self.each = seconds / len(numbers)
+        self.seconds_per_case = seconds / len(numbers)
 
     def record_death(self, numbers: Sequence[int]) -> list:
         """Return the cases to abandon; split the other cases of a failed chunk into halves.
@@ -261,7 +273,7 @@ class Chunks:
         if len(numbers) == 1 and self.deaths[numbers[0]] >= MAX_DEATHS:
             return list(numbers)
         half = (len(numbers) + 1) // 2
-        self.suspect += [part for part in (list(numbers[:half]), list(numbers[half:])) if part]
+        self.suspects += filter(None, (list(numbers[:half]), list(numbers[half:])))
         return []
 
 
@@ -296,11 +308,8 @@ def iterate_chunks(
             executor.begin(work, len(numbers), say)
         work = choose_meshes(work)
         # With several workers, only the workers import the code that `_min_chunk_size` needs to run a case.
-        chunks = Chunks(
-            work.cases.neighbours(numbers),
-            executor.workers,
-            _min_chunk_size(work) if executor.workers == 1 else 1,
-        )
+        min_size = _min_chunk_size(work) if executor.workers == 1 else 1
+        chunks = Chunks(work.cases.neighbours(numbers), executor.workers, min_size)
         yield from _iterate_executor_results(chunks, executor.run(work, chunks.take, say))
     finally:
         if hasattr(executor, "end"):
@@ -309,17 +318,17 @@ def iterate_chunks(
 
 def _iterate_executor_results(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
     """Yield what `iterate_chunks` yields, for the chunks that an executor has computed."""
-    for chunk, seconds, found in done:
-        if isinstance(found, Died):
-            lost = chunks.record_death(chunk)
-            if lost:
-                failed = CaseResults.blank(len(lost))
-                for case, number in enumerate(lost):
-                    failed.fail(case, f"{found.reason}, {chunks.deaths[number]} times")
-                yield lost, failed, None, seconds
+    for chunk, seconds, answer in done:
+        if not isinstance(answer, Died):
+            chunks.record_time(chunk, seconds)
+            yield chunk, *answer, seconds
             continue
-        chunks.record_time(chunk, seconds)
-        yield chunk, *found, seconds
+        abandoned = chunks.record_death(chunk)
+        if abandoned:
+            failed = CaseResults.blank(len(abandoned))
+            for case, number in enumerate(abandoned):
+                failed.fail(case, f"{answer.reason}, {chunks.deaths[number]} times")
+            yield abandoned, failed, None, seconds
 
 
 class RemainingTime:
@@ -340,10 +349,12 @@ class RemainingTime:
 
         count: cases of the chunk; seconds: time that it took.
         """
-        self.left, self.chunks = self.left - count, self.chunks + 1
+        self.left -= count
+        self.chunks += 1
         # The first chunk of each worker includes imports and compilation.
         if self.chunks > self.workers:
-            self.work, self.cases = self.work / 2 + seconds, self.cases / 2 + count
+            self.work = self.work / 2 + seconds
+            self.cases = self.cases / 2 + count
         return self.left * self.work / self.cases / self.workers if self.cases else None
 
 

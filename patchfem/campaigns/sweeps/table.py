@@ -10,6 +10,7 @@ import csv
 import io
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 from ...disk.open_with_timeout import open_for_reading
 from ...inputs.cells import NUMBER_PATTERN
@@ -34,11 +35,7 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
             open_for_reading(path) as raw,
             io.TextIOWrapper(raw, encoding="utf-8-sig", newline="") as file,
         ):
-            lines = [
-                (number, [cell.strip() for cell in row])
-                for number, row in enumerate(csv.reader(file), 1)
-                if any(cell.strip() for cell in row)
-            ]
+            lines = _read_lines(file)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         return None, [f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}"]
     if len(lines) < 2:
@@ -46,48 +43,69 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
             f"{path}: the first line must be a header such as `{HEADER}`, and each line after it must give "
             "one case"
         ]
-    first = lines[0][1]
-    heads = [
-        _HEAD.fullmatch(cell)
-        for cell in first[: first.index(OUTCOME_COLUMN) if OUTCOME_COLUMN in first else None]
-    ]
+    header = lines.pop(0)
+    key_cells = header.cells
+    if OUTCOME_COLUMN in key_cells:
+        key_cells = key_cells[: key_cells.index(OUTCOME_COLUMN)]
+    heads = list(map(_HEAD.fullmatch, key_cells))
     if not heads or not all(heads):
         return None, [
-            f"{path}:{lines[0][0]}: the first line must be a header such as `{HEADER}`, not "
-            f"'{','.join(first)[:80]}'"
+            f"{path}:{header.number}: the first line must be a header such as `{HEADER}`, not "
+            f"'{','.join(header.cells)[:80]}'"
         ]
-    wrong = [
-        f"{path}:{number}: the line must have {len(first)} cells, as the header has, not {len(row)}"
-        for number, row in lines[1:]
-        if len(row) != len(first)
-    ]
+    mistakes = []
+    n_columns = len(header.cells)
+    for line in lines:
+        if len(line.cells) != n_columns:
+            mistakes.append(
+                f"{path}:{line.number}: the line must have {n_columns} cells, as the header has, not "
+                f"{len(line.cells)}"
+            )
     keys = [head[1] for head in heads]
-    wrong += [
-        f"{path}:{lines[0][0]}: {key}: two columns have this key; remove one of them"
-        for key in dict.fromkeys(keys)
-        if keys.count(key) > 1
-    ]
-    if wrong:
-        return None, wrong
+    for key in dict.fromkeys(keys):
+        if keys.count(key) > 1:
+            mistakes.append(
+                f"{path}:{header.number}: {key}: two columns have this key; remove one of them"
+            )
+    if mistakes:
+        return None, mistakes
     axes = []
-    for place, (key, unit) in enumerate(head.groups() for head in heads):
-        axis, mistakes = _parse_column(
-            key, unit, [(number, row[place]) for number, row in lines[1:]]
-        )
+    for column, head in enumerate(heads):
+        key, unit = head.groups()
+        cells = [(line.number, line.cells[column]) for line in lines]
+        axis, wrong_cells = _parse_column(key, unit, cells)
         axes.append(axis)
-        wrong += [f"{path}:{number or lines[0][0]}: {key}: {text}" for number, text in mistakes]
-    return (None, wrong) if wrong else (Cases(tuple(axes), True), [])
+        for number, text in wrong_cells:
+            mistakes.append(f"{path}:{number or header.number}: {key}: {text}")
+    return (None, mistakes) if mistakes else (Cases(tuple(axes), True), [])
+
+
+class _Line(NamedTuple):
+    """Number of a line of a file, from 1, and its cells."""
+
+    number: int
+    cells: list
+
+
+def _read_lines(file) -> list:
+    """Return the lines that are not empty."""
+    lines = []
+    for number, row in enumerate(csv.reader(file), 1):
+        cells = [cell.strip() for cell in row]
+        if any(cells):
+            lines.append(_Line(number, cells))
+    return lines
 
 
 def _parse_column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[tuple]]:
     """Return the axis of a column of (line, cell), and its mistakes as (line or 0, message)."""
-    known = {}
-    wrong = []
+    axes = {}
+    mistakes = []
     for number, cell in cells:
-        if cell in known:
+        if cell in axes:
             continue
         if unit is not None and not NUMBER_PATTERN.fullmatch(cell):
-            wrong.append(
+            mistakes.append(
                 (
                     number,
                     f"'{cell[:60]}' must be a number without a unit; write the unit in the header",
@@ -95,19 +113,15 @@ def _parse_column(key: str, unit: str | None, cells: list) -> tuple[Axis | None,
             )
             continue
         try:
-            known[cell] = make_axis(key, [f"{cell} {unit}" if unit else cell])
+            axes[cell] = make_axis(key, [f"{cell} {unit}" if unit else cell])
         except ValueError as error:
-            wrong.append((number, str(error)))
+            mistakes.append((number, str(error)))
             if str(error).startswith("not a key"):
                 return None, [(0, str(error))]
-    if wrong:
-        return None, wrong
-    parts = [known[cell] for _, cell in cells]
-    numbers = all(part.unit for part in parts)
-    texts = tuple(part.texts[0] for part in parts)
-    return Axis(
-        key,
-        texts,
-        tuple(part.values[0] for part in parts) if numbers else texts,
-        parts[0].unit if numbers else "",
-    ), []
+    if mistakes:
+        return None, mistakes
+    values = [axes[cell] for _, cell in cells]
+    texts = tuple(value.texts[0] for value in values)
+    if not all(value.unit for value in values):
+        return Axis(key, texts, texts, ""), []
+    return Axis(key, texts, tuple(value.values[0] for value in values), values[0].unit), []

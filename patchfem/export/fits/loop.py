@@ -65,7 +65,7 @@ def _fit_json(fitted: FittedLoop) -> dict:
     bounds = [*keys.ranges, *(offset.range for offset in fitted.offsets)]
     held = None
     if fitted.held_rms is not None:
-        held = {"rows": int(fitted.held.sum()), "rms": fitted.held_rms}
+        held = {"rows": int(fitted.held_out.sum()), "rms": fitted.held_rms}
     measured = loop.path.name
     return describe_measurement(keys.scene.title, measured, loop.quantity, keys.outcome) | {
         "values": describe_values(keys),
@@ -73,7 +73,7 @@ def _fit_json(fitted: FittedLoop) -> dict:
         "unknown": describe_unknown(bounds, found),
         "correlation": describe_correlation(found),
         "unit": LABELS[loop.quantity][1],
-        "rows": int((~fitted.held).sum()),
+        "rows": int((~fitted.held_out).sum()),
         "effective_rows": None if np.isnan(found.intervals.rows) else found.intervals.rows,
         "rms": fitted.rms,
         "held": held,
@@ -98,7 +98,7 @@ def _csv_rows(fitted: FittedLoop) -> list:
         head.insert(0, "time [s]")
         columns.insert(0, loop.time)
     rows = zip(*(column.tolist() for column in columns))
-    held = fitted.held.tolist()
+    held = fitted.held_out.tolist()
     return [head, *([*map(repr, row), int(out)] for row, out in zip(rows, held))]
 
 
@@ -114,7 +114,10 @@ def _draw_charts(fitted: FittedLoop) -> list:
     residual = (fitted.model - loop.reading) * scale
     over_slide = []
     over_rows = [charts.make_line(number[[0, -1]], [0.0, 0.0], "soft", width=0.8)]
-    groups = ((~fitted.held, "soft", "measured"), (fitted.held, "warm", "measured, held out"))
+    groups = (
+        (~fitted.held_out, "soft", "measured"),
+        (fitted.held_out, "warm", "measured, held out"),
+    )
     for rows, colour, text in groups:
         if rows.any():
             over_slide.append(

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...campaigns.fits.patch import FITTED_LAWS, FittedLaw, FittedPatch
+from ...campaigns.fits.patch import FittedPatch
+from ...campaigns.fits.patch_laws import FITTED_LAWS, FittedLaw
 from ...formatting import (
     SENTENCE_UNITS,
     choose_axis_unit,

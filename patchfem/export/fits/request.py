@@ -1,7 +1,7 @@
 """Request for a fit from the command line or Python: options, kind of fit, results folder."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 from ...campaigns.fits.curve import DEFAULT_STARTS, fit_curve, is_curve
@@ -10,7 +10,7 @@ from ...campaigns.fits.loop_path import LoopOptions
 from ...campaigns.fits.patch import fit_patch, read_slides
 from ...campaigns.fits.problem import parse_ranges
 from ...campaigns.fits.wear import fit_wear
-from ...campaigns.rows.asked import FitRequest
+from ...campaigns.rows.condition_models import FitRequest
 from ...campaigns.rows.fit import RowsOptions, fit_rows
 from ...campaigns.rows.search import UNSTABLE, SearchSettings
 from ...core import PatchfemError
@@ -21,6 +21,7 @@ from ..results import STARTS, Folder
 from .curve import describe_curve_fit
 from .files import FitFiles, write_fit
 from .loop import describe_loop_fit
+from .options import FitOptions
 from .patch import describe_patch_fit
 from .rows import Starts, describe_rows_fit
 from .wear import describe_wear_fit
@@ -54,27 +55,6 @@ FITS_BY_OPTION = {
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
-    """Options of a fit besides the free keys; OPTIONS_BY_KIND lists those of each kind of fit."""
-
-    hold: tuple = ()
-    offset: tuple = ()
-    warm_up: bool = False
-    leave_out: str = ""
-    starts: int | None = None
-    seed: int = 0
-    unstable: str = UNSTABLE[0]
-    placebo: tuple = ()
-    resume: bool = False
-    from_patch: bool = False
-    amplitudes: str = ""
-
-    def names_given(self) -> list:
-        """Return the names of the options that differ from their default."""
-        return [field.name for field in fields(self) if getattr(self, field.name) != field.default]
-
-
-@dataclass(frozen=True, slots=True)
 class Listener:
     """Callbacks of a fit.
 
@@ -91,7 +71,7 @@ def fit_into(
     scene: Scene,
     to: str,
     free: Sequence[str],
-    options: Options,
+    options: FitOptions,
     target: Path,
     listener: Listener = Listener(),
 ) -> FitFiles:
@@ -104,7 +84,7 @@ def fit_into(
         File of the measurement, or a measured depth; "" with `options.from_patch`.
     free : sequence of str
         Free keys with their ranges, "table.key=low..high".
-    options : Options
+    options : FitOptions
     target : Path
         Results folder, which is claimed before the work.
     listener : Listener
@@ -162,7 +142,7 @@ def choose_kind(scene: Scene, to: str) -> str:
     return "curve" if is_curve(to) else "rows"
 
 
-def _check_options(kind: str, options: Options, format_option: Callable) -> None:
+def _check_options(kind: str, options: FitOptions, format_option: Callable) -> None:
     """Raise PatchfemError for an option that this kind of fit does not have, or a wrong value."""
     others = [name for name in options.names_given() if name not in OPTIONS_BY_KIND[kind]]
     if others:
@@ -187,12 +167,12 @@ def _fit_rows(
     scene: Scene,
     path: Path,
     free: Sequence[str],
-    options: Options,
+    options: FitOptions,
     folder: Folder,
     listener: Listener,
 ) -> FitFiles:
     """Fit a rig to rows; searches that are done are stored in the folder."""
-    wanted = parse_ranges(free)
+    ranges = parse_ranges(free)
     question = (
         scene.resolved(),
         free,
@@ -203,9 +183,9 @@ def _fit_rows(
         options.unstable,
         path.read_bytes() if path.is_file() else "",
     )
-    kept = Starts(folder.path / STARTS, question, options.resume)
+    stored_starts = Starts(folder.path / STARTS, question, options.resume)
     starts = options.starts or DEFAULT_ROW_STARTS
-    how = SearchSettings(starts, options.seed, options.unstable, kept)
-    asked = RowsOptions(options.hold, options.leave_out, options.placebo, how)
-    fitted = fit_rows(FitRequest(scene, wanted, path), asked, listener.say, listener.progress)
+    search = SearchSettings(starts, options.seed, options.unstable, stored_starts)
+    row_options = RowsOptions(options.hold, options.leave_out, options.placebo, search)
+    fitted = fit_rows(FitRequest(scene, ranges, path), row_options, listener.say, listener.progress)
     return describe_rows_fit(fitted, folder.target)

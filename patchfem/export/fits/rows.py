@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ... import __version__
-from ...campaigns.rows.asked import READINGS
 from ...campaigns.rows.cells import scores
+from ...campaigns.rows.condition_models import GAIN_KEYS
 from ...campaigns.rows.fit import SAME_SCORE, FittedRows
 from ...campaigns.rows.null_models import NULL_MODELS
 from ...core import G_N
@@ -95,29 +95,29 @@ def describe_answer(fitted: FittedRows) -> dict:
     nulls_stable = {}
     for name in NULL_MODELS:
         null = fitted.nulls[name]
-        nulls[name] = fitted.score(null.logs, null.left) | {"numbers": null.numbers}
-        nulls_stable[name] = fitted.score(null.logs, null.left, stable=True)
+        nulls[name] = fitted.score(null.logs, null.left_out_logs) | {"numbers": null.numbers}
+        nulls_stable[name] = fitted.score(null.logs, null.left_out_logs, stable=True)
     return describe_measurement(keys.scene.title, cells.path.name, "rows", keys.outcome) | {
         "values": describe_values(keys),
-        "scores": fitted.score(fitted.logs, fitted.left),
-        "scores_stable": fitted.score(fitted.logs, fitted.left, stable=True),
+        "scores": fitted.score(fitted.logs, fitted.left_out_logs),
+        "scores_stable": fitted.score(fitted.logs, fitted.left_out_logs, stable=True),
         "nulls": nulls,
         "nulls_stable": nulls_stable,
-        "unstable": fitted.how.unstable,
+        "unstable": fitted.settings.unstable,
         "reading": _instrument_settings(fitted),
         "unknown": describe_unknown(keys.ranges, found),
         "correlation": describe_correlation(found),
-        "readings": int((~fitted.held).sum()),
-        "held": int(fitted.held.sum()),
+        "readings": int((~fitted.held_out).sum()),
+        "held": int(fitted.held_out.sum()),
         "rms": found.rms,
-        "seed": fitted.how.seed,
+        "seed": fitted.settings.seed,
         "starts": _search_starts(fitted),
         "folds": _fold_scores(fitted),
         "placebos": _placebo_scores(fitted),
         "rows": _row_entries(fitted),
         "evaluations": found.counts.evaluations,
         "failures": found.counts.failures,
-        "motions": fitted.runs,
+        "motions": fitted.n_motions,
         "warnings": keys.warnings,
         "seconds": round(keys.seconds, 6),
     }
@@ -125,14 +125,14 @@ def describe_answer(fitted: FittedRows) -> dict:
 
 def _instrument_settings(fitted: FittedRows) -> dict:
     """Return the settings of the instruments, with fitted or given gains."""
-    read = fitted.asked.read
+    read = fitted.models.read
     out = {
         "reading": "peak" if read is None else read.reading,
         "reading_cutoff": None if read is None else read.reading_cutoff,
     }
     keys = fitted.keys
     values = {bound.key: float(value) for bound, value in zip(keys.ranges, keys.fit.values)}
-    for key in READINGS:
+    for key in GAIN_KEYS:
         name = key.partition(".")[2]
         out[name] = values.get(key, 1.0 if read is None else getattr(read, name))
     return out
@@ -141,7 +141,7 @@ def _instrument_settings(fitted: FittedRows) -> dict:
 def _search_starts(fitted: FittedRows) -> list:
     """Return where each search began and ended, with its training score."""
     names = [bound.key for bound in fitted.keys.ranges]
-    found = fitted.found
+    found = fitted.search
     out = []
     for begin, end, rms in zip(found.starts.tolist(), found.ends.tolist(), found.rms.tolist()):
         settled = math.isfinite(rms)
@@ -161,10 +161,10 @@ def _fold_scores(fitted: FittedRows) -> list:
     return [
         {
             "left_out": fold.name,
-            "training": fold.found.fit.rms,
-            "scores": scores(fitted.cells, fitted.left, fold.readings),
-            "values": dict(zip(names, fold.found.fit.values.tolist())),
-            "starts": [rms if math.isfinite(rms) else None for rms in fold.found.rms.tolist()],
+            "training": fold.search.fit.rms,
+            "scores": scores(fitted.cells, fitted.left_out_logs, fold.readings),
+            "values": dict(zip(names, fold.search.fit.values.tolist())),
+            "starts": [rms if math.isfinite(rms) else None for rms in fold.search.rms.tolist()],
         }
         for fold in fitted.folds
     ]
@@ -199,7 +199,7 @@ def _row_entries(fitted: FittedRows) -> list:
             entry[name] = {
                 "measured": getattr(row, name),
                 "computed": value if value is None or math.isfinite(value) else None,
-                "held": None if n is None else bool(fitted.held[n]),
+                "held": None if n is None else bool(fitted.held_out[n]),
             }
         out.append(entry)
     return out

@@ -9,9 +9,9 @@ from command_line import cli
 
 import patchfem as pf
 from patchfem import SceneError, build, run
-from patchfem.campaigns.rows.asked import ConditionModels, FitRequest
 from patchfem.campaigns.rows.cells import read_readings
 from patchfem.campaigns.rows.computed import ModelReadings
+from patchfem.campaigns.rows.condition_models import ConditionModels, FitRequest
 from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N, PatchfemError
@@ -99,7 +99,7 @@ def fitted(scene, path, wanted, **beside):
     how = SearchSettings(
         beside.pop("starts", 2), beside.pop("seed", 0), beside.pop("unstable", "bound")
     )
-    return fit_rows(FitRequest(scene, wanted, path), RowsOptions(how=how, **beside))
+    return fit_rows(FitRequest(scene, wanted, path), RowsOptions(search=how, **beside))
 
 
 LINEAR_FREE = (
@@ -133,7 +133,7 @@ def test_exact_a_linear_rig_is_recovered_from_closed_forms(tmp_path):
         "acceleration_gain": found.keys.fit.values[2],
         "displacement_gain": found.keys.fit.values[3],
     }
-    assert found.score(found.logs, found.left)["fitted"]["all"] < 1e-6
+    assert found.score(found.logs, found.left_out_logs)["fitted"]["all"] < 1e-6
 
 
 def test_intervals_of_a_linear_rig_hold_the_truth(tmp_path):
@@ -199,8 +199,8 @@ def test_always_rows_held_out_or_left_out_do_not_change_the_fit(tmp_path, rubbed
         for each in (rows, other)
     )
     assert np.array_equal(first.keys.fit.values, second.keys.fit.values)
-    assert np.array_equal(first.found.ends, second.found.ends) and np.array_equal(
-        first.found.rms, second.found.rms
+    assert np.array_equal(first.search.ends, second.search.ends) and np.array_equal(
+        first.search.rms, second.search.rms
     )
     assert not np.array_equal(first.logs, second.logs)
     one, two = (
@@ -208,12 +208,12 @@ def test_always_rows_held_out_or_left_out_do_not_change_the_fit(tmp_path, rubbed
         for each in (rows, other)
     )
     assert [fold.name for fold in one.folds] == ["135 Hz", "143 Hz", "150 Hz"]
-    assert np.array_equal(one.folds[2].found.fit.values, two.folds[2].found.fit.values)
-    assert not np.array_equal(one.folds[0].found.fit.values, two.folds[0].found.fit.values)
+    assert np.array_equal(one.folds[2].search.fit.values, two.folds[2].search.fit.values)
+    assert not np.array_equal(one.folds[0].search.fit.values, two.folds[0].search.fit.values)
     assert (
-        one.score(one.logs, one.left)["left_out"]["all"]
+        one.score(one.logs, one.left_out_logs)["left_out"]["all"]
         < 1e-3
-        < two.score(two.logs, two.left)["left_out"]["all"]
+        < two.score(two.logs, two.left_out_logs)["left_out"]["all"]
     )
 
 
@@ -262,7 +262,8 @@ def test_rows_flagged_u_are_lower_bounds(tmp_path):
         assert np.array_equal(found["bound"], np.where(cells.unstable, np.minimum(logs, 0), logs))
     stable = fitted(scene, path, free(*LINEAR_FREE), starts=1)
     whole, without = (
-        stable.score(stable.logs, stable.left, stable=part)["fitted"] for part in (False, True)
+        stable.score(stable.logs, stable.left_out_logs, stable=part)["fitted"]
+        for part in (False, True)
     )
     assert (
         without["all"] == pytest.approx(np.sqrt(np.mean(stable.logs[~cells.unstable] ** 2)))
@@ -372,7 +373,7 @@ def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
 
     def go(question, resume):
         how = SearchSettings(2, 0, "bound", Starts(file, question, resume))
-        return fit_rows(FitRequest(scene, wanted, path), RowsOptions(how=how))
+        return fit_rows(FitRequest(scene, wanted, path), RowsOptions(search=how))
 
     first = go("one", False)
     again = go("one", True)
@@ -381,10 +382,10 @@ def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
     file.write_text(json.dumps(kept))
     half = go("one", True)
     other = go("other", True)
-    assert again.runs < half.runs < first.runs == other.runs
+    assert again.n_motions < half.n_motions < first.n_motions == other.n_motions
     for one in (again, half, other):
         assert np.array_equal(one.keys.fit.values, first.keys.fit.values)
-        assert np.array_equal(one.found.rms, first.found.rms)
+        assert np.array_equal(one.search.rms, first.search.rms)
 
 
 @pytest.mark.parametrize("text", ["[]", "3", "{", "[" * 100_000, '{"ends": {"all/0": [[1], 2]}}'])
@@ -409,7 +410,7 @@ def test_placebos_are_complete_fits(tmp_path):
         own.text == "structure.mode.axial.damping=0.03"
         and other.text == "structure.mode.axial.damping=0.1"
     )
-    assert own.found.fit.values == pytest.approx(found.keys.fit.values, rel=1e-12)
+    assert own.search.fit.values == pytest.approx(found.keys.fit.values, rel=1e-12)
     rms = [float(np.sqrt(np.mean(one.logs**2))) for one in (own, other)]
     assert rms[0] < 1e-6 and rms[1] > 0.1
 
@@ -458,4 +459,4 @@ def test_exact_the_reading_and_the_gain_of_the_scene_are_those_of_the_instrument
     )
     one, two = (fitted(scene, path, free(*LINEAR_FREE), starts=1, seed=seed) for seed in (0, 1))
     assert one.keys.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)
-    assert not np.array_equal(one.found.starts, two.found.starts)
+    assert not np.array_equal(one.search.starts, two.search.starts)

@@ -61,12 +61,12 @@ def test_held_rows_are_named_by_frequency_input_flag_or_run(tmp_path):
     assert cells.select("input=4 g").all()
     assert cells.select("flag=R").tolist() == [False, False, True, False]
     assert cells.select("run=143 Hz repeat").tolist() == [False, False, True, False]
-    parts = cells.parts("run", np.ones(4, bool))
-    assert [(name, int(part.sum())) for name, part in parts] == [
-        ("143 Hz", 2),
-        ("143 Hz repeat", 1),
-        ("150 Hz", 1),
-    ]
+    groups = cells.group_readings("run", np.ones(4, bool))
+    assert {name: int(group.sum()) for name, group in groups.items()} == {
+        "143 Hz": 2,
+        "143 Hz repeat": 1,
+        "150 Hz": 1,
+    }
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,7 @@ def test_table_1_null_scores_leave_one_frequency_out():
     found = {}
     for name in NULL_MODELS:
         left = np.full(cells.row.size, np.nan)
-        for _, part in cells.parts("frequency", every):
+        for part in cells.group_readings("frequency", every).values():
             left[part] = fit_null_model(cells, name, ~part)[0][part]
         found[name] = scores(cells, left, every)
     assert found["constant"] == pytest.approx(

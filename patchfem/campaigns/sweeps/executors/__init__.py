@@ -1,7 +1,8 @@
 """Executors, which compute the chunks of a sweep: in this process, in several, or with Dask.
 
 Each has `workers` and `run(work, take, say)`, which yields (chunk, seconds, answer or Died) of
-every chunk that `take` returns. `make_executor` returns an executor by its name.
+every chunk that `take` returns; the answer is the result of `sweep.compute_chunk`. `make_executor`
+returns an executor by its name.
 
 Read `LocalExecutor` first.
 """
@@ -19,7 +20,21 @@ class LocalExecutor:
     workers = 1
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
-        """Yield (chunk, seconds, result of `answer`) of each chunk that `take` returns."""
+        """Compute the chunks that `take` returns.
+
+        Parameters
+        ----------
+        work : Work
+        take : callable
+            Returns the next chunk, or None.
+        say : callable, optional
+            Takes a line of text.
+
+        Yields
+        ------
+        tuple
+            Chunk, seconds, and the result of `compute_chunk`.
+        """
         while (chunk := take()) is not None:
             yield chunk, *compute_timed(work, chunk, say)
 

@@ -70,20 +70,19 @@ class Cluster:
                 }
             )
             # no dashboard, on a port of this machine
-            quiet = {
-                "dashboard": False,
-                "dashboard_address": "127.0.0.1:0",
-            }
+            scheduler_options = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
             self.own = distributed.LocalCluster(
                 workers or os.cpu_count() or 1,
                 threads_per_worker=1,
                 processes=True,
-                scheduler_kwargs=quiet,
+                scheduler_kwargs=scheduler_options,
                 silence_logs="CRITICAL",
             )
         self.name = f"--executor dask{':' * bool(address)}{address}"
-        for one in (*getLogger("distributed").handlers, getLogger("tornado"), getLogger("asyncio")):
-            one.setLevel(CRITICAL)  # their messages are reported by this class
+        # Their messages are reported by this class.
+        loggers = (getLogger("tornado"), getLogger("asyncio"))
+        for logger in (*getLogger("distributed").handlers, *loggers):
+            logger.setLevel(CRITICAL)
         tls = distributed.Security().get_connection_args("client")["ssl_context"] is not None
         if address.startswith("tls:") and not tls:
             raise PatchfemError(
@@ -96,41 +95,59 @@ class Cluster:
             )
         except (OSError, TimeoutError, ValueError) as error:
             raise Missing(f"{self.name}: no scheduler answers at this address ({error})") from None
-        found = self.client.run(environment_versions, on_error="return")
-        self.workers = max(len(found), 1)
-        for own in found.values():
-            if own != environment_versions():
+        versions = self.client.run(environment_versions, on_error="return")
+        self.workers = max(len(versions), 1)
+        for worker_versions in versions.values():
+            if worker_versions != environment_versions():
                 self.client.close()
-                raise self._worker_error(own, environment_versions())
+                raise self._worker_error(worker_versions, environment_versions())
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
-        """Yield (chunk, seconds, answer or Died) of each chunk that `take` returns, as they come in."""
+        """Compute the chunks that `take` returns.
+
+        Parameters
+        ----------
+        work : Work
+        take : callable
+            Returns the next chunk, or None.
+        say : callable, optional
+            Takes a line of text.
+
+        Yields
+        ------
+        tuple
+            (chunk, seconds, answer or Died), as they come in.
+        """
         from distributed import as_completed
         from distributed.client import ClosedClientError
 
         path = work.asked.path
-        want = environment_versions(work)
-        there = replace(work, asked=replace(work.asked, path=Path(os.path.abspath(path))))
+        versions = environment_versions(work)
+        shared_work = replace(work, asked=replace(work.asked, path=Path(os.path.abspath(path))))
         try:
             # Dask repeats this task if all workers that store its result have died.
-            shared = self.client.submit(_identity, there, pure=False)
+            shared = self.client.submit(_identity, shared_work, pure=False)
             ready = as_completed(loop=self.client.loop, with_results=True, raise_errors=False)
-            on_the_way = {}
+            pending = {}
             while True:
-                while (
-                    len(on_the_way) < CHUNKS_PER_WORKER * self.workers
-                    and (chunk := take(not on_the_way)) is not None
-                ):
-                    future = self.client.submit(_answer, shared, chunk, (want, path), pure=False)
-                    on_the_way[future] = chunk
+                while len(pending) < CHUNKS_PER_WORKER * self.workers:
+                    chunk = take(idle=not pending)
+                    if chunk is None:
+                        break
+                    future = self.client.submit(
+                        _answer, shared, chunk, (versions, path), pure=False
+                    )
+                    pending[future] = chunk
                     ready.add(future)
-                if not on_the_way:
+                if not pending:
                     return
-                future, found = next(ready)
-                chunk = on_the_way.pop(future)
-                if isinstance(found, dict):
-                    raise self._worker_error(found, want)
-                yield chunk, *(found if future.status == "finished" else self._report_death(future))
+                future, answer = next(ready)
+                chunk = pending.pop(future)
+                if isinstance(answer, dict):
+                    raise self._worker_error(answer, versions)
+                if future.status != "finished":
+                    answer = self._report_death(future)
+                yield chunk, *answer
         except ClosedClientError:
             raise self._connection_error() from None
         finally:
@@ -142,23 +159,24 @@ class Cluster:
         """Return the error of a lost connection."""
         return Missing(f"{self.name}: the connection to the scheduler is lost")
 
-    def _worker_error(self, found: dict | Exception, want: dict) -> Missing:
+    def _worker_error(self, on_worker: dict | Exception, here: dict) -> Missing:
         """Return the error of a worker that cannot compute the work.
 
-        found: versions of the worker, or the exception in place of them; want: those of this
+        on_worker: versions of the worker, or the exception in place of them; here: those of this
         machine.
         """
-        if isinstance(found, Exception):
-            said = f"{type(found).__name__}: {found}"
+        if isinstance(on_worker, Exception):
+            reason = f"{type(on_worker).__name__}: {on_worker}"
             return Missing(
-                f"{self.name}: patchfem {want['patchfem']} is not installed on a worker ({said})"
+                f"{self.name}: patchfem {here['patchfem']} is not installed on a worker ({reason})"
             )
-        names = [name for name in want if found[name] != want[name] and name != "files"]
-        there, here = (", ".join(f"{name} {one[name]}" for name in names) for one in (found, want))
+        names = [name for name in here if on_worker[name] != here[name] and name != "files"]
         if names:
+            other_versions = ", ".join(f"{name} {on_worker[name]}" for name in names)
+            own_versions = ", ".join(f"{name} {here[name]}" for name in names)
             return Missing(
-                f"{self.name}: a worker has {there}, but this machine has {here}; install the same version "
-                "on all machines"
+                f"{self.name}: a worker has {other_versions}, but this machine has {own_versions}; install "
+                "the same version on all machines"
             )
         return Missing(
             f"{self.name}: the files named in the scene differ between a worker and this machine; put the "
@@ -173,22 +191,18 @@ class Cluster:
         if future.status == "cancelled":  # nothing in this process cancels a chunk
             raise self._connection_error()
         error = future.exception()
-        killed = type(error).__name__ == "KilledWorker"
-        return 0.0, Died(
-            "its worker died"
-            if killed
-            else f"the worker of this case failed ({type(error).__name__}: {error})"
-        )
+        kind = type(error).__name__
+        reason = f"the worker of this case failed ({kind}: {error})"
+        return 0.0, Died("its worker died" if kind == "KilledWorker" else reason)
 
 
 @cache
 def _source() -> str:
     """Return a hash of the sources of this package."""
     root = Path(__file__).parents[3]
-    texts = sorted(
-        (path.relative_to(root).as_posix(), path.read_bytes()) for path in root.rglob("*.py")
-    )
-    return sha256(repr(texts).encode()).hexdigest()[:8]
+    paths = root.rglob("*.py")
+    texts = [(path.relative_to(root).as_posix(), path.read_bytes()) for path in paths]
+    return sha256(repr(sorted(texts)).encode()).hexdigest()[:8]
 
 
 def environment_versions(work: Work | None = None) -> dict:
@@ -196,12 +210,14 @@ def environment_versions(work: Work | None = None) -> dict:
 
     These are versions by name and, as `files`, the hash of the scene with the files that it names.
     """
-    own = {
+    versions = {
         "patchfem": f"{__version__} (sources {_source()})",
         "numpy": np.__version__,
         "python": "{}.{}".format(*sys.version_info),
     }
-    return own if work is None else own | {"files": work.asked.digest()}
+    if work is not None:
+        versions["files"] = work.asked.digest()
+    return versions
 
 
 def _identity(work: Work) -> Work:
@@ -209,7 +225,7 @@ def _identity(work: Work) -> Work:
     return work
 
 
-def _answer(work: Work, chunk: list, asked: tuple) -> tuple | dict:
+def _answer(work: Work, chunk: list, origin: tuple) -> tuple | dict:
     """Compute a chunk in a worker; return (seconds, answer).
 
     If the worker has another version or other files, return what it has (`environment_versions`) instead.
@@ -219,17 +235,17 @@ def _answer(work: Work, chunk: list, asked: tuple) -> tuple | dict:
     work : Work
     chunk : list
         Numbers of cases.
-    asked : tuple
+    origin : tuple
         `environment_versions` of the process that runs the sweep, and the path of the scene there, which messages
         must name.
     """
-    want, path = asked
-    if (own := environment_versions(work)) != want:
-        return own
-    seconds, (found, told) = compute_timed(replace(work, write=None), chunk)
+    versions, path = origin
+    worker_versions = environment_versions(work)
+    if worker_versions != versions:
+        return worker_versions
+    seconds, (results, told) = compute_timed(replace(work, write=None), chunk)
     folder = f"{work.asked.path.parent}{os.sep}"
-    named = str(path.parent / "_")[:-1]
-    found.messages.update(
-        {case: text.replace(folder, named) for case, text in found.messages.items()}
-    )
-    return seconds, write_or_return(work, chunk, found, told)
+    origin_folder = str(path.parent / "_")[:-1]
+    for case, text in results.messages.items():
+        results.messages[case] = text.replace(folder, origin_folder)
+    return seconds, write_or_return(work, chunk, results, told)

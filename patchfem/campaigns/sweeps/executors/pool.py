@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
+from typing import NamedTuple
 
 from ....core import Missing
 from ..sweep import Died, Work
@@ -22,7 +23,8 @@ ONE_THREAD = {
     name: "1"
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 }
-PACKAGE, MODULE = Path(__file__).parents[3], __name__.rpartition(".")[0] + ".worker"
+PACKAGE = Path(__file__).parents[3]
+MODULE = __name__.rpartition(".")[0] + ".worker"
 # The worker imports this package from its file, and nothing from the current folder. The folder
 # that contains the package comes last in the path: it may be the folder in which all dependencies
 # were installed.
@@ -38,10 +40,18 @@ main()
 """
 
 
+class ComputedChunk(NamedTuple):
+    """A chunk, the seconds that it took, and the result of `sweep.compute_chunk`, or Died."""
+
+    chunk: list
+    seconds: float
+    answer: tuple | Died
+
+
 class Worker:
     """A process that computes one chunk after the other."""
 
-    def __init__(self, work: Work, silent: bool = False):
+    def __init__(self, work: Work, *, silent: bool = False):
         here, there = Pipe()
         words = [
             sys.executable,
@@ -76,18 +86,18 @@ class Worker:
         except OSError:
             pass  # The process is dead, which `receive` notices next.
 
-    def receive(self) -> tuple:
-        """Return (chunk, seconds, answer), with Died instead of the answer if the process died."""
+    def receive(self) -> ComputedChunk:
+        """Receive the result of the chunk, with Died instead of the answer if the process died."""
         try:
-            seconds, found = self.pipe.recv()
+            seconds, answer = self.pipe.recv()
         except (EOFError, OSError):
             seconds = 0.0
-            found = Died(
+            answer = Died(
                 f"the process that ran this case died ({_describe_status(self.process.wait())})"
             )
         chunk = self.chunk
         self.chunk = None
-        return chunk, seconds, found
+        return ComputedChunk(chunk, seconds, answer)
 
     def end(self) -> None:
         """Kill the process."""
@@ -117,7 +127,7 @@ class Pool:
         """
         self.end()
         for _ in range(min(self.workers, count)):
-            self.ready.append(_start_worker(work, say is None))
+            self.ready.append(_start_worker(work, silent=say is None))
 
     def end(self) -> None:
         """Kill the processes that wait for the meshes."""
@@ -125,49 +135,65 @@ class Pool:
             self.ready.pop().end()
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
-        """Yield (chunk, seconds, answer or Died) of each chunk that `take` returns, as they come in."""
+        """Compute the chunks that `take` returns.
+
+        Parameters
+        ----------
+        work : Work
+        take : callable
+            Returns the next chunk, or None.
+        say : callable, optional
+            Takes a line of text.
+
+        Yields
+        ------
+        ComputedChunk
+            As they come in.
+        """
         workers = self.ready
         self.ready = []
         try:
-            for one in workers:
-                one.send_work(work)
+            for worker in workers:
+                worker.send_work(work)
             while True:
-                self._hand_out(workers, lambda: _start_worker(work, say is None), take)
+                self._hand_out(workers, lambda: _start_worker(work, silent=say is None), take)
                 busy = {worker.pipe: worker for worker in workers if worker.chunk is not None}
                 if not busy:
                     return
                 for pipe in wait(list(busy)):
-                    one = busy[pipe]
-                    taken = one.receive()
-                    if isinstance(taken[2], Died):
-                        workers.remove(one)
-                        one.end()
+                    worker = busy[pipe]
+                    computed = worker.receive()
+                    if isinstance(computed.answer, Died):
+                        workers.remove(worker)
+                        worker.end()
                     elif (chunk := take()) is not None:
                         # The worker receives its next chunk before the result is written, which
                         # takes time.
-                        one.send_chunk(chunk)
-                    yield taken
+                        worker.send_chunk(chunk)
+                    yield computed
         finally:
-            for one in workers:
-                one.end()
+            for worker in workers:
+                worker.end()
 
     def _hand_out(self, workers: list, start: Callable, take: Callable) -> None:
         """Give every idle process a chunk, and start processes while there are chunks and too few."""
-        for one in [worker for worker in workers if worker.chunk is None] + [None] * (
-            self.workers - len(workers)
-        ):
+        idle = [worker for worker in workers if worker.chunk is None]
+        while idle or len(workers) < self.workers:
             chunk = take()
             if chunk is None:
                 return
-            if one is None:
-                workers.append(one := start())
-            one.send_chunk(chunk)
+            if idle:
+                worker = idle.pop(0)
+            else:
+                worker = start()
+                workers.append(worker)
+            worker.send_chunk(chunk)
 
 
-def _start_worker(work: Work, silent: bool) -> Worker:
+def _start_worker(work: Work, *, silent: bool) -> Worker:
     """Start a process; Missing if the system refuses."""
     try:
-        return Worker(work, silent)
+        return Worker(work, silent=silent)
     except OSError as error:
         raise Missing(
             f"a process of the sweep cannot be started ({error.strerror}); lower -j"

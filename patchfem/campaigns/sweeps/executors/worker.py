@@ -14,20 +14,21 @@ def main() -> None:
     empty suppresses messages.
     """
     # an interrupt is handled by the process that started the sweep
-    for one in ("SIGINT", "SIGHUP"):
-        if hasattr(signal, one):
-            signal.signal(getattr(signal, one), signal.SIG_IGN)
+    for name in ("SIGINT", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
     pipe = Connection(int(sys.argv[1]))
     try:
         work = pipe.recv()
-
         sweep.warm_up(work)
+        say = None if sys.argv[2] else _print_line
         while True:
-            asked = pipe.recv()
-            if isinstance(asked, sweep.Work):  # the same work with the meshes that all cases share
-                work = asked
+            message = pipe.recv()
+            if isinstance(message, sweep.Work):
+                # the same work with the meshes that all cases share
+                work = message
             else:
-                pipe.send(sweep.compute_timed(work, asked, None if sys.argv[2] else _print_line))
+                pipe.send(sweep.compute_timed(work, message, say))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         # the process that started the sweep has ended
         return

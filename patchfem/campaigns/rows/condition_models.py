@@ -12,25 +12,23 @@ from ...scene.scene import Scene, SceneError, loads
 from ..fits.problem import model_without_joint
 
 # These keys scale the readings; they are not part of the model.
-READINGS = ("measured.acceleration_gain", "measured.displacement_gain")
+GAIN_KEYS = ("measured.acceleration_gain", "measured.displacement_gain")
 
 
 class FitRequest:
     """Problem of a fit: the scene of a rig, the ranges of its free keys, and a file of rows."""
 
-    def __init__(self, scene: Scene, wanted, measured):
+    def __init__(self, scene: Scene, ranges, measured):
         self.scene = scene
-        self.wanted = wanted
+        self.ranges = ranges
         self.measured = measured
 
     def condition_models(self, conditions, *sets: str) -> ConditionModels:
         """Return the models of the scene at conditions (c, 2), with additional --set strings."""
-        scene = (
-            loads(self.scene.text, self.scene.path, [*self.scene.sets, *sets])
-            if sets
-            else self.scene
-        )
-        return ConditionModels(scene, conditions, self.wanted, self.measured)
+        scene = self.scene
+        if sets:
+            scene = loads(scene.text, scene.path, [*scene.sets, *sets])
+        return ConditionModels(scene, conditions, self.ranges, self.measured)
 
 
 class ConditionModels:
@@ -44,7 +42,7 @@ class ConditionModels:
     scene : Scene
     conditions : (c, 2) array
         Frequency [Hz] and input [m s-2].
-    wanted : list of Range
+    ranges : list of Range
         Bounds of the free keys.
     measured : Path
         File of the rows.
@@ -55,54 +53,54 @@ class ConditionModels:
         For a scene or a key that cannot be fitted.
     """
 
-    def __init__(self, scene: Scene, conditions, wanted, measured):
+    def __init__(self, scene: Scene, conditions, ranges, measured):
         self.scene = scene
-        self.wanted = wanted
+        self.ranges = ranges
         self.notes = []
         self.sets = []
         self._refuse(measured)
-        if scene.measured is None and any(one.key.startswith("measured.") for one in wanted):
+        if scene.measured is None and any(bound.key.startswith("measured.") for bound in ranges):
             self.sets.append(f"measured.file={measured.resolve().as_posix()}")
         if scene.accuracy.method in (None, "auto"):
-            self._settle()
+            self._choose_steady_method()
         start = loads(scene.text, scene.path, [*scene.sets, *self.sets])
         self.base = BaseScene(start)
         self.read = start.measured
-        self.inner = [k for k, one in enumerate(wanted) if one.key not in READINGS]
-        self.rigs = [
-            build(self.base.override(condition_sets(*condition))).rig for condition in conditions
-        ]
+        self.inner = [k for k, bound in enumerate(ranges) if bound.key not in GAIN_KEYS]
+        self.rigs = []
+        for condition in conditions:
+            self.rigs.append(build(self.base.override(condition_sets(*condition))).rig)
 
     def _refuse(self, measured) -> None:
         """Raise PatchfemError for a scene or a key that cannot be fitted to rows."""
         scene = self.scene
-        drive = self.scene.drive
-        where = f"{scene.path}: fit --to {measured.name}: "
+        drive = scene.drive
+        location = f"{scene.path}: fit --to {measured.name}: "
         if scene.kind not in ("rig", "linear"):
             raise PatchfemError(
-                f"{where}to fit a file whose rows give frequency and input, the scene must be a rig, "
+                f"{location}to fit a file whose rows give frequency and input, the scene must be a rig, "
                 f"but this is a {scene.kind} scene; to fit a loop with a column of displacement, use a "
                 "scene with [slide]"
             )
         if drive.kind != "base" or not find_waveform(drive).is_sine:
             raise PatchfemError(
-                f"{where}each row was measured under a sine of the base; set drive.kind = 'base' and "
+                f"{location}each row was measured under a sine of the base; set drive.kind = 'base' and "
                 "drive.waveform = 'sine'"
             )
         if drive.displacement is not None:
             raise PatchfemError(
-                f"{where}the rows give the input as an acceleration; replace drive.displacement by "
+                f"{location}the rows give the input as an acceleration; replace drive.displacement by "
                 "drive.acceleration"
             )
         if scene.wear is not None:
-            raise PatchfemError(f"{where}[wear] cannot be fitted; leave [wear] out")
-        for one in self.wanted:
-            if one.key.startswith("drive.") or one.key == "measured.reading_cutoff":
+            raise PatchfemError(f"{location}[wear] cannot be fitted; leave [wear] out")
+        for bound in self.ranges:
+            if bound.key.startswith("drive.") or bound.key == "measured.reading_cutoff":
                 raise PatchfemError(
-                    f"--free {one.key}: the rows of the file give the drive; choose a key of the rig"
+                    f"--free {bound.key}: the rows of the file give the drive; choose a key of the rig"
                 )
 
-    def _settle(self) -> None:
+    def _choose_steady_method(self) -> None:
         """Set the method 'harmonic' if the scene allows it."""
         steady = "accuracy.method=harmonic"
         try:
@@ -117,7 +115,7 @@ class ConditionModels:
 
     def model(self, values) -> Model:
         """Return the model with values (n,) of the free keys, at the drive of the scene."""
-        sets = [self.wanted[k].format_assignment(values[k]) for k in self.inner]
+        sets = [self.ranges[k].format_assignment(values[k]) for k in self.inner]
         return model_without_joint(self.base, sets)
 
     def at(self, model: Model, condition: int) -> Model:
@@ -133,7 +131,7 @@ class ConditionModels:
     @property
     def moves_pieces(self) -> bool:
         """Whether a free key changes how the pieces are pressed."""
-        return any(one.key.startswith("contact.") for one in self.wanted)
+        return any(bound.key.startswith("contact.") for bound in self.ranges)
 
 
 def condition_sets(frequency: float, level: float) -> list:

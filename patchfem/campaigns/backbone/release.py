@@ -1,0 +1,243 @@
+"""Release of a mode from an amplitude, in which no other mode is excited, and the run of its decay."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import InitialState, NotConverged, PatchfemError, Response
+from ...effects import NO_WAVEFORM
+from ...formatting import format_length
+from ...model.model import Model
+from ...model.rig import DriveLevels
+from ...response.decay_curve import find_turning_points
+from ...runs.rig import decays, numerics, solve
+from ...runs.rig.engines import PIECES
+from ...structure import drives
+from ...structure.drive_sizes import find_decay_rate
+from .balance import HARMONICS, find_free_motions
+from .decay_reading import read_decay
+from .joint import MIN_AMPLITUDE_FACTOR, RELEASE_FACTOR, Joint
+
+# Cycles of the first decay; longer ones follow until the amplitude is small enough.
+FIRST_CYCLES = 50
+MAX_CYCLES_ONE_MODE = 12800  # Cycles of the longest decay of one mode; a longer one takes minutes.
+MAX_CYCLES = 3200  # The same for several modes, for which each cycle takes longer.
+MAX_CYCLES_TURNS = 102400  # For one mode with elastic elements, of which only reversals are stored.
+# Amplitudes at which the free motion of a release is computed, up to that of the release.
+N_START_STEPS = 12
+MAX_RAISED = 3  # Maximum number of repeated releases, each from a higher amplitude.
+MAX_RAISE_FACTOR = 8.0  # Largest ratio of the amplitudes of two successive releases.
+# End of a decay / smallest amplitude, by which coarser runs reach this amplitude as well.
+END_FACTOR = 0.8
+N_FREE_SWINGS = 3.0  # Periods of the free mode within which the first swings of a decay appear.
+ANNOUNCED_SECONDS = 20.0  # CPU seconds of a decay, above which it is announced.
+COARSER_RUNS_FACTOR = 2.0  # CPU seconds of a decay with its coarser runs / without them.
+
+
+class Release(NamedTuple):
+    """Run of a release: its model, its numerical settings and its Solution."""
+
+    model: Model
+    numerics: object
+    solution: object
+
+
+class DecayingRelease(NamedTuple):
+    """A release that does not grow, and the number of amplitudes up to the one of the release."""
+
+    n_amplitudes: int
+    release: Release
+
+
+class _GrowingRelease(NotConverged):
+    """Raised if a released motion grows: negative damping supplies more energy than is dissipated."""
+
+
+def run_release(joint: Joint, model: Model, choice) -> Release:
+    """Run the model of a release.
+
+    Parameters
+    ----------
+    joint : Joint
+    model : Model
+        As from `release_model`.
+    choice : Numerics
+        Numerical settings.
+
+    Returns
+    -------
+    Release
+    """
+    return Release(model, choice, solve.solve(model, choice, joint.patch))
+
+
+def release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> DecayingRelease:
+    """Release the mode from the largest amplitude from which its motion does not grow.
+
+    Parameters
+    ----------
+    joint : Joint
+    amplitudes : (k,) array
+        Increasing, at the output [m].
+    progress : callable, optional
+        Takes a sentence about the time that a long decay takes.
+
+    Returns
+    -------
+    DecayingRelease
+
+    Raises
+    ------
+    NotConverged
+        If the motion grows from all amplitudes.
+    """
+    for count in range(amplitudes.size, 0, -1):
+        try:
+            release = _release_to_smallest(joint, amplitudes[:count], progress)
+            return DecayingRelease(count, release)
+        except _GrowingRelease:
+            continue
+    raise NotConverged(
+        f"a release from {format_length(amplitudes[0], 3)} grows, because the negative damping "
+        "supplies more energy than friction dissipates; give smaller amplitudes with --amplitudes"
+    )
+
+
+def _is_growing(joint: Joint, motion: Response) -> bool:
+    """Return whether the swings of a motion grow along the shape of the sticking mode."""
+    shape = joint.shape
+    _, turns = find_turning_points(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
+    swings = np.abs(np.diff(turns))
+    return find_decay_rate(joint.modes) < 0 and swings.size > 2 and swings[-1] > swings[0]
+
+
+def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
+    """Release the mode and compute as many cycles as the decay to the smallest amplitude takes.
+
+    The release begins at an amplitude at which the first reading is above the largest amplitude.
+    Each longer run is announced with a time that follows from the time per cycle of the run before.
+    """
+    travel = joint.model.rig.springs.travel
+    begin = min(RELEASE_FACTOR * float(amplitudes[-1]), travel)
+    cycles = FIRST_CYCLES
+    n_raised = 0
+    seconds_per_cycle = 0.0
+    free_omega = joint.modes.omega[joint.mode]
+    free_swings = N_FREE_SWINGS * 2 * np.pi / free_omega if free_omega else np.inf
+    lowest = END_FACTOR * amplitudes[0]
+    while True:
+        model, choice = _choose_numerics(joint, begin, cycles)
+        max_cycles = _max_cycles(joint, choice.engine)
+        expected = COARSER_RUNS_FACTOR * seconds_per_cycle * cycles
+        if progress is not None and expected > ANNOUNCED_SECONDS:
+            progress(f"decay over {cycles} cycles: about {expected:.2g} s of computing time")
+        release = run_release(joint, model, choice)
+        motion = release.solution.response
+        seconds_per_cycle = release.solution.seconds / cycles
+        if _is_growing(joint, motion):
+            raise _GrowingRelease("the release grows")
+        decay = read_decay(joint, motion)
+        end = motion.time[-1]
+        if not decay.time.size:
+            if cycles >= max_cycles or end >= free_swings:
+                return release
+            # The cycles are those of the sticking mode; a swing in slip can last hundreds of them.
+            cycles = min(8 * cycles, max_cycles)
+            continue
+        high = decay.amplitude[0]
+        low = decay.amplitude[-1]
+        stops = decay.time[-1] < end - 3 / decay.frequency[-1]
+        if high < amplitudes[-1] and begin < travel and n_raised < MAX_RAISED:
+            begin = _raise_release(joint, begin, high, amplitudes[-1])
+            n_raised += 1
+        elif low <= lowest or cycles >= max_cycles or stops:
+            return release
+        else:
+            damping = decay.damping[-1]
+            more = np.log(low / lowest) / (2 * np.pi * damping) if damping > 0 else np.inf
+            cycles = int(min(np.clip(cycles + more, 2 * cycles, 8 * cycles), max_cycles))
+
+
+def _max_cycles(joint: Joint, engine: str) -> int:
+    """Return the largest number of cycles of a release."""
+    if joint.modes.omega.size > 1:
+        return MAX_CYCLES
+    return MAX_CYCLES_TURNS if engine == PIECES.name else MAX_CYCLES_ONE_MODE
+
+
+def _choose_numerics(joint: Joint, begin: float, cycles: int) -> tuple:
+    """Return the model of a release from an amplitude `begin` [m], and its numerical settings."""
+    model = release_model(joint, begin)
+    drive = replace(model.rig.drive, cycles=float(cycles))
+    model = replace(model, rig=replace(model.rig, drive=drive))
+    choice = numerics.choose(model)
+    stores_reversals = joint.is_rigid or choice.engine == PIECES.name
+    if joint.modes.omega.size > 1 or not stores_reversals:
+        choice = replace(choice, window=int(cycles))
+    return model, choice
+
+
+def _raise_release(joint: Joint, begin: float, high: float, largest: float) -> float:
+    """Return a higher amplitude [m] for a release whose first reading is below `largest`.
+
+    Parameters
+    ----------
+    joint : Joint
+    begin : float
+        Amplitude of the release so far [m].
+    high : float
+        Its first reading [m].
+    largest : float
+        Amplitude [m] that the first reading must exceed.
+    """
+    # Friction reduces the amplitude by two static deflections per half swing.
+    deflection = joint.output_amplitude(joint.deflection) if joint.friction_limit else 0.0
+    limit = max(MAX_RAISE_FACTOR * begin, RELEASE_FACTOR * (begin + 2 * deflection))
+    raised = begin * RELEASE_FACTOR * largest / high
+    return min(raised, limit, joint.model.rig.springs.travel)
+
+
+def release_model(joint: Joint, amplitude: float) -> Model:
+    """Return the model of a mode that is released at an amplitude [m] of the output."""
+    model = decays.with_automatic_method(joint.model)
+    period = 2 * np.pi / (joint.omega)
+    rig = model.rig.with_signal(
+        drives.make_release(period),
+        kind="free",
+        waveform=NO_WAVEFORM,
+        frequency=None,
+        force=None,
+        levels=DriveLevels(),
+    )
+    rig = replace(rig, start=_start_release(joint, amplitude))
+    return replace(model, rig=rig)
+
+
+def _start_release(joint: Joint, amplitude: float) -> InitialState:
+    """Return the initial state of a release at an amplitude [m] of the output.
+
+    It is the free motion by harmonic balance, in which no other mode is excited. If this is not
+    known, it is the shape of the mode: with the contact stuck, or without the contact at amplitudes
+    at which all of it slips.
+    """
+    modes = joint.modes
+    at_rest = np.zeros(modes.omega.size)
+    if at_rest.size > 1:
+        try:
+            joint.require_steady_loops("balance")
+            first = float(joint.output_amplitude(MIN_AMPLITUDE_FACTOR * joint.slip_displacement))
+            first = min(first or amplitude, amplitude)
+            amplitudes = np.unique(np.geomspace(first, amplitude, N_START_STEPS))
+            free = find_free_motions(joint.steady_laws(), joint, amplitudes, HARMONICS[0])[-1]
+            if free is not None:
+                order = np.arange(HARMONICS[0] + 1)[:, None]
+                rates = 1j * free.omega * order * free.modal
+                return InitialState(free.modal.real.sum(axis=0), rates.real.sum(axis=0))
+        except (NotConverged, PatchfemError):
+            pass
+    output = float(modes.output[joint.mode])
+    if amplitude > joint.slip_amplitude and output:
+        free_shape = np.eye(at_rest.size)[joint.mode]
+        return InitialState(free_shape * amplitude / abs(output), at_rest)
+    return InitialState(joint.shape * amplitude / joint.reach, at_rest)
