@@ -14,7 +14,6 @@ from PIL import Image
 
 from patchfem.export.drawing.film import DPI, FRAME_SIZE, make_film
 from patchfem.export.drawing.flat import STYLE, Picture
-from patchfem.export.drawing.panels import upper_piece_slide, upper_points
 from patchfem.export.fields.series import MIN_STEP_RATIO, Series, last_consecutive_frames
 
 WIDE, HIGH = 1200, 680
@@ -71,61 +70,24 @@ def test_exact_the_last_cycle_is_without_the_pressed_state():
     ) == (0, 1)
 
 
-@pytest.mark.slow
-def test_exact_one_scale_holds_every_frame_and_the_pieces_stay_in_the_window(bench):
-    with Series(bench) as series:
+def test_exact_one_scale_holds_every_frame_and_the_pieces_stay_in_the_window(small):
+    with Series(small) as series:
         film = make_film(series)
-        assert film.numbers == tuple(range(len(series))) and len(series) > 10
         frames = [series.frame(number) for number in film.numbers]
-    mises = np.array([one.cell_data["von_mises"][one.cell_data["part"] < 2] for one in frames])
-    assert film.tops[0] == mises.max() if not film.over[0] else film.tops[0] < mises.max()
     line = frames[0].interface()
-    stress = [
-        one.point_data[name][line] for one in frames for name in ("normal_stress", "shear_stress")
-    ]
+    stress = [frame.point_data["normal_stress"][line] for frame in frames]
     assert film.reach == (np.min(stress), np.max(stress))
-    pairs = [film.panels(one) for one in frames]
-    for k in (0, 1):
-        assert (
-            len(
-                {
-                    (one[k].window, one[k].top, one[k].over, one[k].factor, one[k].aside)
-                    for one in pairs
-                }
-            )
-            == 1
-        )
-        places = np.concatenate(
-            [
-                one[k].places[
-                    np.unique(frame.connectivity[np.repeat(one[k].cells, np.diff(frame.offsets))])
-                ]
-                for one, frame in zip(pairs, frames)
-            ]
-        )
-        left, right, bottom, top = film.windows[k]
-        assert (places[:, 0].min(), places[:, 0].max()) == (left, right)
-        assert (places[:, 1].min(), places[:, 1].max()) == (bottom, top)
-
-
-@pytest.mark.slow
-def test_exact_the_slide_is_taken_out_before_the_rest_is_magnified(bench):
-    with Series(bench) as series:
-        film = make_film(series)
-        frames = [series.frame(number) for number in film.numbers]
-    slides = np.array([upper_piece_slide(one) for one in frames])
-    length = 12.7e-3
-    assert 0.01 < film.aside * np.abs(slides).max() / length < 0.035
-    for one, slide in zip(frames, slides):
-        far = upper_points(one)
-        far = far[one.points[far, 1] == one.points[:, 1].max()]
-        move = one.point_data["displacement"][far, 0] - slide
-        for panel in film.panels(one):
-            aside = panel.places[far, 0] * 1e-3 - one.points[far, 0]
-            assert aside == pytest.approx(
-                film.aside * slide + panel.factor * move, abs=1e-7 * length
-            )
-            assert np.abs(aside).max() < 0.1 * length
+    for panels, window, top in zip(
+        zip(*map(film.panels, frames)), film.windows, film.tops, strict=True
+    ):
+        places = []
+        for panel, frame in zip(panels, frames):
+            assert (panel.window, panel.top, panel.aside) == (window, top, film.aside)
+            assert panel.factor == panels[0].factor
+            cells = np.repeat(panel.cells, np.diff(frame.offsets))
+            places.append(panel.places[np.unique(frame.connectivity[cells])])
+        (left, bottom), (right, high) = np.min(places, axis=(0, 1)), np.max(places, axis=(0, 1))
+        assert (left, right, bottom, high) == tuple(window)
 
 
 def test_exact_the_range_of_colours_is_the_same_in_every_frame(small):

@@ -45,15 +45,6 @@ def test_exact_share_of_three_waves(length, share):
     )
 
 
-def test_exact_elements_that_keep_three_waves():
-    # lost: 27 % without the finest, 60 % without the finest two
-    profile = cosines([6, 40, 300], [3.0, 2.0, 1.0])
-    for kept, order in ((0.99, 300), (0.74, 300), (0.72, 40), (0.41, 40), (0.39, 6)):
-        assert wave_spectrum(profile).element_length(kept) == pytest.approx(
-            LENGTH / order, rel=1e-12
-        )
-
-
 @given(st.integers(0, 1000), st.floats(0.05, 0.95))
 def test_always_the_element_just_keeps_what_was_asked(seed, kept):
     profile = self_affine(LENGTH, 1000, 2e-6, 0.6, 3e-3, 40e-6, seed)
@@ -64,17 +55,6 @@ def test_always_the_element_just_keeps_what_was_asked(seed, kept):
         >= fine_fraction(profile, 2 * element * 1.001)
         > 1 - kept
     )
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_exact_share_of_a_known_spectrum(seed):
-    """A periodic trace of known mean squares: what levelling and mirroring move about stays within 3 %."""
-    profile = self_affine(LENGTH, 4000, 1.0, 0.5, 1e-3, 50e-6, seed)
-    k = np.arange(1, 254)
-    power = np.maximum(k * 1e-3 / LENGTH, 1) ** -2.0
-    for cut in (100e-6, 200e-6, 400e-6):
-        wanted = np.sqrt(power[LENGTH / k < cut].sum() / power.sum())
-        assert fine_fraction(profile, cut) == pytest.approx(wanted, abs=0.03)
 
 
 def test_exact_tilt_and_height_do_not_count():

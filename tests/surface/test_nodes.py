@@ -67,28 +67,6 @@ def test_exact_means_against_fine_quadrature(grid, seed):
     assert average_at_nodes(trace(x, z), nodes) == pytest.approx(wanted, abs=1e-10)
 
 
-def test_exact_parabola_on_even_nodes():
-    """Mean of x^2 over a tributary length is x^2 + h^2/12; at the ends (4 m0 - m1)/3 = x^2 -+ ... - h^2/4."""
-    x = np.linspace(-HALF, HALF, 200 * 500 + 1)
-    off = average_at_nodes(trace(x, x**2), EVEN) - EVEN**2
-    assert off[1:-1] == pytest.approx(H**2 / 12, rel=1e-4)
-    assert off[[0, -1]] == pytest.approx(-(H**2) / 4, rel=1e-4)
-
-
-def test_order_two_for_a_smooth_profile():
-    errors = []
-    for cells in (100, 200, 400, 800):
-        nodes = HALF * np.sin(np.pi / 2 * np.linspace(-1, 1, cells + 1))  # uneven
-        x = np.linspace(-HALF, HALF, 100 * cells + 1)
-        errors.append(
-            np.abs(
-                average_at_nodes(sine(x, 1.0, 5e-3, 0.3), nodes) - sine(nodes, 1.0, 5e-3, 0.3).z
-            ).max()
-        )
-    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(2.0, abs=0.1)
-    assert errors[-1] < 2e-4
-
-
 @pytest.mark.parametrize("elements", [0.5, 1.0, 1.3, 2.0, 4.0, 11.0])
 def test_exact_waves_lose_what_the_docstring_says(elements):
     """sin(pi h / wave) / (pi h / wave) of the height: 0 at one element, 64 % at two, 90 % at four."""
@@ -98,24 +76,6 @@ def test_exact_waves_lose_what_the_docstring_says(elements):
     assert seen[2:-2] == pytest.approx(
         np.sinc(1 / elements) * sine(EVEN, 1.0, wave, 0.7).z[2:-2], abs=1e-4
     )
-
-
-def test_exact_the_mean_of_the_gap_is_kept():
-    """Inside, the tributary lengths tile the patch: heights that vanish near its ends keep their integral."""
-    x = np.sort(np.random.default_rng(2).uniform(-HALF, HALF, 3000))
-    z = np.where(np.abs(x) < HALF - 4 * H, np.random.default_rng(3).normal(size=x.size), 0.0)
-    profile = trace(np.concatenate([[-HALF], x, [HALF]]), np.concatenate([[0], z, [0]]))
-    assert (average_at_nodes(profile, EVEN) * H).sum() == pytest.approx(
-        np.trapezoid(profile.z, profile.x), rel=1e-11
-    )
-
-
-def test_exact_larger_z_opens_the_gap():
-    x = np.array([-HALF, 0.0, HALF])
-    gap = average_at_nodes(trace(x, [0, 1e-6, 0]), EVEN)
-    assert gap[100] == pytest.approx(1e-6 * (1 - H / HALF / 4), rel=1e-12) and gap[
-        0
-    ] == pytest.approx(0, abs=1e-18)
 
 
 def test_exact_own_coordinate_where_the_trace_covers_the_patch():

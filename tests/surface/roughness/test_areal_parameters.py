@@ -96,14 +96,6 @@ def test_exact_a_sine_of_whole_periods():
     assert rows["Vvc"] == pytest.approx(void[0.1] - void[0.8], rel=1e-3)
 
 
-def test_exact_the_flattest_two_fifths_of_a_straight_abbott_curve():
-    """Heights even between -1 and 1: the core is all of them, Sk = 2, no peaks and no valleys."""
-    z = np.random.default_rng(0).permutation(np.linspace(-1, 1, 10_000)).reshape(100, 100)
-    heights = Surface(z, (1.0, 1.0)).heights
-    assert heights.core.height == pytest.approx(2, rel=1e-3)
-    assert heights.core.peak_height == pytest.approx(0, abs=1e-3) == heights.core.valley_depth
-
-
 def test_exact_the_autocorrelation_is_the_sum_over_measured_pairs():
     z = np.random.default_rng(3).normal(size=(9, 12))
     z[2, 3] = z[5, 7:9] = np.nan

@@ -82,19 +82,6 @@ def test_exact_a_trace_without_two_elements_has_no_spacing():
     assert mean_spacing(Heights(np.zeros(100), UM)) is None
 
 
-def test_exact_core_of_even_heights():
-    """Heights spread evenly from -1 to 1: the curve is straight, all of it core."""
-    z = np.linspace(-1, 1, 10_001)
-    found = fit_core(Heights(np.random.default_rng(1).permutation(z), UM))
-    assert found.height == pytest.approx(2, rel=1e-3)
-    assert found.peak_height == pytest.approx(0, abs=1e-3) and found.valley_depth == pytest.approx(
-        0, abs=1e-3
-    )
-    assert found.first_ratio == pytest.approx(0, abs=1e-3) and found.second_ratio == pytest.approx(
-        1, abs=1e-3
-    )
-
-
 def test_exact_core_of_gaussian_heights():
     """The curve of a Gaussian surface by its quantiles; line, ratios and areas by quadrature of the normal law."""
     n = 200_001
@@ -141,12 +128,6 @@ def test_exact_every_row_has_a_name_of_its_own_and_a_definition():
     rows = [*PRIMARY, *ROUGH]
     assert len(rows) + len(AREAL) + len(WAVES) + len(WINDOW) == len(TABLE)
     assert all(len(row.text.split()) > 4 and row.unit in ("m", "1") for row in TABLE.values())
-
-
-def test_exact_elements_of_a_sine():
-    """Rc = 2 A."""
-    z = np.sin(2 * np.pi * (np.arange(10_007) + 0.5) / 1000.7)
-    assert TABLE["Rc"].compute(Heights(z, 1.0)) == pytest.approx(2, rel=1e-4)
 
 
 def test_exact_elements_of_unlike_heights():
