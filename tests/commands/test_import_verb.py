@@ -137,36 +137,6 @@ def test_exact_the_response_written_is_read_by_structure_file(shaken, tmp_path):
     build(FORCED + (tmp_path / "modes.toml").read_text())
 
 
-def test_always_the_export_of_a_release_is_a_record_that_a_law_is_fitted_to(tmp_path):
-    """The friction of the run comes back from the decay that is read from its own histories."""
-    text = (
-        AROUND.replace('"coulomb"', '"elastic-plastic"\nbond_length = "200 um"')
-        + '[structure]\nmoving_mass = "1 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n'
-        'damping = 0.003\nslide = 1.0\n[drive]\nkind = "free"\ndisplacement = "600 um"\ncycles = 40\n'
-    )
-    (tmp_path / "free.toml").write_text(text)
-    assert cli("run", tmp_path / "free.toml", "-o", tmp_path / "run", "-q", "--no-page").code == 0
-    for name, more in (("out.csv", ["--histories"]), ("out.uff", [])):
-        assert cli("export", tmp_path / "run", "-o", tmp_path / name, *more).code == 0
-        answer = cli("import", tmp_path / name, "--decay", "-o", tmp_path / f"{name}.decay.csv")
-        assert answer.code == 0, answer.err
-    fitted = cli(
-        "fit",
-        tmp_path / "free.toml",
-        "--to",
-        tmp_path / "out.csv.decay.csv",
-        "--free",
-        "friction.static=0.2..0.5",
-        "-o",
-        tmp_path / "fit",
-        "--json",
-    )
-    assert fitted.code == 0, fitted.err
-    assert json.loads(fitted.out)["values"]["friction.static"]["value"] == pytest.approx(
-        0.3, rel=0.05
-    )
-
-
 def test_exact_a_free_decay_of_a_table(tmp_path):
     time, place = free()
     rows = [f"{t!r},{1e3 * p!r}" for t, p in zip(time.tolist(), place.tolist())]

@@ -107,6 +107,7 @@ def test_exact_a_sweep_with_a_failed_case_has_no_receipt(swept, tmp_path):
 BENCH = POINT + COULOMB + '[slide]\nkind = "file"\nfile = "one.csv"\n'
 
 
+@pytest.mark.share(0, 3, 5, 6)
 @pytest.mark.parametrize(
     "table, words",
     [
