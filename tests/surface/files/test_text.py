@@ -73,19 +73,6 @@ def test_exact_every_spelling_is_the_same_trace(tmp_path, content):
     assert not profile.x.flags.writeable and not profile.z.flags.writeable
 
 
-@pytest.mark.parametrize("unit", UNITS)
-def test_exact_units_of_both_columns(tmp_path, unit):
-    profile = read(
-        tmp_path,
-        text([0, 1, 2], [0, 0.25, -0.25], f"x [{unit}],z [{unit}]")
-        if unit != "km"
-        else text([0, 1e-3, 2e-3], [0, 0.25e-3, -0.25e-3], "x [km],z [km]"),
-    )
-    scale = UNITS[unit] if unit != "km" else 1.0
-    assert profile.x == pytest.approx(np.array([0, 1, 2]) * scale, rel=1e-15)
-    assert profile.z == pytest.approx(np.array([0, 0.25, -0.25]) * scale, rel=1e-15)
-
-
 def test_exact_missing_heights_keep_their_place(tmp_path):
     profile = read(tmp_path, "x [um],z [um]\n0,1\n1,\n2,NaN\n3,***\n4, nan \n5,2\n6,*****\n7,1\n")
     assert profile.missing.tolist() == [False, True, True, True, True, False, True, False]
@@ -264,7 +251,6 @@ def test_always_reading_is_quick(tmp_path, count, seconds):
     assert np.allclose(profile.z, np.round(z, 6) * UM, rtol=1e-14, atol=0)
 
 
-SEED = text(X, Z).encode()
 lines_of_junk = st.lists(
     st.text(alphabet='0123456789.,;\t eE+-nax[]um*#"z()\n', max_size=30), max_size=8
 )
@@ -325,11 +311,6 @@ def attempt(content: bytes) -> None:
                  lines_of_junk.map(lambda rows: "\n".join(rows).encode())))  # fmt: skip
 def test_always_junk_is_refused_by_name(content):
     attempt(content)
-
-
-@given(st.integers(0, len(SEED)), st.integers(0, 40), st.binary(max_size=6))
-def test_always_a_damaged_file_is_read_or_refused_by_name(at, cut, put):
-    attempt(SEED[:at] + put + SEED[at + cut :])
 
 
 @given(st.lists(st.tuples(st.floats(), st.floats()), max_size=30), st.sampled_from([*UNITS]))
