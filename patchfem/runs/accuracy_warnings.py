@@ -77,29 +77,29 @@ class Finding(NamedTuple):
     climbed: tuple = ()
 
 
-def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
+def tolerance_warnings(finding: Finding, coarse=(), still=()) -> list[str]:
     """Return warnings about measures, static and of the motion, that miss the tolerance.
 
     Parameters
     ----------
-    found : Finding
+    finding : Finding
     coarse : sequence of Patch
         The patch on the coarser meshes of its ladder, if they are at hand.
     still : sequence of Patch
         The patch on the ladder of its static measures, fine to coarse, if that is another one.
     """
-    model = found.model
+    model = finding.model
     tolerance = model.accuracy.tolerance
     excess = {}
-    for name, measure in found.measures.items():
+    for name, measure in finding.measures.items():
         ratio = min(measure.error_ratio(tolerance), MAX_EXCESS)
         if ratio > 1:
             excess[name] = ratio
-    has_faces = found.patch is None and model.has_interface_patches
+    has_faces = finding.patch is None and model.has_interface_patches
     static_names = ()
     if has_faces:
         static_names = faces.static_measures(model)
-    elif found.patch is not None:
+    elif finding.patch is not None:
         static_names = patch_rows.TABLE
     static = {name: ratio for name, ratio in excess.items() if name in static_names}
     moving = {name: ratio for name, ratio in excess.items() if name not in static_names}
@@ -108,56 +108,56 @@ def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
 
         def warn_of_face(face) -> list:
             """Return the warnings on the patch of an interface."""
-            return tolerance_warnings(_select_interface_measures(found, face), face.patches[1:])
+            return tolerance_warnings(_select_interface_measures(finding, face), face.patches[1:])
 
         warnings = faces.merge_sentences(model, warn_of_face)
     elif static:
-        at_rest = found
+        at_rest = finding
         meshes = coarse
         if still:
-            at_rest = found._replace(
+            at_rest = finding._replace(
                 model=replace(model, patch=model.patch.with_mesh(is_static=True, slip=None)),
                 patch=still[0],
             )
             meshes = still[1:] or coarse
-        warnings = [_warning(found, static, _static_remedy(at_rest, static, meshes))]
+        warnings = [_warning(finding, static, _static_remedy(at_rest, static, meshes))]
     if moving:
-        warnings.append(_warning(found, moving, _motion_remedy(found, moving, coarse)))
+        warnings.append(_warning(finding, moving, _motion_remedy(finding, moving, coarse)))
     return warnings
 
 
-def _select_interface_measures(found: Finding, face) -> Finding:
+def _select_interface_measures(finding: Finding, face) -> Finding:
     """Return the static measures of the patch of an interface, without numbers in their names."""
     measures = {}
     for name in patch_rows.TABLE:
         numbered = rows.add_interface_number(name, face.number)
-        if found.measures.get(numbered) is not None:
-            measures[name] = found.measures[numbered]
+        if finding.measures.get(numbered) is not None:
+            measures[name] = finding.measures[numbered]
     return Finding(face.model, measures, face.patch)
 
 
-def _named_measures(found: Finding, excess: dict) -> list[str]:
+def _named_measures(finding: Finding, excess: dict) -> list[str]:
     """Return the names of the measures that a warning mentions.
 
     They are the main measures with an excess that are not zero within their error, else the measure
     with the largest excess.
     """
-    known = found.measures
+    known = finding.measures
     main = [name for name in MAIN if name in excess and known[name].error < abs(known[name].value)]
     others = {name: times for name, times in excess.items() if not name.startswith(RING)} or excess
     return main or [max(others, key=others.get)]
 
 
-def _warning(found: Finding, excess: dict, remedy: str) -> str:
+def _warning(finding: Finding, excess: dict, remedy: str) -> str:
     """Return the warning with the errors of the main measures, the tolerance and the remedy."""
-    names = _named_measures(found, excess)
-    first, *more = (f"of {_error_words(found.measures[name])}" for name in names)
+    names = _named_measures(finding, excess)
+    first, *more = (f"of {_error_words(finding.measures[name])}" for name in names)
     listed = "".join(f", {name} {words}" for name, words in zip(names[1:], more, strict=True))
     count = len(excess) - len(names)
     others = ""
     if count:
         others = f" ({count} other measure{'s' * (count > 1)} also exceed{'s' * (count < 2)} the tolerance)"
-    tolerance = found.model.accuracy.tolerance
+    tolerance = finding.model.accuracy.tolerance
     return f"{names[0]} has an estimated error {first}{listed}; the tolerance is {tolerance:g}{others}; {remedy}"
 
 
@@ -168,30 +168,30 @@ def _error_words(measure) -> str:
     return f"at least its value ({measure})"
 
 
-def _static_remedy(found: Finding, excess: dict, coarse) -> str:
+def _static_remedy(finding: Finding, excess: dict, coarse) -> str:
     """Return the remedy for static measures: more strips, or a finer mesh."""
-    asked = found.model.patch
-    peak = found.measures.get("pressure_peak")
+    patch_model = finding.model.patch
+    peak = finding.measures.get("pressure_peak")
     is_wear_unbounded = (
-        "worn_depth_max" in _named_measures(found, excess)
+        "worn_depth_max" in _named_measures(finding, excess)
         and peak is not None
         and peak.value is None
     )
     if is_wear_unbounded or max(excess.values()) >= MAX_EXCESS:
         return NO_REMEDY
     if (
-        asked.mesh.file is None
-        and asked.interface.strips is not None
-        and asked.interface.strips.count > 1
+        patch_model.mesh.file is None
+        and patch_model.interface.strips is not None
+        and patch_model.interface.strips.count > 1
     ):
-        return _strip_remedy(asked, excess)
+        return _strip_remedy(patch_model, excess)
     # the ladder of meshes ends where all decisive measures meet the tolerance, or at its limit
     return _mesh_remedy(
-        found.model, [(found, coarse)], is_at_limit=excess.keys() <= set(patch_rows.DECISIVE)
+        finding.model, [(finding, coarse)], is_at_limit=excess.keys() <= set(patch_rows.DECISIVE)
     )
 
 
-def _strip_remedy(asked, excess: dict) -> str:
+def _strip_remedy(patch_model, excess: dict) -> str:
     """Return the number of strips that meets the tolerance.
 
     The peak of the outermost strip is computed at its centre, so that its error is of first order
@@ -199,11 +199,11 @@ def _strip_remedy(asked, excess: dict) -> str:
     mesh.
     """
     ratio = max(times if name in FIRST_ORDER else times**0.5 for name, times in excess.items())
-    count = ceil(asked.interface.strips.count * ratio)
+    count = ceil(patch_model.interface.strips.count * ratio)
     if count > MAX_STRIPS:
         return NO_REMEDY
     return f"set contact.strips.count = {count}" + (
-        "" if asked.mesh.is_automatic else f" and leave out {ELEMENT_SIZE}"
+        "" if patch_model.mesh.is_automatic else f" and leave out {ELEMENT_SIZE}"
     )
 
 
@@ -218,19 +218,19 @@ def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
     is_at_limit : bool
         Whether the ladder of meshes has ended.
     """
-    asked = [found.model.patch for found, _ in places]
-    cause = f"the mesh ({max(found.patch.x.size for found, _ in places)} interface nodes) causes this error"
-    if any(patch.mesh.file is not None for patch in asked):
+    patch_models = [finding.model.patch for finding, _ in places]
+    cause = f"the mesh ({max(finding.patch.x.size for finding, _ in places)} interface nodes) causes this error"
+    if any(patch.mesh.file is not None for patch in patch_models):
         return faces.in_scene(model, f"{cause}; split the elements of contact.mesh")
-    if not all(patch.mesh.is_automatic for patch in asked):
+    if not all(patch.mesh.is_automatic for patch in patch_models):
         return faces.in_scene(model, f"{cause}; leave out {ELEMENT_SIZE}")
     tolerances = [] if is_at_limit else [_refining_tolerance(*place) for place in places]
     tolerances = [tolerance for tolerance in tolerances if tolerance is not None]
     if tolerances:
         return f"{cause}; set accuracy.tolerance = {min(tolerances):.3g} for a finer mesh"
-    patches = [found.patch for found, _ in places if isinstance(found.patch, press.Patch)]
+    patches = [finding.patch for finding, _ in places if isinstance(finding.patch, press.Patch)]
     seconds = max(map(ladder.next_seconds, patches), default=0.0)
-    limit = ladder.most_seconds(asked[0])
+    limit = ladder.most_seconds(patch_models[0])
     if seconds > limit:
         cause += (
             f"; the next mesh would take about {format_number(seconds, 2)} CPU s, and at most {limit:g} CPU s are spent "
@@ -239,50 +239,52 @@ def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
     return f"{cause}; no accuracy.tolerance leads to a finer mesh; {USE_ERROR}"
 
 
-def _refining_tolerance(found: Finding, coarse) -> float | None:
+def _refining_tolerance(finding: Finding, coarse) -> float | None:
     """Return the tolerance for which a patch gets a finer mesh; None if its ladder has ended.
 
     If the coarser meshes are not at hand, it is the tolerance for one more halving.
     """
-    asked = found.model.patch
-    tolerance = found.model.accuracy.tolerance
-    if asked.mesh.shared is not None and isinstance(found.patch, press.Patch):
-        if ladder.next_seconds(found.patch) > ladder.most_seconds(asked):
+    patch_model = finding.model.patch
+    tolerance = finding.model.accuracy.tolerance
+    if patch_model.mesh.shared is not None and isinstance(finding.patch, press.Patch):
+        if ladder.next_seconds(finding.patch) > ladder.most_seconds(patch_model):
             return None
-    if not any(coarse) or asked.mesh.shared is not None:
+    if not any(coarse) or patch_model.mesh.shared is not None:
         return PROPOSED_TOLERANCE_RATIO * tolerance
     return ladder.tolerance_of_next_mesh(
-        asked, found.climbed or [found.patch, *coarse], asked.mesh.tolerance or tolerance
+        patch_model,
+        finding.climbed or [finding.patch, *coarse],
+        patch_model.mesh.tolerance or tolerance,
     )
 
 
-def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
+def _motion_remedy(finding: Finding, excess: dict, coarse) -> str:
     """Return the remedy for the main measure of a motion, by the largest part of its error.
 
     A looser tolerance is no remedy: it chooses coarser steps and meshes.
     """
-    model = found.model
-    extra = found.extra
-    name = max(_named_measures(found, excess), key=excess.get)
+    model = finding.model
+    extra = finding.extra
+    name = max(_named_measures(finding, excess), key=excess.get)
     steps = extra.get("steps_per_cycle") or extra.get("steps")
-    cause = _main_cause(found, name)
+    cause = _main_cause(finding, name)
     if cause == "steps" and steps is not None:
-        return _step_remedy(found, name, excess, int(steps))
+        return _step_remedy(finding, name, excess, int(steps))
     if cause == "end":
         return _end_remedy(extra["cycles"], int(steps))
-    if cause == "mesh" and found.patch is not None:
-        return _mesh_remedy(model, [(found, coarse)])
+    if cause == "mesh" and finding.patch is not None:
+        return _mesh_remedy(model, [(finding, coarse)])
     if cause == "mesh":
         soft = [face for face in faces.press_faces(model) if face.partial_slip]
         return _mesh_remedy(
-            model, [(_select_interface_measures(found, face), face.patches[1:]) for face in soft]
+            model, [(_select_interface_measures(finding, face), face.patches[1:]) for face in soft]
         )
     if cause == "reduced":  # the error falls with the square of the number of modes
         ratio = min(max(2.0, excess[name] ** 0.5), 16.0)
         n_modes = ceil(model.rig.modes.omega.size * ratio)
         return f"set structure.reduced.modes = {min(n_modes, model.rig.structure.max_modes)}"
-    if cause == "modes" and extra["shear_modes"] < found.patch.x.size:
-        return f"set accuracy.shear_modes = {min(4 * extra['shear_modes'], found.patch.x.size)}"
+    if cause == "modes" and extra["shear_modes"] < finding.patch.x.size:
+        return f"set accuracy.shear_modes = {min(4 * extra['shear_modes'], finding.patch.x.size)}"
     if cause == "bonds":
         pinned = [key for key in ("tail", "merge") if getattr(model.accuracy, key) is not None]
         if pinned:
@@ -293,26 +295,29 @@ def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
         return "more drive cycles make this value more accurate; raise drive.cycles"
     if extra.get("harmonics") is None or name.startswith(SAMPLED_MEASURES):
         return NO_REMEDY
-    return notes.more_harmonics(extra["harmonics"], _harmonics_of_friction(found))
+    return notes.more_harmonics(extra["harmonics"], _harmonics_of_friction(finding))
 
 
-def _main_cause(found: Finding, name: str) -> str:
+def _main_cause(finding: Finding, name: str) -> str:
     """Return the largest part of the error of a measure, a kind of `response.coarser.find_open_kinds`."""
-    parts = found.extra.get("left_open")
+    parts = finding.extra.get("left_open")
     if parts is not None:
         return max(
             parts["parts"], key=lambda kind: parts["parts"][kind].get(name, 0.0), default="own"
         )
     # results of a batch, or of a run without an estimate, have no parts
-    if found.extra.get("steps_per_cycle") or found.extra.get("steps"):
+    if finding.extra.get("steps_per_cycle") or finding.extra.get("steps"):
         return "steps"
-    return "own" if found.patch is None else "mesh"
+    return "own" if finding.patch is None else "mesh"
 
 
-def _step_remedy(found: Finding, name: str, excess: dict, steps: int) -> str:
+def _step_remedy(finding: Finding, name: str, excess: dict, steps: int) -> str:
     """Return the steps per cycle that the order of convergence requires, or another remedy."""
-    model = found.model
-    parts = found.extra.get("left_open") or {"parts": {"steps": {name: 1.0}}, "orders": {name: 2.0}}
+    model = finding.model
+    parts = finding.extra.get("left_open") or {
+        "parts": {"steps": {name: 1.0}},
+        "orders": {name: 2.0},
+    }
     order = parts["orders"].get(name)
     exact = ""
     if (
@@ -375,13 +380,13 @@ def _end_remedy(cycles: float, steps: int) -> str:
     )
 
 
-def _harmonics_of_friction(found: Finding) -> float:
+def _harmonics_of_friction(finding: Finding) -> float:
     """Return the harmonics of a friction force that depends on the speed.
 
     They are the largest speed over the reference speed of the law; 0 for other laws.
     """
-    law = found.model.friction
-    slip = found.measures.get("slip_amplitude")
+    law = finding.model.friction
+    slip = finding.measures.get("slip_amplitude")
     if law is None or slip is None or not law_has_trait(law.law, "creeps"):
         return 0.0
-    return 2 * pi / found.extra["period"] * slip.value / law.reference_speed
+    return 2 * pi / finding.extra["period"] * slip.value / law.reference_speed

@@ -66,9 +66,9 @@ class Cost:
         return int(sum(part.bytes for part in self.parts))
 
     def __add__(self, other: Cost) -> Cost:
-        def merge(mine: dict, others: dict) -> dict:
+        def merge(first: dict, second: dict) -> dict:
             """Return the sum of two dicts of numbers by name."""
-            return mine | {name: mine.get(name, 0) + value for name, value in others.items()}
+            return first | {name: first.get(name, 0) + value for name, value in second.items()}
 
         summed = map(
             add, (self.parts, self.words, self.steps), (other.parts, other.words, other.steps)

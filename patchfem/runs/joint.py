@@ -36,20 +36,22 @@ def remove_joint(model: Model, patch=None) -> Model:
     with locate_errors(model.source):
         if patch is None:
             patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
-        held = patch_stiffness(model, patch) if patch.pressure.load > 0 else 0.0
-        return replace(model, rig=model.rig.structure.without_joint(held))
+        stiffness = patch_stiffness(model, patch) if patch.pressure.load > 0 else 0.0
+        return replace(model, rig=model.rig.structure.without_joint(stiffness))
 
 
 def patch_stiffness(model: Model, patch) -> float:
     """Return the tangential stiffness [N/m] of a pressed patch with its law while nothing slips."""
     f = model.friction
     load = patch.pressure.load
-    held = record.stick_stiffness(f, load)
-    if not model.partial_slip or (np.isfinite(held) and not law_has_trait(f.law, "set-valued")):
-        held = compute_sticking_stiffness(model.rig.friction.interfaces[0], load)
+    stiffness = record.stick_stiffness(f, load)
+    if not model.partial_slip or (
+        np.isfinite(stiffness) and not law_has_trait(f.law, "set-valued")
+    ):
+        stiffness = compute_sticking_stiffness(model.rig.friction.interfaces[0], load)
     if not model.partial_slip:
-        return held
-    length = f.static * load / held  # 0 for a law that is rigid in stick
+        return stiffness
+    length = f.static * load / stiffness  # 0 for a law that is rigid in stick
     if patch.strips is not None:
         return float(
             sum(strip_element[0].sum() for strip_element in strip_elements(patch, f.static, length))
@@ -80,5 +82,5 @@ def stuck_patch_stiffness(model: Model, patch, apart: tuple):
         or not law_has_trait(model.friction.law, "set-valued")
     ):
         return None
-    found = patch_result.static_measures(model, patch, tuple(apart)).get("tangential_stiffness")
-    return None if found is None or found.value is None or found.error is None else found
+    measure = patch_result.static_measures(model, patch, tuple(apart)).get("tangential_stiffness")
+    return None if measure is None or measure.value is None or measure.error is None else measure

@@ -28,12 +28,10 @@ def describe_largest_part(parts: tuple) -> str:
 
     It is "" if this part is small.
     """
-    most = next((part for part in parts if part.key), None)
-    if most is None or most.bytes < MIN_NAMED_FRACTION * sum(part.bytes for part in parts):
+    largest = next((part for part in parts if part.key), None)
+    if largest is None or largest.bytes < MIN_NAMED_FRACTION * sum(part.bytes for part in parts):
         return ""
-    return (
-        f"{most.bytes / 1e6:.0f} MB of the memory are for {most.what}; {most.key} sets their size"
-    )
+    return f"{largest.bytes / 1e6:.0f} MB of the memory are for {largest.what}; {largest.key} sets their size"
 
 
 def free_bytes(*, needs_compiler: bool = False) -> float:
@@ -76,8 +74,8 @@ def _limits() -> list:
         import resource
     except ImportError:
         return [float("inf")]
-    found = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA))
-    return [float("inf") if limit == resource.RLIM_INFINITY else float(limit) for limit in found]
+    limits = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA))
+    return [float("inf") if limit == resource.RLIM_INFINITY else float(limit) for limit in limits]
 
 
 def free_in_control_group(
@@ -130,14 +128,16 @@ def _remaining_bytes(folder: Path, limit: str, usage: str) -> float:
     Inactive cached files count as free.
     """
     try:
-        most = int((folder / limit).read_text("ascii"))
-        taken = int((folder / usage).read_text("ascii"))
+        max_bytes = int((folder / limit).read_text("ascii"))
+        used_bytes = int((folder / usage).read_text("ascii"))
         lines = (folder / "memory.stat").read_text("ascii").splitlines()
         known = dict(line.split() for line in lines)
     except (OSError, ValueError):  # the limit is "max", or a file is missing
         return float("inf")
     return float(
-        most - taken + int(known.get("total_inactive_file", known.get("inactive_file", 0)))
+        max_bytes
+        - used_bytes
+        + int(known.get("total_inactive_file", known.get("inactive_file", 0)))
     )
 
 
@@ -151,11 +151,12 @@ def reason_of_refusal(parts: tuple, free: float | None = None) -> str:
     total = sum(part.bytes for part in parts)
     if total <= free:
         return ""
-    most = next((part for part in parts if part.key), None)
+    largest = next((part for part in parts if part.key), None)
     text = f"about {total / 1e9:.3g} GB of memory are needed, but only {max(free, 0.0) / 1e9:.2g} GB are free"
-    if most is None or most.bytes < 0.1 * total:
+    if largest is None or largest.bytes < 0.1 * total:
         return f"{text}; free some memory, or run on a machine with more memory"
-    return f"{text}; {most.bytes / 1e9:.3g} GB of these are for {most.what}: {CURES.get(most.key, f'lower {most.key}')}"
+    remedy = CURES.get(largest.key, f"lower {largest.key}")
+    return f"{text}; {largest.bytes / 1e9:.3g} GB of these are for {largest.what}: {remedy}"
 
 
 def refuse(parts: tuple) -> None:

@@ -314,10 +314,10 @@ def _complete_result(result: Result, notes: list, begin: float, meshes: PatchMes
 def _yielding_faces(result: Result) -> dict:
     """Return the notes on faces that yield even at the peak pressure minus its error."""
     peak = result.measures.get("pressure_peak")
-    asked = result.plan.model.patch
-    if asked is None or result.patch is None or peak is None or peak.value is None:
+    patch_model = result.plan.model.patch
+    if patch_model is None or result.patch is None or peak is None or peak.value is None:
         return {}
-    return strength.yielding_faces(asked, peak.value - (peak.error or 0.0))
+    return strength.yielding_faces(patch_model, peak.value - (peak.error or 0.0))
 
 
 def _saving_context(kept: StateFile | None, what: Plan, patch):

@@ -185,13 +185,13 @@ def work_check_warning(values: dict, steps: int | None, harmonics: int | None = 
     ]
 
 
-def more_harmonics(found: int, sharp: float = 0.0) -> str:
+def more_harmonics(n_harmonics: int, sharp: float = 0.0) -> str:
     """Return the remedy that proposes a larger number of harmonics than `found`.
 
     A balance with few harmonics says little about its convergence. sharp: number of harmonics that
     the friction law itself needs.
     """
-    return f"set accuracy.harmonics = {max(HARMONICS_FACTOR * found, MIN_HARMONICS, min(ceil(sharp), MOST_HARMONICS))}"
+    return f"set accuracy.harmonics = {max(HARMONICS_FACTOR * n_harmonics, MIN_HARMONICS, min(ceil(sharp), MOST_HARMONICS))}"
 
 
 def heating_sentences(model, patch, work: float, duration: float) -> list:

@@ -211,30 +211,30 @@ def choices(result) -> dict:
     """
     extra = result.extra
     patch = result.patch
-    out = {}
+    settings = {}
     if (engine := extra.get("engine")) is not None:
-        out["engine"] = engine
-    if (found := extra.get("map")) is not None:
-        out["map"] = found
+        settings["engine"] = engine
+    if (map_name := extra.get("map")) is not None:
+        settings["map"] = map_name
     steps = extra.get("steps")
     if steps is not None:
-        out["steps_per_cycle"] = int(steps)
-    out |= {name: int(extra[name]) for name in COUNTS if extra.get(name) is not None}
+        settings["steps_per_cycle"] = int(steps)
+    settings |= {name: int(extra[name]) for name in COUNTS if extra.get(name) is not None}
     if (local := extra.get("step_tolerance")) is not None:
-        out |= {"step_tolerance": float(local), "steps": int(extra["steps_taken"])}
+        settings |= {"step_tolerance": float(local), "steps": int(extra["steps_taken"])}
     if (summed := extra.get("quadrature")) is not None:
-        out["quadrature"] = summed
+        settings["quadrature"] = summed
     if (window := extra.get("window")) is not None:
-        out["window_cycles"] = int(window)
+        settings["window_cycles"] = int(window)
     for face in extra.get("faces", ()):
-        out[rows.add_interface_number("interface_nodes", face.number)] = int(face.patch.x.size)
+        settings[rows.add_interface_number("interface_nodes", face.number)] = int(face.patch.x.size)
     if patch is not None:
-        out["interface_nodes"] = int(patch.x.size)
+        settings["interface_nodes"] = int(patch.x.size)
         if patch.averaging is not None:
-            out["profile_averaging"] = float(patch.averaging)
+            settings["profile_averaging"] = float(patch.averaging)
         if result.plan.model.patch.interface.strips is not None:
-            out["strips"] = int(result.plan.model.patch.interface.strips[0])
-    return out
+            settings["strips"] = int(result.plan.model.patch.interface.strips[0])
+    return settings
 
 
 def measure_engines(result) -> dict:

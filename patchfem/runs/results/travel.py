@@ -45,7 +45,7 @@ def warn_of_large_slide(patch, slide) -> list:
     ]
 
 
-def outcome_on_piece(outcome, asked, patch, slide, lateral=None):
+def outcome_on_piece(outcome, patch_model, patch, slide, lateral=None):
     """Return the outcome of a run, or LEAVES_CONTACT if the slide exceeded the piece.
 
     See `response.outcome.check_piece_length`.
@@ -53,7 +53,7 @@ def outcome_on_piece(outcome, asked, patch, slide, lateral=None):
     Parameters
     ----------
     outcome : Outcome or None
-    asked : PatchModel
+    patch_model : PatchModel
     patch : Patch or None
         None for [normal], which has no length.
     slide : (k,)
@@ -63,7 +63,7 @@ def outcome_on_piece(outcome, asked, patch, slide, lateral=None):
     """
     if patch is None:
         return outcome
-    pieces = asked.pieces
+    pieces = patch_model.pieces
     mean_length = (pieces.lower.length + pieces.upper.length) / 2
     outcome = check_piece_length(outcome, largest_slide(slide), mean_length)
     if lateral is None:

@@ -159,20 +159,20 @@ def expected_elements(model: Model) -> tuple:
     for interface in model.rig.friction.interfaces:
         load = interface_load(model, interface)
         if law_has_trait(interface.numbers.law, "set-valued"):
-            most = inf
-            mine = 1
+            stiffness = inf
+            n_elements = 1
         else:
             element = record.make_law(interface.numbers, load).element(load)
-            mine = int(element.numbers[1]) >> count_merges(model)
-            most = float(element.numbers[2 : 2 + int(element.numbers[1])].sum())
+            n_elements = int(element.numbers[1]) >> count_merges(model)
+            stiffness = float(element.numbers[2 : 2 + int(element.numbers[1])].sum())
         if model.partial_slip or interface.partial_slip:
             patch = interface.patch or model.patch
-            most = 1 / (1 / most + 1 / patch.pieces.shear_stiffness)
-            mine = patch_model.TYPICAL_N_NODES
+            stiffness = 1 / (1 / stiffness + 1 / patch.pieces.shear_stiffness)
+            n_elements = patch_model.TYPICAL_N_NODES
             if not patch.mesh.is_automatic:
-                mine = round(patch.pieces.length / patch.uniform_element_size) + 1
-        count = count + mine
-        stiff = max(stiff, most if most < inf else 0.0)
+                n_elements = round(patch.pieces.length / patch.uniform_element_size) + 1
+        count = count + n_elements
+        stiff = max(stiff, stiffness if stiffness < inf else 0.0)
     return count, stiff
 
 

@@ -216,14 +216,14 @@ def _shear_modes(patch, law, count: int | None, model) -> tuple:
     few = model.patch.mesh.can_gather_points
     if (law, count, tolerance, few) not in made:
         mode_tolerance = (FEWER if few else 0.1) * tolerance
-        found = fields.bond_shear_modes(patch, law, count, mode_tolerance, fewest=few)
+        reduced = fields.bond_shear_modes(patch, law, count, mode_tolerance, fewest=few)
         force = None
         if few:
-            found, force, _ = shear_modes.fewest_gauss_points(
-                found, patch.x[found.points], FEWER * tolerance
+            reduced, force, _ = shear_modes.fewest_gauss_points(
+                reduced, patch.x[reduced.points], FEWER * tolerance
             )
             force = force / law.static
-        made[law, count, tolerance, few] = found, force
+        made[law, count, tolerance, few] = reduced, force
     return made[law, count, tolerance, few]
 
 
@@ -249,13 +249,15 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
     made = _SHEAR_MODES.setdefault(patch, {})
     key = (law.static, law.length, law.ratio, tolerance, points, modes)
     if key not in made:
-        found = fields.bond_shear_modes(patch, law, None, tolerance, fewest=True)
+        all_modes = fields.bond_shear_modes(patch, law, None, tolerance, fewest=True)
         made[key] = None
-        if found.stiffness.size <= modes:
-            few, limit, error = shear_modes.modes_on_gauss(found, patch.x[found.points], points)
-            whole = found.spectrum.backbone(max(shear_modes.N_REFERENCE_MODES, 4 * modes))
-            error += found.spectrum.relative_difference(
-                whole, found.spectrum.backbone(found.stiffness.size)
+        if all_modes.stiffness.size <= modes:
+            few, limit, error = shear_modes.modes_on_gauss(
+                all_modes, patch.x[all_modes.points], points
+            )
+            whole = all_modes.spectrum.backbone(max(shear_modes.N_REFERENCE_MODES, 4 * modes))
+            error += all_modes.spectrum.relative_difference(
+                whole, all_modes.spectrum.backbone(all_modes.stiffness.size)
             )
             made[key] = (few, limit, error) if error <= 2 * tolerance else None
     return made[key]

@@ -91,10 +91,10 @@ def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
         None if no level is above the onset.
     """
     past = make_onset_test("slip") if past is None else past
-    found = bracket_onset(levels, past)
-    if found is None:
+    bracket = bracket_onset(levels, past)
+    if bracket is None:
         return None
-    before, first = found
+    before, first = bracket
     first = levels[first]
     low = levels[before].drive if before >= 0 else 0.0
     high = first.drive
@@ -152,12 +152,12 @@ def level_measures(rig, levels, probe, tolerance: float, *, has_friction: bool, 
         level, half_width = lowest
         change = 0.0
         for run, beside in coarser:
-            found = onset(run.levels, run.probe, tolerance, past)
+            coarse_onset = onset(run.levels, run.probe, tolerance, past)
             reference = lowest
             if beside is not None:
                 reference = onset(beside.levels, beside.probe, tolerance, past)
-            is_missing = found is None or reference is None
-            change += level if is_missing else abs(found[0] - reference[0])
+            is_missing = coarse_onset is None or reference is None
+            change += level if is_missing else abs(coarse_onset[0] - reference[0])
         measures["onset_level"] = Measure(size * level, unit, size * (half_width + change), 1e-9)
     elif has_friction:
         measures["onset_level"] = Measure(

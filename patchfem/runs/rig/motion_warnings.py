@@ -41,49 +41,57 @@ def collect_warnings(run) -> list:
     """Return the warnings of a `passes.Coupled`."""
     model = run.model
     patch = run.patch
-    raw = run.solution
-    found = run.measures
-    book = raw.book
-    harmonics = raw.extra.get("harmonics")
-    steps = raw.extra.get("steps_per_cycle")
+    solution = run.solution
+    measures = run.measures
+    book = solution.book
+    harmonics = solution.extra.get("harmonics")
+    steps = solution.extra.get("steps_per_cycle")
     if "steps_per_cycle" in ENGINES[run.numerics.engine].summary_numbers:
         steps = run.numerics.steps
-    out = [
+    warnings = [
         *model.rig.structure.notes,
         *_as_one_point(model, patch, run.numerics),
-        *note_on_heating(model, patch, raw.response, book["friction"]),
+        *note_on_heating(model, patch, solution.response, book["friction"]),
     ]
     if run.has_friction:
-        out += law_warnings(model, run.outcome, found, float(np.abs(raw.window.slide_rate).max()))
-    out += created_warning(model, book, model.rig.drive.cycles)
+        warnings += law_warnings(
+            model, run.outcome, measures, float(np.abs(solution.window.slide_rate).max())
+        )
+    warnings += created_warning(model, book, model.rig.drive.cycles)
     if (
         patch is not None
         and model.rig.friction.load_varies
-        and raw.contact is not None
-        and raw.contact.reduction is not None
+        and solution.contact is not None
+        and solution.contact.reduction is not None
     ):
-        out += modes_note(model, raw.contact.reduction.stiffness.size, raw.contact.sets.x.size)
+        warnings += modes_note(
+            model, solution.contact.reduction.stiffness.size, solution.contact.sets.x.size
+        )
     if model.grooves is not None and model.partial_slip:
-        out += modes_note(model, raw.contact.shear.stiffness.size, raw.contact.shear.points.size)
-    out += [
-        *work_check_warning(found, steps, harmonics),
+        warnings += modes_note(
+            model, solution.contact.shear.stiffness.size, solution.contact.shear.points.size
+        )
+    warnings += [
+        *work_check_warning(measures, steps, harmonics),
         *changing_note(run.outcome, run.drive),
-        *raw.notes,
+        *solution.notes,
     ]
     if not model.rig.drive.levels.amplitudes:
-        out += warn_if_ringing(
-            raw,
-            found,
+        warnings += warn_if_ringing(
+            solution,
+            measures,
             (model.accuracy.tolerance, find_min_decay_rate(model.rig.modes)),
             run.drive,
             run.numerics.cycles,
         )
-    if raw.message and raw.outcome is not Outcome.LEAVES_GROOVES:
-        out.append(raw.message)
-    out += warn_of_large_slide(patch, raw.response.slide) if patch is not None else ()
+    if solution.message and solution.outcome is not Outcome.LEAVES_GROOVES:
+        warnings.append(solution.message)
+    warnings += warn_of_large_slide(patch, solution.response.slide) if patch is not None else ()
     if model.has_interface_patches:
-        out += faces.merge_sentences(model, lambda face: _face_warnings(face, raw.response))
-    return out
+        warnings += faces.merge_sentences(
+            model, lambda face: _face_warnings(face, solution.response)
+        )
+    return warnings
 
 
 def _face_warnings(face, response) -> list:
@@ -160,29 +168,33 @@ def _nearest_resonance(modes: list, at: float, *, upper: bool) -> str:
 def collect_notes(run) -> list:
     """Return the notes of a `passes.Coupled` on its law, engine, fields and the end of its motion."""
     model = run.model
-    raw = run.solution
+    solution = run.solution
     rig = run.model.rig
     ended = [
         *_lateral_motion_sentence(run),
-        *([raw.message] if raw.message and raw.outcome is Outcome.LEAVES_GROOVES else []),
+        *(
+            [solution.message]
+            if solution.message and solution.outcome is Outcome.LEAVES_GROOVES
+            else []
+        ),
     ]
     if run.patch is not None and run.patch.strips is not None and model.partial_slip:
         return [
             "strips that slip part by part have no common shear stress, so the fields contain only the pressure",
             *ended,
         ]
-    out = [*_bond_notes(model, run.patch, raw), *climbing_as_one(model, run.patch)]
+    notes = [*_bond_notes(model, run.patch, solution), *climbing_as_one(model, run.patch)]
     f = model.friction
     if len(rig.friction.interfaces):
-        out += _engine_notes(run)
-    if raw.levels and rig.drive.levels.onset[0] == "slip" and raw.held > 0:
-        out.append(
-            f"onset_level: slip counts only if its amplitude is above {format_length(raw.held)}, a thousandth of the "
+        notes += _engine_notes(run)
+    if solution.levels and rig.drive.levels.onset[0] == "slip" and solution.held > 0:
+        notes.append(
+            f"onset_level: slip counts only if its amplitude is above {format_length(solution.held)}, a thousandth of the "
             "elastic range of the interface; a part of the interface may slip earlier"
         )
     return [
         *rig.structure.reduction_notes,
-        *out,
+        *notes,
         *creeping_note(f),
         *_release_sentence(run),
         *ended,
@@ -255,7 +267,7 @@ def _as_one_point(model, patch, numerics) -> list:
     return [AS_ONE_POINT]
 
 
-def _bond_notes(model, patch, raw) -> list:
+def _bond_notes(model, patch, solution) -> list:
     """Return notes, as a list, on bonds that grow."""
     f = model.friction
     if f is None or not law_has_trait(f.law, "bonds"):
@@ -263,7 +275,7 @@ def _bond_notes(model, patch, raw) -> list:
     limit = f.static * normal_load(model, patch)
     steady = limit > 0 and not model.rig.friction.load_varies
     return growth_notes(
-        model.bonds, float(np.abs(raw.response.force).max()) / limit if steady else None
+        model.bonds, float(np.abs(solution.response.force).max()) / limit if steady else None
     )
 
 
@@ -310,14 +322,14 @@ def _note_unmoved_elements(run) -> list:
     return []
 
 
-def law_warnings(model, outcome, found, peak: float) -> list:
+def law_warnings(model, outcome, measures, peak: float) -> list:
     """Return the warnings on the friction law of a run.
 
     Parameters
     ----------
     model : Model
     outcome : Outcome
-    found : dict
+    measures : dict
         Measures by name.
     peak : float
         Largest speed of the slide [m/s].
@@ -327,7 +339,7 @@ def law_warnings(model, outcome, found, peak: float) -> list:
     return [
         *unbounded_bonds(model.bonds),
         *warn_of_unformed_bonds(model.bonds, peak),
-        *warn_of_creep(model.bonds, outcome, found),
+        *warn_of_creep(model.bonds, outcome, measures),
     ]
 
 

@@ -114,9 +114,9 @@ def remove_expected_joint(rig, links: dict):
     of a chain. If these are stiffer than the modes allow, the Rig is unchanged.
     """
     try:
-        found = rig.structure.without_joint(held_stiffness(links))
-        structure = replace(found.structure, without_joint=rig.structure.without_joint)
-        return replace(found, structure=structure)
+        bare_rig = rig.structure.without_joint(held_stiffness(links))
+        structure = replace(bare_rig.structure, without_joint=rig.structure.without_joint)
+        return replace(bare_rig, structure=structure)
     except PatchfemError:
         return rig
 
@@ -134,17 +134,17 @@ def mode_frequencies(rig, chain: dict) -> list:
         rows = np.concatenate([rows, modes.lateral_faces])
         stiffness = np.tile(stiffness, 2)
     named = rig.structure.lists_modes and modes.shapes is None
-    out = []
+    frequencies = []
     for k, omega in enumerate(modes.omega):
-        held = modes.compute_stuck_mode(rows, stiffness, k)[0]
-        out.append(
+        stuck_omega = modes.compute_stuck_mode(rows, stiffness, k)[0]
+        frequencies.append(
             {
                 "name": modes.names[k] if named else f"mode {k + 1}",
                 "free_frequency": float(omega) / (2 * pi),
-                "stuck_frequency": None if held is None else held / (2 * pi),
+                "stuck_frequency": None if stuck_omega is None else stuck_omega / (2 * pi),
             }
         )
-    return out
+    return frequencies
 
 
 def cost(model: Model, points: int) -> Cost:
@@ -334,7 +334,7 @@ def _lever(rig) -> float:
     return slide / base if rig.structure.lists_modes and base > 0 else 1.0
 
 
-def first_words(rig, found: dict, chain: dict) -> list:
+def first_words(rig, sizes: dict, chain: dict) -> list:
     """Return the sentence on D of a single mode, as a list.
 
     It says whether the block sticks, and whether friction bounds its motion.
@@ -342,13 +342,13 @@ def first_words(rig, found: dict, chain: dict) -> list:
     Parameters
     ----------
     rig : Rig
-    found : dict
+    sizes : dict
         `groups`.
     chain : dict
         Links of the stiffness chain by name; a link that is not STIFF compared with the mode lets a
         stuck block move.
     """
-    d = found.get("D")
+    d = sizes.get("D")
     if (
         d is None
         or rig.modes.omega.size != 1
@@ -367,8 +367,8 @@ def first_words(rig, found: dict, chain: dict) -> list:
         ]
     if d >= 1:
         return [f"D = {d:.3g} >= 1: friction should hold the block, so that it sticks"]
-    if "D_kinetic" in found:  # the kinetic limit acts on a block that slides
-        sliding = found["D_kinetic"] * _lever(rig)
+    if "D_kinetic" in sizes:  # the kinetic limit acts on a block that slides
+        sliding = sizes["D_kinetic"] * _lever(rig)
         return [
             f"D = {d:.3g} is below 1, so that the block slips; with the kinetic coefficient {_describe_sliding(sliding)}"
         ]

@@ -22,8 +22,8 @@ def make_rubbing(model: Model, numerics: Numerics):
         return march.make_elastic_plastic_law(f.static, f.bond_length)
     if not is_bond_list(f):
         return march.make_bonds_law(model.bonds)
-    found = choose_quadrature(model, numerics)
-    return march.make_bond_lists_law(model.bonds, found.reach(f.order), found.merge)
+    choice = choose_quadrature(model, numerics)
+    return march.make_bond_lists_law(model.bonds, choice.reach(f.order), choice.merge)
 
 
 def varying_load_model(model: Model, numerics: Numerics, patch):

@@ -134,14 +134,14 @@ class BalanceFinder:
             Point of a curve from which the solution starts, if there are several motions.
         """
         begin = perf_counter()
-        found = periodic_point(
+        motion = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
         )
-        found, stable, notes = self._find_stable(drive, found)
-        values, response, book = self._compute_measures(found, drive)
+        motion, stability, notes = self._find_stable(drive, motion)
+        values, response, book = self._compute_measures(motion, drive)
         errors = self._errors(
             values,
-            found,
+            motion,
             drive,
             lambda motion, sine: self._compute_measures(motion, sine, 2 * SAMPLES).values,
         )
@@ -150,20 +150,20 @@ class BalanceFinder:
                 min(errors["slip_start_phase"], np.pi / 2), 2 * np.pi / SAMPLES
             )
             errors["stick_fraction"] = max(errors.get("stick_fraction", 0.0), 4 / SAMPLES)
-        name, _ = balanced_regime(found)
+        name, _ = balanced_regime(motion)
         held = name == "stuck"
         extra = {
-            "regime": name if stable.stable else f"{name}, unstable",
-            "multipliers": stable.multipliers,
-            "residual": found.residual,
-            "harmonics": found.harmonics,
+            "regime": name if stability.stable else f"{name}, unstable",
+            "multipliers": stability.multipliers,
+            "residual": motion.residual,
+            "harmonics": motion.harmonics,
         }
         amplitude = np.array([values["relative_displacement_amplitude"]])
         outcome = Outcome.STUCK if held else Outcome.STEADY
         message = ""
-        if not stable.stable:
+        if not stability.stable:
             outcome = Outcome.NOT_CONVERGED
-            message = describe_instability(stable.multipliers)
+            message = describe_instability(stability.multipliers)
         return Solution(
             values,
             response,
@@ -178,9 +178,9 @@ class BalanceFinder:
             errors=errors,
             extra=extra,
             notes=notes,
-        ), found
+        ), motion
 
-    def _errors(self, values: dict, found, drive, read) -> dict:
+    def _errors(self, values: dict, motion, drive, read) -> dict:
         """Return errors of the measures of a SteadyMotion by name.
 
         If no finer SteadyMotion converges, they are the error of the balance itself.
@@ -189,17 +189,17 @@ class BalanceFinder:
         ----------
         values : dict
             Measures by name.
-        found : SteadyMotion
+        motion : SteadyMotion
         drive : SineDrive
         read : callable
             Function (SteadyMotion, drive) that returns measures by name.
         """
-        errors = {name: abs(v) * min(found.error, 1.0) for name, v in values.items()}
+        errors = {name: abs(v) * min(motion.error, 1.0) for name, v in values.items()}
         try:
-            finer = refine_point(found, self.modes, drive)
+            finer = refine_point(motion, self.modes, drive)
         except NotConverged:
             return errors
-        residual = max(found.left, finer.left)
+        residual = max(motion.left, finer.left)
         finer_values = read(finer, drive) if np.isfinite(finer.error) else {}
         for name, error in finer_errors(values, finer_values).items():
             errors[name] = error + abs(values[name]) * residual
@@ -235,56 +235,56 @@ class BalanceFinder:
 
     def curve_point(self, drive, near=None) -> CurvePoint:
         """Return a point of a curve without its errors."""
-        found = periodic_point(
+        motion = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
         )
-        return self._curve_point(add_stability(found, self.modes))
+        return self._curve_point(add_stability(motion, self.modes))
 
-    def _curve_point(self, found) -> CurvePoint:
+    def _curve_point(self, motion) -> CurvePoint:
         """Return a SteadyMotion, whose multipliers are known, as a point of a curve."""
-        kind = balanced_regime(found)[0]
-        stable = bool(found.stable)
-        drive = SineDrive(found.level, found.omega, self.model.rig.drive.signal.moving)
+        kind = balanced_regime(motion)[0]
+        stable = bool(motion.stable)
+        drive = SineDrive(motion.level, motion.omega, self.model.rig.drive.signal.moving)
         return CurvePoint(
             drive,
-            self._read(found, drive),
+            self._read(motion, drive),
             {},
             kind if stable else f"{kind}, unstable",
-            float(np.abs(found.multipliers).max(initial=0.0)),
+            float(np.abs(motion.multipliers).max(initial=0.0)),
             stable,
             Outcome.STUCK if kind == "stuck" else Outcome.STEADY,
-            found,
+            motion,
         )
 
-    def _read(self, found, drive) -> dict:
+    def _read(self, motion, drive) -> dict:
         """Return the measures of a curve, by name."""
-        response = make_cycle_response(found, self.modes, drive, SAMPLES)
+        response = make_cycle_response(motion, self.modes, drive, SAMPLES)
         row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {
-            COLUMN_MEASURES["amplitude"]: found.amplitude(row),
+            COLUMN_MEASURES["amplitude"]: motion.amplitude(row),
             COLUMN_MEASURES["acceleration_peak"]: compute_acceleration_peak(response),
             **wave_measures(*odd_harmonics(response, drive)),
         }
         return {name: value for name, value in values.items() if value is not None}
 
-    def _compute_measures(self, found, drive, samples: int = SAMPLES) -> CycleMeasures:
+    def _compute_measures(self, motion, drive, samples: int = SAMPLES) -> CycleMeasures:
         """Compute the measures of a cycle of a SteadyMotion from samples."""
-        response = make_cycle_response(found, self.modes, drive, samples)
-        book = find_cycle_energies(found, self.modes) | {
+        response = make_cycle_response(motion, self.modes, drive, samples)
+        book = find_cycle_energies(motion, self.modes) | {
             "stored": 0.0,
-            "iterations": float(found.iterations),
+            "iterations": float(motion.iterations),
         }
-        speed = np.arange(len(found.modal))[:, None] * found.omega * np.abs(found.modal)
+        speed = np.arange(len(motion.modal))[:, None] * motion.omega * np.abs(motion.modal)
         book |= {
             "power": abs(book["work_in"]),
             "peak_stored": self.modes.mass / 2 * float(np.sum(speed**2)),
         }
-        top = found.amplitude(self.modes.output)
+        top = motion.amplitude(self.modes.output)
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
         run = EngineResult(response, response, extremes, np.zeros(1), book)
         reader = Balanced(self.model, self.numerics, self.patch, steps=samples)
-        reader.turns = found.turns()
+        reader.turns = motion.turns()
         return CycleMeasures(reader.values(run, drive), response, book)
 
     def curve(self, drive) -> tuple:
@@ -331,10 +331,10 @@ class BalanceFinder:
         drive = self.model.rig.drive.signal
         return 2 * np.pi * abs(drive.high - drive.low)
 
-    def _point_of_branch(self, found, drive) -> CurvePoint:
+    def _point_of_branch(self, motion, drive) -> CurvePoint:
         """Return a SteadyMotion of a branch as a point of a curve with its errors."""
-        found = add_stability(found, self.modes) if found.stable is None else found
-        point = self._curve_point(found)._replace(regime="stable" if found.stable else "unstable")
+        motion = add_stability(motion, self.modes) if motion.stable is None else motion
+        point = self._curve_point(motion)._replace(regime="stable" if motion.stable else "unstable")
         errors = self._errors(point.values, point.near, point.drive, self._read)
         for name in errors:
             errors[name] += HARMONIC_ROUND_OFF * abs(point.values[name])

@@ -243,14 +243,14 @@ def curve_columns(points, folds=()) -> dict:
     They are frequency [Hz], level [m s-2], regime, multiplier, and each of COLUMN_MEASURES with its error.
     folds: frequencies [Hz] at which the curve turns back.
     """
-    out = {
+    columns = {
         "frequency": np.array([point.drive.omega / (2 * np.pi) for point in points]),
         "level": np.array([point.drive.acceleration for point in points]),
     }
     for column, name in COLUMN_MEASURES.items():
-        out[column] = np.array([point.values.get(name, np.nan) for point in points])
-        out[f"{column}_error"] = np.array([point.errors.get(name, np.nan) for point in points])
-    return out | {
+        columns[column] = np.array([point.values.get(name, np.nan) for point in points])
+        columns[f"{column}_error"] = np.array([point.errors.get(name, np.nan) for point in points])
+    return columns | {
         "regime": np.array([point.regime for point in points]),
         "multiplier": np.array([point.multiplier for point in points]),
         "folds": np.array(folds),
@@ -270,33 +270,33 @@ def motion_at_levels(finder, drive):
         If no level has a steady motion.
     """
     points = []
-    said = []
+    failures = []
     best = None
     for part in drive.segments:
         sine = SineDrive(part.amplitude, part.omega, drive.moving)
         near = points[-1].near if points and points[-1].stable else None
         try:
-            raw, near = finder.point(sine, near)
-        except NotConverged as why:
+            solution, near = finder.point(sine, near)
+        except NotConverged as failure:
             if finder.tries_another:
                 raise
             points.append(make_missing_point(sine))
-            said.append(why)
+            failures.append(failure)
             continue
-        points.append(curve_point(sine, seen_by_gauge(finder.model, raw), near))
+        points.append(curve_point(sine, seen_by_gauge(finder.model, solution), near))
         if best is None or index_of_largest(points) == len(points) - 1:
-            best = raw, sine
-        said += [raw.message] if raw.message else []
+            best = solution, sine
+        failures += [solution.message] if solution.message else []
     if best is None:
-        raise said[0]  # no level has a steady motion
+        raise failures[0]  # no level has a steady motion
 
     def probe(number: int, level: float) -> Level:
         """Return the Level at another level [m s-2], started from the motion at a known level."""
         sine = SineDrive(level, drive.segments[0].omega, drive.moving)
         return finder.curve_point(sine, points[number].near if number >= 0 else None).level
 
-    lost_ones = f"no steady motion was found at {len(said)} of {len(points)} drive levels; at the first of them: "
-    notes = tuple(f"{lost_ones}{one}" for one in said[:1])
+    lost_ones = f"no steady motion was found at {len(failures)} of {len(points)} drive levels; at the first of them: "
+    notes = tuple(f"{lost_ones}{one}" for one in failures[:1])
     return replace(
         best[0],
         extra=best[0].extra | {"curve": curve_columns(points), "at": best[1]},

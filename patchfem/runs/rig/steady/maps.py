@@ -85,8 +85,8 @@ class Maps(Followed):
         self.modes = model.rig.modes
         self.patch = patch
         self.frames = frames
-        self.found = self.elements(model, numerics, patch)
-        self.groups = self.found.groups
+        self.contact_elements = self.elements(model, numerics, patch)
+        self.groups = self.contact_elements.groups
 
     def repeating(self, drive, near) -> PeriodicMotion:
         """Return the PeriodicMotion under a sine."""
@@ -97,7 +97,7 @@ class Maps(Followed):
         begin = perf_counter()
         motion = self.repeating(drive, near)
         numerics = replace(self.numerics, cycles=2.0, window=1)
-        reader = PieceReader(self.model, numerics, self.patch, self.found)
+        reader = PieceReader(self.model, numerics, self.patch, self.contact_elements)
         run = histories.simulate(
             self.modes,
             drive,
@@ -158,7 +158,9 @@ class Maps(Followed):
             )
         waves = wave_measures(*map(float, run.reading.waves), find_max_acceleration(drive))
         values = _curve_measures(amplitude, run.acceleration, waves)
-        is_stuck = PieceReader(self.model, self.numerics, self.patch, self.found).sticks(run)
+        is_stuck = PieceReader(self.model, self.numerics, self.patch, self.contact_elements).sticks(
+            run
+        )
         return CurvePoint(
             drive=drive,
             values=values,

@@ -209,9 +209,9 @@ def solve_peak(points: list, folds, finder) -> Solution:
     places = np.array([point.drive.omega for point in points]) / (2 * np.pi)
     off = 0.0
     open_ones = dict.fromkeys(raw.values, 0.0)
-    for way in (-1, 1):
-        heights = y[best::way]
-        away = np.abs(places[best::way] - places[best])
+    for direction in (-1, 1):
+        heights = y[best::direction]
+        away = np.abs(places[best::direction] - places[best])
         if heights.size < 2:
             continue
         # points at which the largest amplitude cannot be
@@ -220,7 +220,7 @@ def solve_peak(points: list, folds, finder) -> Solution:
         far = float(away[: number + 1].max())
         near = min(far, float(away[1]) + SHIFT * error / height * _width(heights, away))
         off = max(off, near)
-        for name, gap in _gaps(finder, points[best + way * number], raw).items():
+        for name, gap in _gaps(finder, points[best + direction * number], raw).items():
             open_ones[name] = max(open_ones[name], gap * near / far if far else gap)
     open_ones[AMPLITUDE] = min(above, raw.values[AMPLITUDE]) + missed
     errors = {name: error + open_ones.get(name, 0.0) for name, error in errors.items()}
