@@ -9,9 +9,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import patchfem as pf
-from patchfem.runs.rig.steady import curves
 from patchfem.scene.starting import read_template
-from patchfem.structure.drives import SweepDrive
 
 LAWS = ("none", "coulomb", "elastic-plastic", "chain", "iwan", "bouc-wen")
 FIRST, COUNT = 71_000_000, 30
@@ -193,21 +191,3 @@ def test_always_the_steady_amplitude_of_a_run_holds_that_of_the_harmonic_balance
         else:
             told.append(abs(steady.value - truth.value) <= steady.error + truth.error)
     assert np.mean(told or [1]) >= (0.9 if len(told) > 9 else 1)
-
-
-def test_exact_the_coarser_curve_is_computed_near_the_peak():
-    """Down to 0.8 of the peak and a quarter of that way beyond; another peak of that height, or a short curve, is
-    searched as a whole."""
-    f = np.linspace(50, 250, 201)
-    curve = {"frequency": f, "amplitude": 1 / (1 + ((f - 140) / 10) ** 2)}
-    near = curves.sweep_around_peak(sweep := SweepDrive(50.0, 250.0, 10.0), curve, 140.0)
-    assert (near.low, near.high, near.duration) == pytest.approx(
-        (131.0, 149.0, 10.0)
-    ) and near.starts == curves.N_START_POINTS
-    back = curves.sweep_around_peak(
-        SweepDrive(250.0, 50.0, 10.0), {name: each[::-1] for name, each in curve.items()}, 140.0
-    )
-    assert (back.low, back.high) == pytest.approx((149.0, 131.0))
-    two = curve | {"amplitude": curve["amplitude"] + 0.85 / (1 + ((f - 220) / 5) ** 2)}
-    assert curves.sweep_around_peak(sweep, two, 140.0) is None
-    assert curves.sweep_around_peak(sweep, curve | {"amplitude": np.ones(201)}, 140.0) is None

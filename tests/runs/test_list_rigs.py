@@ -61,25 +61,14 @@ def drawn(rng) -> str:
     )
 
 
-def books(seed, count) -> list:
-    """(energy_balance, work_check, of stretch what is created over what passes, scene) of random rigs."""
-    rng = np.random.default_rng(seed)
-    out = []
-    for _ in range(count):
-        text = drawn(rng)
-        found = run(load(text), estimate=False)
-        value = {name: one.value for name, one in found.measures.items()}
-        passed = value["energy_dissipated"] + found.extra["book"]["power"]
-        created = value["energy_created"] / passed if '"stretch"' in text else 0.0
-        out.append((value["energy_balance"], value["work_check"], created, text))
-    return out
-
-
-def close(found) -> None:
-    for balance, check, created, text in found:
-        assert balance <= 1e-8 and created <= 1e-12, text
-        assert check <= 5e-3, text
-
-
 def test_always_both_books_of_6_random_rigs_close():
-    close(books(1, 6))
+    """Energy balance and friction work; with the reading "stretch" no energy is created."""
+    rng = np.random.default_rng(1)
+    for _ in range(6):
+        text = drawn(rng)
+        result = run(load(text), estimate=False)
+        values = {name: measure.value for name, measure in result.measures.items()}
+        assert values["energy_balance"] <= 1e-8 and values["work_check"] <= 5e-3, text
+        if '"stretch"' in text:
+            exchanged = values["energy_dissipated"] + result.extra["book"]["power"]
+            assert values["energy_created"] <= 1e-12 * exchanged, text
