@@ -454,19 +454,6 @@ def test_exact_a_mass_on_springs_beside_a_contact_is_told_as_its_mode():
     assert "its damping ratio" in only(BLOCK + COULOMB + SPRING + PUSH)
 
 
-def test_exact_what_the_message_says_is_the_same_rig():
-    """The mode that is named moves as the mass on the spring does, without friction."""
-    mode = ('[structure]\nmoving_mass = "3 kg"\n[[structure.mode]]\nname = "a"\nfrequency = "41.0936 Hz"\n'
-            'damping = 0.00775\nslide = 1.0\n')  # fmt: skip
-    ours, want = (
-        run(loads(text + PUSH, sets=["drive.cycles=1000"]))
-        .measures["relative_displacement_amplitude"]
-        .value
-        for text in (mode, SPRING + DAMPER)
-    )
-    assert ours == pytest.approx(want, rel=1e-4)
-
-
 @pytest.mark.parametrize("rest", ['masses = ["1 kg", "2 kg"]\n', 'moving_mass = "3 kg"\n'])
 def test_refuses_other_masses_beside_a_contact_by_the_same_way_out(rest):
     pair = "[1, 2]" if "masses" in rest else "[1, 0]"

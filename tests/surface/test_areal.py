@@ -24,17 +24,6 @@ def bumps(shape, missing=0.0, seed=5) -> np.ndarray:
     return np.where(rng.random(shape) < missing, np.nan, z)
 
 
-@pytest.mark.parametrize("missing", [0.0, 0.3])
-def test_exact_a_plane_is_taken_out_and_nothing_else(missing):
-    """A plane added to a levelled scan changes nothing."""
-    flat = level_plane(scan(bumps((31, 47), missing)))
-    tilted = scan(flat.z + 4e-5 + 0.02 * flat.x - 0.05 * flat.y[:, None])
-    again = level_plane(tilted)
-    assert np.array_equal(np.isnan(again.z), flat.missing)
-    assert np.nanmax(np.abs(again.z - flat.z)) < 1e-18
-    assert again.notes == ("one",) and not again.z.flags.writeable
-
-
 def test_exact_the_plane_of_a_dense_least_squares_solve():
     one = scan(bumps((13, 21), 0.4))
     rows, columns = np.nonzero(~one.missing)

@@ -112,19 +112,6 @@ def test_always_flanks_rougher_than_the_trace_before_are_not_unworn():
     assert find_flanks(before, replace(other, z=frozen_array(4 * (other.z - cut)))) is None
 
 
-def test_always_a_comparison_says_where_and_warns_of_the_wrong_order():
-    p = track("band", 90301, 2001)
-    found = compare_traces(p.before, p.after)
-    back = compare_traces(p.after, p.before)
-    assert not any("wrong order" in text for text in compose_verdict([found])[1])
-    assert any("wrong order" in text for text in compose_verdict([back])[1])
-    on = p.after.x[p.worn > 0]
-    values = found.values
-    assert values["worn_from_after"].value == pytest.approx(on[0], abs=2 * UM)
-    assert values["worn_to_before"].value == pytest.approx(on[-1] - p.shift, abs=2 * UM)
-    assert any("a track from x = " in text for text in compose_verdict([found])[1])
-
-
 def test_always_no_place_where_nothing_is_worn():
     p = pair(90302, share=0.0)
     assert compare_traces(p.before, p.after, shift=p.shift).worn.extent is None

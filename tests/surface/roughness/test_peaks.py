@@ -105,35 +105,6 @@ def test_exact_moments_of_known_sines():
             )
 
 
-def test_a_made_surface_has_the_peaks_of_its_traces():
-    """Moments of rows of a made surface against its spectrum, and its peaks, counted on the grid, against theirs."""
-    n = 768
-    step = 1.0
-    z = gaussian(n, step, (12.0, 60.0))
-    z /= z.std()
-    found = Moments(
-        *np.sqrt(
-            np.mean([np.square(trace_moments(trace_of(row, step)).fine) for row in z[::8]], axis=0)
-        )
-    )
-    power = np.abs(np.fft.fft2(z)) ** 2 / n**4
-    k = 2 * np.pi * np.fft.fftfreq(n, step)
-    truth = [np.sqrt(np.sum(power * (2 * np.sin(k / 2)) ** (2 * order))) for order in range(3)]
-    assert found == pytest.approx(truth, rel=0.05)
-    one = gaussian_peaks(Moments(*truth))
-    around = [
-        np.roll(z, shift, axis=(0, 1))
-        for shift in ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (1, -1), (-1, 1))
-    ]
-    top = (z > around).all(axis=0)
-    count = top.sum()
-    assert count / n**2 == pytest.approx(one.density, rel=4 / np.sqrt(count))
-    assert z[top].std() == pytest.approx(one.deviation, rel=4 / np.sqrt(2 * count))
-    bend = (4 * z - sum(around[:4]))[top].mean() / 2
-    # differences over a step of a twelfth of a wave
-    assert 1 / bend == pytest.approx(one.radius, rel=0.05)
-
-
 def test_exact_what_dust_is_left_out_of_a_table_and_what_dust_is_in_it_is_said():
     """Five grains of eight samples are left out, a sixth lower one is taken for the surface and makes its curvature."""
     step = 0.5e-6
