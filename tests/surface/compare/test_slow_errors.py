@@ -26,6 +26,7 @@ def errors_of_gap(gap, walk: float, seeds: range) -> np.ndarray:
     return np.array(errors)
 
 
+@pytest.mark.share(1, 2)
 @pytest.mark.parametrize(
     ("gap", "walk", "least"),
     [

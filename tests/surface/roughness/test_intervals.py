@@ -77,14 +77,6 @@ def test_always_intervals_by_degrees_of_freedom_hold_the_mean():
     assert set(found) == names and all(0.81 <= share <= 0.99 for share in found.values()), found
 
 
-@pytest.mark.slow
-def test_always_intervals_by_degrees_of_freedom_hold_the_mean_of_300():
-    """90 % within three deviations of the count, 0.05."""
-    names = {"Pq", "Rq", "Pdq", "Rdq", "band_amplitude"}
-    found = coverage(300, 4000, names)
-    assert set(found) == names and all(0.85 <= share <= 0.95 for share in found.values()), found
-
-
 def test_exact_degrees_of_freedom_of_white_noise():
     """n independent heights have n degrees of freedom, so Rq scatters by 1 / sqrt(2 n)."""
     n = 20_000

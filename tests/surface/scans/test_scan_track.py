@@ -6,7 +6,7 @@ from made_scans import aligned
 
 from patchfem.surface.areal import Areal
 from patchfem.surface.scans import change
-from patchfem.surface.scans.track import find_direction, measure_scan_track
+from patchfem.surface.scans.track import measure_scan_track
 
 CELL, COUNT = 1e-6, 260
 SIDE, WIDTH, DEPTH, RIDGE = CELL * (COUNT - 1), 60e-6, 0.5e-6, 20e-6  # RIDGE: base of the ridges
@@ -104,14 +104,6 @@ def test_always_what_is_no_track_says_why(kind):
     assert found.why and all(
         one.value is None and one.reason == found.why for one in found.values.values()
     )
-
-
-def test_exact_the_direction_of_a_rotated_track():
-    axis = CELL * np.arange(COUNT)
-    for angle in np.linspace(-1.5, 1.5, 7):
-        depth, _ = made(angle, 0.0)
-        found, coherence = find_direction(depth, depth > 0, axis, axis)
-        assert found == pytest.approx(angle, abs=0.01) and coherence > 0.9
 
 
 @pytest.mark.slow
