@@ -18,7 +18,7 @@ GAP_ROUND = 1e-9  # the same over the range of the gap, whose round-off limits t
 
 
 def press_to_approach_with_rotation(
-    asked, pieces: Compliance, gap, under, stiff: Compliance
+    patch_model, pieces: Compliance, gap, under, stiff: Compliance
 ) -> tuple:
     """Solve the contact under a prescribed approach with free rotation.
 
@@ -27,12 +27,12 @@ def press_to_approach_with_rotation(
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     pieces : Compliance
     gap : (m,) or (s, m)
         Unloaded gap [m], of strips (s, m).
     under : callable
-        Function (asked, pieces, gap) that solves the contact under the load of the model.
+        Function (patch_model, pieces, gap) that solves the contact under the load of the model.
     stiff : Compliance
         Pieces with their skin as under a large load.
 
@@ -51,16 +51,16 @@ def press_to_approach_with_rotation(
     """
     from scipy.optimize import brentq
 
-    refuse_opening(asked, stiff)
-    distance = asked.loading.approach
+    refuse_opening(patch_model, stiff)
+    distance = patch_model.loading.approach
     tried = []
-    least = _least_load(asked, np.ptp(pieces.interface.x))
+    least = _least_load(patch_model, np.ptp(pieces.interface.x))
 
     def short(log_load: float) -> float:
         """Return by how much the approach under least load + exp(log_load) [N] exceeds the distance."""
         # in excess of the least load: near it, the piece rotates ever faster until it tips over
         load = least + float(np.exp(log_load))
-        tried.append(under(asked.with_loading(load=load, approach=None), pieces, gap))
+        tried.append(under(patch_model.with_loading(load=load, approach=None), pieces, gap))
         return tried[-1][1].approach - distance
 
     top = np.log(max(distance, np.ptp(gap), 1e-12) / pieces.normal.mean())
@@ -73,7 +73,7 @@ def press_to_approach_with_rotation(
         top = top + 2
     while low == top or short(low) >= 0:
         if low == bottom:
-            apart = asked.with_loading(
+            apart = patch_model.with_loading(
                 load=0.0, approach=None, can_rotate=False, rotational_stiffness=0.0
             )
             pieces, still, skin, strips = under(apart, pieces, gap)
@@ -96,17 +96,17 @@ def press_to_approach_with_rotation(
     return best
 
 
-def _least_load(asked, length: float) -> float:
+def _least_load(patch_model, length: float) -> float:
     """Return the load [N] below which a free piece tips over under its moment."""
     tips = (
-        asked.loading.can_rotate
-        and asked.loading.line_moment
-        and asked.loading.rotational_stiffness == 0
+        patch_model.loading.can_rotate
+        and patch_model.loading.line_moment
+        and patch_model.loading.rotational_stiffness == 0
     )
-    return 2 * abs(asked.loading.line_moment) / length if tips else 0.0
+    return 2 * abs(patch_model.loading.line_moment) / length if tips else 0.0
 
 
-def refuse_opening(asked, pieces: Compliance) -> None:
+def refuse_opening(patch_model, pieces: Compliance) -> None:
     """Raise PatchfemError if a larger load on the load line opens the gap in the middle.
 
     Under large loads the shapes of the surfaces become irrelevant. The problem of flat pieces, also
@@ -117,27 +117,29 @@ def refuse_opening(asked, pieces: Compliance) -> None:
     foundation) this begins at a third of the length. A moment that does not increase with the load
     does not have this effect.
     """
-    if not asked.loading.can_rotate or not asked.loading.offset:
+    if not patch_model.loading.can_rotate or not patch_model.loading.offset:
         return
     flat = np.zeros(pieces.interface.x.size)
 
     def closing(offset: float) -> float:
         """Return the approach [m] of flat pieces that a load of 1 N presses at `offset` [m]."""
         return press(
-            pieces, flat, 1.0, float(offset), spring=asked.loading.rotational_stiffness
+            pieces, flat, 1.0, float(offset), spring=patch_model.loading.rotational_stiffness
         ).approach
 
-    if closing(asked.loading.offset) > 0:
+    if closing(patch_model.loading.offset) > 0:
         return
     from scipy.optimize import brentq
 
-    limit = brentq(closing, 0.0, asked.loading.offset, xtol=1e-4 * abs(asked.loading.offset))
-    holder = "raise" if asked.loading.rotational_stiffness > 0 else "name"
+    limit = brentq(
+        closing, 0.0, patch_model.loading.offset, xtol=1e-4 * abs(patch_model.loading.offset)
+    )
+    holder = "raise" if patch_model.loading.rotational_stiffness > 0 else "name"
     raise PatchfemError(
-        f"the line of the load lies {format_length(asked.loading.offset, 6)} off the middle; beyond "
+        f"the line of the load lies {format_length(patch_model.loading.offset, 6)} off the middle; beyond "
         f"{format_length(limit, 3)} a "
         "larger load opens the gap at the middle of the piece, so an approach of "
-        f"{format_length(asked.loading.approach, 6)} belongs to several loads or to none; lower "
+        f"{format_length(patch_model.loading.approach, 6)} belongs to several loads or to none; lower "
         f"contact.load_line.offset, {holder} contact.holder.rotational_stiffness, or give contact.load "
         "in place of the approach",
         "contact.approach.distance",

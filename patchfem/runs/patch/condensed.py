@@ -106,12 +106,12 @@ def load_compliance(body, piece, fresh: bool) -> InterfaceCompliance:
     return compliance
 
 
-def condense(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
+def condense(patch_model, grid, upper_grid=None, fresh: bool = False) -> Pair:
     """Assemble and condense the pieces of a `PatchModel`.
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     grid, upper_grid : TensorGrid or PieceMesh
         Meshes from `make_piece_meshes`; the upper one is None if the pieces are alike.
     fresh : bool
@@ -121,12 +121,14 @@ def condense(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     -------
     Pair
     """
-    width = asked.pieces.width * asked.pieces.pairs
+    width = patch_model.pieces.width * patch_model.pieces.pairs
     start = perf_counter()
-    piece = finite_elements(grid, make_elastic_layers(asked, asked.pieces.lower))
+    piece = finite_elements(grid, make_elastic_layers(patch_model, patch_model.pieces.lower))
     upper = piece
     if upper_grid is not None:
-        upper = finite_elements(upper_grid, make_elastic_layers(asked, asked.pieces.upper))
+        upper = finite_elements(
+            upper_grid, make_elastic_layers(patch_model, patch_model.pieces.upper)
+        )
     low = load_compliance(grid, piece, fresh)
     high = low if upper is piece else load_compliance(upper_grid, upper, fresh)
     joint = None
@@ -153,39 +155,41 @@ def condense(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     )
 
 
-def shared_pairs(asked) -> tuple:
+def shared_pairs(patch_model) -> tuple:
     """Return the condensed pieces (Pair) of every level of a `PatchModel` that has `meshes`."""
-    return tuple(shared_pair(asked, level) for level in range(len(asked.mesh.shared.levels)))
-
-
-def shared_pair(asked, level: int) -> Pair:
-    """Return the condensed pieces of one level of a `PatchModel` that has `meshes`."""
-    bodies = asked.mesh.shared.levels[level]
-    return store.reuse(
-        _pair_key(asked, asked.mesh.shared.name, level),
-        lambda: delete_factors(condense(asked, *bodies)),
+    return tuple(
+        shared_pair(patch_model, level) for level in range(len(patch_model.mesh.shared.levels))
     )
 
 
-def keep_pairs(asked, meshes, pairs) -> None:
+def shared_pair(patch_model, level: int) -> Pair:
+    """Return the condensed pieces of one level of a `PatchModel` that has `meshes`."""
+    bodies = patch_model.mesh.shared.levels[level]
+    return store.reuse(
+        _pair_key(patch_model, patch_model.mesh.shared.name, level),
+        lambda: delete_factors(condense(patch_model, *bodies)),
+    )
+
+
+def keep_pairs(patch_model, meshes, pairs) -> None:
     """Keep condensed pieces (Pair, level by level) of new shared meshes for `shared_pair`.
 
-    asked: one of the patches that share the meshes.
+    patch_model: one of the patches that share the meshes.
     """
     for level, pair in enumerate(pairs):
-        store.keep(_pair_key(asked, meshes.name, level), delete_factors(pair))
+        store.keep(_pair_key(patch_model, meshes.name, level), delete_factors(pair))
 
 
-def _pair_key(asked, name: str, level: int) -> tuple:
+def _pair_key(patch_model, name: str, level: int) -> tuple:
     """Return the key of the condensed pieces of a `PatchModel` on one level of named meshes."""
     return (
         "pair",
         name,
         level,
-        asked.pieces.lower,
-        asked.pieces.upper,
-        asked.pieces.plane,
-        asked.pieces.width * asked.pieces.pairs,
+        patch_model.pieces.lower,
+        patch_model.pieces.upper,
+        patch_model.pieces.plane,
+        patch_model.pieces.width * patch_model.pieces.pairs,
     )
 
 
@@ -200,17 +204,19 @@ def delete_factors(pair: Pair) -> Pair:
     return pair
 
 
-def pair_on_same_meshes(asked, pair: Pair) -> Pair:
+def pair_on_same_meshes(patch_model, pair: Pair) -> Pair:
     """Return the pieces of a `PatchModel` condensed on the meshes of another Pair.
 
     Shared pieces are reused if the meshes are shared.
     """
-    for k, level in enumerate(() if asked.mesh.shared is None else asked.mesh.shared.levels):
+    for k, level in enumerate(
+        () if patch_model.mesh.shared is None else patch_model.mesh.shared.levels
+    ):
         if np.array_equal(level[0].x, pair.grid.x) and (level[1] is None) == (
             pair.upper is pair.piece
         ):
-            return shared_pair(asked, k)
-    return condense(asked, pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
+            return shared_pair(patch_model, k)
+    return condense(patch_model, pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
 
 
 def _rise(body, x) -> np.ndarray:

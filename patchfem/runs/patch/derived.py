@@ -9,20 +9,20 @@ from .measures import measures, plane_band
 from .press import Patch
 
 
-def static_measures(asked, patch: Patch, coarse, tolerance: float | None) -> dict:
+def static_measures(patch_model, patch: Patch, coarse, tolerance: float | None) -> dict:
     """Return the static measures of a patch with errors (see `measures.measures`).
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     patch : Patch
     coarse : sequence of Patch or None
         The patch on coarser meshes, fine to coarse.
     tolerance : float or None
         Tolerance that chose the mesh; None for a given mesh.
     """
-    if asked.solved is not None:
-        return asked.solved.measures
+    if patch_model.solved is not None:
+        return patch_model.solved.measures
     coarse = tuple(coarse)
 
     def make() -> dict:
@@ -31,15 +31,15 @@ def static_measures(asked, patch: Patch, coarse, tolerance: float | None) -> dic
 
     return (
         store.reuse(("measures", patch, coarse, tolerance), make)
-        if store.may_be_shared(asked)
+        if store.may_be_shared(patch_model)
         else make()
     )
 
 
-def plane_notes(asked, patch: Patch) -> list:
+def plane_notes(patch_model, patch: Patch) -> list:
     """Return the note on the plane state of a patch (`measures.plane_band`), as a list."""
-    if asked.solved is not None:
-        return asked.solved.band
-    if not store.may_be_shared(asked):
-        return plane_band(asked, patch)
-    return store.reuse(("plane band", patch), lambda: plane_band(asked, patch))
+    if patch_model.solved is not None:
+        return patch_model.solved.band
+    if not store.may_be_shared(patch_model):
+        return plane_band(patch_model, patch)
+    return store.reuse(("plane band", patch), lambda: plane_band(patch_model, patch))

@@ -89,11 +89,11 @@ def press_on_meshes(one, tolerance: float) -> tuple:
     PatchfemError
         With the key of the interface at fault.
     """
-    asked = one.patch
-    files = asked.mesh.file is not None or asked.gap.profile is not None
-    key = ("face", asked if files else store.content_key(asked), tolerance)
+    patch_model = one.patch
+    files = patch_model.mesh.file is not None or patch_model.gap.profile is not None
+    key = ("face", patch_model if files else store.content_key(patch_model), tolerance)
     try:
-        return store.reuse(key, lambda: result.solve_all(asked, tolerance))
+        return store.reuse(key, lambda: result.solve_all(patch_model, tolerance))
     except PatchfemError as error:
         error.key = error.key and f"{one.key}.{error.key}"
         raise

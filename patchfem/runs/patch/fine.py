@@ -84,45 +84,47 @@ class PointLevel(NamedTuple):
     cornered: bool
 
 
-def takes_points(asked) -> bool:
+def takes_points(patch_model) -> bool:
     """Return whether a `PatchModel` can be solved on equally spaced points.
 
     These are bare pieces of equal length with a profile, under a load, or under an approach without
     rotation.
     """
-    loading = asked.loading
+    loading = patch_model.loading
     can_turn = loading.can_rotate or loading.rotational_stiffness > 0
     held = loading.approach is None or not can_turn
     return (
-        asked.mesh.is_automatic
-        and asked.gap.profile is not None
-        and asked.interface.skin is None
-        and asked.interface.strips is None
-        and not asked.pieces.has_overhang
-        and asked.mesh.edge_motion != "wear"
+        patch_model.mesh.is_automatic
+        and patch_model.gap.profile is not None
+        and patch_model.interface.skin is None
+        and patch_model.interface.strips is None
+        and not patch_model.pieces.has_overhang
+        and patch_model.mesh.edge_motion != "wear"
         and held
     )
 
 
-def solve_on_points(asked, enough) -> PointSolution:
+def solve_on_points(patch_model, enough) -> PointSolution:
     """Solve a `PatchModel` on an increasing number of points.
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     enough : callable
         Function of the measures that ends the refinement; MAX_POINTS and MAX_WORK end it as well.
     """
-    count = _first_level_points(asked)
+    count = _first_level_points(patch_model)
     series = []
     found = {}
     with one_thread():
         try:
-            cells = [_ends(asked, level) for level in range(MIN_LEVELS)]
-            coarse = [_level(asked, ends, count, None) for ends in cells]
+            cells = [_ends(patch_model, level) for level in range(MIN_LEVELS)]
+            coarse = [_level(patch_model, ends, count, None) for ends in cells]
             series = coarse[-1:]
             while len(series) < MIN_LEVELS or not (enough(found) or _is_expensive(series[-1])):
-                series.append(_level(asked, cells[-1], 2 * series[-1].force.size, series[-1].force))
+                series.append(
+                    _level(patch_model, cells[-1], 2 * series[-1].force.size, series[-1].force)
+                )
                 found = _add_series(coarse, series) if len(series) >= MIN_LEVELS else {}
         except (NotConverged, np.linalg.LinAlgError):
             pass
@@ -133,9 +135,9 @@ def solve_on_points(asked, enough) -> PointSolution:
     )
 
 
-def _first_level_points(asked) -> int:
+def _first_level_points(patch_model) -> int:
     """Return the number of points of the first level."""
-    n_samples = asked.pieces.length / profile.find_sample_spacing(asked.gap.profile)
+    n_samples = patch_model.pieces.length / profile.find_sample_spacing(patch_model.gap.profile)
     return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))
 
 
@@ -163,12 +165,12 @@ def _add_series(coarse: list, series: list) -> dict:
     }
 
 
-def _ends(asked, level: int) -> list:
+def _ends(patch_model, level: int) -> list:
     """Return the change of compliance due to the free ends of the pieces, on the cells of a level.
 
     Returns positions (k,) [m] and changes (2, k, k) [m2/N] for pressure and for shear.
     """
-    length = asked.pieces.length
+    length = patch_model.pieces.length
     sides = (-0.5, 0.5)
     layout = Layout(
         -length / 2,
@@ -181,41 +183,45 @@ def _ends(asked, level: int) -> list:
     ).scale_cells(0.5**level)
     places = divide_into_columns(layout)
     changes = 0.0
-    for piece, share in _bodies(asked):
+    for piece, share in _bodies(patch_model):
         depth, coated = _rows(piece, layout)
         changes = changes + share * np.array(
-            end_compliance(make_piece(places, depth, coated, make_elastic_layers(asked, piece)))
+            end_compliance(
+                make_piece(places, depth, coated, make_elastic_layers(patch_model, piece))
+            )
         )
     return places, changes
 
 
-def _bodies(asked) -> list:
+def _bodies(patch_model) -> list:
     """Return (piece, multiplicity) for the distinct pieces."""
-    pieces = asked.pieces
+    pieces = patch_model.pieces
     return [(pieces.upper, 2)] if pieces.are_alike else [(pieces.lower, 1), (pieces.upper, 1)]
 
 
-def operators(asked, ends: tuple, count: int) -> tuple:
+def operators(patch_model, ends: tuple, count: int) -> tuple:
     """Return the PointCompliance for pressure and for shear of equally spaced points.
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     ends : tuple
         Change of compliance by the free ends of the pieces, from `_ends`.
     count : int
         Number of points.
     """
-    length = asked.pieces.length
-    width = asked.pieces.width * asked.pieces.pairs
+    length = patch_model.pieces.length
+    width = patch_model.pieces.width * patch_model.pieces.pairs
     x = ((np.arange(count) + 0.5) / count - 0.5) * length
     k = np.arange(count) * np.pi / length
     waves = sum(
         share
         * np.array(
-            layer_compliance(k, piece.height, piece.thickness, make_elastic_layers(asked, piece))
+            layer_compliance(
+                k, piece.height, piece.thickness, make_elastic_layers(patch_model, piece)
+            )
         )
-        for piece, share in _bodies(asked)
+        for piece, share in _bodies(patch_model)
     )
     out = []
     for wave, change in zip(waves, ends[1]):
@@ -240,16 +246,18 @@ def _rows(piece, layout: Layout) -> tuple:
     )
 
 
-def _level(asked, ends: tuple, count: int, start) -> PointLevel:
+def _level(patch_model, ends: tuple, count: int, start) -> PointLevel:
     """Solve the contact on `count` points.
 
     start: forces (n,) [N] of the level with half as many points, or None.
     """
-    normal, shear = operators(asked, ends, count)
+    normal, shear = operators(patch_model, ends, count)
     x = normal.x
-    between = np.linspace(-asked.pieces.length / 2, asked.pieces.length / 2, 2 * count + 1)
-    gap = asked.gap.evaluate(between).heights[1::2]
-    force, closing, theta, work = _solve_forces(asked, normal, gap, start)
+    between = np.linspace(
+        -patch_model.pieces.length / 2, patch_model.pieces.length / 2, 2 * count + 1
+    )
+    gap = patch_model.gap.evaluate(between).heights[1::2]
+    force, closing, theta, work = _solve_forces(patch_model, normal, gap, start)
     moved = normal.product(force)
     opening = gap + theta * x - closing + moved
     touches = force > 0
@@ -259,16 +267,16 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
         )
     opening = np.where(touches, 0.0, np.maximum(opening, 0.0))
     surface = Surface(x, np.full(count, normal.area), force / normal.area, opening, gap)
-    values, found, stretches = _values(asked, (normal, shear), force, opening)
-    values |= {"approach": closing, "rotation": asked.gap.angle + theta}
-    cell = asked.pieces.length / count
+    values, found, stretches = _values(patch_model, (normal, shear), force, opening)
+    values |= {"approach": closing, "rotation": patch_model.gap.angle + theta}
+    cell = patch_model.pieces.length / count
     hidden = Hidden(
-        asked.pieces.length,
+        patch_model.pieces.length,
         int(touches.sum()),
         cell * bool(found),
         cell * len(found),
         OFFSET,
-        asked.loading.moment is not None,
+        patch_model.loading.moment is not None,
         float(np.ptp(gap) + np.abs(moved).max()),
         0.0,
         0.0,
@@ -278,7 +286,7 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
     return PointLevel(force, surface, stretches, values, hidden, work, bool(cornered))
 
 
-def _solve_forces(asked, normal: PointCompliance, gap, start) -> tuple:
+def _solve_forces(patch_model, normal: PointCompliance, gap, start) -> tuple:
     """Solve for the forces of a level.
 
     Returns forces (n,) [N], approach [m], rotation [rad] in addition to that in the gap, and
@@ -286,18 +294,18 @@ def _solve_forces(asked, normal: PointCompliance, gap, start) -> tuple:
     """
     x = normal.x
     begin = None if start is None else np.repeat(start, 2) / 2
-    low = gap.min() if asked.loading.approach is None else asked.loading.approach
-    moment = None if asked.loading.approach is not None else asked.loading.moment
-    load = asked.loading.load if asked.loading.approach is None else None
+    low = gap.min() if patch_model.loading.approach is None else patch_model.loading.approach
+    moment = None if patch_model.loading.approach is not None else patch_model.loading.moment
+    load = patch_model.loading.load if patch_model.loading.approach is None else None
     force, count = solve_by_gradients(
         normal,
-        patch_problem(x, gap - low, load, moment, asked.loading.rotational_stiffness),
+        patch_problem(x, gap - low, load, moment, patch_model.loading.rotational_stiffness),
         CONTACT_TOL,
         MAX_ITERATIONS,
         begin,
     )
     touches = force > 0
-    if asked.loading.approach is not None or not touches.any():
+    if patch_model.loading.approach is not None or not touches.any():
         return force, float(low), 0.0, count
     depth = (gap + normal.product(force))[touches]
     if moment is None:
@@ -308,7 +316,7 @@ def _solve_forces(asked, normal: PointCompliance, gap, start) -> tuple:
     return force, float(depth.mean() - lean * middle), -lean, count
 
 
-def _values(asked, both: tuple, force, gap) -> tuple:
+def _values(patch_model, both: tuple, force, gap) -> tuple:
     """Return the measures except approach and rotation, the ends of the contact, and its parts.
 
     The parts are (k, 2) [m].
@@ -323,7 +331,7 @@ def _values(asked, both: tuple, force, gap) -> tuple:
     bears = np.concatenate([[False], touches, [False]])
     edges = iter(found)
     places = [
-        next(edges).position if 0 < at < x.size else (at / x.size - 0.5) * asked.pieces.length
+        next(edges).position if 0 < at < x.size else (at / x.size - 0.5) * patch_model.pieces.length
         for at in np.flatnonzero(bears[1:] != bears[:-1])
     ]
     stretches = np.array(places).reshape(-1, 2)
@@ -335,7 +343,7 @@ def _values(asked, both: tuple, force, gap) -> tuple:
     moment = float(force @ x)
     out = {
         "normal_load": load,
-        "contact_fraction": float(long.sum()) / asked.pieces.length,
+        "contact_fraction": float(long.sum()) / patch_model.pieces.length,
         "pressure_peak": peak,
         "moment": moment,
         "contact_half_width": float(places[-1] - places[0]) / 2,
@@ -344,6 +352,6 @@ def _values(asked, both: tuple, force, gap) -> tuple:
         "normal_stiffness": set_stiffness(normal, touches, one, found),
         "rotational_stiffness": set_stiffness(normal, touches, x, found),
     }
-    if asked.pieces.are_alike:
+    if patch_model.pieces.are_alike:
         out["tangential_stiffness"] = set_stiffness(shear, touches, one, found)
     return out, found, stretches

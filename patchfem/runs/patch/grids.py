@@ -86,23 +86,25 @@ class ContactExtent:
         return self.span[1] - self.span[0]
 
 
-def search_pair(asked) -> Pair:
+def search_pair(patch_model) -> Pair:
     """Return the pieces on the columns of the first search for a contact.
 
     Patches of the same geometry share them.
     """
-    layout = search_layout(asked)
+    layout = search_layout(patch_model)
     key = (
         "search",
         layout,
-        asked.pieces.lower,
-        asked.pieces.upper,
-        asked.pieces.plane,
-        asked.pieces.width * asked.pieces.pairs,
-        asked.mesh.is_static,
-        asked.gap.jumps,
+        patch_model.pieces.lower,
+        patch_model.pieces.upper,
+        patch_model.pieces.plane,
+        patch_model.pieces.width * patch_model.pieces.pairs,
+        patch_model.mesh.is_static,
+        patch_model.gap.jumps,
     )
-    return store.reuse(key, lambda: delete_factors(condense(asked, *make_grids(asked, layout))))
+    return store.reuse(
+        key, lambda: delete_factors(condense(patch_model, *make_grids(patch_model, layout)))
+    )
 
 
 class BaseGrids(NamedTuple):
@@ -115,17 +117,17 @@ class BaseGrids(NamedTuple):
     contact: ContactExtent | None
 
 
-def base_grids(asked) -> BaseGrids:
+def base_grids(patch_model) -> BaseGrids:
     """Return the coarsest grids of a `PatchModel`, graded to the contact that is found on them.
 
     The result is kept, because the plan of a run and the run itself need the same grids.
     """
-    has_files = asked.mesh.file is not None or asked.gap.profile is not None
-    key = ("base grids", asked if has_files else store.content_key(asked))
-    return store.reuse(key, lambda: _search_grids(asked))
+    has_files = patch_model.mesh.file is not None or patch_model.gap.profile is not None
+    key = ("base grids", patch_model if has_files else store.content_key(patch_model))
+    return store.reuse(key, lambda: _search_grids(patch_model))
 
 
-def _search_grids(asked) -> BaseGrids:
+def _search_grids(patch_model) -> BaseGrids:
     """Search for the contact of a `PatchModel` on columns graded to the result of the last search.
 
     If a varying load moves the edges of the contact, the columns are fine wherever the edges lie
@@ -133,27 +135,32 @@ def _search_grids(asked) -> BaseGrids:
     interface.
     """
     sweep = []
-    if asked.mesh.edge_motion == "load" and asked.loading.load is not None:
-        sweep = [asked.with_loading(load=share * asked.loading.load) for share in SWING]
-    layout = search_layout(asked)
+    if patch_model.mesh.edge_motion == "load" and patch_model.loading.load is not None:
+        sweep = [patch_model.with_loading(load=share * patch_model.loading.load) for share in SWING]
+    layout = search_layout(patch_model)
     contact = None
     # without a load there is no contact to search for
-    for search in range(MAX_SEARCHES if asked.nominal_load > 0 else 0):
-        pair = condense(asked, *make_grids(asked, layout)) if search else search_pair(asked)
+    for search in range(MAX_SEARCHES if patch_model.nominal_load > 0 else 0):
+        pair = (
+            condense(patch_model, *make_grids(patch_model, layout))
+            if search
+            else search_pair(patch_model)
+        )
         x = pair.grid.x
         seen = [
-            contact_extent(press_patch(each, pair), asked.mesh.slip) for each in (asked, *sweep)
+            contact_extent(press_patch(each, pair), patch_model.mesh.slip)
+            for each in (patch_model, *sweep)
         ]
         contact = seen[0]
         last = layout
-        layout = find_layout(asked, seen)
+        layout = find_layout(patch_model, seen)
         cells = max(one.cell / one.wide for one in seen)
-        shows = _shows_crests(asked, x, layout) and _shows_slip(contact.slip_zones, x, layout)
-        if cells <= 1 / (EDGE_CELLS[asked.mesh.is_static] - 1) and shows:
+        shows = _shows_crests(patch_model, x, layout) and _shows_slip(contact.slip_zones, x, layout)
+        if cells <= 1 / (EDGE_CELLS[patch_model.mesh.is_static] - 1) and shows:
             break
         if _is_settled(layout, last):
             break
-    return BaseGrids(make_grids(asked, layout), contact)
+    return BaseGrids(make_grids(patch_model, layout), contact)
 
 
 def _is_settled(layout: Layout, last: Layout) -> bool:
@@ -180,64 +187,64 @@ def _shows_slip(zones: tuple, x, layout: Layout) -> bool:
     return True
 
 
-def _shows_crests(asked, x, layout: Layout) -> bool:
+def _shows_crests(patch_model, x, layout: Layout) -> bool:
     """Return whether columns x (k,) [m] are short enough for a pressure over waves.
 
     The limit is twice the cells of a layout.
     """
-    if _longest(asked) == np.inf or x.size > MAX_COLUMNS:
+    if _longest(patch_model) == np.inf or x.size > MAX_COLUMNS:
         return True
     return bool((np.diff(x) <= 2 * layout.cell_lengths((x[1:] + x[:-1]) / 2)).all())
 
 
-def _longest(asked) -> float:
+def _longest(patch_model) -> float:
     """Return the longest cell [m] that resolves the waves of profile and shapes; else inf."""
     return min(
-        asked.gap.wave / WAVE_CELLS,
-        np.inf if asked.gap.profile is None else asked.uniform_element_size,
+        patch_model.gap.wave / WAVE_CELLS,
+        np.inf if patch_model.gap.profile is None else patch_model.uniform_element_size,
     )
 
 
-def search_layout(asked) -> Layout:
+def search_layout(patch_model) -> Layout:
     """Return equal columns on which a contact is searched for."""
-    half = asked.pieces.length / 2
-    cell = min(asked.pieces.length / SEARCH_CELLS, _longest(asked))
+    half = patch_model.pieces.length / 2
+    cell = min(patch_model.pieces.length / SEARCH_CELLS, _longest(patch_model))
     return Layout(-half, half, (), (-half, half), cell, cell, 0.0)
 
 
-def find_layout(asked, seen: list) -> Layout:
+def find_layout(patch_model, seen: list) -> Layout:
     """Return the columns of the coarsest mesh, graded towards the ends of some contacts.
 
     seen: ContactExtents, of one patch under several loads or of several patches.
     """
-    length = asked.pieces.length
+    length = patch_model.pieces.length
     half = length / 2
     span = (min(one.span[0] for one in seen), max(one.span[1] for one in seen))
     wide = min(one.wide for one in seen)
-    thick = _coating(asked)
+    thick = _coating(patch_model)
     # the third mesh, whose cells are a quarter as long, has to resolve the waves
-    most = min(length / 12, 4 * _longest(asked))
+    most = min(length / 12, 4 * _longest(patch_model))
     if max(len(one.places) for one in seen) > MAX_PLACES:
         return Layout(-half, half, (), span, *(2 * [min(length / 64, most)]), 0.0)
-    if asked.mesh.edge_motion == "wear":
+    if patch_model.mesh.edge_motion == "wear":
         most = min(most, length * WEAR_CELL)
     inside = min(wide / 6, length / 24, most)
     # a contact of one or two nodes is searched again with shorter cells
     along = NODE_CELLS
     if np.isfinite(max(one.cell for one in seen)):
-        along = EDGE_CELLS[asked.mesh.is_static]
+        along = EDGE_CELLS[patch_model.mesh.is_static]
     # a band that an edge sweeps would have many cells, and each is a different contact set
-    fine = thick / 4 if thick and asked.mesh.edge_motion != "load" else np.inf
+    fine = thick / 4 if thick and patch_model.mesh.edge_motion != "load" else np.inf
     least = max(min(wide / along, fine), MIN_CELL * length)
     bands = _bands([one.places for one in seen], least)
     # a jump of the gap is a node; quantities that depend on it converge with the first power of its
     # cell
-    bands += tuple((place, place, least / STEP_CELLS) for place in asked.gap.jumps)
-    known, fall = find_rounded_edges(asked)
+    bands += tuple((place, place, least / STEP_CELLS) for place in patch_model.gap.jumps)
+    known, fall = find_rounded_edges(patch_model)
     near = [place for place in known if span[0] - least <= place <= span[1] + least]
     bands += tuple((place, place, min(least, fall / 4)) for place in near)
-    sharp = STEP_CELLS if asked.has_singular_ends else 1
-    if _longest(asked) < np.inf:
+    sharp = STEP_CELLS if patch_model.has_singular_ends else 1
+    if _longest(patch_model) < np.inf:
         crests = [crest for contact in seen for crest in contact.crests]
         bands += tuple(
             (place, place, max(half / CREST_CELLS, least / STEP_CELLS)) for place, half in crests
@@ -248,16 +255,18 @@ def find_layout(asked, seen: list) -> Layout:
         for low, high in one.slip_zones
     )
     corner = max(
-        min(thick / 16 if thick else np.inf, wide / EDGE_CELLS[asked.mesh.is_static] / sharp),
+        min(thick / 16 if thick else np.inf, wide / EDGE_CELLS[patch_model.mesh.is_static] / sharp),
         MIN_CELL * length,
     )
     ends = {place for one in seen for place in one.corners}
     bands += tuple((place, place, corner) for place in sorted(ends))
     # the far corners, where a free side meets the holder, have singular stresses
     bands += tuple(
-        (side * half, side * half, min(asked.pieces.height, length) / 20) for side in (-1, 1)
+        (side * half, side * half, min(patch_model.pieces.height, length) / 20) for side in (-1, 1)
     )
-    return Layout(-half, half, bands, span, max(inside, least), most, SLOPE[asked.mesh.is_static])
+    return Layout(
+        -half, half, bands, span, max(inside, least), most, SLOPE[patch_model.mesh.is_static]
+    )
 
 
 def _bands(places: list, least: float) -> tuple:
@@ -271,10 +280,14 @@ def _bands(places: list, least: float) -> tuple:
     return tuple((place, place, least) for each in places for place in each)
 
 
-def _coating(asked) -> float:
+def _coating(patch_model) -> float:
     """Return the thickness [m] of the thinner coating; 0 without a coating."""
     return min(
-        (piece.thickness for piece in (asked.pieces.lower, asked.pieces.upper) if piece.thickness),
+        (
+            piece.thickness
+            for piece in (patch_model.pieces.lower, patch_model.pieces.upper)
+            if piece.thickness
+        ),
         default=0.0,
     )
 
@@ -341,28 +354,33 @@ def _crests(x, sigma) -> tuple:
     return tuple(zip(x[top + 1].tolist(), wide.tolist())) if top.size <= MAX_PLACES else ()
 
 
-def make_grids(asked, layout: Layout) -> list:
+def make_grids(patch_model, layout: Layout) -> list:
     """Return the grids of the pieces with the columns of a layout; one grid if they are alike."""
-    pieces = (asked.pieces.lower, asked.pieces.upper)
-    if asked.pieces.are_alike:
+    pieces = (patch_model.pieces.lower, patch_model.pieces.upper)
+    if patch_model.pieces.are_alike:
         pieces = pieces[:1]
-    x = make_columns(asked, layout)
+    x = make_columns(patch_model, layout)
     return [
-        extend_grid(asked, piece, grid_on(asked, x, piece), 1 + SLOPE[asked.mesh.is_static])
+        extend_grid(
+            patch_model,
+            piece,
+            grid_on(patch_model, x, piece),
+            1 + SLOPE[patch_model.mesh.is_static],
+        )
         for piece in pieces
     ]
 
 
-def make_columns(asked, layout: Layout) -> np.ndarray:
+def make_columns(patch_model, layout: Layout) -> np.ndarray:
     """Return the columns (k,) [m] of a layout, at most MAX_COLUMNS."""
-    x = divide_into_columns(layout, asked.gap.jumps)
+    x = divide_into_columns(layout, patch_model.gap.jumps)
     while x.size > MAX_COLUMNS + 1 and layout.bands:
         layout = layout.scale_cells(x.size / MAX_COLUMNS)
-        x = divide_into_columns(layout, asked.gap.jumps)
+        x = divide_into_columns(layout, patch_model.gap.jumps)
     return x
 
 
-def grid_on(asked, x, piece) -> TensorGrid:
+def grid_on(patch_model, x, piece) -> TensorGrid:
     """Return the grid of one piece on columns x (k,) [m].
 
     Its rows are as fine as the columns at the interface, at the inner face of the coating and at
@@ -373,11 +391,13 @@ def grid_on(asked, x, piece) -> TensorGrid:
     top = float(np.diff(x).min())
     # a row is at most a tenth of the length; in a piece taller than this it may be 1/24 of the
     # height, and never more than 1/6 of it
-    cap = min(max(asked.pieces.length / 10, height / 24), height / 6)
-    bands = [(0.0, 0.0, top), (height, height, min(height, asked.pieces.length) / 60)]
+    cap = min(max(patch_model.pieces.length / 10, height / 24), height / 6)
+    bands = [(0.0, 0.0, top), (height, height, min(height, patch_model.pieces.length) / 60)]
     if thick:
         bands.append((thick, thick, max(thick / 4, top)))
-    layout = Layout(0.0, height, tuple(bands), (0.0, height), cap, cap, SLOPE[asked.mesh.is_static])
+    layout = Layout(
+        0.0, height, tuple(bands), (0.0, height), cap, cap, SLOPE[patch_model.mesh.is_static]
+    )
     depth, coated = divide_into_rows(layout, thick)
     return TensorGrid(frozen_array(x), depth, coated)
 

@@ -22,18 +22,18 @@ TOL_OF_SECONDS = 1e-3
 MAX_DECADES = 6  # decades of the tolerance that are searched for one that needs a finer mesh
 
 
-def solve_split(asked, level: int, estimate: bool) -> tuple:
+def solve_split(patch_model, level: int, estimate: bool) -> tuple:
     """Solve a patch on the mesh of its file with every edge halved `level` times.
 
     The coarser patches are those of `solve_all`.
     """
-    low, high = make_piece_meshes(asked)
+    low, high = make_piece_meshes(patch_model)
     for _ in range(level):
         low, high = (None if body is None else body.refine() for body in (low, high))
-    return _with_coarser(asked, low, high, estimate, True)
+    return _with_coarser(patch_model, low, high, estimate, True)
 
 
-def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
+def solve_all(patch_model, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
     """Solve a patch on its mesh and on coarser ones.
 
     A patch without a prescribed element size is solved on a ladder of nested meshes until it meets
@@ -43,7 +43,7 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     tolerance : float
     estimate : bool
         Whether the coarser meshes are solved as well.
@@ -55,39 +55,48 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
     tuple
         Patches, fine to coarse, at least two; None for each that is not solved.
     """
-    if asked.solved is not None and not fresh:
-        return asked.solved.patches
-    if asked.mesh.shared is not None:
+    if patch_model.solved is not None and not fresh:
+        return patch_model.solved.patches
+    if patch_model.mesh.shared is not None:
         if fresh:
             return solve_on_pairs(
-                asked,
-                [condense(asked, *level, fresh=True) for level in asked.mesh.shared.levels],
+                patch_model,
+                [
+                    condense(patch_model, *level, fresh=True)
+                    for level in patch_model.mesh.shared.levels
+                ],
                 estimate,
             )
-        if store.may_be_shared(asked):
+        if store.may_be_shared(patch_model):
             return store.reuse(
-                ("patches", store.content_key(asked), estimate),
-                lambda: solve_on_pairs(asked, shared_pairs(asked), estimate),
+                ("patches", store.content_key(patch_model), estimate),
+                lambda: solve_on_pairs(patch_model, shared_pairs(patch_model), estimate),
             )
-        found = solve_on_pairs(asked, shared_pairs(asked), estimate)
-        if estimate and _misses_trace(asked, found, asked.mesh.tolerance or tolerance):
-            return solve_on_ladder(asked.with_mesh(shared=None), asked.mesh.tolerance or tolerance)
+        found = solve_on_pairs(patch_model, shared_pairs(patch_model), estimate)
+        if estimate and _misses_trace(patch_model, found, patch_model.mesh.tolerance or tolerance):
+            return solve_on_ladder(
+                patch_model.with_mesh(shared=None), patch_model.mesh.tolerance or tolerance
+            )
         return found
-    if asked.mesh.is_automatic:
-        return solve_on_ladder(asked, asked.mesh.tolerance or tolerance, estimate, fresh)
-    return _with_coarser(asked, *make_piece_meshes(asked), estimate, fresh)
+    if patch_model.mesh.is_automatic:
+        return solve_on_ladder(
+            patch_model, patch_model.mesh.tolerance or tolerance, estimate, fresh
+        )
+    return _with_coarser(patch_model, *make_piece_meshes(patch_model), estimate, fresh)
 
 
-def _misses_trace(asked, patches: tuple, tolerance: float) -> bool:
+def _misses_trace(patch_model, patches: tuple, tolerance: float) -> bool:
     """Return whether a patch with a profile misses its tolerance on shared meshes."""
-    if not asked.mesh.is_automatic or asked.gap.profile is None or patches[1] is None:
+    if not patch_model.mesh.is_automatic or patch_model.gap.profile is None or patches[1] is None:
         return False
     return not is_within_tolerance(measures(*patches, tolerance=tolerance), tolerance)
 
 
-def solve_on_pairs(asked, pairs, estimate: bool = True) -> tuple:
+def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
     """Solve a patch on condensed pieces, from fine to coarse (see `solve_all`)."""
-    return _pad_to_three(press_patch(asked, pair) for pair in pairs[: None if estimate else 1])
+    return _pad_to_three(
+        press_patch(patch_model, pair) for pair in pairs[: None if estimate else 1]
+    )
 
 
 def _pad_to_three(patches) -> tuple:
@@ -96,18 +105,18 @@ def _pad_to_three(patches) -> tuple:
     return out + (None,) * (3 - len(out))
 
 
-def _with_coarser(asked, low, high, estimate: bool, fresh: bool) -> tuple:
+def _with_coarser(patch_model, low, high, estimate: bool, fresh: bool) -> tuple:
     """Solve a patch on given bodies and on coarser ones (see `solve_all`)."""
     found = [(low, high), *(comparison_meshes(low, high) if estimate else ())]
-    return _pad_to_three(solve(asked, *level, fresh) for level in found)
+    return _pad_to_three(solve(patch_model, *level, fresh) for level in found)
 
 
-def meshes_of_file(asked) -> list:
+def meshes_of_file(patch_model) -> list:
     """Return the meshes of a patch whose elements are prescribed or come from a file.
 
     The order is that of `solve_all`.
     """
-    low, high = make_piece_meshes(asked)
+    low, high = make_piece_meshes(patch_model)
     return [(low, high), *comparison_meshes(low, high)]
 
 
@@ -128,7 +137,9 @@ def comparison_meshes(low, high) -> list:
     return out
 
 
-def solve_on_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
+def solve_on_ladder(
+    patch_model, tolerance: float, estimate: bool = True, fresh: bool = False
+) -> tuple:
     """Solve a patch on a ladder of nested meshes until it meets its tolerance.
 
     If the next mesh is expensive, points as fine as the profile give more accurate measures, and
@@ -138,7 +149,7 @@ def solve_on_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool 
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     tolerance : float
     estimate : bool
         If False, only the third mesh is solved.
@@ -150,14 +161,17 @@ def solve_on_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool 
     tuple
         Patches on all meshes, fine to coarse.
     """
-    grids = base_grids(asked).bodies
+    grids = base_grids(patch_model).bodies
     out = []
     on_points = None
     while True:
         try:
             wanted = estimate or len(out) == MIN_LEVELS - 1
             out.insert(
-                0, press_patch(asked, condense(asked, *grids, fresh=fresh)) if wanted else None
+                0,
+                press_patch(patch_model, condense(patch_model, *grids, fresh=fresh))
+                if wanted
+                else None,
             )
         # the cells are too short for double precision: the coarser meshes are kept
         except NotConverged:
@@ -180,27 +194,27 @@ def solve_on_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool 
                 stretches=on_points.stretches,
             )
         found = measures(*out, tolerance=tolerance)
-        shows_slip = _shows_slip(asked, out, tolerance)
+        shows_slip = _shows_slip(patch_model, out, tolerance)
         if (
             dear > MAX_SECONDS[False]
             and not is_within_tolerance(found, tolerance)
-            and _finer(asked)
+            and _finer(patch_model)
         ):
-            on_points = out[0] = _on_points(asked, out, tolerance)
+            on_points = out[0] = _on_points(patch_model, out, tolerance)
             found = measures(*out, tolerance=tolerance)
         enough = bool(out[0].sharper) or is_within_tolerance(found, tolerance)
-        if dear > most_seconds(asked, tolerance) or (shows_slip and enough):
+        if dear > most_seconds(patch_model, tolerance) or (shows_slip and enough):
             return tuple(out)
 
 
-def most_seconds(asked, tolerance: float | None = None) -> float:
+def most_seconds(patch_model, tolerance: float | None = None) -> float:
     """Return the predicted CPU seconds that the finest mesh of a `PatchModel` may take.
 
     The motion of a prescribed slip is cheap, so that a tight tolerance allows a finer mesh, up to
     the limit of a static patch. tolerance: None for the limit at any tolerance.
     """
-    if asked.mesh.slip is None:
-        return MAX_SECONDS[asked.mesh.is_static]
+    if patch_model.mesh.slip is None:
+        return MAX_SECONDS[patch_model.mesh.is_static]
     if tolerance is None:
         return MAX_SECONDS[True]
     return min(
@@ -209,7 +223,7 @@ def most_seconds(asked, tolerance: float | None = None) -> float:
 
 
 def solve_static_ladder(
-    asked, tolerance: float, estimate: bool = True, fresh: bool = False
+    patch_model, tolerance: float, estimate: bool = True, fresh: bool = False
 ) -> tuple:
     """Solve the patch of a bench with partial slip on the meshes of a static run, fine to coarse.
 
@@ -217,34 +231,34 @@ def solve_static_ladder(
     already.
     """
     if (
-        not asked.interface.partial_slip
-        or asked.solved is not None
-        or asked.mesh.shared is not None
-        or not asked.mesh.is_automatic
+        not patch_model.interface.partial_slip
+        or patch_model.solved is not None
+        or patch_model.mesh.shared is not None
+        or not patch_model.mesh.is_automatic
     ):
         return ()
-    static = asked.with_mesh(is_static=True, slip=None)
-    return solve_on_ladder(static, asked.mesh.tolerance or tolerance, estimate, fresh)
+    static = patch_model.with_mesh(is_static=True, slip=None)
+    return solve_on_ladder(static, patch_model.mesh.tolerance or tolerance, estimate, fresh)
 
 
-def _shows_slip(asked, patches: list, tolerance: float) -> bool:
+def _shows_slip(patch_model, patches: list, tolerance: float) -> bool:
     """Return whether patches, fine to coarse, resolve the work of a prescribed slip."""
-    if asked.mesh.slip is None:
+    if patch_model.mesh.slip is None:
         return True
-    return slip_zones.slip_missed(patches, asked.mesh.slip, tolerance) <= 1
+    return slip_zones.slip_missed(patches, patch_model.mesh.slip, tolerance) <= 1
 
 
-def _finer(asked) -> bool:
+def _finer(patch_model) -> bool:
     """Return whether a patch with a profile can be solved on equally spaced points."""
-    if asked.gap.profile is None:
+    if patch_model.gap.profile is None:
         return False
 
-    return fine.takes_points(asked)
+    return fine.takes_points(patch_model)
 
 
-def _on_points(asked, patches: list, tolerance: float):
+def _on_points(patch_model, patches: list, tolerance: float):
     """Return the finest patch with measures computed on points as fine as its profile."""
-    found = fine.solve_on_points(asked, partial(_enough, patches, tolerance))
+    found = fine.solve_on_points(patch_model, partial(_enough, patches, tolerance))
     first = patches[0]
     return replace(
         first,
@@ -255,12 +269,12 @@ def _on_points(asked, patches: list, tolerance: float):
     )
 
 
-def tolerance_of_next_mesh(asked, patches, tolerance: float) -> float | None:
+def tolerance_of_next_mesh(patch_model, patches, tolerance: float) -> float | None:
     """Return the loosest tolerance / 10^k at which a patch would be solved on a finer mesh.
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     patches : sequence of Patch
         As `solve_on_ladder` returns them at that tolerance.
     tolerance : float
@@ -272,9 +286,9 @@ def tolerance_of_next_mesh(asked, patches, tolerance: float) -> float | None:
         complete.
     """
     seconds = next_seconds(patches[0])
-    if seconds > most_seconds(asked):
+    if seconds > most_seconds(patch_model):
         return None
-    if asked.gap.profile is not None and patches[0].sharper:
+    if patch_model.gap.profile is not None and patches[0].sharper:
         ended = not is_within_tolerance(
             measures(*(patch for patch in patches if patch is not None), tolerance=tolerance),
             tolerance,
@@ -283,9 +297,9 @@ def tolerance_of_next_mesh(asked, patches, tolerance: float) -> float | None:
     known = [patch for patch in patches if patch is not None]
     for tighter in (tolerance * 10.0**-k for k in range(1, MAX_DECADES + 1)):
         enough = is_within_tolerance(measures(*known, tolerance=tighter), tighter) and _shows_slip(
-            asked, known, tighter
+            patch_model, known, tighter
         )
-        if not enough and seconds <= most_seconds(asked, tighter):
+        if not enough and seconds <= most_seconds(patch_model, tighter):
             return tighter
     return None
 

@@ -38,13 +38,13 @@ EXTRAPOLATED_ERROR_RATIO = 2.0
 MEASURES_WITH_BAND = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 
 
-def plane_band(asked, patch: Patch) -> list:
+def plane_band(patch_model, patch: Patch) -> list:
     """Return a sentence, as a list, on the model error of the plane state of a patch.
 
     There is none for a piece that is far wider than tall in plane strain, or far taller than wide
     in plane stress. Otherwise no mesh reduces this error.
     """
-    other = other_plane(asked)
+    other = other_plane(patch_model)
     if other is None:
         return []
     try:
@@ -52,38 +52,38 @@ def plane_band(asked, patch: Patch) -> list:
         theirs = values(press_patch(other, pair_on_same_meshes(other, patch.pair)))
     except PatchfemError as error:
         return [
-            f"{_plane_state_clause(asked)}; the true state lies between plane strain and plane stress; how much the two "
+            f"{_plane_state_clause(patch_model)}; the true state lies between plane strain and plane stress; how much the two "
             f"differ is not known, because for plane {other.pieces.plane} the contact could not be solved ({error})"
         ]
-    return band_words(asked, mine, theirs)
+    return band_words(patch_model, mine, theirs)
 
 
-def other_plane(asked):
+def other_plane(patch_model):
     """Return the `PatchModel` in the other plane state; None if its own is clearly right."""
-    ratio = asked.pieces.width / asked.pieces.height
-    if ratio >= CLEAR if asked.pieces.plane == "strain" else ratio <= 1 / CLEAR:
+    ratio = patch_model.pieces.width / patch_model.pieces.height
+    if ratio >= CLEAR if patch_model.pieces.plane == "strain" else ratio <= 1 / CLEAR:
         return None
-    plane = "stress" if asked.pieces.plane == "strain" else "strain"
-    return replace(asked, pieces=replace(asked.pieces, plane=plane))
+    plane = "stress" if patch_model.pieces.plane == "strain" else "strain"
+    return replace(patch_model, pieces=replace(patch_model.pieces, plane=plane))
 
 
-def _plane_state_clause(asked) -> str:
+def _plane_state_clause(patch_model) -> str:
     """Return the clause on the assumed plane state."""
-    pieces = asked.pieces
+    pieces = patch_model.pieces
     ratio = pieces.width / pieces.height
     return f"plane {pieces.plane} is assumed, and the pieces are {ratio:.2g} times as wide as tall"
 
 
-def band_words(asked, mine: dict, theirs: dict) -> list:
+def band_words(patch_model, mine: dict, theirs: dict) -> list:
     """Return the sentence of `plane_band` from values by name in both plane states.
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     mine, theirs : dict
         Values in the plane state of the model and in the other one.
     """
-    first = "approach" if asked.loading.approach is None else "normal_load"
+    first = "approach" if patch_model.loading.approach is None else "normal_load"
     closing = (theirs["approach"] - mine["approach"]) if first == "approach" else 0.0
     parts = [f"approach by {'+' * (closing > 0)}{format_length(closing, 3)}"] if closing else []
     shares = [
@@ -92,10 +92,10 @@ def band_words(asked, mine: dict, theirs: dict) -> list:
         if name != "approach" and mine[name]
     ]
     parts += [f"{name} by {100 * share:+.2g} %" for name, share in shares if abs(share) > 1e-3]
-    other = "stress" if asked.pieces.plane == "strain" else "strain"
+    other = "stress" if patch_model.pieces.plane == "strain" else "strain"
     return (
         [
-            f"{_plane_state_clause(asked)}; the true state lies between plane strain and plane stress; "
+            f"{_plane_state_clause(patch_model)}; the true state lies between plane strain and plane stress; "
             f"plane {other} would change "
             f"the results by these amounts: {', '.join(parts)}"
         ]
@@ -104,7 +104,7 @@ def band_words(asked, mine: dict, theirs: dict) -> list:
     )
 
 
-def strip_error(asked, patch: Patch, found: dict) -> dict:
+def strip_error(patch_model, patch: Patch, found: dict) -> dict:
     """Return measures whose errors include the effect of the number of strips.
 
     It is the change to another number of strips on the mesh of `patch`, at second order. Measures
@@ -112,13 +112,13 @@ def strip_error(asked, patch: Patch, found: dict) -> dict:
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     patch : Patch
     found : dict
         Measures by name.
     """
-    other, ratio = other_strips(asked)
-    if other is asked:
+    other, ratio = other_strips(patch_model)
+    if other is patch_model:
         return found
     beside = values(press_patch(other, patch.pair))
     here = values(patch)
@@ -132,24 +132,24 @@ def strip_error(asked, patch: Patch, found: dict) -> dict:
     }
 
 
-def other_strips(asked) -> tuple:
+def other_strips(patch_model) -> tuple:
     """Return the `PatchModel` with another number of strips, and how many times coarser it is.
 
     It has half as many strips, or twice as many if half as many would not reach to the load line.
     Without strips to halve it is the model itself.
     """
-    strips = asked.interface.strips
+    strips = patch_model.interface.strips
     if strips is None or strips.count < 2:
-        return asked, 2.0
+        return patch_model, 2.0
     count = strips.count // 2
     ratio = 2.0
     if strips.offset is not None and abs(strips.offset) >= compute_outermost_strip_distance(
-        asked.pieces.width, count
+        patch_model.pieces.width, count
     ):
         count = 2 * strips.count
         ratio = 0.5
-    interface = replace(asked.interface, strips=strips._replace(count=count))
-    return replace(asked, interface=interface), ratio
+    interface = replace(patch_model.interface, strips=strips._replace(count=count))
+    return replace(patch_model, interface=interface), ratio
 
 
 def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:

@@ -37,17 +37,17 @@ CELL_FACTORS = (4.0, 2.8, 2.0, 1.5, 1.0)
 MAX_CELL_RATIO = 2.0
 
 
-def geometry_key(asked) -> tuple:
+def geometry_key(patch_model) -> tuple:
     """Return the key of all that the meshes and pieces of a `PatchModel` depend on.
 
     It does not contain load and shapes, and is equal for patches that may share meshes.
     """
-    mesh = asked.mesh
-    gap = asked.gap
+    mesh = patch_model.mesh
+    gap = patch_model.gap
     file = mesh.file
     changed = file.stat().st_mtime_ns if file is not None and file.exists() else 0
     return (
-        asked.pieces,
+        patch_model.pieces,
         mesh.element_size,
         mesh.is_static,
         mesh.edge_motion,
@@ -76,9 +76,9 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
     SharedMeshes or None
         None if no case can be solved.
     """
-    asked = patches[0]
-    if not asked.mesh.is_automatic:
-        return with_digest(ladder.meshes_of_file(asked))
+    patch_model = patches[0]
+    if not patch_model.mesh.is_automatic:
+        return with_digest(ladder.meshes_of_file(patch_model))
     cases, every = select_distinct_patches(patches)
     swept = [
         case.with_loading(load=share * case.loading.load)
@@ -95,16 +95,16 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
     )
     # the first state of a contact that moves later, or slips in part, says nothing about its
     # measures
-    shares = CELL_FACTORS[-1:] if asked.mesh.edge_motion or slips else CELL_FACTORS
+    shares = CELL_FACTORS[-1:] if patch_model.mesh.edge_motion or slips else CELL_FACTORS
     own = None
     if layout is None:
         return None
     while True:
         share = shares[0]
         shares = shares[1:]
-        bodies = grids.make_grids(asked, layout.scale_cells(share))
+        bodies = grids.make_grids(patch_model, layout.scale_cells(share))
         if shares:
-            own = own or grids.make_grids(asked, layout)
+            own = own or grids.make_grids(patch_model, layout)
             if bodies[0].x.size >= own[0].x.size:  # both already have the largest number of columns
                 continue
         pairs, missed_by = _refine_until_met(
@@ -175,28 +175,28 @@ def select_distinct_patches(patches, most: int = MAX_CASES) -> tuple:
     return [rows[keys[k]] for k in sorted(picked)], False
 
 
-def _contact_numbers(asked) -> tuple:
+def _contact_numbers(patch_model) -> tuple:
     """Return the numbers by which the contacts of two patches of one geometry differ."""
     shapes = [
         float(value)
-        for _, part in asked.gap.shapes
+        for _, part in patch_model.gap.shapes
         for _, value in part
         if isinstance(value, (int, float))
     ]
     skin = [
         float(value or 0.0)
-        for _, value in asked.interface.skin or ()
+        for _, value in patch_model.interface.skin or ()
         if isinstance(value, (int, float)) or value is None
     ]
     own = (
-        asked.loading.load,
-        asked.loading.approach,
-        asked.loading.offset,
-        asked.loading.line_moment,
-        asked.loading.can_rotate,
-        asked.loading.rotational_stiffness,
-        *(asked.mesh.slip or ()),
-        *(asked.interface.strips or ()),
+        patch_model.loading.load,
+        patch_model.loading.approach,
+        patch_model.loading.offset,
+        patch_model.loading.line_moment,
+        patch_model.loading.can_rotate,
+        patch_model.loading.rotational_stiffness,
+        *(patch_model.mesh.slip or ()),
+        *(patch_model.interface.strips or ()),
     )
     return (*(float(value or 0.0) for value in own), *shapes, *skin)
 
@@ -260,13 +260,13 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
     return layout
 
 
-def _contact_of_case(asked, pair, patch):
+def _contact_of_case(patch_model, pair, patch):
     """Return the contact of a case, from `patch` or solved by itself; None if that fails.
 
     The single run of the case then reports the error.
     """
     try:
-        return grids.contact_extent(patch or press_patch(asked, pair), asked.mesh.slip)
+        return grids.contact_extent(patch or press_patch(patch_model, pair), patch_model.mesh.slip)
     except PatchfemError:
         return None
 
@@ -373,11 +373,11 @@ def _refine_until_met(cases: list, bodies, tolerance: float, once: bool, least: 
             return pairs, missed_by
 
 
-def _error_ratio(asked, pairs: list, tolerance: float) -> float:
+def _error_ratio(patch_model, pairs: list, tolerance: float) -> float:
     """Return the largest error of a case over the tolerance; 0 if it cannot be solved at all."""
     try:
         return max_error_ratio(
-            measures(*ladder.solve_on_pairs(asked, pairs), tolerance=tolerance), tolerance
+            measures(*ladder.solve_on_pairs(patch_model, pairs), tolerance=tolerance), tolerance
         )
     except PatchfemError:
         return 0.0

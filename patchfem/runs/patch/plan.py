@@ -64,12 +64,12 @@ class Sizes(NamedTuple):
         return float(sum(columns * rows for columns, rows in self.finest))
 
 
-def expected_grids(asked, tolerance: float) -> Sizes:
+def expected_grids(patch_model, tolerance: float) -> Sizes:
     """Return the grids on which a `PatchModel` is expected to be solved at a tolerance.
 
     The coarsest grid is that of the run. A mesh file is not read and counts as an automatic grid.
     """
-    levels = _expected_levels(asked, tolerance)
+    levels = _expected_levels(patch_model, tolerance)
     bodies = [body for body in levels[0] if body is not None]
     finest = tuple(map(node_counts, bodies))
     return Sizes(
@@ -77,27 +77,27 @@ def expected_grids(asked, tolerance: float) -> Sizes:
         finest,
         len(levels),
         sum(map(predict_condensing_seconds, levels))
-        * (OTHER_FACTOR if asked.mesh.file is not None else 1.0),
+        * (OTHER_FACTOR if patch_model.mesh.file is not None else 1.0),
         sum(predict_bytes(*nodes, is_mirrored(body)) for nodes, body in zip(finest, bodies)),
-        asked.pieces.has_overhang or asked.mesh.file is not None,
+        patch_model.pieces.has_overhang or patch_model.mesh.file is not None,
     )
 
 
-def _expected_levels(asked, tolerance: float) -> list:
+def _expected_levels(patch_model, tolerance: float) -> list:
     """Return the bodies of each expected level, fine to coarse."""
-    if asked.mesh.shared is not None:
-        return list(asked.mesh.shared.levels)
-    if not asked.mesh.is_automatic:
-        low, high = make_piece_meshes(asked.with_mesh(file=None))
+    if patch_model.mesh.shared is not None:
+        return list(patch_model.mesh.shared.levels)
+    if not patch_model.mesh.is_automatic:
+        low, high = make_piece_meshes(patch_model.with_mesh(file=None))
         return [(low, high), *comparison_meshes(low, high)]
-    bodies, contact = base_grids(asked)
-    has_edges = bool(asked.gap.jumps or (contact is not None and contact.places))
+    bodies, contact = base_grids(patch_model)
+    has_edges = bool(patch_model.gap.jumps or (contact is not None and contact.places))
     levels = [bodies]
     while len(levels) < MIN_LEVELS + (has_edges and tolerance < TIGHT_TOL):
         bodies = [body.refine() for body in bodies]
         if (
             len(levels) >= MIN_LEVELS
-            and predict_condensing_seconds(bodies) > MAX_SECONDS[asked.mesh.is_static]
+            and predict_condensing_seconds(bodies) > MAX_SECONDS[patch_model.mesh.is_static]
         ):
             break
         levels.insert(0, bodies)
@@ -142,13 +142,13 @@ def cost(model: Model) -> Cost:
     return replace(total, parts=parts)
 
 
-def pressing_cost(asked, tolerance: float) -> Cost:
+def pressing_cost(patch_model, tolerance: float) -> Cost:
     """Return the cost of pressing one `PatchModel`, and of its fields.
 
     The work of condensing follows from the sizes of its grids; the time per unit of work, and that
     of the fields and files of the finest grid, was measured over random patches.
     """
-    found = expected_grids(asked, tolerance)
+    found = expected_grids(patch_model, tolerance)
     per_second = (
         cost_model.OUTLINE_CONDENSING_FACTOR if found.outlined else cost_model.CONDENSING_FACTOR
     )
@@ -162,28 +162,33 @@ def pressing_cost(asked, tolerance: float) -> Cost:
         if found.outlined
         else CONDENSING_BYTES_RATIO * found.bytes
     )
-    if not asked.mesh.is_static:
+    if not patch_model.mesh.is_static:
         times["fields"] += cost_model.FRAMES_SECONDS + cost_model.FRAME_NODE_SECONDS * found.nodes
         size += FRAMES_NODE * found.nodes
     sizes = {"interface_points": found.points, "elastic_unknowns_about": int(2 * found.nodes)}
     return Cost(times, (MemoryPart(size, "pieces"),), sizes=sizes)
 
 
-def chain(asked) -> dict:
+def chain(patch_model) -> dict:
     """Return the stiffness [N/m] of the links in series of a `PatchModel`, by name.
 
     A link that the scene does not give is "rigid".
     """
     out = {
-        "holder": asked.loading.tangential_stiffness or "rigid",
-        "pieces_shear": asked.pieces.shear_stiffness if asked.interface.has_shear else "rigid",
+        "holder": patch_model.loading.tangential_stiffness or "rigid",
+        "pieces_shear": patch_model.pieces.shear_stiffness
+        if patch_model.interface.has_shear
+        else "rigid",
         "asperities": "rigid",
     }
-    if asked.interface.skin is not None and asked.interface.skin.tangential_ratio is not None:
-        area = asked.pieces.length * asked.pieces.width * asked.pieces.pairs
+    if (
+        patch_model.interface.skin is not None
+        and patch_model.interface.skin.tangential_ratio is not None
+    ):
+        area = patch_model.pieces.length * patch_model.pieces.width * patch_model.pieces.pairs
         out["asperities"] = (
-            asked.interface.skin.tangential_ratio
-            * skin.mean_stiffness(asked, asked.nominal_load / area)
+            patch_model.interface.skin.tangential_ratio
+            * skin.mean_stiffness(patch_model, patch_model.nominal_load / area)
             * area
         )
     return out
@@ -196,13 +201,17 @@ def groups(model: Model) -> dict:
     the pieces as bars.
     """
     out = {}
-    asked = model.patch
-    load = asked.nominal_load
+    patch_model = model.patch
+    load = patch_model.nominal_load
     if model.friction is not None:
-        out["slip_length"] = model.friction.static * load / asked.pieces.shear_stiffness
-    if asked.gap.tilt is not None and load > 0:
-        approach = load * asked.pieces.series_compliance(lambda m: (1 - m.poisson**2) / m.young)
-        out["tilt_over_first_opening"] = asked.gap.tilt * asked.pieces.length / (2 * approach)
+        out["slip_length"] = model.friction.static * load / patch_model.pieces.shear_stiffness
+    if patch_model.gap.tilt is not None and load > 0:
+        approach = load * patch_model.pieces.series_compliance(
+            lambda m: (1 - m.poisson**2) / m.young
+        )
+        out["tilt_over_first_opening"] = (
+            patch_model.gap.tilt * patch_model.pieces.length / (2 * approach)
+        )
     return out
 
 
@@ -223,43 +232,44 @@ def face_words(name: str, one) -> list:
     return [f"interface {name} has a patch of its own: {found}"]
 
 
-def assembly_sentence(asked) -> str:
+def assembly_sentence(patch_model) -> str:
     """Return the sentence on how the stiffness of the pieces of a `PatchModel` is assembled."""
-    if asked.mesh.file is not None:
+    if patch_model.mesh.file is not None:
         return (
             "scikit-fem assembles the stiffness of a piece in contact.mesh cell by cell, or, if the mesh of the "
             "piece is a tensor grid, from the matrices of three reference cells"
         )
     return (
         "scikit-fem assembles the stiffness cell by cell, because the mesh of the shaped ends is not a tensor grid"
-        if asked.pieces.has_overhang
+        if patch_model.pieces.has_overhang
         else "the stiffness of the tensor grids is assembled from scikit-fem's matrices of three reference cells"
     )
 
 
-def verdict(found: dict, asked) -> list:
+def verdict(found: dict, patch_model) -> list:
     """Return sentences on the tilt, the skin and the assembly of a `PatchModel`.
 
     The tilt group determines the extent of the contact of flat pieces only.
     """
     rough = (
         []
-        if asked.interface.skin is None
+        if patch_model.interface.skin is None
         else skin.note_on_peak_stiffness(
-            asked,
-            asked.nominal_load / (asked.pieces.length * asked.pieces.width * asked.pieces.pairs),
+            patch_model,
+            patch_model.nominal_load
+            / (patch_model.pieces.length * patch_model.pieces.width * patch_model.pieces.pairs),
         )
     )
-    return [*_tilt_sentence(found, asked), *rough, assembly_sentence(asked)]
+    return [*_tilt_sentence(found, patch_model), *rough, assembly_sentence(patch_model)]
 
 
-def _tilt_sentence(found: dict, asked) -> list:
+def _tilt_sentence(found: dict, patch_model) -> list:
     """Return the sentence on the tilt, as a list."""
     tilt = found.get("tilt_over_first_opening")
-    gap = asked.gap
+    gap = patch_model.gap
     if tilt is None:
         return []
-    if gap.profile is not None or asked.interface.strips is not None or len(gap.shapes) > 1:
+    if gap.profile is not None or patch_model.interface.strips is not None or len(gap.shapes) > 1:
         return [
             f"the tilt is {tilt:.3g} times the tilt at which an edge of flat pieces would start to open, but these "
             "pieces are not flat"

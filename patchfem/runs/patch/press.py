@@ -118,12 +118,12 @@ class Patch:
         return self.pressure.sigma_n > 0
 
 
-def solve(asked, grid, upper_grid=None, fresh: bool = False) -> Patch:
+def solve(patch_model, grid, upper_grid=None, fresh: bool = False) -> Patch:
     """Assemble and condense the pieces of a `PatchModel`, and solve the contact.
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     grid, upper_grid : TensorGrid or PieceMesh
         Meshes from `make_piece_meshes`; the upper one is None if the pieces are alike.
     fresh : bool
@@ -134,17 +134,17 @@ def solve(asked, grid, upper_grid=None, fresh: bool = False) -> Patch:
     PatchfemError
         As in `press_patch`, and by the contact solver.
     """
-    return press_patch(asked, condense(asked, grid, upper_grid, fresh))
+    return press_patch(patch_model, condense(patch_model, grid, upper_grid, fresh))
 
 
-def press_patch(asked, pair: Pair, worn=None) -> Patch:
+def press_patch(patch_model, pair: Pair, worn=None) -> Patch:
     """Solve the contact of a pair with the shapes, the load and the holder of a `PatchModel`.
 
     A pair serves any number of models.
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     pair : Pair
     worn : (m,) or (s, m), optional
         Depth [m] that wear has added to the gap, of strips (s, m).
@@ -155,10 +155,10 @@ def press_patch(asked, pair: Pair, worn=None) -> Patch:
         If a profile does not fit the mesh.
     """
     x = pair.compliance.interface.x
-    gap, notes, seconds = asked.gap.evaluate(x)
+    gap, notes, seconds = patch_model.gap.evaluate(x)
     gap = gap + pair.rise if worn is None else gap + pair.rise + worn
-    rim = asked.gap.half_step_heights(x)
-    out = _on(asked, pair, gap, notes, seconds)
+    rim = patch_model.gap.half_step_heights(x)
+    out = _on(patch_model, pair, gap, notes, seconds)
     if (
         pair.joint is not None
         and pair.joint.ripple > RIPPLE
@@ -178,7 +178,7 @@ def press_patch(asked, pair: Pair, worn=None) -> Patch:
     return replace(
         out,
         either=tuple(
-            (0.5 - side * lean, _on(asked, pair, gap + shift, notes, seconds))
+            (0.5 - side * lean, _on(patch_model, pair, gap + shift, notes, seconds))
             for side, shift in zip((-1, 1), shifts)
         ),
     )
@@ -221,19 +221,19 @@ def zigzags(x, sigma) -> float:
     )
 
 
-def _on(asked, pair: Pair, gap, notes: tuple, seconds: dict) -> Patch:
+def _on(patch_model, pair: Pair, gap, notes: tuple, seconds: dict) -> Patch:
     """Solve the contact of a pair on the gap (m,) [m]."""
     begin = perf_counter()
-    how = _choose_solver(asked)(asked, pair.compliance, gap)
-    return as_patch(asked, pair, gap, notes, seconds | {"press": perf_counter() - begin}, how)
+    how = _choose_solver(patch_model)(patch_model, pair.compliance, gap)
+    return as_patch(patch_model, pair, gap, notes, seconds | {"press": perf_counter() - begin}, how)
 
 
-def as_patch(asked, pair: Pair, gap, notes: tuple, seconds: dict, how: tuple) -> Patch:
+def as_patch(patch_model, pair: Pair, gap, notes: tuple, seconds: dict, how: tuple) -> Patch:
     """Return the Patch of a solved pair.
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     pair : Pair
     gap : (m,)
         Unloaded gap [m].
@@ -245,11 +245,15 @@ def as_patch(asked, pair: Pair, gap, notes: tuple, seconds: dict, how: tuple) ->
     """
     pieces, pressure, skin, strips = how
     giving = pieces.tangential
-    if not asked.interface.has_shear:
+    if not patch_model.interface.has_shear:
         giving = frozen_array(giving - pair.compliance.tangential)
-    if asked.loading.tangential_stiffness:
-        giving = frozen_array(giving + 1 / asked.loading.tangential_stiffness)
-    ratio = asked.interface.skin.tangential_ratio if asked.interface.skin is not None else None
+    if patch_model.loading.tangential_stiffness:
+        giving = frozen_array(giving + 1 / patch_model.loading.tangential_stiffness)
+    ratio = (
+        patch_model.interface.skin.tangential_ratio
+        if patch_model.interface.skin is not None
+        else None
+    )
     return Patch(
         pair,
         pieces,
@@ -259,24 +263,24 @@ def as_patch(asked, pair: Pair, gap, notes: tuple, seconds: dict, how: tuple) ->
         skin,
         strips,
         ratio,
-        asked.interface.skin is not None,
-        asked.gap.jumps,
-        asked.has_singular_ends,
+        patch_model.interface.skin is not None,
+        patch_model.gap.jumps,
+        patch_model.has_singular_ends,
         notes,
         pair.seconds | seconds,
-        averaging=asked.gap.averaging_length(pieces.interface.x, pressure.sigma_n > 0),
+        averaging=patch_model.gap.averaging_length(pieces.interface.x, pressure.sigma_n > 0),
     )
 
 
-def areas(asked, interface) -> np.ndarray:
+def areas(patch_model, interface) -> np.ndarray:
     """Return the nodal areas (m,) [m2] of a `PatchModel` on an interface; (s, m) for strips."""
-    if asked.interface.strips is None:
+    if patch_model.interface.strips is None:
         return interface.weight
-    count = asked.interface.strips.count
+    count = patch_model.interface.strips.count
     return np.repeat(interface.weight[None] / count, count, axis=0)
 
 
-def make_force_function(asked, pair: Pair):
+def make_force_function(patch_model, pair: Pair):
     """Return a function that computes the contact forces on the worn faces of a `PatchModel`.
 
     It maps worn depth (m,) [m], which is added to the gap, and softening (m,) [m/N], which is added
@@ -288,17 +292,17 @@ def make_force_function(asked, pair: Pair):
     PatchfemError
         If a profile does not fit the mesh.
     """
-    gap = asked.gap.evaluate(pair.compliance.interface.x).heights
+    gap = patch_model.gap.evaluate(pair.compliance.interface.x).heights
     gap = gap + pair.rise
     bare = pair.compliance
-    how = _choose_solver(asked)
-    if asked.interface.strips is not None:
-        return PressedStrips(asked, bare, gap)
+    how = _choose_solver(patch_model)
+    if patch_model.interface.strips is not None:
+        return PressedStrips(patch_model, bare, gap)
 
     def press(worn, softening):
         """Return the contact forces (m,) [N] for worn depth (m,) [m] and softening (m,) [m/N]."""
         soft = replace(bare, normal=bare.normal + np.diag(softening)) if softening.any() else bare
-        return how(asked, soft, gap + worn)[1].sigma_n * bare.interface.weight
+        return how(patch_model, soft, gap + worn)[1].sigma_n * bare.interface.weight
 
     return press
 
@@ -310,13 +314,13 @@ class PressedStrips:
     `begin` sets the contact set of the start, so that a run after an interruption gives the same
     bits.
 
-    - asked: PatchModel.
+    - patch_model: PatchModel.
     - bare: compliance of the pieces without skin.
     - gap (m,): unloaded gap [m].
     - warm_start: contact set and factors of the last solution.
     """
 
-    asked: object
+    patch_model: object
     bare: Compliance
     gap: np.ndarray
     warm_start: WarmStart = field(default_factory=WarmStart)
@@ -328,62 +332,62 @@ class PressedStrips:
     def __call__(self, worn, softening) -> np.ndarray:
         """Return the contact forces (s, m) [N] for worn depth [m] and softening [m/N], (s, m) each."""
         how = _choose_solver(
-            self.asked,
+            self.patch_model,
             partial(
                 _solve_under_load,
                 added=softening if softening.any() else None,
                 warm_start=self.warm_start,
             ),
         )
-        return how(self.asked, self.bare, self.gap + worn)[3].force
+        return how(self.patch_model, self.bare, self.gap + worn)[3].force
 
 
-def _choose_solver(asked, under=None):
-    """Return the function (asked, pieces, gap) that solves the contact of a `PatchModel`.
+def _choose_solver(patch_model, under=None):
+    """Return the function (patch_model, pieces, gap) that solves the contact of a `PatchModel`.
 
     It returns (Compliance with its skin, ContactState, skin, strips). under: function for a given
     load; None for `_solve_under_load`.
     """
     under = under or _solve_under_load
-    if asked.loading.approach is None or not (
-        asked.loading.can_rotate or asked.loading.rotational_stiffness > 0
+    if patch_model.loading.approach is None or not (
+        patch_model.loading.can_rotate or patch_model.loading.rotational_stiffness > 0
     ):
         return under
     bare = (
         with_linear_skin
-        if asked.interface.skin is not None and asked.interface.skin.law == "linear"
+        if patch_model.interface.skin is not None and patch_model.interface.skin.law == "linear"
         else lambda skin, pieces: pieces
     )
-    return lambda asked, pieces, gap: press_to_approach_with_rotation(
-        asked, pieces, gap, under, bare(asked.interface.skin, pieces)
+    return lambda patch_model, pieces, gap: press_to_approach_with_rotation(
+        patch_model, pieces, gap, under, bare(patch_model.interface.skin, pieces)
     )
 
 
-def _solve_under_load(asked, pieces: Compliance, gap, added=None, warm_start=None) -> tuple:
+def _solve_under_load(patch_model, pieces: Compliance, gap, added=None, warm_start=None) -> tuple:
     """Solve the contact under a load, or under an approach with fixed rotation.
 
     Returns (Compliance with its skin, ContactState, skin, strips). added, warm_start: parameters of
     `StripCompliance`.
     """
     strips = skin = None
-    angle = asked.gap.angle
-    moment = asked.loading.moment
-    spring = asked.loading.rotational_stiffness
-    if asked.interface.strips is not None:
+    angle = patch_model.gap.angle
+    moment = patch_model.loading.moment
+    spring = patch_model.loading.rotational_stiffness
+    if patch_model.interface.strips is not None:
         pieces, pressure, skin, strips = strip_press.press_strips_of_patch(
-            asked, pieces, gap, (angle, moment, spring), added, warm_start
+            patch_model, pieces, gap, (angle, moment, spring), added, warm_start
         )
-    elif asked.interface.skin is not None and asked.interface.skin.law != "linear":
+    elif patch_model.interface.skin is not None and patch_model.interface.skin.law != "linear":
         pieces, pressure, skin = skin_press.press_through_asperities(
-            asked, pieces, gap, angle, moment, spring
+            patch_model, pieces, gap, angle, moment, spring
         )
     else:
-        if asked.interface.skin is not None:
-            pieces = with_linear_skin(asked.interface.skin, pieces)
-        if asked.loading.approach is not None:
-            pressure = press_to_approach(pieces, gap, asked.loading.approach, angle)
+        if patch_model.interface.skin is not None:
+            pieces = with_linear_skin(patch_model.interface.skin, pieces)
+        if patch_model.loading.approach is not None:
+            pressure = press_to_approach(pieces, gap, patch_model.loading.approach, angle)
         else:
-            pressure = press(pieces, gap, asked.loading.load, moment, angle, spring=spring)
+            pressure = press(pieces, gap, patch_model.loading.load, moment, angle, spring=spring)
     return pieces, pressure, skin, strips
 
 

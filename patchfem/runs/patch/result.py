@@ -78,11 +78,13 @@ def static_measures(model, patch, coarse) -> dict:
     coarse : sequence of Patch or None
         The patch on coarser meshes, fine to coarse.
     """
-    asked = model.patch
+    patch_model = model.patch
     tolerance = (
-        (asked.mesh.tolerance or model.accuracy.tolerance) if asked.mesh.is_automatic else None
+        (patch_model.mesh.tolerance or model.accuracy.tolerance)
+        if patch_model.mesh.is_automatic
+        else None
     )
-    found = set_floors(model, derived.static_measures(asked, patch, coarse, tolerance))
+    found = set_floors(model, derived.static_measures(patch_model, patch, coarse, tolerance))
     # for worn strips, `wear.measures` adds the error due to their number
     if patch.strips is None or coarse[0] is None or model.wear is not None:
         return found
@@ -97,17 +99,17 @@ def set_floors(model, found: dict) -> dict:
     return {name: replace(one, floor=max(one.floor, least[name])) for name, one in found.items()}
 
 
-def floors(asked, tolerance: float, values: dict) -> dict:
+def floors(patch_model, tolerance: float, values: dict) -> dict:
     """Return the floor of each static measure by name, for values that are numbers or (q,).
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     tolerance : float
     values : dict
         Values by name.
     """
-    arm = asked.pieces.length / 2
+    arm = patch_model.pieces.length / 2
     terms = {
         "approach": abs(values["rotation"]) * arm,
         "pressure_centre": arm,
@@ -133,7 +135,7 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
     )
 
 
-def warn_of_strains(asked, patch) -> list:
+def warn_of_strains(patch_model, patch) -> list:
     """Return warnings on large strains, on cells of a given size that lock, and on the gap."""
     beyond = (
         [
@@ -145,18 +147,18 @@ def warn_of_strains(asked, patch) -> list:
     )
     return [
         *strain_warnings(
-            asked, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond
+            patch_model, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond
         ),
         *(text for text in patch.notes if not nodes.is_note(text)),
     ]
 
 
-def strain_warnings(asked, top: float, approach: float, beyond=()) -> list:
+def strain_warnings(patch_model, top: float, approach: float, beyond=()) -> list:
     """Return the warnings of `warn_of_strains` on strains and locking.
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     top : float
         Largest nodal pressure [Pa].
     approach : float
@@ -165,12 +167,12 @@ def strain_warnings(asked, top: float, approach: float, beyond=()) -> list:
         Warnings that are inserted before the one on locking.
     """
     out = []
-    stuff = _materials(asked)
+    stuff = _materials(patch_model)
     words = (
         "the peak pressure is {:.3g} of the lowest Young's modulus",
         "the approach is {:.3g} of the total height of the two pieces",
     )
-    for share, what in zip(_strains(asked, top, approach), words):
+    for share, what in zip(_strains(patch_model, top, approach), words):
         if share > MAX_SMALL_STRAIN:
             out.append(
                 what.format(share)
@@ -178,10 +180,10 @@ def strain_warnings(asked, top: float, approach: float, beyond=()) -> list:
             )
     out += beyond
     stiff = max(m.poisson for m in stuff)
-    if asked.pieces.plane == "strain" and stiff > LOCKS and not asked.mesh.is_automatic:
+    if patch_model.pieces.plane == "strain" and stiff > LOCKS and not patch_model.mesh.is_automatic:
         cure = (
             "split the elements of contact.mesh"
-            if asked.mesh.file is not None
+            if patch_model.mesh.file is not None
             else "leave out contact.element_size"
         )
         out.append(
@@ -192,27 +194,27 @@ def strain_warnings(asked, top: float, approach: float, beyond=()) -> list:
     return out
 
 
-def exceeds_small_strains(asked, top, approach):
+def exceeds_small_strains(patch_model, top, approach):
     """Return whether `strain_warnings` may have a warning, for one patch or arrays of many."""
     return (
-        np.maximum(*_strains(asked, top, approach)) > MAX_SMALL_STRAIN
-        if asked.mesh.is_automatic
+        np.maximum(*_strains(patch_model, top, approach)) > MAX_SMALL_STRAIN
+        if patch_model.mesh.is_automatic
         else np.ones(np.shape(top), bool)
     )
 
 
-def _strains(asked, top, approach) -> tuple:
+def _strains(patch_model, top, approach) -> tuple:
     """Return peak pressure over lowest Young's modulus, and approach over height of the pieces."""
-    return top / min(m.young for m in _materials(asked)), approach / (
-        asked.pieces.lower.height + asked.pieces.upper.height
+    return top / min(m.young for m in _materials(patch_model)), approach / (
+        patch_model.pieces.lower.height + patch_model.pieces.upper.height
     )
 
 
-def _materials(asked) -> list:
+def _materials(patch_model) -> list:
     """Return the materials of the pieces and their coatings."""
     return [
         material
-        for piece in (asked.pieces.lower, asked.pieces.upper)
+        for piece in (patch_model.pieces.lower, patch_model.pieces.upper)
         for material in (piece.substrate, piece.coating and piece.coating.material)
         if material
     ]
@@ -228,7 +230,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
     coarse : sequence of Patch or None
         Patches of the error estimate; if the first one is None, the plane state is not discussed.
     """
-    asked = model.patch
+    patch_model = model.patch
     by_forms = [
         side
         for side, body in (("lower", patch.pair.grid), ("upper", patch.pair.upper_grid))
@@ -244,7 +246,9 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
     )
     out += [
         *notes_on_mesh_file(patch.pair),
-        *notes_on_tall_pieces(asked, patch.pressure.load / patch.pieces.interface.weight.sum()),
+        *notes_on_tall_pieces(
+            patch_model, patch.pressure.load / patch.pieces.interface.weight.sum()
+        ),
     ]
     if patch.sharper:
         out.append(
@@ -252,14 +256,14 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
             "the value with the smaller error is given; on these points short waves are treated as in infinite "
             f"layers; {_mesh_clause(model, patch)}"
         )
-    elif patch.averaging is not None and not asked.gap.is_rough:
+    elif patch.averaging is not None and not patch_model.gap.is_rough:
         out.append(
             "where the profile is in contact, its heights are averaged over a length of "
             f"{format_length(patch.averaging, 3)}; the errors include the effect of the choice of this length"
         )
-    if asked.interface.skin is not None and patch.pressure.load > 0:
+    if patch_model.interface.skin is not None and patch.pressure.load > 0:
         bears = patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0)
-        out += skin.note_on_peak_stiffness(asked, float(patch.pressure.load / bears))
+        out += skin.note_on_peak_stiffness(patch_model, float(patch.pressure.load / bears))
     if patch.strips is not None:
         out.append(patch.strips.note)
     if patch.pair.coupling > MIN_COUPLING_RATIO and model.kind != "patch":
@@ -269,10 +273,10 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
             "the largest slide"
         )
     if model.kind == "patch":
-        out += frictionless(asked, patch)
+        out += frictionless(patch_model, patch)
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
         # an unstructured mesh has no coarser one: its second patch is finer than its first
-        out += derived.plane_notes(asked, patch if coarse[-1] is None else coarse[0])
+        out += derived.plane_notes(patch_model, patch if coarse[-1] is None else coarse[0])
     return out
 
 
@@ -290,7 +294,7 @@ def _mesh_clause(model, patch) -> str:
     return f"fields and motion are computed on {where}"
 
 
-def frictionless(asked, patch) -> list:
+def frictionless(patch_model, patch) -> list:
     """Return a note, as a list, on unlike pieces: Dundurs' beta and the effect of perfect stick.
 
     Faces of unlike pieces slide on each other under pressure. Stick prevents this by shear
@@ -306,7 +310,7 @@ def frictionless(asked, patch) -> list:
     cross = pair.closing[here]
     stuck = normal - cross @ np.linalg.solve(patch.pieces.tangential[here], cross.T)
     more = one @ np.linalg.solve(stuck, one) / (one @ np.linalg.solve(normal, one)) - 1
-    beta = abs(_dundurs(asked))
+    beta = abs(_dundurs(patch_model))
     return [
         f"the pieces have different elasticity (Dundurs' beta {beta:.2g} at the interface), and the pressure is "
         f"computed without friction; if the pieces stuck perfectly, normal_stiffness would be {100 * more:.2g} % "
@@ -314,16 +318,16 @@ def frictionless(asked, patch) -> list:
     ]
 
 
-def _dundurs(asked) -> float:
+def _dundurs(patch_model) -> float:
     """Return Dundurs' beta of the two faces."""
     shear = []
     kappa = []
-    for piece in (asked.pieces.lower, asked.pieces.upper):
+    for piece in (patch_model.pieces.lower, patch_model.pieces.upper):
         face = piece.coating.material if piece.coating else piece.substrate
         shear.append(face.young / (2 + 2 * face.poisson))
         kappa.append(
             3 - 4 * face.poisson
-            if asked.pieces.plane == "strain"
+            if patch_model.pieces.plane == "strain"
             else (3 - face.poisson) / (1 + face.poisson)
         )
     (a, b), (k, q) = shear, kappa
@@ -352,7 +356,7 @@ def notes_on_mesh_file(pair) -> list:
     return out
 
 
-def notes_on_tall_pieces(asked, mean: float) -> list:
+def notes_on_tall_pieces(patch_model, mean: float) -> list:
     """Return a note for each tall piece whose bending moves the load sideways, as a list.
 
     The model neglects that the lever arm increases. The measure is the load over the buckling load
@@ -362,14 +366,14 @@ def notes_on_tall_pieces(asked, mean: float) -> list:
     """
     out = []
     for side in ("lower", "upper"):
-        piece = getattr(asked.pieces, side)
+        piece = getattr(patch_model.pieces, side)
         young = piece.substrate.young
         nu = piece.substrate.poisson
-        stiff = young / (1 - nu**2) if asked.pieces.plane == "strain" else young
-        share = mean / (np.pi**2 * stiff * asked.pieces.length**2 / (48 * piece.height**2))
-        if piece.height > asked.pieces.length and share > MIN_BUCKLING_RATIO:
+        stiff = young / (1 - nu**2) if patch_model.pieces.plane == "strain" else young
+        share = mean / (np.pi**2 * stiff * patch_model.pieces.length**2 / (48 * piece.height**2))
+        if piece.height > patch_model.pieces.length and share > MIN_BUCKLING_RATIO:
             out.append(
-                f"the {side} piece is {piece.height / asked.pieces.length:.3g} times as tall as it is long and carries "
+                f"the {side} piece is {piece.height / patch_model.pieces.length:.3g} times as tall as it is long and carries "
                 f"{share:.2g} of the load at which it would buckle sideways (limit {MIN_BUCKLING_RATIO:g}); the computation "
                 "neglects that bending lengthens the lever arm of the load"
             )

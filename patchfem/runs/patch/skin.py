@@ -19,9 +19,9 @@ from ...model import peaks as traces
 from ...surface.roughness import peaks
 
 
-def skin_law(asked):
+def skin_law(patch_model):
     """Return the smooth pressure law of the asperity layer of a patch."""
-    part = asked.interface.skin
+    part = patch_model.interface.skin
     if part.law == "exponential":
         pressure = (
             part.normal_stiffness * part.decay_length if part.normal_stiffness is not None else None
@@ -29,31 +29,31 @@ def skin_law(asked):
         return asperity_laws.ExponentialAsperities(part.decay_length, pressure)
     faces = [
         piece.coating.material if piece.coating else piece.substrate
-        for piece in (asked.pieces.lower, asked.pieces.upper)
+        for piece in (patch_model.pieces.lower, patch_model.pieces.upper)
     ]
     modulus = 1 / sum((1 - face.poisson**2) / face.young for face in faces)
     return asperity_laws.HertzAsperities(part.radius, part.density, part.height_deviation, modulus)
 
 
-def mean_stiffness(asked, pressure: float) -> float:
+def mean_stiffness(patch_model, pressure: float) -> float:
     """Return the normal stiffness [Pa/m] of the asperity layer under a uniform `pressure` [Pa].
 
     It is 0 for a smooth skin without pressure.
     """
-    if asked.interface.skin.law == "linear":
-        return asked.interface.skin.normal_stiffness
-    law = skin_law(asked)
+    if patch_model.interface.skin.law == "linear":
+        return patch_model.interface.skin.normal_stiffness
+    law = skin_law(patch_model)
     if isinstance(law, asperity_laws.ExponentialAsperities):
         return pressure / law.u0
     return float(law.stiffness(law.separation(np.array([pressure])))[0]) if pressure > 0 else 0.0
 
 
-def note_on_peak_stiffness(asked, pressure: float) -> list:
+def note_on_peak_stiffness(patch_model, pressure: float) -> list:
     """Return a sentence, as a list, on how reliable the stiffness of peaks from a profile is.
 
     Also for peaks from root mean squares; [] for any other skin. pressure: mean pressure [Pa].
     """
-    part = asked.interface.skin
+    part = patch_model.interface.skin
     if part is None or part.law != "hertz" or part.rms_height is None or not pressure > 0:
         return []
     soft, stiff = peaks.persson_stiffness(pressure, part.rms_height)
@@ -62,17 +62,17 @@ def note_on_peak_stiffness(asked, pressure: float) -> list:
     waves = f" of the waves below {format_quantity(part.cutoff, 'm', 3)}" if part.cutoff else ""
     if part.from_ is not None:
         found = traces.read_spectral_moments(Path(part.from_), part.cutoff)
-        half = f" (from every second sample: {_half(asked, found.coarse, pressure)})"
+        half = f" (from every second sample: {_half(patch_model, found.coarse, pressure)})"
         told = [f"contact.asperities: {one}" for one in (*found.dust, found.not_gaussian) if one]
-    elif asked.gap.profile is not None and part.cutoff is None:
+    elif patch_model.gap.profile is not None and part.cutoff is None:
         told = [
             "contact.asperities.rms_height: the profile already contains all waves longer than "
-            f"{format_length(2 * asked.gap.average)}; if rms_height comes from the same trace as the profile, give the rms "
+            f"{format_length(2 * patch_model.gap.average)}; if rms_height comes from the same trace as the profile, give the rms "
             "values of the shorter waves only (patchfem profile --cutoff prints them)"
         ]
     return [
         f"contact.asperities: under the mean pressure of {format_quantity(pressure, 'Pa', 3)} the peaks{waves} have "
-        f"a stiffness of {mean_stiffness(asked, pressure):.3g} Pa/m{half}; Persson's theory, which includes waves "
+        f"a stiffness of {mean_stiffness(patch_model, pressure):.3g} Pa/m{half}; Persson's theory, which includes waves "
         "of all lengths, "
         f'gives {soft:.3g} to {stiff:.3g} Pa/m; to use the stiffness of that theory, set law = "exponential" and '
         f'decay_length = "{sum(peaks.PERSSON) / 2 * part.rms_height * 1e6:.3g} um"',
@@ -80,7 +80,7 @@ def note_on_peak_stiffness(asked, pressure: float) -> list:
     ]
 
 
-def _half(asked, coarse, pressure: float) -> str:
+def _half(patch_model, coarse, pressure: float) -> str:
     """Return the stiffness of the peaks from every second sample of the profile, as text."""
     try:
         one = peaks.gaussian_peaks(coarse) if coarse else None
@@ -89,8 +89,10 @@ def _half(asked, coarse, pressure: float) -> str:
     if one is None:
         return "no surface of such peaks"
     new = {"radius": one.radius, "density": one.density, "height_deviation": one.deviation}
-    interface = replace(asked.interface, skin=asked.interface.skin.model_copy(update=new))
-    return f"{mean_stiffness(replace(asked, interface=interface), pressure):.3g} Pa/m"
+    interface = replace(
+        patch_model.interface, skin=patch_model.interface.skin.model_copy(update=new)
+    )
+    return f"{mean_stiffness(replace(patch_model, interface=interface), pressure):.3g} Pa/m"
 
 
 def cut_off_pressure(pressure) -> np.ndarray:
@@ -103,7 +105,7 @@ def cut_off_pressure(pressure) -> np.ndarray:
 
 
 def press_through_asperities(
-    asked, pieces: Compliance, gap, angle: float, moment, spring: float
+    patch_model, pieces: Compliance, gap, angle: float, moment, spring: float
 ) -> tuple:
     """Solve the contact of a pair through an asperity layer with a smooth law.
 
@@ -112,7 +114,7 @@ def press_through_asperities(
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     pieces : Compliance
     gap : (m,)
         Unloaded gap [m].
@@ -130,12 +132,12 @@ def press_through_asperities(
         a single strip.
     """
     interface = pieces.interface
-    by = asked.loading.approach
+    by = patch_model.loading.approach
     loads = HolderLoads()
     if by is None:
-        loads = HolderLoads(asked.loading.load, moment, spring=spring)
+        loads = HolderLoads(patch_model.loading.load, moment, spring=spring)
     layout = StripLayout(interface.x, interface.weight, np.zeros(1))
-    strips = StripModel(StripCompliance(pieces.normal), layout, skin_law(asked))
+    strips = StripModel(StripCompliance(pieces.normal), layout, skin_law(patch_model))
     state = press_strips(strips, gap, loads, approach=by, rotation=angle)
     answer = ContactState(
         frozen_array(cut_off_pressure(state.pressure[0])),
@@ -151,7 +153,7 @@ def press_through_asperities(
     stiff = np.maximum(state.stiffness[0] * interface.weight, 1e-300)
     # the lower bound keeps the compliance of unloaded nodes finite
     crush = np.diag(1 / np.maximum(stiff, MIN_RELATIVE_PRESSURE * stiff.max()))
-    ratio = asked.interface.skin.tangential_ratio
+    ratio = patch_model.interface.skin.tangential_ratio
     tangential = pieces.tangential + crush / ratio if ratio is not None else pieces.tangential
     return (
         Compliance(interface, frozen_array(pieces.normal + crush), frozen_array(tangential)),

@@ -107,11 +107,11 @@ class BatchSolution(NamedTuple):
     planes: tuple
     levels: list
 
-    def band(self, asked, k: int) -> list:
-        """Return the sentence of `measures.plane_band` on the k-th patch, of PatchModel `asked`."""
+    def band(self, patch_model, k: int) -> list:
+        """Return the sentence of `measures.plane_band` on the k-th patch, of PatchModel `patch_model`."""
         return (
             one_by_one.band_words(
-                asked,
+                patch_model,
                 *(
                     {name: float(column[k]) for name, column in plane.items()}
                     for plane in self.planes
@@ -138,47 +138,49 @@ class BatchSolution(NamedTuple):
         }
 
 
-def not_together(asked) -> str:
+def not_together(patch_model) -> str:
     """Return the reason why a `PatchModel` is not solved with others; "" if it may be."""
-    if asked.mesh.shared is None:
+    if patch_model.mesh.shared is None:
         return "the case has a mesh of its own"
     if not all(
         isinstance(body, TensorGrid) or body is None
-        for level in asked.mesh.shared.levels
+        for level in patch_model.mesh.shared.levels
         for body in level
     ):
         return "the meshes of the pieces are not plain grids"
-    if asked.gap.profile is not None:
+    if patch_model.gap.profile is not None:
         return "a profile has its own averaging length"
-    return _not_of_one_stretch(asked) or (
-        "" if len(asked.mesh.shared.levels) > 2 else "the mesh of the case cannot be made coarser"
+    return _not_of_one_stretch(patch_model) or (
+        ""
+        if len(patch_model.mesh.shared.levels) > 2
+        else "the mesh of the case cannot be made coarser"
     )
 
 
-def _not_of_one_stretch(asked) -> str:
+def _not_of_one_stretch(patch_model) -> str:
     """Return the reason why a `PatchModel` on plain grids cannot have a contact of one interval.
 
     "" if it can.
     """
-    skin = asked.interface.skin
-    if asked.interface.strips is not None or (skin is not None and skin.law != "linear"):
+    skin = patch_model.interface.skin
+    if patch_model.interface.strips is not None or (skin is not None and skin.law != "linear"):
         return "strips or a smooth skin lie between the pieces"
-    if not asked.loading.load:
+    if not patch_model.loading.load:
         return "no load presses the pieces together"
-    is_unbounded = asked.has_singular_ends or asked.gap.jumps
+    is_unbounded = patch_model.has_singular_ends or patch_model.gap.jumps
     return "the pressure of the case may be unbounded" if is_unbounded else ""
 
 
-def pressing_kind(asked) -> tuple:
+def pressing_kind(patch_model) -> tuple:
     """Return the properties that patches solved together share, apart from their pieces."""
-    return asked.mesh.shared.name, *_kind(asked)
+    return patch_model.mesh.shared.name, *_kind(patch_model)
 
 
-def _kind(asked) -> tuple:
+def _kind(patch_model) -> tuple:
     """Return the numbers of the linear asperity layer, and whether the rotation is fixed."""
-    skin = asked.interface.skin
+    skin = patch_model.interface.skin
     numbers = None if skin is None else (skin.normal_stiffness, skin.tangential_ratio)
-    return numbers, asked.loading.moment is None
+    return numbers, patch_model.loading.moment is None
 
 
 def collect_loads(patches: Sequence) -> PatchLoads:
@@ -227,9 +229,9 @@ def patches_on(patches, pair: Pair) -> list:
         and isinstance(pair.upper_grid, TensorGrid)
         and not pair.closing.any()
     )
-    for k, asked in enumerate(patches if grids else ()):
-        if not _not_of_one_stretch(asked):
-            groups.setdefault(_kind(asked), []).append(k)
+    for k, patch_model in enumerate(patches if grids else ()):
+        if not _not_of_one_stretch(patch_model):
+            groups.setdefault(_kind(patch_model), []).append(k)
     for cases in groups.values():
         with one_thread():
             level = solve_on_pair(collect_loads([patches[k] for k in cases]), pair)
@@ -277,9 +279,9 @@ def max_error_ratios(patches, pairs: list, tolerance: float) -> list:
     grids = all(
         isinstance(body, TensorGrid) for pair in pairs for body in (pair.grid, pair.upper_grid)
     )
-    for k, asked in enumerate(patches if grids and len(pairs) > 2 else ()):
-        if asked.gap.profile is None and not _not_of_one_stretch(asked):
-            groups.setdefault((asked.mesh.tolerance, *_kind(asked)), []).append(k)
+    for k, patch_model in enumerate(patches if grids and len(pairs) > 2 else ()):
+        if patch_model.gap.profile is None and not _not_of_one_stretch(patch_model):
+            groups.setdefault((patch_model.mesh.tolerance, *_kind(patch_model)), []).append(k)
     for cases in groups.values():
         found = pressed_together(collect_loads([patches[k] for k in cases]), tolerance, pairs)
         for place in np.flatnonzero(found.good).tolist():
@@ -288,28 +290,28 @@ def max_error_ratios(patches, pairs: list, tolerance: float) -> list:
 
 
 def pressed_together(
-    asked: PatchLoads, tolerance: float, pieces: list | None = None
+    patch_model: PatchLoads, tolerance: float, pieces: list | None = None
 ) -> BatchSolution:
     """Solve patches on the meshes that they share, and estimate their errors.
 
     Parameters
     ----------
-    asked : PatchLoads
+    patch_model : PatchLoads
     tolerance : float
         Relative error above which values are extrapolated.
     pieces : list of Pair, optional
         Pieces, fine to coarse, that replace the shared ones; the other plane state is then not
         solved.
     """
-    pairs = pieces or shared_pairs(asked.first)
-    first = asked.first
+    pairs = pieces or shared_pairs(patch_model.first)
+    first = patch_model.first
     level = None
     levels = []
     with one_thread():
         for pair in reversed(pairs):
-            level = solve_on_pair(asked, pair, level)
+            level = solve_on_pair(patch_model, pair, level)
             levels.insert(0, level)
-        theirs = () if pieces else _in_other_plane(asked, levels[1])
+        theirs = () if pieces else _in_other_plane(patch_model, levels[1])
     fine = levels[0]
     pair = pairs[0]
     good = np.logical_and.reduce([level.is_solved for level in (*levels, *theirs)])
@@ -341,9 +343,9 @@ def pressed_together(
     )
 
 
-def _make_patch(asked, pair: Pair, level: Level, k: int):
-    """Return the k-th patch of a level, of PatchModel `asked`, as `press.press_patch` returns it."""
-    gap, notes, seconds = asked.gap.evaluate(level.x)
+def _make_patch(patch_model, pair: Pair, level: Level, k: int):
+    """Return the k-th patch of a level, of PatchModel `patch_model`, as `press.press_patch` returns it."""
+    gap, notes, seconds = patch_model.gap.evaluate(level.x)
     rows = level.pressure
     pressure = ContactState(
         frozen_array(rows.sigma_n[k]),
@@ -357,48 +359,48 @@ def _make_patch(asked, pair: Pair, level: Level, k: int):
         MappingProxyType({}),
     )
     return as_patch(
-        asked,
+        patch_model,
         pair,
         gap + pair.rise,
         notes,
         seconds,
-        (_with_asperities(asked, pair), pressure, None, None),
+        (_with_asperities(patch_model, pair), pressure, None, None),
     )
 
 
-def _with_asperities(asked, pair: Pair):
+def _with_asperities(patch_model, pair: Pair):
     """Return the Compliance of a pair, in series with a linear asperity layer if there is one."""
-    skin = asked.interface.skin
+    skin = patch_model.interface.skin
     return pair.compliance if skin is None else with_linear_skin(skin, pair.compliance)
 
 
-def _in_other_plane(asked: PatchLoads, known: Level) -> tuple:
+def _in_other_plane(patch_model: PatchLoads, known: Level) -> tuple:
     """Return the patches on the second mesh in the other plane state; () if it is not needed."""
-    other = one_by_one.other_plane(asked.first)
+    other = one_by_one.other_plane(patch_model.first)
     return (
         ()
         if other is None
-        else (solve_on_pair(asked._replace(first=other), shared_pair(other, 1), known),)
+        else (solve_on_pair(patch_model._replace(first=other), shared_pair(other, 1), known),)
     )
 
 
-def solve_on_pair(asked: PatchLoads, pair: Pair, coarse: Level | None = None) -> Level:
+def solve_on_pair(patch_model: PatchLoads, pair: Pair, coarse: Level | None = None) -> Level:
     """Solve patches on one Pair.
 
     Parameters
     ----------
-    asked : PatchLoads
+    patch_model : PatchLoads
     pair : Pair
     coarse : Level, optional
         The same patches on coarser cells, near whose ends of contact the search starts.
     """
     bare = pair.compliance
-    pieces = _with_asperities(asked.first, pair)
+    pieces = _with_asperities(patch_model.first, pair)
     x = bare.interface.x
-    held = asked.moment is None
-    gap = asked.gaps(x) + pair.rise
+    held = patch_model.moment is None
+    gap = patch_model.gaps(x) + pair.rise
     gap_range = np.ptp(gap, axis=1)
-    turned = np.zeros(asked.load.size) if held else asked.angle
+    turned = np.zeros(patch_model.load.size) if held else patch_model.angle
     # the rotation of a free piece is measured from zero, so that it keeps its digits
     gap = gap - turned[:, None] * x
     low = gap.min(axis=1)
@@ -406,9 +408,9 @@ def solve_on_pair(asked: PatchLoads, pair: Pair, coarse: Level | None = None) ->
     tangential = Intervals(pieces.tangential, x)
     contacts = normal.press(
         gap - low[:, None],
-        asked.load,
-        None if held else asked.moment - asked.spring * turned,
-        asked.spring,
+        patch_model.load,
+        None if held else patch_model.moment - patch_model.spring * turned,
+        patch_model.spring,
         coarse and _about(x, coarse),
     )
     tangential.fill_sums(contacts.first)
@@ -417,7 +419,7 @@ def solve_on_pair(asked: PatchLoads, pair: Pair, coarse: Level | None = None) ->
         sigma,
         contacts.opening,
         low + contacts.closing,
-        contacts.theta + asked.angle - turned,
+        contacts.theta + patch_model.angle - turned,
         contacts.force.sum(axis=1),
         contacts.force @ x,
         Outcome.DONE,
@@ -435,7 +437,9 @@ def solve_on_pair(asked: PatchLoads, pair: Pair, coarse: Level | None = None) ->
         normal.stiffness(contacts, is_rotation=True),
     )
     peak = peak_pressures(
-        x, sigma, None if asked.first.interface.skin is None else softness / normal.c.diagonal()
+        x,
+        sigma,
+        None if patch_model.first.interface.skin is None else softness / normal.c.diagonal(),
     )
     return Level(
         static_values(bare.interface, pressure, peak, edge_values), pressure, contacts, gap_range, x

@@ -37,29 +37,33 @@ def clear() -> None:
     _RESULTS.clear()
 
 
-def content_key(asked) -> tuple:
+def content_key(patch_model) -> tuple:
     """Return a key that is equal for all `PatchModel`s with the same content."""
-    gap = asked.gap
-    mesh = asked.mesh
-    interface = asked.interface
+    gap = patch_model.gap
+    mesh = patch_model.mesh
+    interface = patch_model.interface
     shapes = tuple((name, tuple(part)) for name, part in gap.shapes)
     heights = (gap.profile, gap.average, gap.limit, gap.is_rough, gap.side, gap.material)
     return (
-        asked.pieces,
-        asked.loading,
+        patch_model.pieces,
+        patch_model.loading,
         (interface.strips, interface.has_shear, interface.partial_slip),
         interface.skin and tuple(interface.skin),
         replace(mesh, shared=None),
         mesh.shared and mesh.shared.name,
-        asked.solved,
+        patch_model.solved,
         shapes,
         heights,
     )
 
 
-def may_be_shared(asked) -> bool:
+def may_be_shared(patch_model) -> bool:
     """Return whether the results of a `PatchModel` may be reused by other cases of a sweep.
 
     This requires shared meshes, and neither a mesh nor a profile from a file.
     """
-    return asked.mesh.shared is not None and asked.mesh.file is None and asked.gap.profile is None
+    return (
+        patch_model.mesh.shared is not None
+        and patch_model.mesh.file is None
+        and patch_model.gap.profile is None
+    )

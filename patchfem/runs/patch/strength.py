@@ -58,12 +58,12 @@ def min_stress_ratio(poisson: float, plane: str) -> float:
     return sqrt(3) / 2 * (1 - 2 * poisson) / sqrt(1 - poisson + poisson**2)
 
 
-def yielding_faces(asked, peak: float) -> dict:
+def yielding_faces(patch_model, peak: float) -> dict:
     """Return a note for each material of a face that yields under a pressure.
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     peak : float
         Pressure [Pa] that acts at least somewhere on the interface.
 
@@ -73,12 +73,12 @@ def yielding_faces(asked, peak: float) -> dict:
         Notes by Strength.
     """
     notes = {}
-    for side, piece in (("lower", asked.pieces.lower), ("upper", asked.pieces.upper)):
+    for side, piece in (("lower", patch_model.pieces.lower), ("upper", patch_model.pieces.upper)):
         face = piece.coating.material if piece.coating else piece.substrate
         known = yield_strength(face)
         if known is None or known in notes:
             continue
-        stress = min_stress_ratio(face.poisson, asked.pieces.plane) * peak
+        stress = min_stress_ratio(face.poisson, patch_model.pieces.plane) * peak
         if stress > known.pressure:
             notes[known] = (
                 f"under the largest pressure the von Mises stress is at least {stress / 1e6:.4g} MPa at the face of "

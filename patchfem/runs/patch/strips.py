@@ -23,7 +23,7 @@ from .skin import MIN_RELATIVE_PRESSURE, cut_off_pressure, skin_law
 
 
 def press_strips_of_patch(
-    asked, pieces: Compliance, gap, held: tuple, added=None, warm_start=None
+    patch_model, pieces: Compliance, gap, held: tuple, added=None, warm_start=None
 ) -> tuple:
     """Solve the contact of a pair in strips.
 
@@ -32,7 +32,7 @@ def press_strips_of_patch(
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     pieces : Compliance
     gap : (m,) or (s, m)
         Unloaded gap [m].
@@ -48,19 +48,19 @@ def press_strips_of_patch(
         StripsState.
     """
     (count, roll, offset), interface, (angle, moment, spring) = (
-        asked.interface.strips,
+        patch_model.interface.strips,
         pieces.interface,
         held,
     )
-    skin = make_asperities(asked)
-    by = asked.loading.approach
+    skin = make_asperities(patch_model)
+    by = patch_model.loading.approach
     one = split_into_strips(pieces, count)
-    layout = StripLayout(interface.x, one.weight, strip_offsets(asked.pieces.width, count))
+    layout = StripLayout(interface.x, one.weight, strip_offsets(patch_model.pieces.width, count))
     strips = StripModel(StripCompliance(one.normal, added, warm_start), layout, skin)
-    roll_moment = None if offset is None else asked.loading.load * offset
+    roll_moment = None if offset is None else patch_model.loading.load * offset
     loads = HolderLoads(roll_moment=roll_moment)
     if by is None:
-        loads = HolderLoads(asked.loading.load, moment, roll_moment, spring)
+        loads = HolderLoads(patch_model.loading.load, moment, roll_moment, spring)
     state = press_strips(strips, gap, loads, approach=by, rotation=angle, roll=roll)
     mean = (
         cut_off_pressure(state.pressure) if isinstance(skin, SmoothAsperities) else state.pressure
@@ -79,14 +79,14 @@ def press_strips_of_patch(
     return pieces, answer, skin if isinstance(skin, SmoothAsperities) else None, state
 
 
-def make_asperities(asked):
+def make_asperities(patch_model):
     """Return the asperity layer between the strips; None if they are bare."""
-    if asked.interface.skin is None:
+    if patch_model.interface.skin is None:
         return None
-    if asked.interface.skin.law == "linear":
-        return LinearAsperities(asked.interface.skin.normal_stiffness)
+    if patch_model.interface.skin.law == "linear":
+        return LinearAsperities(patch_model.interface.skin.normal_stiffness)
 
-    return skin_law(asked)
+    return skin_law(patch_model)
 
 
 def rotational_stiffness(state, c, x, weight) -> float:
