@@ -222,8 +222,9 @@ def contact_entry(result: Result) -> dict:
     patch = result.patch
     if patch is None or patch.strips is not None or not patch.active.any():
         return {}
-    intervals = patch.stretches
-    if intervals is None:
+    if patch.points is not None:
+        intervals = patch.points.intervals
+    else:
         intervals = values.contact_intervals(patch, values.contact_ends(patch))
     return {
         "contact": {

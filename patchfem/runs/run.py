@@ -302,9 +302,13 @@ def _complete_result(result: Result, notes: list, begin: float, meshes: PatchMes
         outcome = Outcome.NOT_CONVERGED
     path = model.source.path
     notes = [*shorten_file_names(notes, path), *yielding_faces.values()]
+    patch = result.patch
+    if patch is not None:
+        patch = replace(patch, frames=result.fields)
     return replace(
         result,
         outcome=outcome,
+        patch=patch,
         measures=with_meanings(result.measures, "interface" if model.patch is None else "strip"),
         warnings=shorten_file_names(warnings, path),
         extra=result.extra | {"notes": notes, "yielding_faces": yielding_faces},
@@ -359,7 +363,7 @@ def state_key(model, patch, version: str) -> str:
     """
     arrays = []
     if patch is not None:
-        arrays += [patch.x, patch.gap]
+        arrays += [patch.x, patch.unloaded_gap]
     if model.wear is not None and model.wear.start is not None:
         arrays += [model.wear.start.x, model.wear.start.depth]
     if model.slide is not None and model.slide.corners is not None:

@@ -154,7 +154,9 @@ def test_exact_the_limit_of_a_geometric_series(ratio):
     end = ratio / (ratio - 1)
     assert found.extrapolated == pytest.approx(end, rel=1e-12)
     assert found.error == pytest.approx(1.8 * (end - sums[-1]), rel=1e-12)
-    assert found.left == pytest.approx((end - sums[-1]) / (4 if ratio > 2.6 else 2), rel=1e-12)
+    assert found.extrapolated_error == pytest.approx(
+        (end - sums[-1]) / (4 if ratio > 2.6 else 2), rel=1e-12
+    )
 
 
 if __name__ == "__main__":

@@ -162,8 +162,8 @@ def test_exact_on_flat_ground_they_wear_as_the_exact_set_of_elements():
     keys = {"slide.amplitude": "0.3 um", "wear.cycles": 1000, "wear.jumps": 1}
     here = run(SOFT + SLIDE, False, **keys, **{"contact.grooves.amplitude": "1e-11 um"})
     there = run(SOFT + SLIDE, False, **keys, **{"contact.grooves.amplitude": "0 um"})
-    np.testing.assert_allclose(here.patch.gap, there.patch.gap, rtol=2e-3)
-    path = here.patch.gap / here.patch.pressure.sigma_n
+    np.testing.assert_allclose(here.patch.unloaded_gap, there.patch.unloaded_gap, rtol=2e-3)
+    path = here.patch.unloaded_gap / here.patch.pressure.sigma_n
     assert np.ptp(path) > 0.05 * path.mean()
 
 

@@ -216,7 +216,7 @@ def test_always_spikes_and_missing_heights_are_counted_and_bridged(tmp_path):
     said = " ".join(found.warnings)
     assert "4 of 1271 heights are spikes" in said and "36 of 1271" in said
     assert not any("are spikes" in line for line in clean.warnings)
-    assert np.abs(found.patch.gap - clean.patch.gap).max() <= 2e-8
+    assert np.abs(found.patch.unloaded_gap - clean.patch.unloaded_gap).max() <= 2e-8
     assert value(found, "pressure_peak") == pytest.approx(value(clean, "pressure_peak"), rel=0.02)
     assert value(found, "contact_fraction") == pytest.approx(
         value(clean, "contact_fraction"), abs=0.02

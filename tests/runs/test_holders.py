@@ -87,7 +87,7 @@ def test_exact_unlike_pieces_add_their_compliances_and_may_be_swapped():
 def test_exact_a_step_lifts_one_side():
     patch, found = solved(tables='[contact.step]\nheight = "1 um"\nat = "2 mm"\n')
     x = patch.pair.grid.x
-    assert patch.gap == pytest.approx(np.where(x > 2e-3, 1e-6, 0.0))
+    assert patch.unloaded_gap == pytest.approx(np.where(x > 2e-3, 1e-6, 0.0))
     assert patch.pressure.sigma_n[x > 2e-3].max() == 0 and found["pressure_centre"] < 0
     assert step(np.array([-1.0, 0.0, 1.0]), 2.0, 0.0).tolist() == [0.0, 1.0, 2.0]
 

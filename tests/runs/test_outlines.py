@@ -250,7 +250,7 @@ def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer
     scene = loads(BLOCK + NARROW.format("upper") + profile, tmp_path / "scene.toml")
     model = build(scene).patch
     patch = solve(model, *make_piece_meshes(model))
-    assert patch.x[-1] == 4e-3 and np.ptp(patch.gap) > 0
+    assert patch.x[-1] == 4e-3 and np.ptp(patch.unloaded_gap) > 0
     assert find_file_faults(scene, tmp_path) == []
     for text in (BLOCK, BLOCK + NARROW.format("upper").replace("8 mm", "8.3 mm")):
         scene = loads(text + profile, tmp_path / "scene.toml")

@@ -223,7 +223,7 @@ def test_exact_a_stylus_trace_of_a_surface_is_its_gap_turned(tmp_path, on):
     (one, trace), (other, turned) = (
         solved(part, path=tmp_path / "scene.toml") for part in (surface, gap)
     )
-    assert trace == turned and np.array_equal(one.gap, other.gap)
+    assert trace == turned and np.array_equal(one.unloaded_gap, other.unloaded_gap)
     upright = solved(profile(tmp_path, x, z, "gap.csv") + side, path=tmp_path / "scene.toml")[1]
     assert upright["pressure_peak"] > 1.1 * trace["pressure_peak"]  # it rides on its two ends
 
@@ -293,7 +293,7 @@ def test_exact_a_rounded_mesh_is_the_flat_mesh_with_the_rounding_in_its_gap(tmp_
     found = asked("", keys, path=tmp_path / "scene.toml")
     patch = solve(found, *make_piece_meshes(found))
     x = patch.x
-    assert patch.gap == pytest.approx(x**2 / (2 * 5.0), rel=1e-9, abs=1e-18)
+    assert patch.unloaded_gap == pytest.approx(x**2 / (2 * 5.0), rel=1e-9, abs=1e-18)
     mine = values(patch)
     crown = solved('[contact.crown]\nradius = "5 m"\n')[1]
     for name in ("pressure_peak", "contact_fraction", "normal_stiffness", "approach"):

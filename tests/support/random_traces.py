@@ -116,7 +116,7 @@ def compare_trace(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     doubts = {name: float(one.error) for name, one in known.items()}
     return {
         "group": kind,
-        "engine": "points" if result.patch.sharper else "cells",
+        "engine": "points" if result.patch.points else "cells",
         "seconds": seconds,
         "warnings": list(result.warnings),
         "rows": measure_rows(result.measures, truths, doubts),

@@ -114,40 +114,44 @@ def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
     first = models[0]
     alike = isinstance(models, SimilarModels)
     asked = (
-        static.asked_by_columns(models.columns().patch, len(models))
+        static.loads_by_columns(models.columns().patch, len(models))
         if alike
         else static.collect_loads([model.patch for model in models])
     )
-    found = static.pressed_together(asked, first.accuracy.tolerance)
+    found = static.solve_together(asked, first.accuracy.tolerance)
     out = CaseResults.blank(len(models))
-    good = found.good
-    wide = ~found.good
+    good = found.is_solved
+    wide = ~good
     tolerance = first.accuracy.tolerance
-    unknown = np.any([found.errors[name] >= found.values[name] for name in POSITIVE], axis=0)
+    values_by_name = {name: estimate.value for name, estimate in found.estimates.items()}
+    decisive = [found.estimates[name] for name in POSITIVE]
+    unknown = np.any([estimate.error >= estimate.value for estimate in decisive], axis=0)
     floors = {
         name: np.broadcast_to(least, good.shape)
-        for name, least in of_patch.floors(first.patch, tolerance, found.values).items()
+        for name, least in of_patch.floors(first.patch, tolerance, values_by_name).items()
     }
-    for name, values in found.values.items():
+    for name, estimate in found.estimates.items():
         out.measure(name, TABLE[name].unit)
         for columns, given in (
-            (out.values, values),
-            (out.errors, found.errors[name]),
+            (out.values, estimate.value),
+            (out.errors, estimate.error),
             (out.floors, floors[name]),
         ):
             columns[name][:] = np.where(good, given, np.nan)
         wide = wide | (
-            found.errors[name]
-            > np.maximum(compute_allowed_error(tolerance, values, floors[name]), TINY)
+            estimate.error
+            > np.maximum(compute_allowed_error(tolerance, estimate.value, floors[name]), TINY)
         )
     out.outcome[good] = str(Outcome.DONE)
     out.outcome[good & unknown] = str(Outcome.NOT_CONVERGED)
     nodes = {"interface_nodes": found.levels[0].x.size}
     out.numerics.update(dict.fromkeys(np.flatnonzero(good).tolist(), nodes))
-    strained = of_patch.exceeds_small_strains(first.patch, found.top, found.approach)
+    largest_pressure = found.largest_pressure
+    strained = of_patch.exceeds_small_strains(first.patch, largest_pressure, found.approach)
     pieces = first.patch.pieces
-    mean = found.values["normal_load"] / (pieces.length * pieces.width * pieces.pairs)
-    least_peak = found.values["pressure_peak"] - found.errors["pressure_peak"]
+    mean = values_by_name["normal_load"] / (pieces.length * pieces.width * pieces.pairs)
+    peak = found.estimates["pressure_peak"]
+    least_peak = peak.value - peak.error
     always = bool(first.source.remarks) or not alike
     told = file_name_shortener(first.source.path)
     for case in np.flatnonzero(good & (wide | strained | always)).tolist():
@@ -156,7 +160,7 @@ def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
         warned = [
             *model.source.remarks,
             *of_patch.strain_warnings(
-                model.patch, float(found.top[case]), float(found.approach[case])
+                model.patch, float(largest_pressure[case]), float(found.approach[case])
             ),
             *tolerance_warnings(Finding(model, measures, _Nodes(found.levels[0].x))),
         ]
@@ -165,7 +169,7 @@ def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
     for case in np.flatnonzero(good).tolist():
         notes = [
             *of_patch.notes_on_tall_pieces(first.patch, mean[case]),
-            *found.band(first.patch, case),
+            *found.plane_sentences(first.patch, case),
             *yielding_faces(first.patch, least_peak[case]).values(),
         ]
         if notes:

@@ -18,8 +18,8 @@ GAP_ROUND = 1e-9  # the same over the range of the gap, whose round-off limits t
 
 
 def press_to_approach_with_rotation(
-    patch_model, pieces: Compliance, gap, under, stiff: Compliance
-) -> tuple:
+    patch_model, pieces: Compliance, gap, under_load, stiff: Compliance
+):
     """Solve the contact under a prescribed approach with free rotation.
 
     The load is searched at which the approach is reached. If even a millionth of the load that flat
@@ -31,15 +31,14 @@ def press_to_approach_with_rotation(
     pieces : Compliance
     gap : (m,) or (s, m)
         Unloaded gap [m], of strips (s, m).
-    under : callable
+    under_load : callable
         Function (patch_model, pieces, gap) that solves the contact under the load of the model.
     stiff : Compliance
         Pieces with their skin as under a large load.
 
     Returns
     -------
-    tuple
-        Compliance with its skin, ContactState, skin, strips.
+    press.SolvedContact
 
     Raises
     ------
@@ -53,39 +52,43 @@ def press_to_approach_with_rotation(
 
     refuse_opening(patch_model, stiff)
     distance = patch_model.loading.approach
-    tried = []
+    solutions = []
     least = _least_load(patch_model, np.ptp(pieces.interface.x))
 
-    def short(log_load: float) -> float:
+    def excess(log_load: float) -> float:
         """Return by how much the approach under least load + exp(log_load) [N] exceeds the distance."""
         # in excess of the least load: near it, the piece rotates ever faster until it tips over
         load = least + float(np.exp(log_load))
-        tried.append(under(patch_model.with_loading(load=load, approach=None), pieces, gap))
-        return tried[-1][1].approach - distance
+        solutions.append(
+            under_load(patch_model.with_loading(load=load, approach=None), pieces, gap)
+        )
+        return solutions[-1].pressure.approach - distance
 
     top = np.log(max(distance, np.ptp(gap), 1e-12) / pieces.normal.mean())
     low = top = max(top, np.log(least) if least > 0 else top)
     bottom = top - np.log(1e6) if least == 0 else np.log(least * 1e-9)
     for _ in range(60):
-        if short(top) >= 0:
+        if excess(top) >= 0:
             break
         low = top
         top = top + 2
-    while low == top or short(low) >= 0:
+    while low == top or excess(low) >= 0:
         if low == bottom:
-            apart = patch_model.with_loading(
+            unloaded_model = patch_model.with_loading(
                 load=0.0, approach=None, can_rotate=False, rotational_stiffness=0.0
             )
-            pieces, still, skin, strips = under(apart, pieces, gap)
-            open_ = frozen_array(np.atleast_2d(gap).min(axis=0) - min(distance, gap.min()))
-            return pieces, replace(still, gap=open_, approach=distance), skin, strips
+            unloaded = under_load(unloaded_model, pieces, gap)
+            open_gap = frozen_array(np.atleast_2d(gap).min(axis=0) - min(distance, gap.min()))
+            pressure = replace(unloaded.pressure, gap=open_gap, approach=distance)
+            return unloaded._replace(pressure=pressure)
         low, top = max(low - 2, bottom), low
-    brentq(short, low, top, xtol=1e-13, rtol=1e-14)
-    best = min(tried, key=lambda one: abs(one[1].approach - distance))
-    if abs(best[1].approach - distance) > APPROACH_TOL * distance + GAP_ROUND * np.ptp(gap):
-        reached = [one[1].approach for one in tried]
-        below = max(a for a in reached if a < distance)
-        above = min(a for a in reached if a > distance)
+    brentq(excess, low, top, xtol=1e-13, rtol=1e-14)
+    approaches = [solution.pressure.approach for solution in solutions]
+    nearest = int(np.argmin(np.abs(np.array(approaches) - distance)))
+    error = abs(approaches[nearest] - distance)
+    if error > APPROACH_TOL * distance + GAP_ROUND * np.ptp(gap):
+        below = max(approach for approach in approaches if approach < distance)
+        above = min(approach for approach in approaches if approach > distance)
         raise NotConverged(
             f"an approach of {distance:.6g} m cannot be reached: the approach jumps from {below:.6g} m "
             f"to {above:.6g} m when the line of the load passes one of the few nodes in contact; "
@@ -93,7 +96,7 @@ def press_to_approach_with_rotation(
             "contact.load in place of the approach",
             "contact.approach.distance",
         )
-    return best
+    return solutions[nearest]
 
 
 def _least_load(patch_model, length: float) -> float:

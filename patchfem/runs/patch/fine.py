@@ -13,6 +13,7 @@ import numpy as np
 
 from ...contact.active_set import patch_problem
 from ...contact.conjugate_gradients import solve_by_gradients
+from ...contact.edges import EdgeValues
 from ...contact.half_space.layer import end_compliance, layer_compliance
 from ...contact.half_space.point_compliance import (
     PointCompliance,
@@ -26,9 +27,16 @@ from ...elasticity.lapack import one_thread
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...model import profile
 from ...model.pieces import make_elastic_layers
-from .measures import OFFSET, Hidden, measures_from_series, shared_errors
-from .press import Surface
-from .values import vertex
+from .measures import (
+    MIN_EDGE_OFFSET,
+    PEAK_MEASURES,
+    Estimate,
+    Resolution,
+    converge,
+    shared_errors,
+)
+from .press import PointSolution, Surface
+from .values import peak_pressures, static_values
 
 MIN_LEVELS = 3  # fewer levels do not show an order of convergence
 MAX_POINTS = 60_000  # points of a level; more would exceed the time of a patch
@@ -41,25 +49,8 @@ CONTACT_TOL = 3e-8  # relative residual of a solved contact
 MAX_ITERATIONS = 4000  # iterations of one contact
 CORNER_SPAN = 1e-3  # length of a corner over that of the interface
 # pressure at a corner over the largest; above it the largest pressure may be at the corner
-CORNER_PRESSURE = 0.2
+MIN_CORNER_PRESSURE_RATIO = 0.2
 MAX_OVERLAP = 1e-6  # largest overlap of a solved contact over the displacement due to the pressure
-
-
-class PointSolution(NamedTuple):
-    """Static measures from points of a profile, and the finest level that was solved.
-
-    - measures: (value, error) by name; {} if a level is not solved.
-    - surface, stretches: as in `Patch`; None if a level is not solved.
-    """
-
-    measures: dict
-    surface: Surface | None = None
-    stretches: np.ndarray | None = None
-
-    @property
-    def spacing(self) -> float | None:
-        """Distance [m] between the points; None without a solution."""
-        return None if self.surface is None else float(self.surface.x[1] - self.surface.x[0])
 
 
 class PointLevel(NamedTuple):
@@ -67,21 +58,56 @@ class PointLevel(NamedTuple):
 
     - force (n,): nodal forces [N].
     - surface: pressure and gap on the points.
-    - stretches (k, 2): parts in contact [m].
+    - intervals (k, 2): parts in contact [m].
     - values: static measures by name.
-    - hidden: errors that the levels may share.
-    - work: iterations.
-    - cornered: whether the pressure at a free corner may be the largest; a few cells at the ends do
-      not resolve it.
+    - resolution: errors that the levels may share.
+    - n_iterations: iterations of the solver.
+    - has_corner_peak: whether the pressure at a free corner may be the largest; a few cells at the
+      ends do not resolve it.
     """
 
     force: np.ndarray
     surface: Surface
-    stretches: np.ndarray
+    intervals: np.ndarray
     values: dict
-    hidden: Hidden
-    work: int
-    cornered: bool
+    resolution: Resolution
+    n_iterations: int
+    has_corner_peak: bool
+
+
+class FreeEnds(NamedTuple):
+    """Change of the compliance of infinite layers by the free ends of the pieces.
+
+    - x (k,): positions [m].
+    - normal, tangential (k, k): changes [m2/N] for pressure and for shear.
+    """
+
+    x: np.ndarray
+    normal: np.ndarray
+    tangential: np.ndarray
+
+
+class PointForces(NamedTuple):
+    """Forces on the points of a level, and the state of the upper holder.
+
+    - force (n,): nodal forces [N].
+    - approach, rotation: [m] and [rad]; the rotation adds to that of the gap.
+    - n_iterations: iterations of the solver.
+    """
+
+    force: np.ndarray
+    approach: float
+    rotation: float
+    n_iterations: int
+
+
+class HolderState(NamedTuple):
+    """Load [N], moment [N m], approach [m] and rotation [rad] of the upper holder."""
+
+    load: float
+    moment: float
+    approach: float
+    rotation: float
 
 
 def takes_points(patch_model) -> bool:
@@ -91,48 +117,48 @@ def takes_points(patch_model) -> bool:
     rotation.
     """
     loading = patch_model.loading
-    can_turn = loading.can_rotate or loading.rotational_stiffness > 0
-    held = loading.approach is None or not can_turn
+    can_rotate = loading.can_rotate or loading.rotational_stiffness > 0
     return (
-        patch_model.mesh.is_automatic
-        and patch_model.gap.profile is not None
+        patch_model.gap.profile is not None
+        and patch_model.mesh.is_automatic
+        and patch_model.mesh.edge_motion != "wear"
         and patch_model.interface.skin is None
         and patch_model.interface.strips is None
         and not patch_model.pieces.has_overhang
-        and patch_model.mesh.edge_motion != "wear"
-        and held
+        and (loading.approach is None or not can_rotate)
     )
 
 
-def solve_on_points(patch_model, enough) -> PointSolution:
+def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
     """Solve a `PatchModel` on an increasing number of points.
 
     Parameters
     ----------
     patch_model : PatchModel
-    enough : callable
-        Function of the measures that ends the refinement; MAX_POINTS and MAX_WORK end it as well.
+    meets_tolerance : callable
+        Function of a PointSolution that ends the refinement; MAX_POINTS and MAX_WORK end it too.
+
+    Returns
+    -------
+    PointSolution or None
+        None if fewer than MIN_LEVELS levels are solved.
     """
     count = _first_level_points(patch_model)
-    series = []
-    found = {}
+    solution = None
     with one_thread():
         try:
-            cells = [_ends(patch_model, level) for level in range(MIN_LEVELS)]
-            coarse = [_level(patch_model, ends, count, None) for ends in cells]
-            series = coarse[-1:]
-            while len(series) < MIN_LEVELS or not (enough(found) or _is_expensive(series[-1])):
-                series.append(
-                    _level(patch_model, cells[-1], 2 * series[-1].force.size, series[-1].force)
-                )
-                found = _add_series(coarse, series) if len(series) >= MIN_LEVELS else {}
+            ends = [_compute_free_ends(patch_model, level) for level in range(MIN_LEVELS)]
+            coarse = [_solve_level(patch_model, free_ends, count) for free_ends in ends]
+            levels = coarse[-1:]
+            while solution is None or not (meets_tolerance(solution) or _is_expensive(levels[-1])):
+                force = levels[-1].force
+                levels.append(_solve_level(patch_model, ends[-1], 2 * force.size, force))
+                if len(levels) >= MIN_LEVELS:
+                    estimates = _add_series(coarse, levels)
+                    solution = PointSolution(estimates, levels[-1].surface, levels[-1].intervals)
         except (NotConverged, np.linalg.LinAlgError):
             pass
-    return (
-        PointSolution(found, series[-1].surface, series[-1].stretches)
-        if found
-        else PointSolution({})
-    )
+    return solution
 
 
 def _first_level_points(patch_model) -> int:
@@ -141,91 +167,88 @@ def _first_level_points(patch_model) -> int:
     return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))
 
 
-def _is_expensive(last: PointLevel) -> bool:
+def _is_expensive(level: PointLevel) -> bool:
     """Return whether doubling the points of a level exceeds the limit of points or iterations."""
-    return 2 * last.force.size > MAX_POINTS or 3 * last.work * last.force.size > MAX_WORK
+    count = level.force.size
+    return 2 * count > MAX_POINTS or 3 * level.n_iterations * count > MAX_WORK
 
 
-def _add_series(coarse: list, series: list) -> dict:
-    """Return (value, error) by name from two series of levels.
+def _add_series(coarse: list, levels: list) -> dict:
+    """Return the estimates of measures by name from two series of levels.
 
     The first series has ever finer cells at the ends, the second ever more points with the finest
     of these cells. The extrapolation and the error of the first are added to the second.
     """
-    mine = series[-1].values
-    found = measures_from_series(
-        [one.values for one in series], shared_errors(series[-1].hidden, mine), True, 0.0
-    )
-    ends = measures_from_series([one.values for one in coarse], {}, True, 0.0)
-    unknown = ("pressure_peak", "loaded_fraction") if series[-1].cornered else ()
+    finest = levels[-1]
+    shared = shared_errors(finest.resolution, finest.values)
+    by_points = converge([level.values for level in levels], shared, 0.0)
+    by_ends = converge([level.values for level in coarse], {}, 0.0)
     return {
-        name: (one.value + ends[name].value - coarse[-1].values[name], one.error + ends[name].error)
-        for name, one in found.items()
-        if name not in unknown
+        name: Estimate(
+            float(estimate.value + by_ends[name].value - coarse[-1].values[name]),
+            float(estimate.error + by_ends[name].error),
+        )
+        for name, estimate in by_points.items()
+        if name not in PEAK_MEASURES or not finest.has_corner_peak
     }
 
 
-def _ends(patch_model, level: int) -> list:
-    """Return the change of compliance due to the free ends of the pieces, on the cells of a level.
-
-    Returns positions (k,) [m] and changes (2, k, k) [m2/N] for pressure and for shear.
-    """
-    length = patch_model.pieces.length
-    sides = (-0.5, 0.5)
+def _compute_free_ends(patch_model, level: int) -> FreeEnds:
+    """Return the change of compliance due to the free ends of the pieces, on cells of a level."""
+    half = patch_model.pieces.length / 2
+    cell = END_CELL * patch_model.pieces.length
+    middle_cell = MIDDLE_CELL * patch_model.pieces.length
+    bands = ((-half, -half, cell), (half, half, cell))
     layout = Layout(
-        -length / 2,
-        length / 2,
-        tuple((side * length, side * length, END_CELL * length) for side in sides),
-        (-length / 2, length / 2),
-        MIDDLE_CELL * length,
-        MIDDLE_CELL * length,
-        GROWTH,
+        start=-half,
+        stop=half,
+        bands=bands,
+        span=(-half, half),
+        max_loaded_length=middle_cell,
+        max_length=middle_cell,
+        slope=GROWTH,
     ).scale_cells(0.5**level)
-    places = divide_into_columns(layout)
+    x = divide_into_columns(layout)
     changes = 0.0
-    for piece, share in _bodies(patch_model):
+    for piece, multiplicity in _distinct_pieces(patch_model):
         depth, coated = _rows(piece, layout)
-        changes = changes + share * np.array(
-            end_compliance(
-                make_piece(places, depth, coated, make_elastic_layers(patch_model, piece))
-            )
-        )
-    return places, changes
+        body = make_piece(x, depth, coated, make_elastic_layers(patch_model, piece))
+        changes = changes + multiplicity * np.array(end_compliance(body))
+    return FreeEnds(x, *changes)
 
 
-def _bodies(patch_model) -> list:
+def _distinct_pieces(patch_model) -> list:
     """Return (piece, multiplicity) for the distinct pieces."""
     pieces = patch_model.pieces
     return [(pieces.upper, 2)] if pieces.are_alike else [(pieces.lower, 1), (pieces.upper, 1)]
 
 
-def operators(patch_model, ends: tuple, count: int) -> tuple:
+def operators(patch_model, ends: FreeEnds, count: int) -> tuple:
     """Return the PointCompliance for pressure and for shear of equally spaced points.
 
     Parameters
     ----------
     patch_model : PatchModel
-    ends : tuple
-        Change of compliance by the free ends of the pieces, from `_ends`.
+    ends : FreeEnds
     count : int
         Number of points.
+
+    Returns
+    -------
+    tuple of PointCompliance
     """
     length = patch_model.pieces.length
     width = patch_model.pieces.width * patch_model.pieces.pairs
     x = ((np.arange(count) + 0.5) / count - 0.5) * length
     k = np.arange(count) * np.pi / length
-    waves = sum(
-        share
-        * np.array(
-            layer_compliance(
-                k, piece.height, piece.thickness, make_elastic_layers(patch_model, piece)
-            )
-        )
-        for piece, share in _bodies(patch_model)
-    )
+    waves = 0
+    for piece, multiplicity in _distinct_pieces(patch_model):
+        layers = make_elastic_layers(patch_model, piece)
+        wave_compliance = layer_compliance(k, piece.height, piece.thickness, layers)
+        waves = waves + multiplicity * np.array(wave_compliance)
     out = []
-    for wave, change in zip(waves, ends[1]):
-        modes, sizes = smooth_modes(ends[0], change, x)
+    for wave, change in zip(waves, (ends.normal, ends.tangential)):
+        modes, sizes = smooth_modes(ends.x, change, x)
         out.append(PointCompliance(x, length / count * width, wave, modes, sizes / width))
     return tuple(out)
 
@@ -233,125 +256,127 @@ def operators(patch_model, ends: tuple, count: int) -> tuple:
 def _rows(piece, layout: Layout) -> tuple:
     """Return the depths [m] of the rows of a piece, and the number of rows in its coating."""
     height = piece.height
-    thick = piece.thickness
-    least = layout.bands[0][2]
+    coating = piece.thickness
+    end_cell = layout.bands[0][2]
+    max_cell = 2 * height * layout.max_length / (layout.stop - layout.start)
     bands = [
-        (0.0, 0.0, least),
+        (0.0, 0.0, end_cell),
         (height, height, height * layout.max_length / (layout.stop - layout.start) / 2),
     ]
-    bands += [(thick, thick, max(thick * layout.slope / 4, least))] if thick else []
-    most = 2 * height * layout.max_length / (layout.stop - layout.start)
-    return divide_into_rows(
-        Layout(0.0, height, tuple(bands), (0.0, height), most, most, layout.slope), thick
-    )
+    if coating:
+        bands.append((coating, coating, max(coating * layout.slope / 4, end_cell)))
+    rows = Layout(0.0, height, tuple(bands), (0.0, height), max_cell, max_cell, layout.slope)
+    return divide_into_rows(rows, coating)
 
 
-def _level(patch_model, ends: tuple, count: int, start) -> PointLevel:
+def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLevel:
     """Solve the contact on `count` points.
 
     start: forces (n,) [N] of the level with half as many points, or None.
     """
+    length = patch_model.pieces.length
     normal, shear = operators(patch_model, ends, count)
     x = normal.x
-    between = np.linspace(
-        -patch_model.pieces.length / 2, patch_model.pieces.length / 2, 2 * count + 1
-    )
+    between = np.linspace(-length / 2, length / 2, 2 * count + 1)
     gap = patch_model.gap.evaluate(between).heights[1::2]
-    force, closing, theta, work = _solve_forces(patch_model, normal, gap, start)
-    moved = normal.product(force)
-    opening = gap + theta * x - closing + moved
-    touches = force > 0
-    if not opening.min() >= -MAX_OVERLAP * np.abs(moved).max():
+    solution = _solve_forces(patch_model, normal, gap, start)
+    force = solution.force
+    deflection = normal.product(force)
+    opening = gap + solution.rotation * x - solution.approach + deflection
+    largest_deflection = np.abs(deflection).max()
+    active = force > 0
+    if not opening.min() >= -MAX_OVERLAP * largest_deflection:
         raise NotConverged(
             f"contact: at {count} points the pieces still overlap by up to {-opening.min():.1e} m"
         )
-    opening = np.where(touches, 0.0, np.maximum(opening, 0.0))
-    surface = Surface(x, np.full(count, normal.area), force / normal.area, opening, gap)
-    values, found, stretches = _values(patch_model, (normal, shear), force, opening)
-    values |= {"approach": closing, "rotation": patch_model.gap.angle + theta}
-    cell = patch_model.pieces.length / count
-    hidden = Hidden(
-        patch_model.pieces.length,
-        int(touches.sum()),
-        cell * bool(found),
-        cell * len(found),
-        OFFSET,
-        patch_model.loading.moment is not None,
-        float(np.ptp(gap) + np.abs(moved).max()),
-        0.0,
-        0.0,
-    )
-    near = max(1, round(CORNER_SPAN * count))
-    cornered = max(force[:near].max(), force[-near:].max()) > CORNER_PRESSURE * force.max()
-    return PointLevel(force, surface, stretches, values, hidden, work, bool(cornered))
-
-
-def _solve_forces(patch_model, normal: PointCompliance, gap, start) -> tuple:
-    """Solve for the forces of a level.
-
-    Returns forces (n,) [N], approach [m], rotation [rad] in addition to that in the gap, and
-    iterations.
-    """
-    x = normal.x
-    begin = None if start is None else np.repeat(start, 2) / 2
-    low = gap.min() if patch_model.loading.approach is None else patch_model.loading.approach
-    moment = None if patch_model.loading.approach is not None else patch_model.loading.moment
-    load = patch_model.loading.load if patch_model.loading.approach is None else None
-    force, count = solve_by_gradients(
-        normal,
-        patch_problem(x, gap - low, load, moment, patch_model.loading.rotational_stiffness),
-        CONTACT_TOL,
-        MAX_ITERATIONS,
-        begin,
-    )
-    touches = force > 0
-    if patch_model.loading.approach is not None or not touches.any():
-        return force, float(low), 0.0, count
-    depth = (gap + normal.product(force))[touches]
-    if moment is None:
-        return force, float(depth.mean()), 0.0, count
-    middle = x[touches].mean()
-    arms = x[touches] - middle
-    lean = float(arms @ depth) / max(float(arms @ arms), 1e-300)
-    return force, float(depth.mean() - lean * middle), -lean, count
-
-
-def _values(patch_model, both: tuple, force, gap) -> tuple:
-    """Return the measures except approach and rotation, the ends of the contact, and its parts.
-
-    The parts are (k, 2) [m].
-    """
-    (normal, shear), x, load = both, both[0].x, float(force.sum())
-    touches = force > 0
-    sigma = force / normal.area
-    if not touches.any():
+    if not active.any():
         raise NotConverged("contact: the pieces touch on coarser cells only")
-    one = np.ones(x.size)
-    found = find_edges(normal, force, gap, normal.solve_forces(touches, one))
-    bears = np.concatenate([[False], touches, [False]])
-    edges = iter(found)
-    places = [
-        next(edges).position if 0 < at < x.size else (at / x.size - 0.5) * patch_model.pieces.length
-        for at in np.flatnonzero(bears[1:] != bears[:-1])
-    ]
-    stretches = np.array(places).reshape(-1, 2)
-    long = np.maximum(np.diff(stretches).ravel(), 0.0)
-    peak = float(sigma.max())
-    top = int(np.argmax(sigma))
-    if 0 < top < x.size - 1:
-        peak = max(peak, float(vertex(x, sigma[None], np.array([top]))[0]))
-    moment = float(force @ x)
-    out = {
-        "normal_load": load,
-        "contact_fraction": float(long.sum()) / patch_model.pieces.length,
-        "pressure_peak": peak,
-        "moment": moment,
-        "contact_half_width": float(places[-1] - places[0]) / 2,
-        "pressure_centre": moment / load,
-        "loaded_fraction": load / (normal.area * x.size * peak),
-        "normal_stiffness": set_stiffness(normal, touches, one, found),
-        "rotational_stiffness": set_stiffness(normal, touches, x, found),
-    }
+    opening = np.where(active, 0.0, np.maximum(opening, 0.0))
+    sigma = force / normal.area
+    unit = np.ones(count)
+    contact_edges = find_edges(normal, force, opening, normal.solve_forces(active, unit))
+    intervals = _contact_intervals(active, contact_edges, length)
+    state = HolderState(
+        float(force.sum()),
+        float(force @ x),
+        solution.approach,
+        patch_model.gap.angle + solution.rotation,
+    )
+    tangential = np.nan  # for unlike pieces it depends on the closing that shear causes
     if patch_model.pieces.are_alike:
-        out["tangential_stiffness"] = set_stiffness(shear, touches, one, found)
-    return out, found, stretches
+        tangential = set_stiffness(shear, active, unit, contact_edges)
+    edge_values = EdgeValues(
+        length=float(np.maximum(np.diff(intervals).ravel(), 0.0).sum()),
+        width=float(intervals[-1, 1] - intervals[0, 0]),
+        normal=set_stiffness(normal, active, unit, contact_edges),
+        tangential=tangential,
+        rotational=set_stiffness(normal, active, x, contact_edges),
+    )
+    # the pressure at an end of the interface is that of the point
+    peak = float(peak_pressures(x, sigma[None], node_fraction=unit)[0])
+    values = static_values(length, normal.area * count, state, peak, edge_values)
+    if np.isnan(tangential):
+        del values["tangential_stiffness"]
+    cell = length / count
+    resolution = Resolution(
+        length=length,
+        n_nodes=int(active.sum()),
+        longest_cell=cell * bool(contact_edges),
+        edge_cells=cell * len(contact_edges),
+        edge_offset=MIN_EDGE_OFFSET,
+        can_rotate=patch_model.loading.moment is not None,
+        closing=float(np.ptp(gap) + largest_deflection),
+    )
+    n_corner = max(1, round(CORNER_SPAN * count))
+    corner_force = max(force[:n_corner].max(), force[-n_corner:].max())
+    return PointLevel(
+        force,
+        Surface(x, np.full(count, normal.area), sigma, opening, gap),
+        intervals,
+        values,
+        resolution,
+        solution.n_iterations,
+        bool(corner_force > MIN_CORNER_PRESSURE_RATIO * force.max()),
+    )
+
+
+def _contact_intervals(active, contact_edges: list, length: float) -> np.ndarray:
+    """Return the parts in contact (k, 2) [m] of a contact set (n,) of bool.
+
+    A part ends at an edge between two points, or at an end of the interface.
+    """
+    is_active = np.concatenate([[False], active, [False]])
+    edges = iter(contact_edges)
+    places = []
+    for point in np.flatnonzero(is_active[1:] != is_active[:-1]):
+        is_inside = 0 < point < active.size
+        places.append(next(edges).position if is_inside else (point / active.size - 0.5) * length)
+    return np.array(places).reshape(-1, 2)
+
+
+def _solve_forces(patch_model, normal: PointCompliance, gap, start) -> PointForces:
+    """Solve for the forces of a level, under the load or approach of a `PatchModel`."""
+    x = normal.x
+    loading = patch_model.loading
+    begin = None if start is None else np.repeat(start, 2) / 2
+    has_approach = loading.approach is not None
+    offset = loading.approach if has_approach else gap.min()
+    moment = None if has_approach else loading.moment
+    problem = patch_problem(
+        x,
+        gap - offset,
+        None if has_approach else loading.load,
+        moment,
+        loading.rotational_stiffness,
+    )
+    force, n_iterations = solve_by_gradients(normal, problem, CONTACT_TOL, MAX_ITERATIONS, begin)
+    active = force > 0
+    if has_approach or not active.any():
+        return PointForces(force, float(offset), 0.0, n_iterations)
+    depth = (gap + normal.product(force))[active]
+    if moment is None:
+        return PointForces(force, float(depth.mean()), 0.0, n_iterations)
+    middle = x[active].mean()
+    arms = x[active] - middle
+    slope = float(arms @ depth) / max(float(arms @ arms), 1e-300)
+    return PointForces(force, float(depth.mean() - slope * middle), -slope, n_iterations)

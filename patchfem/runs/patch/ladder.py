@@ -13,12 +13,13 @@ from ...model.pieces import make_piece_meshes
 from . import fine, slip_zones, store
 from .condensed import condense, shared_pairs
 from .grids import MAX_SECONDS, MIN_LEVELS, base_grids, predict_condensing_seconds
-from .measures import is_within_tolerance, measures
+from .measures import max_error_ratio, measures
 from .press import press_patch, solve
 
 # tolerance [1] down to which a patch that slips may take as many CPU seconds as a moving mesh; at a tenth of this
 # tolerance it may take 3.2 times as many
 TOL_OF_SECONDS = 1e-3
+MAX_COLUMNS_WITHOUT_COARSER = 8  # a mesh with no more columns has no coarser one
 MAX_DECADES = 6  # decades of the tolerance that are searched for one that needs a finer mesh
 
 
@@ -27,10 +28,10 @@ def solve_split(patch_model, level: int, estimate: bool) -> tuple:
 
     The coarser patches are those of `solve_all`.
     """
-    low, high = make_piece_meshes(patch_model)
+    bodies = make_piece_meshes(patch_model)
     for _ in range(level):
-        low, high = (None if body is None else body.refine() for body in (low, high))
-    return _with_coarser(patch_model, low, high, estimate, True)
+        bodies = tuple(None if body is None else body.refine() for body in bodies)
+    return _solve_with_coarser(patch_model, bodies, estimate, True)
 
 
 def solve_all(patch_model, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
@@ -57,45 +58,37 @@ def solve_all(patch_model, tolerance: float, estimate: bool = True, fresh: bool 
     """
     if patch_model.solved is not None and not fresh:
         return patch_model.solved.patches
-    if patch_model.mesh.shared is not None:
-        if fresh:
-            return solve_on_pairs(
-                patch_model,
-                [
-                    condense(patch_model, *level, fresh=True)
-                    for level in patch_model.mesh.shared.levels
-                ],
-                estimate,
-            )
-        if store.may_be_shared(patch_model):
-            return store.reuse(
-                ("patches", store.content_key(patch_model), estimate),
-                lambda: solve_on_pairs(patch_model, shared_pairs(patch_model), estimate),
-            )
-        found = solve_on_pairs(patch_model, shared_pairs(patch_model), estimate)
-        if estimate and _misses_trace(patch_model, found, patch_model.mesh.tolerance or tolerance):
-            return solve_on_ladder(
-                patch_model.with_mesh(shared=None), patch_model.mesh.tolerance or tolerance
-            )
-        return found
-    if patch_model.mesh.is_automatic:
-        return solve_on_ladder(
-            patch_model, patch_model.mesh.tolerance or tolerance, estimate, fresh
-        )
-    return _with_coarser(patch_model, *make_piece_meshes(patch_model), estimate, fresh)
+    mesh = patch_model.mesh
+    tolerance = mesh.tolerance or tolerance
+    if mesh.shared is None:
+        if mesh.is_automatic:
+            return solve_on_ladder(patch_model, tolerance, estimate, fresh)
+        return _solve_with_coarser(patch_model, make_piece_meshes(patch_model), estimate, fresh)
+    if fresh:
+        pairs = [condense(patch_model, *level, fresh=True) for level in mesh.shared.levels]
+        return solve_on_pairs(patch_model, pairs, estimate)
+    patches = store.reuse_in_sweep(
+        patch_model,
+        ("patches", store.content_key(patch_model), estimate),
+        lambda: solve_on_pairs(patch_model, shared_pairs(patch_model), estimate),
+    )
+    if estimate and _misses_trace(patch_model, patches, tolerance):
+        return solve_on_ladder(patch_model.with_mesh(shared=None), tolerance)
+    return patches
 
 
 def _misses_trace(patch_model, patches: tuple, tolerance: float) -> bool:
     """Return whether a patch with a profile misses its tolerance on shared meshes."""
-    if not patch_model.mesh.is_automatic or patch_model.gap.profile is None or patches[1] is None:
+    has_trace = patch_model.mesh.is_automatic and patch_model.gap.profile is not None
+    if not has_trace or patches[1] is None:
         return False
-    return not is_within_tolerance(measures(*patches, tolerance=tolerance), tolerance)
+    return max_error_ratio(measures(*patches, tolerance=tolerance), tolerance) > 1
 
 
 def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
     """Solve a patch on condensed pieces, from fine to coarse (see `solve_all`)."""
     return _pad_to_three(
-        press_patch(patch_model, pair) for pair in pairs[: None if estimate else 1]
+        press_patch(patch_model, pair) for pair in (pairs if estimate else pairs[:1])
     )
 
 
@@ -105,10 +98,10 @@ def _pad_to_three(patches) -> tuple:
     return out + (None,) * (3 - len(out))
 
 
-def _with_coarser(patch_model, low, high, estimate: bool, fresh: bool) -> tuple:
+def _solve_with_coarser(patch_model, bodies: tuple, estimate: bool, fresh: bool) -> tuple:
     """Solve a patch on given bodies and on coarser ones (see `solve_all`)."""
-    found = [(low, high), *(comparison_meshes(low, high) if estimate else ())]
-    return _pad_to_three(solve(patch_model, *level, fresh) for level in found)
+    levels = [bodies, *(comparison_meshes(*bodies) if estimate else ())]
+    return _pad_to_three(solve(patch_model, *level, fresh) for level in levels)
 
 
 def meshes_of_file(patch_model) -> list:
@@ -116,8 +109,8 @@ def meshes_of_file(patch_model) -> list:
 
     The order is that of `solve_all`.
     """
-    low, high = make_piece_meshes(patch_model)
-    return [(low, high), *comparison_meshes(low, high)]
+    bodies = make_piece_meshes(patch_model)
+    return [bodies, *comparison_meshes(*bodies)]
 
 
 def comparison_meshes(low, high) -> list:
@@ -125,14 +118,14 @@ def comparison_meshes(low, high) -> list:
 
     They are coarser grids, or the unstructured mesh with every edge halved; empty for few columns.
     """
-    if low.x.size <= 8:
+    if low.x.size <= MAX_COLUMNS_WITHOUT_COARSER:
         return []
     if low.base_grid is None:
         return [tuple(None if body is None else body.refine() for body in (low, high))]
     out = []
-    while len(out) < 2 and low.x.size > 8:
+    while len(out) < 2 and low.x.size > MAX_COLUMNS_WITHOUT_COARSER:
         low = low.coarsen()
-        high = high.coarsen() if high is not None else None
+        high = None if high is None else high.coarsen()
         out.append((low, high))
     return out
 
@@ -162,49 +155,50 @@ def solve_on_ladder(
         Patches on all meshes, fine to coarse.
     """
     grids = base_grids(patch_model).bodies
-    out = []
-    on_points = None
+    patches = []
+    points = None
     while True:
-        try:
-            wanted = estimate or len(out) == MIN_LEVELS - 1
-            out.insert(
-                0,
-                press_patch(patch_model, condense(patch_model, *grids, fresh=fresh))
-                if wanted
-                else None,
-            )
-        # the cells are too short for double precision: the coarser meshes are kept
-        except NotConverged:
-            if not out or out[0] is None:
-                raise
-            return tuple(out) if len(out) > 1 else (*out, None)
+        patch = None
+        if estimate or len(patches) == MIN_LEVELS - 1:
+            try:
+                patch = press_patch(patch_model, condense(patch_model, *grids, fresh=fresh))
+            # the cells are too short for double precision: the coarser meshes are kept
+            except NotConverged:
+                if not patches or patches[0] is None:
+                    raise
+                return tuple(patches) if len(patches) > 1 else (*patches, None)
+        patches.insert(0, patch)
         grids = [grid.refine() for grid in grids]
-        if len(out) < MIN_LEVELS:
+        if len(patches) < MIN_LEVELS:
             continue
-        nothing = out[0].pressure.outcome is Outcome.NO_CONTACT
-        if not estimate or nothing:
-            return tuple(out)
-        dear = predict_condensing_seconds(grids)
-        if on_points is not None:  # the solution on points of the profile is kept for finer meshes
-            out[0] = replace(
-                out[0],
-                sharper=on_points.sharper,
-                averaging=on_points.averaging,
-                fine=on_points.fine,
-                stretches=on_points.stretches,
-            )
-        found = measures(*out, tolerance=tolerance)
-        shows_slip = _shows_slip(patch_model, out, tolerance)
-        if (
-            dear > MAX_SECONDS[False]
-            and not is_within_tolerance(found, tolerance)
-            and _finer(patch_model)
-        ):
-            on_points = out[0] = _on_points(patch_model, out, tolerance)
-            found = measures(*out, tolerance=tolerance)
-        enough = bool(out[0].sharper) or is_within_tolerance(found, tolerance)
-        if dear > most_seconds(patch_model, tolerance) or (shows_slip and enough):
-            return tuple(out)
+        if not estimate or patch.pressure.outcome is Outcome.NO_CONTACT:
+            return tuple(patches)
+        seconds = predict_condensing_seconds(grids)
+        if points is not None:  # the solution on points of the profile is kept for finer meshes
+            patches[0] = _with_points(patch, points)
+        is_within = max_error_ratio(measures(*patches, tolerance=tolerance), tolerance) <= 1
+        shows_slip = _shows_slip(patch_model, patches, tolerance)
+        if seconds > MAX_SECONDS[False] and not is_within and fine.takes_points(patch_model):
+            meets_tolerance = partial(_meets_tolerance, patches, tolerance)
+            points = fine.solve_on_points(patch_model, meets_tolerance)
+            patches[0] = _with_points(patch, points)
+            is_within = max_error_ratio(measures(*patches, tolerance=tolerance), tolerance) <= 1
+        is_done = shows_slip and (patches[0].points is not None or is_within)
+        if is_done or seconds > most_seconds(patch_model, tolerance):
+            return tuple(patches)
+
+
+def _with_points(patch, points):
+    """Return a patch with its solution on points; the patch itself if that is None."""
+    if points is None:
+        return patch
+    return replace(patch, points=points, averaging=points.spacing)
+
+
+def _meets_tolerance(patches: list, tolerance: float, points) -> bool:
+    """Return whether patches meet the tolerance with a solution on points."""
+    found = measures(_with_points(patches[0], points), *patches[1:], tolerance=tolerance)
+    return max_error_ratio(found, tolerance) <= 1
 
 
 def most_seconds(patch_model, tolerance: float | None = None) -> float:
@@ -248,27 +242,6 @@ def _shows_slip(patch_model, patches: list, tolerance: float) -> bool:
     return slip_zones.slip_missed(patches, patch_model.mesh.slip, tolerance) <= 1
 
 
-def _finer(patch_model) -> bool:
-    """Return whether a patch with a profile can be solved on equally spaced points."""
-    if patch_model.gap.profile is None:
-        return False
-
-    return fine.takes_points(patch_model)
-
-
-def _on_points(patch_model, patches: list, tolerance: float):
-    """Return the finest patch with measures computed on points as fine as its profile."""
-    found = fine.solve_on_points(patch_model, partial(_enough, patches, tolerance))
-    first = patches[0]
-    return replace(
-        first,
-        sharper=found.measures,
-        averaging=found.spacing or first.averaging,
-        fine=found.surface,
-        stretches=found.stretches,
-    )
-
-
 def tolerance_of_next_mesh(patch_model, patches, tolerance: float) -> float | None:
     """Return the loosest tolerance / 10^k at which a patch would be solved on a finer mesh.
 
@@ -288,35 +261,21 @@ def tolerance_of_next_mesh(patch_model, patches, tolerance: float) -> float | No
     seconds = next_seconds(patches[0])
     if seconds > most_seconds(patch_model):
         return None
-    if patch_model.gap.profile is not None and patches[0].sharper:
-        ended = not is_within_tolerance(
-            measures(*(patch for patch in patches if patch is not None), tolerance=tolerance),
-            tolerance,
-        )
-        return None if ended else tolerance / 10
     known = [patch for patch in patches if patch is not None]
-    for tighter in (tolerance * 10.0**-k for k in range(1, MAX_DECADES + 1)):
-        enough = is_within_tolerance(measures(*known, tolerance=tighter), tighter) and _shows_slip(
-            patch_model, known, tighter
-        )
-        if not enough and seconds <= most_seconds(patch_model, tighter):
+    if patches[0].points is not None:
+        found = measures(*known, tolerance=tolerance)
+        return tolerance / 10 if max_error_ratio(found, tolerance) <= 1 else None
+    for decade in range(1, MAX_DECADES + 1):
+        tighter = tolerance * 10.0**-decade
+        found = measures(*known, tolerance=tighter)
+        is_done = max_error_ratio(found, tighter) <= 1 and _shows_slip(patch_model, known, tighter)
+        if not is_done and seconds <= most_seconds(patch_model, tighter):
             return tighter
     return None
 
 
 def next_seconds(patch) -> float:
     """Return the predicted CPU seconds of condensing the pieces of a patch on its next mesh."""
-    return predict_condensing_seconds([grid.refine() for grid in _grids(patch)])
-
-
-def _grids(patch) -> tuple:
-    """Return the meshes of a patch, a single one if its pieces are alike."""
     pair = patch.pair
-    return (pair.grid,) if pair.upper is pair.piece else (pair.grid, pair.upper_grid)
-
-
-def _enough(patches: list, tolerance: float, sharp: dict) -> bool:
-    """Return whether patches meet the tolerance with the measures `sharp` computed on points."""
-    return is_within_tolerance(
-        measures(replace(patches[0], sharper=sharp), *patches[1:], tolerance=tolerance), tolerance
-    )
+    grids = [pair.grid] if pair.upper is pair.piece else [pair.grid, pair.upper_grid]
+    return predict_condensing_seconds([grid.refine() for grid in grids])

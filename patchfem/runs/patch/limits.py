@@ -10,9 +10,10 @@ import numpy as np
 
 MAX_RATIO = 4.0  # ratio of successive changes at second order, the largest that is used
 MAX_RATIO_NOT_NESTED = 2.5  # largest ratio that is used for meshes that are not nested
-REGULAR = (2.6, 6.0)  # range of ratios in which a series converges with its order
-SLOWEST = 1.6  # smallest ratio from which the remainder is computed
-GROWING = 1.3  # series with smaller ratios do not converge yet
+MIN_REGULAR_RATIO = 2.6  # smallest ratio of a series that converges with its order
+MAX_REGULAR_RATIO = 6.0  # largest such ratio; above it, the last change is small by chance
+MIN_RATIO = 1.6  # smallest ratio from which the remainder is computed
+MIN_CONVERGING_RATIO = 1.3  # series with smaller ratios do not converge yet
 # error over the remainder, for a steady ratio; the interval fails in less than 2 of 100 random
 # scenes
 STEADY_FACTOR = 1.8
@@ -25,13 +26,13 @@ class Limit(NamedTuple):
     - value: value on the finest mesh.
     - error: half-width of an interval around `value` that contains the limit.
     - extrapolated: limit by the last ratio of the changes.
-    - left: half-width around `extrapolated`.
+    - extrapolated_error: half-width around `extrapolated`.
     """
 
     value: np.ndarray
     error: np.ndarray
     extrapolated: np.ndarray
-    left: np.ndarray
+    extrapolated_error: np.ndarray
 
 
 def extrapolate(values, nested: bool = True) -> Limit:
@@ -47,43 +48,45 @@ def extrapolate(values, nested: bool = True) -> Limit:
         Values, coarse to fine, of one or many series.
     nested : bool
         Whether each mesh halves the cells of the previous one.
+
+    Returns
+    -------
+    Limit
     """
     values = np.asarray(values, float)
+    finest = values[-1]
     last = values[-1] - values[-2]
-    size = np.abs(values[-1] - values[-2])
+    size = np.abs(last)
     if len(values) < 3:
-        return Limit(values[-1], UNSTEADY_FACTOR * size, values[-1], UNSTEADY_FACTOR * size)
+        return Limit(finest, UNSTEADY_FACTOR * size, finest, UNSTEADY_FACTOR * size)
     before = values[-2] - values[-3]
+    size_before = np.abs(before)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         ratio = np.where(last != 0, before / last, np.where(before >= 0, np.inf, -np.inf))
     if not nested:
-        rest = np.maximum(size, np.abs(before) / MAX_RATIO_NOT_NESTED) / (
-            np.clip(ratio, SLOWEST, MAX_RATIO_NOT_NESTED) - 1
-        )
-        return Limit(values[-1], UNSTEADY_FACTOR * rest, values[-1], UNSTEADY_FACTOR * rest)
-    rest = last / (np.clip(ratio, SLOWEST, MAX_RATIO) - 1)
-    # above the largest regular ratio, the last change is small by chance
-    wild = UNSTEADY_FACTOR * np.where(
-        ratio > REGULAR[1],
-        np.maximum(size / (MAX_RATIO - 1), np.abs(before) / MAX_RATIO**2 * 2),
-        np.maximum(size, np.abs(before) / MAX_RATIO),
+        largest = np.maximum(size, size_before / MAX_RATIO_NOT_NESTED)
+        remainder = largest / (np.clip(ratio, MIN_RATIO, MAX_RATIO_NOT_NESTED) - 1)
+        error = UNSTEADY_FACTOR * remainder
+        return Limit(finest, error, finest, error)
+    remainder = last / (np.clip(ratio, MIN_RATIO, MAX_RATIO) - 1)
+    unsteady_error = UNSTEADY_FACTOR * np.where(
+        ratio > MAX_REGULAR_RATIO,
+        np.maximum(size / (MAX_RATIO - 1), size_before / MAX_RATIO**2 * 2),
+        np.maximum(size, size_before / MAX_RATIO),
     )
-    falls = (ratio >= GROWING) & (ratio <= REGULAR[1])
-    return Limit(
-        values[-1],
-        np.where(falls, STEADY_FACTOR * np.abs(rest), wild),
-        np.where(falls, values[-1] + rest, values[-1]),
-        np.where(falls, _extrapolated_half_width(values, rest, ratio), wild),
-    )
-
-
-def _extrapolated_half_width(values, rest, ratio) -> np.ndarray:
-    """Return the half-width around the extrapolated value.
-
-    It is the change of the extrapolated value by the last mesh, and at least a quarter of the
-    remainder.
-    """
-    least = np.abs(rest) / np.where(ratio >= REGULAR[0], 4, 2)
+    # The error of the extrapolated value is its change by the last mesh, and at least a quarter of
+    # the remainder.
+    extrapolated = finest + remainder
+    extrapolated_error = np.abs(remainder) / np.where(ratio >= MIN_REGULAR_RATIO, 4, 2)
     if len(values) < 4:
-        return 2 * least
-    return np.maximum(least, np.abs(values[-1] + rest - extrapolate(values[:-1]).extrapolated))
+        extrapolated_error = 2 * extrapolated_error
+    else:
+        change = np.abs(extrapolated - extrapolate(values[:-1]).extrapolated)
+        extrapolated_error = np.maximum(extrapolated_error, change)
+    is_steady = (ratio >= MIN_CONVERGING_RATIO) & (ratio <= MAX_REGULAR_RATIO)
+    return Limit(
+        finest,
+        np.where(is_steady, STEADY_FACTOR * np.abs(remainder), unsteady_error),
+        np.where(is_steady, extrapolated, finest),
+        np.where(is_steady, extrapolated_error, unsteady_error),
+    )

@@ -1,8 +1,9 @@
 """Measures of a static patch, with errors from coarser meshes.
 
-In: a `Patch` and the same on coarser meshes. Out: measures by name with errors by `limits`,
-plus the errors that a change of the mesh does not show (`Hidden`); and the model errors due to
-the plane state and the number of strips.
+In: a `Patch` and the same on coarser meshes. Out: measures by name (`measures`). A value is that of
+the finest mesh, or its limit by extrapolation (`limits`). Its error contains the remaining change
+by refinement and the errors that no change of the mesh shows (`shared_errors`). The module has also
+the model errors due to the plane state and the number of strips.
 """
 
 from dataclasses import replace
@@ -24,18 +25,463 @@ from .press import Patch, press_patch
 from .values import edge_cells, open_ends, unresolved_rounding, values
 
 # width over height of a piece that is clearly in plane strain; its inverse: in plane stress
-CLEAR = 8.0
+MIN_PLANE_STRAIN_RATIO = 8.0
 FEW_NODES = 12  # the measures of a contact with fewer nodes depend on this number
 UNRESOLVED_NODES = 3  # contacts with at most this many nodes are not resolved
 ROUND_OFF_FRACTION = 5e-12  # relative round-off of the equations of contact
 MIN_ERROR = 1e-9  # smallest relative error that is stated, because nobody needs less
-OFFSET = 0.012  # error of the position of an edge between nodes, in cells
-RISING = 4.0  # the pressure at a corner may still increase by this many times its last change
+MIN_EDGE_OFFSET = 0.012  # error of the position of an edge between nodes, in cells
+# the pressure at a corner may still increase by this many times its last change
+CORNER_RISE_FACTOR = 4.0
 # fraction of the pressure at the corner of a coating that cells longer than its thickness may miss
-CORNER = 0.15
+CORNER_LAYER_FRACTION = 0.15
 # hidden error of an extrapolated value over that of the finest mesh: 4/3 + 1/3, rounded up
 EXTRAPOLATED_ERROR_RATIO = 2.0
+# none of several meshes that do not resolve a rounding shows its effect: the factor of their errors
+UNRESOLVED_ROUNDING_FACTOR = 2.0
 MEASURES_WITH_BAND = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
+PEAK_MEASURES = (
+    "pressure_peak",
+    "loaded_fraction",
+)  # measures that an unbounded pressure leaves out
+
+
+class Estimate(NamedTuple):
+    """Static measure of one patch, or of q patches, and what it was computed from.
+
+    - value: number or (q,).
+    - error: numerical error; None without a coarser mesh.
+    - is_extrapolated: whether the value is the limit of the nested meshes, not that of the finest.
+    """
+
+    value: float
+    error: float | None
+    is_extrapolated: bool = False
+
+    def select(self, case: int) -> "Estimate":
+        """Return the estimate of one of q patches."""
+        return Estimate(self.value[case], self.error[case], self.is_extrapolated[case])
+
+    def to_measure(self, name: str, floor: float | None = None) -> Measure:
+        """Return the Measure of a single patch; None as floor for that of the table."""
+        row = TABLE[name]
+        return Measure(
+            float(self.value),
+            row.unit,
+            None if self.error is None else float(self.error),
+            row.floor if floor is None else floor,
+            engine=patch_rows.EXTRAPOLATED_SOURCE
+            if self.is_extrapolated
+            else patch_rows.ON_FINEST_MESH,
+        )
+
+
+def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:
+    """Return the static measures of a patch by name, each with its error.
+
+    Parameters
+    ----------
+    fine : Patch
+    coarse : Patch or None
+        The patch on coarser meshes, fine to coarse; None for a missing one.
+    tolerance : float or None
+        Tolerance of a patch whose mesh it chose; a value whose error exceeds it is extrapolated.
+
+    Returns
+    -------
+    dict
+        Measure by name; the error is None without a coarser mesh, and 0 without a load.
+    """
+    finest = values(fine)
+    coarse = _with_parts_of_finest(fine, [patch for patch in coarse if patch is not None])
+    if coarse and finest["normal_load"] > 0:
+        missed_peak = unresolved_rounding(fine)
+        estimates = converge(
+            [*(values(patch) for patch in reversed(coarse)), finest],
+            shared_errors(_resolution_of_patch(fine, missed_peak), finest),
+            tolerance,
+            all(cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *coarse))),
+            max(MIN_ERROR, fine.pair.round_off_error),
+            UNRESOLVED_ROUNDING_FACTOR if missed_peak else 1.0,
+        )
+    else:
+        error = 0.0 if coarse else None
+        estimates = {name: Estimate(value, error) for name, value in finest.items()}
+    out = {name: estimate.to_measure(name) for name, estimate in estimates.items()}
+    if coarse and fine.averaging is not None:
+        out |= _peak_at_corner(out, fine, coarse[0])
+    for name, found in ({} if fine.points is None else fine.points.measures).items():
+        if found.error < out[name].error:
+            out[name] = replace(
+                out[name], value=found.value, error=found.error, engine=patch_rows.ON_POINTS
+            )
+    reason = _why_unbounded(fine)
+    for name in PEAK_MEASURES if reason else ():
+        out[name] = replace(out[name], value=None, error=None, reason=reason)
+    return out
+
+
+def _with_parts_of_finest(fine: Patch, coarse: list) -> list:
+    """Return the coarser patches that resolve as many parts of the contact as the finest one.
+
+    A part of a few cells next to a step may be missing on a coarse mesh. The change to such a mesh
+    shows this part and no order of convergence, so that neither this mesh nor coarser ones count.
+
+    Parameters
+    ----------
+    fine : Patch
+    coarse : list of Patch
+        From fine to coarse.
+
+    Returns
+    -------
+    list of Patch
+        At least the first one, whose change is then the only one that the error rests on.
+    """
+    if not fine.model.gap.jumps:
+        return coarse
+    n_parts = _count_parts(fine.active)
+    n_alike = 0
+    while n_alike < len(coarse) and _count_parts(coarse[n_alike].active) == n_parts:
+        n_alike += 1
+    return coarse[: max(n_alike, 1)]
+
+
+def _count_parts(active) -> int:
+    """Return the number of intervals in contact of a contact set (m,) of bool."""
+    return int(active[0]) + int(np.count_nonzero(active[1:] & ~active[:-1]))
+
+
+def _peak_at_corner(found: dict, fine: Patch, coarse: Patch) -> dict:
+    """Return the measures of the peak with errors that contain the pressure at a corner.
+
+    Under a profile, the pressure at a corner may still increase with refinement, although the
+    largest pressure does not change: a corner that the profile just reaches carries ever more on
+    cells half as long. {} if the errors are large enough.
+    """
+    pressure = fine.pressure.sigma_n[[0, -1]].max()
+    coarse_pressure = coarse.pressure.sigma_n[[0, -1]].max()
+    peak, fraction = (found[name] for name in PEAK_MEASURES)
+    error = pressure + CORNER_RISE_FACTOR * abs(pressure - coarse_pressure) - peak.value
+    if not pressure or error <= peak.error:
+        return {}
+    fraction_error = contain_peak_error(fraction.value, fraction.error, error / peak.value)
+    return {
+        "pressure_peak": replace(peak, error=float(error)),
+        "loaded_fraction": replace(fraction, error=float(fraction_error)),
+    }
+
+
+def converge(
+    series: list,
+    shared: dict,
+    tolerance: float | None,
+    nested: bool = True,
+    min_relative_error: float = MIN_ERROR,
+    factor: float = 1.0,
+) -> dict:
+    """Estimate the limits of static measures on nested meshes, and their errors.
+
+    Parameters
+    ----------
+    series : list of dict
+        Values on two meshes or more by name, coarse to fine; numbers or (q,).
+    shared : dict
+        Errors by name that all meshes may share.
+    tolerance : float or None
+        A value whose error is within it is not extrapolated; None: no value is.
+    nested : bool
+        Whether every mesh halves the cells of the previous one.
+    min_relative_error : float
+        Smallest relative error that is stated.
+    factor : float
+        Factor of the errors.
+
+    Returns
+    -------
+    dict
+        Estimate by name.
+    """
+    names = list(series[-1])
+    known = np.array([[values[name] for name in names] for values in series])
+    hidden, floors = np.zeros((2, *known.shape[1:]))
+    for row, name in enumerate(names):
+        hidden[row] = shared.get(name, 0.0)
+        floors[row] = TABLE[name].floor
+    allowed = np.inf
+    if tolerance is not None:
+        allowed = compute_allowed_error(tolerance, known[-1], floors)
+    with np.errstate(invalid="ignore", divide="ignore"):  # patches that were not solved have NaN
+        limit = extrapolate(known, nested)
+        error = np.maximum(factor * limit.error, hidden)
+        extrapolated_error = np.where(
+            (limit.extrapolated != limit.value) & (error > allowed),
+            np.maximum(factor * limit.extrapolated_error, EXTRAPOLATED_ERROR_RATIO * hidden),
+            np.inf,
+        )
+        best = np.where(extrapolated_error < error, limit.extrapolated, limit.value)
+        error = np.minimum(extrapolated_error, error)
+        error = np.maximum(error, min_relative_error * np.abs(known[-1]))
+        out = dict(zip(names, map(Estimate, best, error, best != known[-1])))
+        peak, fraction = (out[name] for name in PEAK_MEASURES)
+        relative = np.where(peak.value > 0, peak.error / peak.value, 0.0)
+        fraction_error = contain_peak_error(fraction.value, fraction.error, relative)
+        out["loaded_fraction"] = fraction._replace(error=fraction_error)
+    return out
+
+
+def contain_peak_error(fraction, error, relative_peak_error):
+    """Return errors of loaded fractions that contain the relative error of the peak.
+
+    The peak is the divisor of the fraction.
+    """
+    return np.maximum(
+        error, fraction * relative_peak_error / (1 - np.minimum(relative_peak_error, 0.5))
+    )
+
+
+def max_error_ratio(found: dict, tolerance: float) -> float:
+    """Return the largest error of the decisive measures over the allowed error [1].
+
+    Above 1, a measure misses the tolerance. A missing value or error counts as 0.
+    """
+    return max(found[name].error_ratio(tolerance) for name in DECISIVE)
+
+
+def _why_unbounded(patch: Patch) -> str:
+    """Return the reason why the pressure of a patch diverges under refinement; "" if it does not.
+
+    A contact that ends at the edge of a step has the pressure of a punch with a sharp corner; a
+    contact across a closed step is more singular. A skin makes the pressure bounded.
+    """
+    if patch.has_skin:
+        return ""
+    x = patch.x
+    cells = np.diff(x)
+    is_loaded = patch.active if patch.strips is None else patch.strips.pressure.any(axis=0)
+    if patch.model.has_singular_ends and is_loaded[[0, -1]].any():
+        return (
+            "unbounded: a sharp corner of one piece presses on the longer face of the other piece"
+        )
+    for jump in patch.model.gap.jumps:
+        cell = cells[np.clip(np.searchsorted(x, jump), 1, cells.size) - 1]
+        if is_loaded[np.abs(x - jump) <= 1.5 * cell].any():
+            return f"unbounded, because the contact reaches a sharp corner, the edge of the step at {jump:.4g} m"
+    return ""
+
+
+def cells_halved(fine, coarse) -> bool:
+    """Return whether every cell of the coarse Pair was split in two."""
+    bodies = ((fine.grid, coarse.grid), (fine.upper_grid, coarse.upper_grid))
+    for fine_body, coarse_body in bodies:
+        halved = fine_body.base_grid
+        grid = coarse_body.base_grid
+        if halved is None or grid is None:
+            return False
+        if halved.x.size != 2 * grid.x.size - 1 or halved.depth.size != 2 * grid.depth.size - 1:
+            return False
+    return True
+
+
+class Resolution(NamedTuple):
+    """How well a mesh resolves the contact of a patch, or of q patches: the errors it may hide.
+
+    - length: length of the interface [m].
+    - n_nodes: nodes in contact.
+    - longest_cell, edge_cells: longest cell in which the contact ends, and the sum of all of them
+      [m].
+    - edge_offset: error of the position of an edge, in cells.
+    - can_rotate: whether the rotation is free.
+    - closing: range of the gap plus largest elastic closing [m].
+    - corner_pressure: pressure [Pa] that is missed at loaded corners of a coating.
+    - wedge_pressure: pressure [Pa] next to a contact of few nodes.
+    - rounding_pressure: pressure [Pa] of a rounding that is not resolved.
+    - open_ends: length of rounded face in which the contact may end [m].
+    - inner_cells: part of `edge_cells` between two parts of the contact [m].
+    """
+
+    length: float
+    n_nodes: int
+    longest_cell: float
+    edge_cells: float
+    edge_offset: float
+    can_rotate: bool
+    closing: float
+    corner_pressure: float = 0.0
+    wedge_pressure: float = 0.0
+    rounding_pressure: float = 0.0
+    open_ends: float = 0.0
+    inner_cells: float = 0.0
+
+
+def resolution_of_patches(pair, pieces, force, gap_range, can_rotate: bool) -> Resolution:
+    """Return the Resolution of q patches on one Pair.
+
+    Parameters
+    ----------
+    pair : Pair
+    pieces : Compliance
+        That of the pair with its skin.
+    force : (q, m) ndarray
+        Nodal forces [N].
+    gap_range : float or (q,) ndarray
+        Range of the gap [m].
+    can_rotate : bool
+        Whether the rotation is free.
+
+    Returns
+    -------
+    Resolution
+    """
+    interface = pieces.interface
+    active = force > 0
+    cells = np.where(active[:, 1:] != active[:, :-1], np.diff(interface.x), 0.0)
+    longest = cells.max(axis=1)
+    corner_pressure = 0.0
+    if pieces is pair.compliance:  # a compliant layer of asperities (skin) bounds the pressure
+        ends = (force / interface.weight)[:, [0, -1]]
+        corner_pressure = _missed_corner_pressure(pair, ends, np.diff(interface.x)[[0, -1]])
+    return Resolution(
+        length=interface.length,
+        n_nodes=np.maximum(active.sum(axis=1), 1),
+        longest_cell=longest,
+        edge_cells=cells.sum(axis=1),
+        edge_offset=_edge_offset(pair, longest),
+        can_rotate=can_rotate,
+        closing=gap_range + np.abs(force @ pieces.normal).max(axis=1),
+        corner_pressure=corner_pressure,
+    )
+
+
+def _resolution_of_patch(patch: Patch, missed_peak: float) -> Resolution:
+    """Return the Resolution of a Patch under load.
+
+    missed_peak: pressure [Pa] of `unresolved_rounding`.
+    """
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    can_rotate = "moment_balance" in patch.pressure.residuals
+    out = resolution_of_patches(
+        patch.pair, patch.pieces, force[None], np.ptp(patch.unloaded_gap), can_rotate
+    )
+    out = Resolution(*(np.ravel(value)[0] for value in out))
+    cells = edge_cells(patch.x, patch.active)
+    first, last = ~patch.active[[0, -1]]
+    is_unresolved = out.n_nodes <= UNRESOLVED_NODES and cells.any()
+    return out._replace(
+        edge_offset=out.edge_offset if patch.skin is None else None,
+        wedge_pressure=_wedge_pressure(patch) if is_unresolved else 0.0,
+        rounding_pressure=missed_peak,
+        open_ends=float(open_ends(patch)),
+        inner_cells=float(cells[int(first) : cells.size - int(last)].sum()),
+    )
+
+
+def shared_errors(resolution: Resolution, finest: dict) -> dict:
+    """Return the errors by name that three meshes may share.
+
+    The changes from mesh to mesh do not show them. They are due to a contact of few nodes, the
+    layer at a loaded corner of a coating thinner than the cells there, a rounding smaller than the
+    cells, and round-off.
+
+    Parameters
+    ----------
+    resolution : Resolution
+        That of the finest mesh.
+    finest : dict
+        Values by name on the finest mesh.
+
+    Returns
+    -------
+    dict
+    """
+    length = resolution.length
+    n_nodes = resolution.n_nodes
+    load = finest["normal_load"]
+    peak = finest["pressure_peak"]
+    # half the sum exceeds the longest cell only if the contact has many ends
+    cell = np.maximum(resolution.longest_cell, resolution.edge_cells / 2)
+    is_unresolved = n_nodes <= UNRESOLVED_NODES
+    arm = np.where(is_unresolved, cell / (2 * n_nodes**2), 1e-3 * cell)
+    has_few_nodes = (cell > 0) & (n_nodes <= FEW_NODES)
+    peak_error = resolution.corner_pressure + np.where(has_few_nodes, peak / (4 * n_nodes**2), 0.0)
+    peak_error = np.maximum(peak_error, resolution.wedge_pressure)
+    peak_error = np.maximum(peak_error, resolution.rounding_pressure - peak)
+    displacement = (
+        ROUND_OFF_FRACTION * (np.abs(finest["approach"]) + resolution.closing)
+        + np.abs(finest["rotation"]) * arm * resolution.can_rotate
+    )
+    fraction_per_pressure = np.divide(
+        finest["loaded_fraction"], peak, out=np.zeros(np.shape(peak)), where=peak != 0
+    )
+    edge_offset = 0.0
+    if resolution.edge_offset is not None:
+        # an edge of a contact of few nodes may lie anywhere in its cell
+        min_offset = np.where(is_unresolved, 1.0, 1 / n_nodes**2)
+        edge_offset = np.maximum(resolution.edge_offset, min_offset)
+    outer_cells = resolution.edge_cells - resolution.inner_cells
+    length_error = edge_offset * resolution.edge_cells + resolution.open_ends
+    width_error = edge_offset * outer_cells + resolution.open_ends
+    return {
+        "normal_load": 1e-10 * load,
+        "pressure_peak": peak_error,
+        "contact_fraction": length_error / length,
+        "contact_half_width": width_error / 2,
+        "loaded_fraction": peak_error * fraction_per_pressure,
+        "pressure_centre": ROUND_OFF_FRACTION * length + arm,
+        "moment": (ROUND_OFF_FRACTION * length + arm) * load,
+        "rotation": displacement / length,
+        "approach": ROUND_OFF_FRACTION * resolution.closing,
+    }
+
+
+def _edge_offset(pair, cell):
+    """Return the error of the position of an edge between two nodes of a Pair, in cells.
+
+    A soft coating thinner than the cells acts as a bed of springs, whose edge is where the pressure
+    of a node vanishes. cell: longest cell in which the contact ends [m].
+    """
+    out = MIN_EDGE_OFFSET
+    for grid, piece in ((pair.grid, pair.piece), (pair.upper_grid, pair.upper)):
+        if grid.coating_thickness > 0:
+            ratio = piece.layers.coating[0] / piece.layers.substrate[0]
+            contrast = 1 - min(ratio, 1 / ratio)
+            cells = np.minimum(1.0, cell / grid.coating_thickness)
+            out = np.maximum(out, edges.edge_offset_fraction(1.0) * cells * contrast)
+    return out
+
+
+def _missed_corner_pressure(pair, sigma, cells):
+    """Return pressures (...) [Pa] that the free end of a coating may add at a loaded corner.
+
+    They are not resolved by cells longer than the thickness of the coating, and fall with the
+    square of the cells.
+
+    Parameters
+    ----------
+    pair : Pair
+    sigma : (..., 2)
+        Pressures at both ends [Pa].
+    cells : (2,)
+        Cells at both ends [m].
+    """
+    thicknesses = [grid.coating_thickness for grid in (pair.grid, pair.upper_grid)]
+    thinnest = min((thickness for thickness in thicknesses if thickness > 0), default=np.inf)
+    fraction = np.minimum(1.0, (cells / thinnest) ** 2)
+    return (CORNER_LAYER_FRACTION * sigma * fraction).max(axis=-1)
+
+
+def _wedge_pressure(patch: Patch) -> float:
+    """Return the largest pressure [Pa] that the gap next to a contact of few nodes allows.
+
+    It is E* times the slope of the gap there.
+    """
+    ends = np.flatnonzero(patch.active[1:] != patch.active[:-1])
+    slopes = np.abs(np.diff(patch.unloaded_gap)) / np.diff(patch.x)
+    flexibility = 0
+    for piece in (patch.pair.piece, patch.pair.upper):
+        young, nu = max(piece.layers.coating, piece.layers.substrate)
+        flexibility += (1 - nu**2) / young
+    return float(slopes[..., ends].max() / flexibility)
 
 
 def plane_band(patch_model, patch: Patch) -> list:
@@ -44,67 +490,80 @@ def plane_band(patch_model, patch: Patch) -> list:
     There is none for a piece that is far wider than tall in plane strain, or far taller than wide
     in plane stress. Otherwise no mesh reduces this error.
     """
-    other = other_plane(patch_model)
-    if other is None:
+    other_model = other_plane(patch_model)
+    if other_model is None:
         return []
     try:
-        mine = values(patch)
-        theirs = values(press_patch(other, pair_on_same_meshes(other, patch.pair)))
+        own_values = values(patch)
+        pair = pair_on_same_meshes(other_model, patch.pair)
+        return band_words(patch_model, own_values, values(press_patch(other_model, pair)))
     except PatchfemError as error:
         return [
-            f"{_plane_state_clause(patch_model)}; the true state lies between plane strain and plane stress; how much the two "
-            f"differ is not known, because for plane {other.pieces.plane} the contact could not be solved ({error})"
+            f"{_plane_state_clause(patch_model)}; how much the two "
+            f"differ is not known, because for plane {other_model.pieces.plane} the contact could not be solved ({error})"
         ]
-    return band_words(patch_model, mine, theirs)
 
 
 def other_plane(patch_model):
     """Return the `PatchModel` in the other plane state; None if its own is clearly right."""
-    ratio = patch_model.pieces.width / patch_model.pieces.height
-    if ratio >= CLEAR if patch_model.pieces.plane == "strain" else ratio <= 1 / CLEAR:
+    pieces = patch_model.pieces
+    ratio = pieces.width / pieces.height
+    if pieces.plane == "strain":
+        is_right = ratio >= MIN_PLANE_STRAIN_RATIO
+    else:
+        is_right = ratio <= 1 / MIN_PLANE_STRAIN_RATIO
+    if is_right:
         return None
-    plane = "stress" if patch_model.pieces.plane == "strain" else "strain"
-    return replace(patch_model, pieces=replace(patch_model.pieces, plane=plane))
+    return replace(patch_model, pieces=replace(pieces, plane=_other_plane_name(pieces)))
+
+
+def _other_plane_name(pieces) -> str:
+    """Return the name of the plane state that the pieces do not have."""
+    return "stress" if pieces.plane == "strain" else "strain"
 
 
 def _plane_state_clause(patch_model) -> str:
     """Return the clause on the assumed plane state."""
     pieces = patch_model.pieces
     ratio = pieces.width / pieces.height
-    return f"plane {pieces.plane} is assumed, and the pieces are {ratio:.2g} times as wide as tall"
+    return (
+        f"plane {pieces.plane} is assumed, and the pieces are {ratio:.2g} times as wide as tall; "
+        "the true state lies between plane strain and plane stress"
+    )
 
 
-def band_words(patch_model, mine: dict, theirs: dict) -> list:
+def band_words(patch_model, own_values: dict, other_values: dict) -> list:
     """Return the sentence of `plane_band` from values by name in both plane states.
 
     Parameters
     ----------
     patch_model : PatchModel
-    mine, theirs : dict
+    own_values, other_values : dict
         Values in the plane state of the model and in the other one.
+
+    Returns
+    -------
+    list of str
     """
-    first = "approach" if patch_model.loading.approach is None else "normal_load"
-    closing = (theirs["approach"] - mine["approach"]) if first == "approach" else 0.0
-    parts = [f"approach by {'+' * (closing > 0)}{format_length(closing, 3)}"] if closing else []
-    shares = [
-        (name, theirs[name] / mine[name] - 1)
-        for name in (first, *MEASURES_WITH_BAND)
-        if name != "approach" and mine[name]
+    changes = []
+    names = MEASURES_WITH_BAND
+    if patch_model.loading.approach is not None:
+        names = ("normal_load", *names)
+    elif closing := other_values["approach"] - own_values["approach"]:
+        changes.append(f"approach by {'+' * (closing > 0)}{format_length(closing, 3)}")
+    for name in names:
+        change = other_values[name] / own_values[name] - 1 if own_values[name] else 0.0
+        if abs(change) > 1e-3:
+            changes.append(f"{name} by {100 * change:+.2g} %")
+    if not changes:
+        return []
+    return [
+        f"{_plane_state_clause(patch_model)}; plane {_other_plane_name(patch_model.pieces)} would change "
+        f"the results by these amounts: {', '.join(changes)}"
     ]
-    parts += [f"{name} by {100 * share:+.2g} %" for name, share in shares if abs(share) > 1e-3]
-    other = "stress" if patch_model.pieces.plane == "strain" else "strain"
-    return (
-        [
-            f"{_plane_state_clause(patch_model)}; the true state lies between plane strain and plane stress; "
-            f"plane {other} would change "
-            f"the results by these amounts: {', '.join(parts)}"
-        ]
-        if parts
-        else []
-    )
 
 
-def strip_error(patch_model, patch: Patch, found: dict) -> dict:
+def add_strip_errors(patch_model, patch: Patch, found: dict) -> dict:
     """Return measures whose errors include the effect of the number of strips.
 
     It is the change to another number of strips on the mesh of `patch`, at second order. Measures
@@ -116,24 +575,27 @@ def strip_error(patch_model, patch: Patch, found: dict) -> dict:
     patch : Patch
     found : dict
         Measures by name.
+
+    Returns
+    -------
+    dict
     """
-    other, ratio = other_strips(patch_model)
-    if other is patch_model:
+    other_model, ratio = other_strips(patch_model)
+    if other_model is patch_model:
         return found
-    beside = values(press_patch(other, patch.pair))
-    here = values(patch)
-    added = {
-        name: errors.error_of_change(here[name] - beside[name], ratio, errors.MAX_ORDER)
-        for name in here
-    }
-    return {
-        name: m if m.value is None else replace(m, error=float(m.error + added[name]))
-        for name, m in found.items()
-    }
+    other_values = values(press_patch(other_model, patch.pair))
+    out = dict(found)
+    for name, value in values(patch).items():
+        measure = found[name]
+        if measure.value is not None:
+            change = value - other_values[name]
+            error = measure.error + errors.error_of_change(change, ratio, errors.MAX_ORDER)
+            out[name] = replace(measure, error=float(error))
+    return out
 
 
 def other_strips(patch_model) -> tuple:
-    """Return the `PatchModel` with another number of strips, and how many times coarser it is.
+    """Return the `PatchModel` with another number of strips, and the ratio of their widths.
 
     It has half as many strips, or twice as many if half as many would not reach to the load line.
     Without strips to halve it is the model itself.
@@ -150,469 +612,3 @@ def other_strips(patch_model) -> tuple:
         ratio = 0.5
     interface = replace(patch_model.interface, strips=strips._replace(count=count))
     return replace(patch_model, interface=interface), ratio
-
-
-def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:
-    """Return the static measures of a patch by name, each with its error.
-
-    A value is that of the finest mesh. Its error contains the remaining change by refinement
-    (`limits`) and the errors that no change of the mesh shows.
-
-    Parameters
-    ----------
-    fine : Patch
-    coarse : Patch or None
-        The patch on coarser meshes, fine to coarse; None for a missing one.
-    tolerance : float or None
-        Tolerance of a patch whose mesh it chose; a value whose error exceeds it is extrapolated.
-    """
-    series = [one for one in coarse if one is not None]
-    mine = values(fine)
-    if not series:
-        return _remove_unbounded(_why_unbounded(fine), measures_from_series([mine], {}))
-    missed_peak = unresolved_rounding(fine)
-    series = _with_parts_of_finest(fine, series)
-    found = [values(one) for one in reversed(series)]
-    nested = all(cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *series)))
-    # none of several meshes that do not resolve a rounding shows its effect
-    rough = 2.0 if missed_peak else 1.0
-    least = (
-        shared_errors(_hidden_by_mesh(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
-    )
-    out = measures_from_series(
-        [*found, mine], least, nested, tolerance, max(MIN_ERROR, fine.pair.round_off_error), rough
-    )
-    if fine.averaging is not None:
-        out = _with_corner_errors(out, fine, series[0])
-    for name, (value, error) in fine.sharper.items():
-        if error < out[name].error:
-            out[name] = replace(out[name], value=value, error=error, engine=patch_rows.ON_POINTS)
-    return _remove_unbounded(_why_unbounded(fine), out)
-
-
-def _with_parts_of_finest(fine: Patch, series: list) -> list:
-    """Return the coarser patches that resolve as many parts of the contact as the finest one.
-
-    A part of a few cells next to a step may be missing on a coarse mesh. The change to such a mesh
-    shows this part and no order of convergence, so that neither this mesh nor coarser ones count.
-
-    Parameters
-    ----------
-    fine : Patch
-    series : list of Patch
-        From fine to coarse.
-
-    Returns
-    -------
-    list of Patch
-        At least the first one, whose change is then the only one that the error rests on.
-    """
-    if not fine.jumps:
-        return series
-    n_parts = _count_parts(fine.active)
-    n_alike = next(
-        (k for k, one in enumerate(series) if _count_parts(one.active) != n_parts), len(series)
-    )
-    return series[: max(n_alike, 1)]
-
-
-def _count_parts(active) -> int:
-    """Return the number of intervals in contact of a contact set (m,) of bool."""
-    return int(active[0]) + int(np.count_nonzero(active[1:] & ~active[:-1]))
-
-
-def _with_corner_errors(found: dict, fine: Patch, coarse: Patch) -> dict:
-    """Return the measures with an error of the peak that contains the pressure at a corner.
-
-    Under a profile, the pressure at a corner may still increase with refinement, although the
-    largest pressure does not change: a corner that the profile just reaches carries ever more on
-    cells half as long.
-    """
-    now, before = (one.pressure.sigma_n[[0, -1]].max() for one in (fine, coarse))
-    peak = found["pressure_peak"]
-    lack = now + RISING * abs(now - before) - peak.value
-    if not now or lack <= peak.error:
-        return found
-    peak = replace(peak, error=float(lack))
-    return found | {
-        "pressure_peak": peak,
-        "loaded_fraction": _widen_for_peak(found["loaded_fraction"], peak),
-    }
-
-
-class Converged(NamedTuple):
-    """Static measures from nested meshes: values and errors by name, numbers or (q,)."""
-
-    values: dict
-    errors: dict
-
-
-def converge(
-    series: list, least: dict, wanted, nested: bool, alike: float, rough: float = 1.0
-) -> Converged:
-    """Estimate the limits of static measures on nested meshes, and their errors.
-
-    Parameters
-    ----------
-    series : list of dict
-        Values on two meshes or more by name, coarse to fine; numbers or (q,).
-    least : dict
-        Errors by name that all meshes may share.
-    wanted : float or None
-        Tolerance: a value whose error is within it is not extrapolated; None: no value is.
-    nested : bool
-        Whether every mesh halves the cells of the previous one.
-    alike : float
-        Smallest relative error that is stated.
-    rough : float
-        Factor of the errors.
-    """
-    names = list(series[-1])
-    known = np.array([[values[name] for name in names] for values in series])
-    hidden, floors = np.zeros((2, *known.shape[1:]))
-    for row, name in enumerate(names):
-        hidden[row] = least.get(name, 0.0)
-        floors[row] = TABLE[name].floor
-    enough = np.inf if wanted is None else compute_allowed_error(wanted, known[-1], floors)
-    with np.errstate(invalid="ignore", divide="ignore"):  # patches that were not solved have NaN
-        seen = extrapolate(known, nested)
-        plain = np.maximum(rough * seen.error, hidden)
-        is_extrapolated = (seen.extrapolated != seen.value) & (plain > enough)
-        left = np.where(
-            is_extrapolated,
-            np.maximum(rough * seen.left, EXTRAPOLATED_ERROR_RATIO * hidden),
-            np.inf,
-        )
-        best = np.where(left < plain, seen.extrapolated, seen.value)
-        error = np.maximum(np.minimum(left, plain), alike * np.abs(known[-1]))
-        found = Converged(dict(zip(names, best)), dict(zip(names, error)))
-        fraction = found.values["loaded_fraction"]
-        peak = found.values["pressure_peak"]
-        relative = np.where(peak > 0, found.errors["pressure_peak"] / peak, 0.0)
-        found.errors["loaded_fraction"] = contain_peak_error(
-            fraction, found.errors["loaded_fraction"], relative
-        )
-    return found
-
-
-def measures_from_series(
-    series: list,
-    least: dict,
-    nested: bool = True,
-    tolerance: float | None = None,
-    alike: float = MIN_ERROR,
-    rough: float = 1.0,
-) -> dict:
-    """Return measures by name from their values on the meshes of one patch.
-
-    Without a coarser mesh there are no errors; without a load they are 0. The parameters are those
-    of `converge`.
-    """
-    mine = series[-1]
-    if len(series) == 1 or not mine["normal_load"] > 0:
-        error = None if len(series) == 1 else 0.0
-        found = Converged(mine, dict.fromkeys(mine, error))
-    else:
-        found = converge(series, least, tolerance, nested, alike, rough)
-    out = {}
-    for name, value in found.values.items():
-        error = found.errors[name]
-        out[name] = Measure(
-            float(value),
-            TABLE[name].unit,
-            None if error is None else float(error),
-            TABLE[name].floor,
-            engine=mesh_engine(value, mine[name]),
-        )
-    return out
-
-
-def mesh_engine(value: float, finest: float) -> str:
-    """Return what computed a value: the finest mesh, if it gives `finest`, or extrapolation."""
-    return patch_rows.ON_FINEST_MESH if value == finest else patch_rows.EXTRAPOLATED_SOURCE
-
-
-def is_within_tolerance(found: dict, tolerance: float) -> bool:
-    """Return whether the errors of the decisive measures are within the tolerance.
-
-    A measure without a value counts as within.
-    """
-    return max_error_ratio(found, tolerance) <= 1
-
-
-def max_error_ratio(found: dict, tolerance: float) -> float:
-    """Return the largest error of the decisive measures over the allowed error [1].
-
-    A missing error counts as 0.
-    """
-    return max(found[name].error_ratio(tolerance) for name in DECISIVE)
-
-
-def _remove_unbounded(why: str, found: dict) -> dict:
-    """Return the measures, with `why` in place of values that diverge under mesh refinement.
-
-    These are the peak pressure next to a loaded step or at a free corner, and the loaded fraction;
-    "" changes nothing.
-    """
-    if not why:
-        return found
-    return found | {
-        name: replace(found[name], value=None, error=None, reason=why)
-        for name in ("pressure_peak", "loaded_fraction")
-        if name in found
-    }
-
-
-def _why_unbounded(patch: Patch) -> str:
-    """Return the reason why the pressure of a patch is unbounded; "" if it is bounded.
-
-    A contact that ends at the edge of a step has the pressure of a punch with a sharp corner; a
-    contact across a closed step is more singular. A skin makes the pressure bounded.
-    """
-    if patch.skinned:
-        return ""
-    x = patch.x
-    cells = np.diff(patch.x)
-    bears = patch.strips.pressure.any(axis=0) if patch.strips is not None else patch.active
-    if patch.sharp and bears[[0, -1]].any():
-        return (
-            "unbounded: a sharp corner of one piece presses on the longer face of the other piece"
-        )
-    for place in patch.jumps:
-        beside = (
-            np.abs(x - place) <= 1.5 * cells[np.clip(np.searchsorted(x, place), 1, cells.size) - 1]
-        )
-        if bears[beside].any():
-            return f"unbounded, because the contact reaches a sharp corner, the edge of the step at {place:.4g} m"
-    return ""
-
-
-def contain_peak_error(fraction, error, share):
-    """Return errors of loaded fractions that contain the relative error `share` of the peak.
-
-    The peak is the divisor of the fraction.
-    """
-    return np.maximum(error, fraction * share / (1 - np.minimum(share, 0.5)))
-
-
-def _widen_for_peak(fraction: Measure, peak: Measure) -> Measure:
-    """Return a loaded fraction whose error contains that of the peak."""
-    return replace(
-        fraction,
-        error=float(contain_peak_error(fraction.value, fraction.error, peak.error / peak.value)),
-    )
-
-
-def cells_halved(fine, coarse) -> bool:
-    """Return whether every cell of the coarse Pair was split in two."""
-    bodies = ((fine.grid, coarse.grid), (fine.upper_grid, coarse.upper_grid))
-    grids = [(a.base_grid, b.base_grid) for a, b in bodies]
-    return all(
-        None not in (a, b) and a.x.size == 2 * b.x.size - 1 and a.depth.size == 2 * b.depth.size - 1
-        for a, b in grids
-    )
-
-
-class Hidden(NamedTuple):
-    """Properties of a patch, or (q,) of many, that determine the errors which its meshes share.
-
-    - length: length of the interface [m].
-    - count: nodes in contact.
-    - cell, cells: longest cell in which the contact ends, and the sum of all of them [m].
-    - offset: error of the position of an edge, in cells.
-    - turns: whether the rotation is free.
-    - spread: range of the gap plus largest elastic closing [m].
-    - corner: pressure [Pa] that is missed at loaded corners of a coating.
-    - wedge: pressure [Pa] next to a contact of few nodes.
-    - missed: pressure [Pa] of a rounding that is not resolved.
-    - open_ends: length of rounded face in which the contact may end [m].
-    - skin: whether the skin is smooth.
-    - between: sum of the cells between two parts of the contact [m].
-    """
-
-    length: float
-    count: int
-    cell: float
-    cells: float
-    offset: float
-    turns: bool
-    spread: float
-    corner: float
-    wedge: float
-    missed: float = 0.0
-    open_ends: float = 0.0
-    skin: bool = False
-    between: float = 0.0
-
-
-def hidden_by_meshes(pair, pieces, force, gap_range, turns: bool) -> Hidden:
-    """Return the Hidden properties of q patches on one Pair.
-
-    Parameters
-    ----------
-    pair : Pair
-    pieces : Compliance
-        That of the pair with its skin.
-    force : (q, m) ndarray
-        Nodal forces [N].
-    gap_range : float or (q,) ndarray
-        Range of the gap [m].
-    turns : bool
-        Whether the rotation is free.
-    """
-    interface = pieces.interface
-    active = force > 0
-    cells = np.where(active[:, 1:] != active[:, :-1], np.diff(interface.x), 0.0)
-    longest = cells.max(axis=1)
-    spread = gap_range + np.abs(force @ pieces.normal).max(axis=1)
-    corner = 0.0
-    if pieces is pair.compliance:  # a compliant layer of asperities (skin) bounds the pressure
-        corner = corner_layer(
-            pair, (force / interface.weight)[:, [0, -1]], np.diff(interface.x)[[0, -1]]
-        )
-    return Hidden(
-        interface.length,
-        np.maximum(active.sum(axis=1), 1),
-        longest,
-        cells.sum(axis=1),
-        offset(pair, longest),
-        turns,
-        spread,
-        corner,
-        0.0,
-    )
-
-
-def _hidden_by_mesh(patch: Patch, missed_peak: float) -> Hidden:
-    """Return the Hidden properties of a Patch under load.
-
-    missed_peak: pressure [Pa] of `unresolved_rounding`.
-    """
-    force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    out = hidden_by_meshes(
-        patch.pair,
-        patch.pieces,
-        force[None],
-        np.ptp(patch.gap),
-        "moment_balance" in patch.pressure.residuals,
-    )
-    out = Hidden(*(np.ravel(value)[0] for value in out))
-    cells = edge_cells(patch.x, patch.active)
-    first, last = ~patch.active[[0, -1]]
-    wedge = _wedge(patch) if out.count <= UNRESOLVED_NODES and cells.any() else 0.0
-    return out._replace(
-        wedge=wedge,
-        missed=missed_peak,
-        open_ends=float(open_ends(patch)),
-        skin=patch.skin is not None,
-        between=float(cells[int(first) : cells.size - int(last)].sum()),
-    )
-
-
-def shared_errors(hidden: Hidden, mine: dict) -> dict:
-    """Return the errors by name that three meshes may share.
-
-    The changes from mesh to mesh do not show them. They are due to a contact of few nodes, the
-    layer at a loaded corner of a coating thinner than the cells there, a rounding smaller than the
-    cells, and round-off.
-
-    Parameters
-    ----------
-    hidden : Hidden
-    mine : dict
-        Values by name on the finest mesh.
-    """
-    length = hidden.length
-    load = mine["normal_load"]
-    count = hidden.count
-    total = mine["pressure_peak"]
-    # half the sum exceeds the longest cell only if the contact has many ends
-    cell = np.maximum(hidden.cell, hidden.cells / 2)
-    few = count <= UNRESOLVED_NODES
-    aside = np.where(few, cell / (2 * count**2), 1e-3 * cell)
-    peak = hidden.corner + np.where((cell > 0) & (count <= FEW_NODES), total / (4 * count**2), 0.0)
-    peak = np.maximum(np.maximum(peak, hidden.wedge), hidden.missed - total)
-    turned = (
-        ROUND_OFF_FRACTION * (np.abs(mine["approach"]) + hidden.spread)
-        + np.abs(mine["rotation"]) * aside * hidden.turns
-    )
-    fullness = np.divide(
-        mine["loaded_fraction"], total, out=np.zeros(np.shape(total)), where=total != 0
-    )
-    # an edge of a contact of few nodes may lie anywhere in its cell
-    near = np.maximum(hidden.offset, np.where(few, 1.0, 1 / count**2)) * (not hidden.skin)
-    off, outer = (
-        near * cells + hidden.open_ends for cells in (hidden.cells, hidden.cells - hidden.between)
-    )
-    return {
-        "normal_load": 1e-10 * load,
-        "pressure_peak": peak,
-        "contact_fraction": off / length,
-        "contact_half_width": outer / 2,
-        "loaded_fraction": peak * fullness,
-        "pressure_centre": ROUND_OFF_FRACTION * length + aside,
-        "moment": (ROUND_OFF_FRACTION * length + aside) * load,
-        "rotation": turned / length,
-        "approach": ROUND_OFF_FRACTION * hidden.spread,
-    }
-
-
-def offset(pair, cell):
-    """Return the error of the position of an edge between two nodes of a Pair, in cells.
-
-    A soft coating thinner than the cells acts as a bed of springs, whose edge is where the pressure
-    of a node vanishes. cell: longest cell in which the contact ends [m].
-    """
-    out = OFFSET
-    for grid, piece in ((pair.grid, pair.piece), (pair.upper_grid, pair.upper)):
-        if grid.coating_thickness > 0:
-            ratio = piece.layers.coating[0] / piece.layers.substrate[0]
-            stiffer = 1 - min(ratio, 1 / ratio)
-            out = np.maximum(
-                out,
-                edges.edge_offset_fraction(1.0)
-                * np.minimum(1.0, cell / grid.coating_thickness)
-                * stiffer,
-            )
-    return out
-
-
-def corner_layer(pair, sigma, cells):
-    """Return pressures (...) [Pa] that the free end of a coating may add at a loaded corner.
-
-    They are not resolved by cells longer than the thickness of the coating, and fall with the
-    square of the cells.
-
-    Parameters
-    ----------
-    pair : Pair
-    sigma : (..., 2)
-        Pressures at both ends [Pa].
-    cells : (2,)
-        Cells at both ends [m].
-    """
-    thick = [
-        grid.coating_thickness
-        for grid in (pair.grid, pair.upper_grid)
-        if grid.coating_thickness > 0
-    ]
-    if not thick:
-        return np.zeros(np.shape(sigma)[:-1])
-    return (CORNER * sigma * np.minimum(1.0, (cells / min(thick)) ** 2)).max(axis=-1)
-
-
-def _wedge(patch: Patch) -> float:
-    """Return the largest pressure [Pa] that the gap next to a contact of few nodes allows.
-
-    It is E* times the slope of the gap there.
-    """
-    x = patch.x
-    active = patch.active
-    ends = np.flatnonzero(active[1:] != active[:-1])
-    slope = (np.abs(np.diff(patch.gap)) / np.diff(x))[..., ends].max()
-    bending = [
-        (1 - nu**2) / young
-        for piece in (patch.pair.piece, patch.pair.upper)
-        for young, nu in (max(piece.layers.coating, piece.layers.substrate),)
-    ]
-    return float(slope / sum(bending))

@@ -20,8 +20,9 @@ from . import strips as strip_press
 from .approach import press_to_approach_with_rotation
 from .condensed import Pair, condense
 
-# ripples over the peak pressure on pieces whose nodes do not match, above which a note states them
-RIPPLE = 1e-2
+# ripple of the pressure over its peak, on pieces whose nodes do not match, above which a note
+# states it
+MIN_RIPPLE = 1e-2
 
 
 class Surface(NamedTuple):
@@ -41,60 +42,73 @@ class Surface(NamedTuple):
     unloaded_gap: np.ndarray
 
 
+class PointSolution(NamedTuple):
+    """Solution on the equally spaced points of a profile, finer than the mesh.
+
+    - measures: `measures.Estimate` by name; only those that these points resolve.
+    - surface: Surface on the finest points.
+    - intervals (k, 2): parts in contact on these points [m].
+    """
+
+    measures: dict
+    surface: Surface
+    intervals: np.ndarray
+
+    @property
+    def spacing(self) -> float:
+        """Distance [m] between the points."""
+        return float(self.surface.x[1] - self.surface.x[0])
+
+
+class SolvedContact(NamedTuple):
+    """Solution of the contact on one gap.
+
+    - pieces: Compliance with its skin; a smooth skin is linearised at the operating point.
+    - pressure: ContactState; of a patch in strips, the means over the width.
+    - skin: StripsState with a single strip of a smooth skin, else None.
+    - strips: StripsState of a patch in strips, else None.
+    """
+
+    pieces: Compliance
+    pressure: ContactState
+    skin: object = None
+    strips: object = None
+
+
 @dataclass(frozen=True, eq=False, slots=True, weakref_slot=True)
 class Patch:
     """Solved patch; forces, areas and stiffnesses are those of all pairs together.
 
+    - model: PatchModel.
     - pair: condensed pieces.
-    - pieces: compliance of pieces and skin; a smooth skin is linearised at the operating point.
+    - pieces, pressure, skin, strips: see `SolvedContact`.
     - giving (m, m): tangential compliance [m/N] by which the patch slips in part: that of the skin,
       of the pieces with [contact.shear], and of the spring of the holder, which is equal in all
       entries.
-    - gap (m,): gap of the unloaded surfaces [m].
-    - pressure: ContactState.
-    - skin: StripsState with a single strip of a smooth skin, else None.
-    - strips: StripsState of a patch in strips, whose means over the width are in `pressure`; else
-      None.
-    - tangential_ratio: k_t/k_n of the skin; None if it is rigid in shear.
-    - skinned: whether a skin of asperities lies between the pieces.
-    - jumps: positions [m] at which the gap has a step.
-    - sharp: whether an end of the interface is a corner on a face that continues.
+    - unloaded_gap (m,): gap of the unloaded surfaces [m]; (s, m) for worn strips.
     - notes: sentences for the warnings.
     - seconds: CPU seconds by name.
-    - sharper: static measures by name as (value, error) from the points of a profile; {} without
-      them.
     - averaging: length [m] over which a profile in contact is averaged; None without a profile.
     - either: if a step of the gap is at a node, which belongs half to each side: (weight, Patch)
       with the whole node on the higher side, and the same on the lower side; else ().
-    - fine: Surface on the points of a profile; None if the mesh is the finest solution.
-    - stretches (k, 2): parts in contact on these points [m].
+    - points: PointSolution of a patch under a profile; None if the mesh is the finest solution.
+    - frames: frames of the interface in a run (`Result.fields`); {} before its end.
     """
 
+    model: object
     pair: Pair
     pieces: Compliance
-    giving: np.ndarray
-    gap: np.ndarray
     pressure: ContactState
     skin: object
     strips: object
-    tangential_ratio: float | None
-    skinned: bool
-    jumps: tuple
-    sharp: bool
+    giving: np.ndarray
+    unloaded_gap: np.ndarray
     notes: tuple
     seconds: dict
-    sharper: dict = field(default_factory=dict)
     averaging: float | None = None
     either: tuple = ()
-    fine: Surface | None = None
-    stretches: np.ndarray | None = None
-
-    @property
-    def on_mesh(self) -> Surface:
-        """Surface on the nodes of the mesh."""
-        return Surface(
-            self.x, self.pieces.interface.weight, self.pressure.sigma_n, self.pressure.gap, self.gap
-        )
+    points: PointSolution | None = None
+    frames: dict = field(default_factory=dict)
 
     @property
     def x(self) -> np.ndarray:
@@ -102,15 +116,63 @@ class Patch:
         return self.pieces.interface.x
 
     @property
-    def skin_share(self) -> np.ndarray | None:
-        """Fraction (m,) [1] of the asperities in the compliance of each node; None for bare pieces."""
-        if not self.skinned:
+    def normal_stress(self) -> np.ndarray:
+        """Normal stress on the nodes (m,) [Pa], compression positive; the mean over strips."""
+        return self.pressure.sigma_n
+
+    @property
+    def gap(self) -> np.ndarray:
+        """Gap under load on the nodes (m,) [m]; the smallest of all strips."""
+        return self.pressure.gap
+
+    @property
+    def shear_stress(self) -> np.ndarray | None:
+        """Shear stress on the nodes (m,) [Pa] at the end of the run, opposed to slip.
+
+        It is 0 in a static run, and None if the run has no traction on the nodes.
+        """
+        return self._last_frame("shear_stress")
+
+    @property
+    def slip(self) -> np.ndarray | None:
+        """Slip of the nodes (m,) [m] at the end of the run, upper minus lower surface.
+
+        It is 0 in a static run, and None if the run has no slip of the nodes.
+        """
+        return self._last_frame("slip")
+
+    def _last_frame(self, name: str) -> np.ndarray | None:
+        """Return the last frame (m,) of a field; 0 in a static run, None if it is unknown."""
+        if name in self.frames:
+            return self.frames[name][-1]
+        return np.zeros(self.x.size) if self.model.mesh.is_static else None
+
+    @property
+    def surface(self) -> Surface:
+        """Surface on the nodes of the mesh."""
+        weight = self.pieces.interface.weight
+        return Surface(self.x, weight, self.normal_stress, self.gap, self.unloaded_gap)
+
+    @property
+    def finest_surface(self) -> Surface:
+        """Surface of the finest solution: on the points of a profile, else on the mesh."""
+        return self.surface if self.points is None else self.points.surface
+
+    @property
+    def has_skin(self) -> bool:
+        """Whether a layer of asperities lies between the pieces."""
+        return self.model.interface.skin is not None
+
+    @property
+    def skin_fraction(self) -> np.ndarray | None:
+        """Fraction (m,) [1] of the skin in the compliance of each node; None for bare pieces."""
+        if not self.has_skin:
             return None
         bare = np.diag(self.pair.compliance.normal)
         if self.strips is None:
             return 1 - bare / np.diag(self.pieces.normal)
-        stiff = self.strips.stiffness.max(axis=0) * self.pieces.interface.weight
-        return 1 / (1 + bare * stiff)
+        stiffness = self.strips.stiffness.max(axis=0) * self.pieces.interface.weight
+        return 1 / (1 + bare * stiffness)
 
     @property
     def active(self) -> np.ndarray:
@@ -128,6 +190,10 @@ def solve(patch_model, grid, upper_grid=None, fresh: bool = False) -> Patch:
         Meshes from `make_piece_meshes`; the upper one is None if the pieces are alike.
     fresh : bool
         Whether to ignore operators kept on disk.
+
+    Returns
+    -------
+    Patch
 
     Raises
     ------
@@ -149,42 +215,50 @@ def press_patch(patch_model, pair: Pair, worn=None) -> Patch:
     worn : (m,) or (s, m), optional
         Depth [m] that wear has added to the gap, of strips (s, m).
 
+    Returns
+    -------
+    Patch
+
     Raises
     ------
     PatchfemError
         If a profile does not fit the mesh.
     """
     x = pair.compliance.interface.x
-    gap, notes, seconds = patch_model.gap.evaluate(x)
-    gap = gap + pair.rise if worn is None else gap + pair.rise + worn
-    rim = patch_model.gap.half_step_heights(x)
-    out = _on(patch_model, pair, gap, notes, seconds)
-    if (
+    heights, notes, seconds = patch_model.gap.evaluate(x)
+    gap = heights + pair.rise if worn is None else heights + pair.rise + worn
+
+    def press_gap(unloaded_gap) -> Patch:
+        """Solve the contact on a gap (m,) [m]."""
+        begin = perf_counter()
+        contact = solve_contact(patch_model, pair.compliance, unloaded_gap)
+        times = seconds | {"press": perf_counter() - begin}
+        return make_patch(patch_model, pair, unloaded_gap, contact, notes, times)
+
+    patch = press_gap(gap)
+    has_ripple = (
         pair.joint is not None
-        and pair.joint.ripple > RIPPLE
-        and zigzags(out.x, out.pressure.sigma_n) > RIPPLE
-    ):
-        out = replace(out, notes=(*notes, f"contact.mesh: {pair.joint.reason}"))
-    if not rim.any():
-        return out
+        and pair.joint.ripple > MIN_RIPPLE
+        and zigzags(x, patch.normal_stress) > MIN_RIPPLE
+    )
+    if has_ripple:
+        patch = replace(patch, notes=(*notes, f"contact.mesh: {pair.joint.reason}"))
+    half_steps = patch_model.gap.half_step_heights(x)
+    if not half_steps.any():
+        return patch
     # A contact set ends less than half a cell beyond its last node. The two sets, with and without
     # the node at the step, are weighted such that the mean end is the step.
-    node = int(np.argmax(rim))
-    bare = 1.0 if out.skin_share is None else 1 - float(out.skin_share[node])
-    lean = bare * edges.edge_offset_fraction(
-        1.0 if pair.row is None else pair.row / float(np.diff(x[node - 1 : node + 2]).min())
-    )
-    shifts = _shifts_at_step(node, gap if worn is None else gap - worn, rim, worn)
-    return replace(
-        out,
-        either=tuple(
-            (0.5 - side * lean, _on(patch_model, pair, gap + shift, notes, seconds))
-            for side, shift in zip((-1, 1), shifts)
-        ),
-    )
+    node = int(np.argmax(half_steps))
+    bare_fraction = 1.0 if patch.skin_fraction is None else 1 - float(patch.skin_fraction[node])
+    cell = float(np.diff(x[node - 1 : node + 2]).min())
+    row_over_cell = 1.0 if pair.row is None else pair.row / cell
+    lean = bare_fraction * edges.edge_offset_fraction(row_over_cell)
+    shifts = _shifts_at_step(node, gap if worn is None else gap - worn, half_steps, worn)
+    parts = [(0.5 - side * lean, press_gap(gap + shift)) for side, shift in zip((-1, 1), shifts)]
+    return replace(patch, either=tuple(parts))
 
 
-def _shifts_at_step(node: int, gap, rim, worn) -> tuple:
+def _shifts_at_step(node: int, gap, half_steps, worn) -> tuple:
     """Return the changes of the gap (m,) [m] for a step's node on its higher and lower side.
 
     The worn depth of the node belongs to a gap at half the height of the step. If the node carries
@@ -192,14 +266,14 @@ def _shifts_at_step(node: int, gap, rim, worn) -> tuple:
     the lower side.
     """
     if worn is None:
-        return -rim, rim
+        return -half_steps, half_steps
     higher = node + 1
     lower = node - 1
     if np.mean(gap[..., lower]) < np.mean(gap[..., higher]):
         higher, lower = lower, higher
     shifts = []
     for side, neighbour in ((-1, higher), (1, lower)):
-        shift = np.broadcast_to(side * rim, worn.shape).copy()
+        shift = np.broadcast_to(side * half_steps, worn.shape).copy()
         shift[..., node] += worn[..., neighbour] - worn[..., node]
         shifts.append(shift)
     return tuple(shifts)
@@ -211,25 +285,20 @@ def zigzags(x, sigma) -> float:
     Three loaded nodes in sequence lie above, below and above the lines through their neighbours, or
     the other way round; the zigzag is half the smallest distance from these lines.
     """
-    share = np.diff(x)[:-1] / (x[2:] - x[:-2])
-    off = sigma[1:-1] - (1 - share) * sigma[:-2] - share * sigma[2:]
-    three = np.stack([off[:-2], -off[1:-1], off[2:]])
-    bears = np.min([sigma[k : sigma.size - 4 + k] for k in range(5)], axis=0, initial=np.inf) > 0
-    alike = bears & ((three > 0).all(axis=0) | (three < 0).all(axis=0))
-    return float(
-        np.abs(three[:, alike]).min(axis=0).max(initial=0.0) / 2 / sigma.max(initial=1e-300)
-    )
+    fraction = np.diff(x)[:-1] / (x[2:] - x[:-2])
+    distance = sigma[1:-1] - (1 - fraction) * sigma[:-2] - fraction * sigma[2:]
+    three = np.stack([distance[:-2], -distance[1:-1], distance[2:]])
+    five = [sigma[k : sigma.size - 4 + k] for k in range(5)]
+    is_loaded = np.min(five, axis=0, initial=np.inf) > 0
+    is_zigzag = is_loaded & ((three > 0).all(axis=0) | (three < 0).all(axis=0))
+    smallest = np.abs(three[:, is_zigzag]).min(axis=0)
+    return float(smallest.max(initial=0.0) / 2 / sigma.max(initial=1e-300))
 
 
-def _on(patch_model, pair: Pair, gap, notes: tuple, seconds: dict) -> Patch:
-    """Solve the contact of a pair on the gap (m,) [m]."""
-    begin = perf_counter()
-    how = _choose_solver(patch_model)(patch_model, pair.compliance, gap)
-    return as_patch(patch_model, pair, gap, notes, seconds | {"press": perf_counter() - begin}, how)
-
-
-def as_patch(patch_model, pair: Pair, gap, notes: tuple, seconds: dict, how: tuple) -> Patch:
-    """Return the Patch of a solved pair.
+def make_patch(
+    patch_model, pair: Pair, gap, contact: SolvedContact, notes: tuple, seconds: dict
+) -> Patch:
+    """Return the Patch of a solved contact.
 
     Parameters
     ----------
@@ -237,38 +306,31 @@ def as_patch(patch_model, pair: Pair, gap, notes: tuple, seconds: dict, how: tup
     pair : Pair
     gap : (m,)
         Unloaded gap [m].
+    contact : SolvedContact
     notes : tuple
     seconds : dict
         CPU seconds by name.
-    how : tuple
-        Compliance with its skin, ContactState, skin, strips.
+
+    Returns
+    -------
+    Patch
     """
-    pieces, pressure, skin, strips = how
-    giving = pieces.tangential
+    giving = contact.pieces.tangential
     if not patch_model.interface.has_shear:
         giving = frozen_array(giving - pair.compliance.tangential)
     if patch_model.loading.tangential_stiffness:
         giving = frozen_array(giving + 1 / patch_model.loading.tangential_stiffness)
-    ratio = (
-        patch_model.interface.skin.tangential_ratio
-        if patch_model.interface.skin is not None
-        else None
-    )
+    x = contact.pieces.interface.x
+    averaging = patch_model.gap.averaging_length(x, contact.pressure.sigma_n > 0)
     return Patch(
+        patch_model,
         pair,
-        pieces,
-        giving,
-        frozen_array(gap),
-        pressure,
-        skin,
-        strips,
-        ratio,
-        patch_model.interface.skin is not None,
-        patch_model.gap.jumps,
-        patch_model.has_singular_ends,
-        notes,
-        pair.seconds | seconds,
-        averaging=patch_model.gap.averaging_length(pieces.interface.x, pressure.sigma_n > 0),
+        *contact,
+        giving=giving,
+        unloaded_gap=frozen_array(gap),
+        notes=notes,
+        seconds=pair.seconds | seconds,
+        averaging=averaging,
     )
 
 
@@ -292,19 +354,17 @@ def make_force_function(patch_model, pair: Pair):
     PatchfemError
         If a profile does not fit the mesh.
     """
-    gap = patch_model.gap.evaluate(pair.compliance.interface.x).heights
-    gap = gap + pair.rise
     bare = pair.compliance
-    how = _choose_solver(patch_model)
+    gap = patch_model.gap.evaluate(bare.interface.x).heights + pair.rise
     if patch_model.interface.strips is not None:
         return PressedStrips(patch_model, bare, gap)
 
-    def press(worn, softening):
+    def compute_forces(worn, softening):
         """Return the contact forces (m,) [N] for worn depth (m,) [m] and softening (m,) [m/N]."""
         soft = replace(bare, normal=bare.normal + np.diag(softening)) if softening.any() else bare
-        return how(patch_model, soft, gap + worn)[1].sigma_n * bare.interface.weight
+        return solve_contact(patch_model, soft, gap + worn).pressure.sigma_n * bare.interface.weight
 
-    return press
+    return compute_forces
 
 
 @dataclass(eq=False, slots=True)
@@ -314,13 +374,13 @@ class PressedStrips:
     `begin` sets the contact set of the start, so that a run after an interruption gives the same
     bits.
 
-    - patch_model: PatchModel.
+    - model: PatchModel.
     - bare: compliance of the pieces without skin.
     - gap (m,): unloaded gap [m].
     - warm_start: contact set and factors of the last solution.
     """
 
-    patch_model: object
+    model: object
     bare: Compliance
     gap: np.ndarray
     warm_start: WarmStart = field(default_factory=WarmStart)
@@ -331,76 +391,65 @@ class PressedStrips:
 
     def __call__(self, worn, softening) -> np.ndarray:
         """Return the contact forces (s, m) [N] for worn depth [m] and softening [m/N], (s, m) each."""
-        how = _choose_solver(
-            self.patch_model,
-            partial(
-                _solve_under_load,
-                added=softening if softening.any() else None,
-                warm_start=self.warm_start,
-            ),
-        )
-        return how(self.patch_model, self.bare, self.gap + worn)[3].force
+        added = softening if softening.any() else None
+        gap = self.gap + worn
+        return solve_contact(self.model, self.bare, gap, added, self.warm_start).strips.force
 
 
-def _choose_solver(patch_model, under=None):
-    """Return the function (patch_model, pieces, gap) that solves the contact of a `PatchModel`.
+def solve_contact(
+    patch_model, pieces: Compliance, gap, added=None, warm_start=None
+) -> SolvedContact:
+    """Solve the contact of pieces on a gap, with the skin, load and holder of a `PatchModel`.
 
-    It returns (Compliance with its skin, ContactState, skin, strips). under: function for a given
-    load; None for `_solve_under_load`.
+    Parameters
+    ----------
+    patch_model : PatchModel
+    pieces : Compliance
+        Pieces without skin.
+    gap : (m,) or (s, m)
+        Unloaded gap [m].
+    added, warm_start
+        Parameters of `StripCompliance`, for strips only.
+
+    Returns
+    -------
+    SolvedContact
     """
-    under = under or _solve_under_load
-    if patch_model.loading.approach is None or not (
-        patch_model.loading.can_rotate or patch_model.loading.rotational_stiffness > 0
-    ):
-        return under
-    bare = (
-        with_linear_skin
-        if patch_model.interface.skin is not None and patch_model.interface.skin.law == "linear"
-        else lambda skin, pieces: pieces
-    )
-    return lambda patch_model, pieces, gap: press_to_approach_with_rotation(
-        patch_model, pieces, gap, under, bare(patch_model.interface.skin, pieces)
-    )
-
-
-def _solve_under_load(patch_model, pieces: Compliance, gap, added=None, warm_start=None) -> tuple:
-    """Solve the contact under a load, or under an approach with fixed rotation.
-
-    Returns (Compliance with its skin, ContactState, skin, strips). added, warm_start: parameters of
-    `StripCompliance`.
-    """
-    strips = skin = None
-    angle = patch_model.gap.angle
-    moment = patch_model.loading.moment
-    spring = patch_model.loading.rotational_stiffness
+    loading = patch_model.loading
+    skin = patch_model.interface.skin
+    can_rotate = loading.can_rotate or loading.rotational_stiffness > 0
+    if loading.approach is not None and can_rotate:
+        # the load is searched at which the approach is reached
+        under_load = partial(solve_contact, added=added, warm_start=warm_start)
+        stiff = with_linear_skin(skin, pieces)
+        return press_to_approach_with_rotation(patch_model, pieces, gap, under_load, stiff)
     if patch_model.interface.strips is not None:
-        pieces, pressure, skin, strips = strip_press.press_strips_of_patch(
-            patch_model, pieces, gap, (angle, moment, spring), added, warm_start
+        return SolvedContact(
+            pieces, *strip_press.press_strips_of_patch(patch_model, pieces, gap, added, warm_start)
         )
-    elif patch_model.interface.skin is not None and patch_model.interface.skin.law != "linear":
-        pieces, pressure, skin = skin_press.press_through_asperities(
-            patch_model, pieces, gap, angle, moment, spring
-        )
-    else:
-        if patch_model.interface.skin is not None:
-            pieces = with_linear_skin(patch_model.interface.skin, pieces)
-        if patch_model.loading.approach is not None:
-            pressure = press_to_approach(pieces, gap, patch_model.loading.approach, angle)
-        else:
-            pressure = press(pieces, gap, patch_model.loading.load, moment, angle, spring=spring)
-    return pieces, pressure, skin, strips
+    if skin is not None and skin.law != "linear":
+        return SolvedContact(*skin_press.press_through_asperities(patch_model, pieces, gap))
+    pieces = with_linear_skin(skin, pieces)
+    angle = patch_model.gap.angle
+    if loading.approach is not None:
+        return SolvedContact(pieces, press_to_approach(pieces, gap, loading.approach, angle))
+    spring = loading.rotational_stiffness
+    pressure = press(pieces, gap, loading.load, loading.moment, angle, spring=spring)
+    return SolvedContact(pieces, pressure)
 
 
-def with_linear_skin(asperities, pieces: Compliance) -> Compliance:
+def with_linear_skin(skin, pieces: Compliance) -> Compliance:
     """Return the pieces in series with the diagonal compliance of a linear asperity layer.
 
-    A skin without a tangential ratio is rigid in shear.
+    Without a layer, or with another law, these are the pieces themselves. A layer without a
+    tangential ratio is rigid in shear.
     """
-    crush = 1 / (asperities.normal_stiffness * pieces.interface.weight)
-    ratio = asperities.tangential_ratio
-    tangential = (
-        pieces.tangential + np.diag(crush / ratio) if ratio is not None else pieces.tangential
-    )
+    if skin is None or skin.law != "linear":
+        return pieces
+    crush = 1 / (skin.normal_stiffness * pieces.interface.weight)
+    tangential = pieces.tangential
+    if skin.tangential_ratio is not None:
+        tangential = tangential + np.diag(crush / skin.tangential_ratio)
     return Compliance(
         pieces.interface, frozen_array(pieces.normal + np.diag(crush)), frozen_array(tangential)
     )

@@ -18,12 +18,12 @@ from ...model.source import locate_errors
 from ...surface import nodes
 from ..results.patch_rows import TABLE
 from ..results.result import Result, at_rest
-from . import derived, skin
+from . import skin, store
 from .ladder import solve_all, solve_static_ladder
-from .measures import strip_error
+from .measures import add_strip_errors, measures, plane_band
 from .values import reaches_steep_end, values
 
-LOCKS = 0.499  # Poisson's ratio up to which the errors of cells that lock are reliable
+MAX_POISSON = 0.499  # Poisson's ratio up to which the errors of cells that lock are reliable
 MAX_SMALL_STRAIN = 0.02  # largest small strain; effects of its second order are neglected
 
 __all__ = [
@@ -66,10 +66,7 @@ def bodies(model) -> tuple:
 def static_measures(model, patch, coarse) -> dict:
     """Return the static measures of the patch of a model.
 
-    If the tolerance chose the mesh, measures that miss it are extrapolated. The floor of a measure
-    that is a difference of larger terms is the tolerance times these: for the approach the rotation
-    times half the length, for the centre of pressure half the length, for the moment the load times
-    half the length.
+    If the tolerance chose the mesh, measures that miss it are extrapolated.
 
     Parameters
     ----------
@@ -77,30 +74,43 @@ def static_measures(model, patch, coarse) -> dict:
     patch : Patch
     coarse : sequence of Patch or None
         The patch on coarser meshes, fine to coarse.
+
+    Returns
+    -------
+    dict
+        Measure by name, with the floors of `floors`.
     """
     patch_model = model.patch
-    tolerance = (
-        (patch_model.mesh.tolerance or model.accuracy.tolerance)
-        if patch_model.mesh.is_automatic
-        else None
-    )
-    found = set_floors(model, derived.static_measures(patch_model, patch, coarse, tolerance))
+    tolerance = None
+    if patch_model.mesh.is_automatic:
+        tolerance = patch_model.mesh.tolerance or model.accuracy.tolerance
+    if patch_model.solved is not None:
+        found = patch_model.solved.measures
+    else:
+        patches = (patch, *coarse)
+        found = store.reuse_in_sweep(
+            patch_model,
+            ("measures", patches, tolerance),
+            lambda: measures(*patches, tolerance=tolerance),
+        )
+    values_by_name = {name: measure.value for name, measure in found.items()}
+    min_floors = floors(patch_model, model.accuracy.tolerance, values_by_name)
+    found = {
+        name: replace(measure, floor=max(measure.floor, min_floors[name]))
+        for name, measure in found.items()
+    }
     # for worn strips, `wear.measures` adds the error due to their number
     if patch.strips is None or coarse[0] is None or model.wear is not None:
         return found
-    return strip_error(model.patch, coarse[0], found)
-
-
-def set_floors(model, found: dict) -> dict:
-    """Return measures with the floors described in `static_measures`."""
-    least = floors(
-        model.patch, model.accuracy.tolerance, {name: one.value for name, one in found.items()}
-    )
-    return {name: replace(one, floor=max(one.floor, least[name])) for name, one in found.items()}
+    return add_strip_errors(patch_model, coarse[0], found)
 
 
 def floors(patch_model, tolerance: float, values: dict) -> dict:
     """Return the floor of each static measure by name, for values that are numbers or (q,).
+
+    The floor of a measure that is a difference of larger terms is the tolerance times these: for
+    the approach the rotation times half the length, for the centre of pressure half the length,
+    for the moment the load times half the length.
 
     Parameters
     ----------
@@ -108,6 +118,10 @@ def floors(patch_model, tolerance: float, values: dict) -> dict:
     tolerance : float
     values : dict
         Values by name.
+
+    Returns
+    -------
+    dict
     """
     arm = patch_model.pieces.length / 2
     terms = {
@@ -125,99 +139,105 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
 
     The parameters are those of `run.run`.
     """
-    p = patch.pressure
-    extra = {"residuals": dict(patch.pressure.residuals), "iterations": patch.pressure.iterations}
-    if p.outcome is Outcome.NO_CONTACT:
+    pressure = patch.pressure
+    if pressure.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
-    found = static_measures(what.model, patch, coarse)
     return Result(
-        what, p.outcome, found, None, None, patch, at_rest(patch), seconds, warnings, extra
+        what,
+        pressure.outcome,
+        static_measures(what.model, patch, coarse),
+        None,
+        None,
+        patch,
+        at_rest(patch),
+        seconds,
+        warnings,
+        {"residuals": dict(pressure.residuals), "iterations": pressure.iterations},
     )
 
 
 def warn_of_strains(patch_model, patch) -> list:
     """Return warnings on large strains, on cells of a given size that lock, and on the gap."""
-    beyond = (
-        [
+    steep_end = []
+    if reaches_steep_end(patch):
+        steep_end = [
             "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
             "contact is computed; lower the tilt or the load"
         ]
-        if reaches_steep_end(patch)
-        else []
-    )
+    largest = patch.pressure.sigma_n.max(initial=0.0)
     return [
-        *strain_warnings(
-            patch_model, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond
-        ),
+        *strain_warnings(patch_model, largest, patch.pressure.approach, steep_end),
         *(text for text in patch.notes if not nodes.is_note(text)),
     ]
 
 
-def strain_warnings(patch_model, top: float, approach: float, beyond=()) -> list:
+def strain_warnings(
+    patch_model, largest_pressure: float, approach: float, other_warnings=()
+) -> list:
     """Return the warnings of `warn_of_strains` on strains and locking.
 
     Parameters
     ----------
     patch_model : PatchModel
-    top : float
+    largest_pressure : float
         Largest nodal pressure [Pa].
     approach : float
         Approach [m].
-    beyond : sequence of str
+    other_warnings : sequence of str
         Warnings that are inserted before the one on locking.
+
+    Returns
+    -------
+    list of str
     """
     out = []
-    stuff = _materials(patch_model)
-    words = (
+    sentences = (
         "the peak pressure is {:.3g} of the lowest Young's modulus",
         "the approach is {:.3g} of the total height of the two pieces",
     )
-    for share, what in zip(_strains(patch_model, top, approach), words):
-        if share > MAX_SMALL_STRAIN:
+    for strain, sentence in zip(_strains(patch_model, largest_pressure, approach), sentences):
+        if strain > MAX_SMALL_STRAIN:
             out.append(
-                what.format(share)
+                sentence.format(strain)
                 + f", beyond the small strains that are assumed ({MAX_SMALL_STRAIN:g})"
             )
-    out += beyond
-    stiff = max(m.poisson for m in stuff)
-    if patch_model.pieces.plane == "strain" and stiff > LOCKS and not patch_model.mesh.is_automatic:
-        cure = (
-            "split the elements of contact.mesh"
-            if patch_model.mesh.file is not None
-            else "leave out contact.element_size"
-        )
+    out += other_warnings
+    poisson = max(material.poisson for material in _materials(patch_model))
+    mesh = patch_model.mesh
+    if patch_model.pieces.plane == "strain" and poisson > MAX_POISSON and not mesh.is_automatic:
+        remedy = "leave out contact.element_size"
+        if mesh.file is not None:
+            remedy = "split the elements of contact.mesh"
         out.append(
             "in plane strain the elements become too stiff (lock) as Poisson's ratio nears 0.5; here "
-            f"Poisson's ratio is {stiff:g} (limit {LOCKS:g}), so the true errors may be "
-            f"twice the estimates; {cure}"
+            f"Poisson's ratio is {poisson:g} (limit {MAX_POISSON:g}), so the true errors may be "
+            f"twice the estimates; {remedy}"
         )
     return out
 
 
-def exceeds_small_strains(patch_model, top, approach):
+def exceeds_small_strains(patch_model, largest_pressure, approach):
     """Return whether `strain_warnings` may have a warning, for one patch or arrays of many."""
-    return (
-        np.maximum(*_strains(patch_model, top, approach)) > MAX_SMALL_STRAIN
-        if patch_model.mesh.is_automatic
-        else np.ones(np.shape(top), bool)
-    )
+    if not patch_model.mesh.is_automatic:
+        return np.ones(np.shape(largest_pressure), bool)
+    return np.maximum(*_strains(patch_model, largest_pressure, approach)) > MAX_SMALL_STRAIN
 
 
-def _strains(patch_model, top, approach) -> tuple:
+def _strains(patch_model, largest_pressure, approach) -> tuple:
     """Return peak pressure over lowest Young's modulus, and approach over height of the pieces."""
-    return top / min(m.young for m in _materials(patch_model)), approach / (
-        patch_model.pieces.lower.height + patch_model.pieces.upper.height
-    )
+    young = min(material.young for material in _materials(patch_model))
+    height = patch_model.pieces.lower.height + patch_model.pieces.upper.height
+    return largest_pressure / young, approach / height
 
 
 def _materials(patch_model) -> list:
     """Return the materials of the pieces and their coatings."""
-    return [
-        material
-        for piece in (patch_model.pieces.lower, patch_model.pieces.upper)
-        for material in (piece.substrate, piece.coating and piece.coating.material)
-        if material
-    ]
+    out = []
+    for piece in (patch_model.pieces.lower, patch_model.pieces.upper):
+        out.append(piece.substrate)
+        if piece.coating:
+            out.append(piece.coating.material)
+    return out
 
 
 def notes_on_neglected_effects(model, patch, coarse) -> list:
@@ -231,26 +251,18 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
         Patches of the error estimate; if the first one is None, the plane state is not discussed.
     """
     patch_model = model.patch
-    by_forms = [
-        side
-        for side, body in (("lower", patch.pair.grid), ("upper", patch.pair.upper_grid))
-        if not isinstance(body, TensorGrid)
-    ]
+    bodies_by_side = {"lower": patch.pair.grid, "upper": patch.pair.upper_grid}
+    sides = [side for side, body in bodies_by_side.items() if not isinstance(body, TensorGrid)]
     out = [text for text in patch.notes if nodes.is_note(text)]
-    out += (
-        [
-            f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece cell by cell"
-        ]
-        if by_forms
-        else []
+    if sides:
+        out.append(
+            f"scikit-fem assembles the stiffness of the {' and the '.join(sides)} piece cell by cell"
+        )
+    out += notes_on_mesh_file(patch.pair)
+    out += notes_on_tall_pieces(
+        patch_model, patch.pressure.load / patch.pieces.interface.weight.sum()
     )
-    out += [
-        *notes_on_mesh_file(patch.pair),
-        *notes_on_tall_pieces(
-            patch_model, patch.pressure.load / patch.pieces.interface.weight.sum()
-        ),
-    ]
-    if patch.sharper:
+    if patch.points is not None:
         out.append(
             f"each static measure is computed on the mesh and on points {format_length(patch.averaging, 3)} apart, and "
             "the value with the smaller error is given; on these points short waves are treated as in infinite "
@@ -261,31 +273,35 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
             "where the profile is in contact, its heights are averaged over a length of "
             f"{format_length(patch.averaging, 3)}; the errors include the effect of the choice of this length"
         )
-    if patch_model.interface.skin is not None and patch.pressure.load > 0:
-        bears = patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0)
-        out += skin.note_on_peak_stiffness(patch_model, float(patch.pressure.load / bears))
+    if patch.has_skin and patch.pressure.load > 0:
+        loaded_area = patch.pieces.interface.weight @ patch.active
+        out += skin.note_on_peak_stiffness(patch_model, float(patch.pressure.load / loaded_area))
     if patch.strips is not None:
         out.append(patch.strips.note)
-    if patch.pair.coupling > MIN_COUPLING_RATIO and model.kind != "patch":
+    if model.kind == "patch":
+        out += note_on_perfect_stick(patch_model, patch)
+    elif patch.pair.coupling > MIN_COUPLING_RATIO:
         out.append(
             "the pieces have different elasticity, which couples shear and normal motion; this coupling is "
             f"neglected; under a shear force the largest normal displacement is {patch.pair.coupling:.2g} times "
             "the largest slide"
         )
-    if model.kind == "patch":
-        out += frictionless(patch_model, patch)
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
         # an unstructured mesh has no coarser one: its second patch is finer than its first
-        out += derived.plane_notes(patch_model, patch if coarse[-1] is None else coarse[0])
+        other = patch if coarse[-1] is None else coarse[0]
+        if patch_model.solved is not None:
+            out += patch_model.solved.plane_sentences
+        else:
+            out += store.reuse_in_sweep(
+                patch_model, ("plane band", other), lambda: plane_band(patch_model, other)
+            )
     return out
 
 
 def _mesh_clause(model, patch) -> str:
     """Return the clause on results that are computed on the mesh, not on points of a profile."""
-    peak = (
-        f"whose largest pressure is {format_quantity(float(patch.pressure.sigma_n.max()), 'Pa', 3)}"
-    )
-    where = f"the mesh of {patch.x.size} interface points, {peak}"
+    largest = format_quantity(float(patch.pressure.sigma_n.max()), "Pa", 3)
+    where = f"the mesh of {patch.x.size} interface points, whose largest pressure is {largest}"
     if model.kind == "patch":
         return (
             f"pressure and gap of the interface are given on these points, but the stress inside the pieces is "
@@ -294,44 +310,43 @@ def _mesh_clause(model, patch) -> str:
     return f"fields and motion are computed on {where}"
 
 
-def frictionless(patch_model, patch) -> list:
+def note_on_perfect_stick(patch_model, patch) -> list:
     """Return a note, as a list, on unlike pieces: Dundurs' beta and the effect of perfect stick.
 
     Faces of unlike pieces slide on each other under pressure. Stick prevents this by shear
     stresses, which stiffen the contact.
     """
     pair = patch.pair
-    held = np.flatnonzero(patch.active)
-    if not pair.closing.any() or not held.size:
+    loaded = np.flatnonzero(patch.active)
+    if not pair.closing.any() or not loaded.size:
         return []
-    here = np.ix_(held, held)
-    one = np.ones(held.size)
-    normal = patch.pieces.normal[here]
-    cross = pair.closing[here]
-    stuck = normal - cross @ np.linalg.solve(patch.pieces.tangential[here], cross.T)
-    more = one @ np.linalg.solve(stuck, one) / (one @ np.linalg.solve(normal, one)) - 1
-    beta = abs(_dundurs(patch_model))
+    rows = np.ix_(loaded, loaded)
+    unit = np.ones(loaded.size)
+    normal = patch.pieces.normal[rows]
+    closing = pair.closing[rows]
+    stuck = normal - closing @ np.linalg.solve(patch.pieces.tangential[rows], closing.T)
+    increase = unit @ np.linalg.solve(stuck, unit) / (unit @ np.linalg.solve(normal, unit)) - 1
+    beta = abs(_compute_dundurs_beta(patch_model))
     return [
         f"the pieces have different elasticity (Dundurs' beta {beta:.2g} at the interface), and the pressure is "
-        f"computed without friction; if the pieces stuck perfectly, normal_stiffness would be {100 * more:.2g} % "
+        f"computed without friction; if the pieces stuck perfectly, normal_stiffness would be {100 * increase:.2g} % "
         "larger; with friction the stiffness lies between the two values"
     ]
 
 
-def _dundurs(patch_model) -> float:
+def _compute_dundurs_beta(patch_model) -> float:
     """Return Dundurs' beta of the two faces."""
+    is_plane_strain = patch_model.pieces.plane == "strain"
     shear = []
     kappa = []
     for piece in (patch_model.pieces.lower, patch_model.pieces.upper):
         face = piece.coating.material if piece.coating else piece.substrate
-        shear.append(face.young / (2 + 2 * face.poisson))
-        kappa.append(
-            3 - 4 * face.poisson
-            if patch_model.pieces.plane == "strain"
-            else (3 - face.poisson) / (1 + face.poisson)
-        )
-    (a, b), (k, q) = shear, kappa
-    return (a * (q - 1) - b * (k - 1)) / (a * (q + 1) + b * (k + 1))
+        nu = face.poisson
+        shear.append(face.young / (2 + 2 * nu))
+        kappa.append(3 - 4 * nu if is_plane_strain else (3 - nu) / (1 + nu))
+    lower = shear[0] * (kappa[1] - 1), shear[0] * (kappa[1] + 1)
+    upper = shear[1] * (kappa[0] - 1), shear[1] * (kappa[0] + 1)
+    return (lower[0] - upper[0]) / (lower[1] + upper[1])
 
 
 def notes_on_mesh_file(pair) -> list:
@@ -347,11 +362,11 @@ def notes_on_mesh_file(pair) -> list:
                 f"contact.mesh: the {side} piece has {count} hole{'s' * (count > 1)} inside, {area:.3g} m2 in "
                 "all; if a hole is not intended, close it in the mesh"
             )
-        fixed, whole = recognise.measure_fixed_length(body)
-        if fixed < MIN_COMPLETE_FRACTION * whole:
+        fixed, length = recognise.measure_fixed_length(body)
+        if fixed < MIN_COMPLETE_FRACTION * length:
             out.append(
-                f"contact.mesh: the held nodes `{side}_far` cover {fixed:.6g} m of a face of {whole:.6g} m, "
-                f"{fixed / whole:.3g} of the length of this face; the rest of the face is free"
+                f"contact.mesh: the held nodes `{side}_far` cover {fixed:.6g} m of a face of {length:.6g} m, "
+                f"{fixed / length:.3g} of the length of this face; the rest of the face is free"
             )
     return out
 
@@ -364,17 +379,18 @@ def notes_on_tall_pieces(patch_model, mean: float) -> list:
     pressure); the motion lacks about this fraction. A piece that is not taller than long bends too
     little. mean: pressure over the whole interface [Pa].
     """
+    pieces = patch_model.pieces
     out = []
-    for side in ("lower", "upper"):
-        piece = getattr(patch_model.pieces, side)
+    for side, piece in (("lower", pieces.lower), ("upper", pieces.upper)):
         young = piece.substrate.young
-        nu = piece.substrate.poisson
-        stiff = young / (1 - nu**2) if patch_model.pieces.plane == "strain" else young
-        share = mean / (np.pi**2 * stiff * patch_model.pieces.length**2 / (48 * piece.height**2))
-        if piece.height > patch_model.pieces.length and share > MIN_BUCKLING_RATIO:
+        if pieces.plane == "strain":
+            young = young / (1 - piece.substrate.poisson**2)
+        buckling_pressure = np.pi**2 * young * pieces.length**2 / (48 * piece.height**2)
+        ratio = mean / buckling_pressure
+        if piece.height > pieces.length and ratio > MIN_BUCKLING_RATIO:
             out.append(
-                f"the {side} piece is {piece.height / patch_model.pieces.length:.3g} times as tall as it is long and carries "
-                f"{share:.2g} of the load at which it would buckle sideways (limit {MIN_BUCKLING_RATIO:g}); the computation "
-                "neglects that bending lengthens the lever arm of the load"
+                f"the {side} piece is {piece.height / pieces.length:.3g} times as tall as it is long and carries "
+                f"{ratio:.2g} of the load at which it would buckle sideways (limit {MIN_BUCKLING_RATIO:g}); the "
+                "computation neglects that bending lengthens the lever arm of the load"
             )
     return out

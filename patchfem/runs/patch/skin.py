@@ -20,19 +20,21 @@ from ...surface.roughness import peaks
 
 
 def skin_law(patch_model):
-    """Return the smooth pressure law of the asperity layer of a patch."""
-    part = patch_model.interface.skin
-    if part.law == "exponential":
-        pressure = (
-            part.normal_stiffness * part.decay_length if part.normal_stiffness is not None else None
-        )
-        return asperity_laws.ExponentialAsperities(part.decay_length, pressure)
+    """Return the pressure law of the asperity layer of a patch."""
+    skin = patch_model.interface.skin
+    if skin.law == "linear":
+        return asperity_laws.LinearAsperities(skin.normal_stiffness)
+    if skin.law == "exponential":
+        pressure = None
+        if skin.normal_stiffness is not None:
+            pressure = skin.normal_stiffness * skin.decay_length
+        return asperity_laws.ExponentialAsperities(skin.decay_length, pressure)
     faces = [
         piece.coating.material if piece.coating else piece.substrate
         for piece in (patch_model.pieces.lower, patch_model.pieces.upper)
     ]
     modulus = 1 / sum((1 - face.poisson**2) / face.young for face in faces)
-    return asperity_laws.HertzAsperities(part.radius, part.density, part.height_deviation, modulus)
+    return asperity_laws.HertzAsperities(skin.radius, skin.density, skin.height_deviation, modulus)
 
 
 def mean_stiffness(patch_model, pressure: float) -> float:
@@ -53,42 +55,47 @@ def note_on_peak_stiffness(patch_model, pressure: float) -> list:
 
     Also for peaks from root mean squares; [] for any other skin. pressure: mean pressure [Pa].
     """
-    part = patch_model.interface.skin
-    if part is None or part.law != "hertz" or part.rms_height is None or not pressure > 0:
+    skin = patch_model.interface.skin
+    if skin is None or skin.law != "hertz" or skin.rms_height is None or not pressure > 0:
         return []
-    soft, stiff = peaks.persson_stiffness(pressure, part.rms_height)
+    soft, stiff = peaks.persson_stiffness(pressure, skin.rms_height)
     half = ""
-    told = []
-    waves = f" of the waves below {format_quantity(part.cutoff, 'm', 3)}" if part.cutoff else ""
-    if part.from_ is not None:
-        found = traces.read_spectral_moments(Path(part.from_), part.cutoff)
-        half = f" (from every second sample: {_half(patch_model, found.coarse, pressure)})"
-        told = [f"contact.asperities: {one}" for one in (*found.dust, found.not_gaussian) if one]
-    elif patch_model.gap.profile is not None and part.cutoff is None:
-        told = [
+    remarks = []
+    waves = f" of the waves below {format_quantity(skin.cutoff, 'm', 3)}" if skin.cutoff else ""
+    if skin.from_ is not None:
+        moments = traces.read_spectral_moments(Path(skin.from_), skin.cutoff)
+        half = f" (from every second sample: {_half(patch_model, moments.coarse, pressure)})"
+        texts = (*moments.dust, moments.not_gaussian)
+        remarks = [f"contact.asperities: {text}" for text in texts if text]
+    elif patch_model.gap.profile is not None and skin.cutoff is None:
+        remarks = [
             "contact.asperities.rms_height: the profile already contains all waves longer than "
-            f"{format_length(2 * patch_model.gap.average)}; if rms_height comes from the same trace as the profile, give the rms "
-            "values of the shorter waves only (patchfem profile --cutoff prints them)"
+            f"{format_length(2 * patch_model.gap.average)}; if rms_height comes from the same trace as the "
+            "profile, give the rms values of the shorter waves only (patchfem profile --cutoff prints them)"
         ]
     return [
         f"contact.asperities: under the mean pressure of {format_quantity(pressure, 'Pa', 3)} the peaks{waves} have "
         f"a stiffness of {mean_stiffness(patch_model, pressure):.3g} Pa/m{half}; Persson's theory, which includes waves "
         "of all lengths, "
         f'gives {soft:.3g} to {stiff:.3g} Pa/m; to use the stiffness of that theory, set law = "exponential" and '
-        f'decay_length = "{sum(peaks.PERSSON) / 2 * part.rms_height * 1e6:.3g} um"',
-        *told,
+        f'decay_length = "{sum(peaks.PERSSON) / 2 * skin.rms_height * 1e6:.3g} um"',
+        *remarks,
     ]
 
 
 def _half(patch_model, coarse, pressure: float) -> str:
     """Return the stiffness of the peaks from every second sample of the profile, as text."""
     try:
-        one = peaks.gaussian_peaks(coarse) if coarse else None
+        surface_peaks = peaks.gaussian_peaks(coarse) if coarse else None
     except PatchfemError:
-        one = None
-    if one is None:
+        surface_peaks = None
+    if surface_peaks is None:
         return "no surface of such peaks"
-    new = {"radius": one.radius, "density": one.density, "height_deviation": one.deviation}
+    new = {
+        "radius": surface_peaks.radius,
+        "density": surface_peaks.density,
+        "height_deviation": surface_peaks.deviation,
+    }
     interface = replace(
         patch_model.interface, skin=patch_model.interface.skin.model_copy(update=new)
     )
@@ -104,9 +111,7 @@ def cut_off_pressure(pressure) -> np.ndarray:
     return np.where(pressure > MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
 
 
-def press_through_asperities(
-    patch_model, pieces: Compliance, gap, angle: float, moment, spring: float
-) -> tuple:
+def press_through_asperities(patch_model, pieces: Compliance, gap) -> tuple:
     """Solve the contact of a pair through an asperity layer with a smooth law.
 
     The gap of the ContactState is the separation of the mean planes, which is negative if the skin
@@ -118,12 +123,6 @@ def press_through_asperities(
     pieces : Compliance
     gap : (m,)
         Unloaded gap [m].
-    angle : float
-        Initial rotation [rad].
-    moment : float or None
-        Moment [N m]; None if the rotation is fixed.
-    spring : float
-        Rotational stiffness of the holder [N m/rad].
 
     Returns
     -------
@@ -132,14 +131,15 @@ def press_through_asperities(
         a single strip.
     """
     interface = pieces.interface
-    by = patch_model.loading.approach
+    loading = patch_model.loading
     loads = HolderLoads()
-    if by is None:
-        loads = HolderLoads(patch_model.loading.load, moment, spring=spring)
+    if loading.approach is None:
+        loads = HolderLoads(loading.load, loading.moment, spring=loading.rotational_stiffness)
     layout = StripLayout(interface.x, interface.weight, np.zeros(1))
     strips = StripModel(StripCompliance(pieces.normal), layout, skin_law(patch_model))
-    state = press_strips(strips, gap, loads, approach=by, rotation=angle)
-    answer = ContactState(
+    angle = patch_model.gap.angle
+    state = press_strips(strips, gap, loads, approach=loading.approach, rotation=angle)
+    pressure = ContactState(
         frozen_array(cut_off_pressure(state.pressure[0])),
         state.gap[0],
         state.delta,
@@ -150,13 +150,13 @@ def press_through_asperities(
         state.iterations,
         state.residuals,
     )
-    stiff = np.maximum(state.stiffness[0] * interface.weight, 1e-300)
+    stiffness = np.maximum(state.stiffness[0] * interface.weight, 1e-300)
     # the lower bound keeps the compliance of unloaded nodes finite
-    crush = np.diag(1 / np.maximum(stiff, MIN_RELATIVE_PRESSURE * stiff.max()))
+    crush = np.diag(1 / np.maximum(stiffness, MIN_RELATIVE_PRESSURE * stiffness.max()))
     ratio = patch_model.interface.skin.tangential_ratio
     tangential = pieces.tangential + crush / ratio if ratio is not None else pieces.tangential
     return (
         Compliance(interface, frozen_array(pieces.normal + crush), frozen_array(tangential)),
-        answer,
+        pressure,
         state,
     )

@@ -13,15 +13,25 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact.batch.intervals import ContactBatch, Intervals
+from ...contact.edges import EdgeValues
 from ...contact.unilateral import RESIDUAL_TOL
-from ...core import ContactState, Measure, Outcome, frozen_array
+from ...core import ContactState, Outcome, frozen_array
 from ...elasticity.lapack import one_thread
 from ...mesh.tensor import TensorGrid
-from ..results.patch_rows import TABLE
-from . import measures as one_by_one
 from .condensed import Pair, shared_pair, shared_pairs
-from .press import as_patch, with_linear_skin
-from .values import EdgeValues, peak_pressures, static_values
+from .measures import (
+    MIN_ERROR,
+    UNRESOLVED_NODES,
+    band_words,
+    cells_halved,
+    converge,
+    max_error_ratio,
+    other_plane,
+    resolution_of_patches,
+    shared_errors,
+)
+from .press import SolvedContact, make_patch, with_linear_skin
+from .values import peak_pressures, static_values
 
 # cells beyond the end of a contact on the coarser mesh within which it may end on this one
 MAX_END_CELLS = 2
@@ -31,12 +41,12 @@ class SolvedPatch(NamedTuple):
     """Patch that was solved together with others.
 
     - measures: static measures by name.
-    - band: sentences on the plane state (`measures.plane_band`).
+    - plane_sentences: sentences on the plane state (`measures.plane_band`).
     - patches: the solved Patch on all meshes, fine to coarse.
     """
 
     measures: dict
-    band: list
+    plane_sentences: list
     patches: tuple
 
 
@@ -90,51 +100,48 @@ class Level(NamedTuple):
 class BatchSolution(NamedTuple):
     """Static measures of q patches that were solved together.
 
-    - values, errors: (q,) by name.
-    - good (q,): whether the patch was solved together with the others.
-    - top (q,): largest nodal pressure [Pa].
-    - approach (q,): on the finest mesh [m].
-    - planes: values (q,) by name on the second mesh, in the plane state of the model and in the
-      other one; () if not needed.
+    - estimates: Estimate (q,) by name.
+    - is_solved (q,): whether the patch was solved together with the others.
+    - plane_values: values (q,) by name on the second mesh, in the plane state of the model and in
+      the other one; () if not needed.
     - levels: the patches on all meshes, fine to coarse.
     """
 
-    values: dict
-    errors: dict
-    good: np.ndarray
-    top: np.ndarray
-    approach: np.ndarray
-    planes: tuple
+    estimates: dict
+    is_solved: np.ndarray
+    plane_values: tuple
     levels: list
 
-    def band(self, patch_model, k: int) -> list:
-        """Return the sentence of `measures.plane_band` on the k-th patch, of PatchModel `patch_model`."""
-        return (
-            one_by_one.band_words(
-                patch_model,
-                *(
-                    {name: float(column[k]) for name, column in plane.items()}
-                    for plane in self.planes
-                ),
-            )
-            if self.planes
-            else []
-        )
+    @property
+    def approach(self) -> np.ndarray:
+        """Approach (q,) [m] on the finest mesh."""
+        return self.levels[0].values["approach"]
 
-    def measures(self, k: int, floors: Mapping | None = None) -> dict:
-        """Return the measures of the k-th patch by name.
+    @property
+    def largest_pressure(self) -> np.ndarray:
+        """Largest nodal pressure (q,) [Pa] on the finest mesh."""
+        return self.levels[0].pressure.sigma_n.max(axis=1)
+
+    def plane_sentences(self, patch_model, case: int) -> list:
+        """Return the sentence of `measures.plane_band` on a patch."""
+        if not self.plane_values:
+            return []
+        own_values, other_values = (
+            {name: float(column[case]) for name, column in values.items()}
+            for values in self.plane_values
+        )
+        return band_words(patch_model, own_values, other_values)
+
+    def measures(self, case: int, floors: Mapping | None = None) -> dict:
+        """Return the measures of a patch by name.
 
         floors: floors (q,) by name that replace those of the table.
         """
         return {
-            name: Measure(
-                float(column[k]),
-                TABLE[name].unit,
-                float(self.errors[name][k]),
-                TABLE[name].floor if floors is None else float(floors[name][k]),
-                engine=one_by_one.mesh_engine(column[k], self.levels[0].values[name][k]),
+            name: estimate.select(case).to_measure(
+                name, None if floors is None else float(floors[name][case])
             )
-            for name, column in self.values.items()
+            for name, estimate in self.estimates.items()
         }
 
 
@@ -199,218 +206,217 @@ def collect_loads(patches: Sequence) -> PatchLoads:
     )
 
 
-def asked_by_columns(patch, count: int) -> PatchLoads:
+def loads_by_columns(patch_model, count: int) -> PatchLoads:
     """Return the `PatchLoads` of `count` patches, given as one PatchModel with columns of numbers."""
 
     def column(number) -> np.ndarray:
         """Return a number as a column (q,)."""
         return np.broadcast_to(np.asarray(number, float), count)
 
-    moment = patch.loading.moment
+    loading = patch_model.loading
     return PatchLoads(
-        patch,
-        column(patch.loading.load),
-        None if moment is None else column(moment),
-        column(patch.loading.rotational_stiffness),
-        column(patch.gap.angle),
-        (patch.gap,),
+        patch_model,
+        column(loading.load),
+        None if loading.moment is None else column(loading.moment),
+        column(loading.rotational_stiffness),
+        column(patch_model.gap.angle),
+        (patch_model.gap,),
     )
 
 
-def patches_on(patches, pair: Pair) -> list:
+def patches_on(patch_models, pair: Pair) -> list:
     """Solve `PatchModel`s of one geometry on a Pair.
 
-    Returns a list of Patch; None for each that this module cannot solve.
+    Parameters
+    ----------
+    patch_models : sequence of PatchModel
+    pair : Pair
+
+    Returns
+    -------
+    list of Patch
+        None for each that this module cannot solve.
     """
-    out = [None] * len(patches)
-    groups = {}
-    grids = (
-        isinstance(pair.grid, TensorGrid)
-        and isinstance(pair.upper_grid, TensorGrid)
-        and not pair.closing.any()
-    )
-    for k, patch_model in enumerate(patches if grids else ()):
-        if not _not_of_one_stretch(patch_model):
-            groups.setdefault(_kind(patch_model), []).append(k)
-    for cases in groups.values():
+    out = [None] * len(patch_models)
+    if not _has_plain_grids(pair) or pair.closing.any():
+        return out
+    for cases in _group_alike(patch_models):
+        alike = [patch_models[case] for case in cases]
         with one_thread():
-            level = solve_on_pair(collect_loads([patches[k] for k in cases]), pair)
-        for place, k in enumerate(cases):
-            if (
-                level.is_solved[place]
-                and level.contacts.n_nodes[place] > one_by_one.UNRESOLVED_NODES
-            ):
-                out[k] = _make_patch(patches[k], pair, level, place)
+            level = solve_on_pair(collect_loads(alike), pair)
+        for row, case in enumerate(cases):
+            if level.is_solved[row] and level.contacts.n_nodes[row] > UNRESOLVED_NODES:
+                out[case] = _make_patch(patch_models[case], pair, level, row)
     return out
 
 
-def solved_patches(patches, tolerance: float) -> list:
+def _has_plain_grids(pair: Pair) -> bool:
+    """Return whether the meshes of both pieces are plain grids."""
+    return isinstance(pair.grid, TensorGrid) and isinstance(pair.upper_grid, TensorGrid)
+
+
+def _group_alike(patch_models) -> list:
+    """Return lists of the indices of `PatchModel`s of one geometry that can be solved together."""
+    groups = {}
+    for case, patch_model in enumerate(patch_models):
+        if not _not_of_one_stretch(patch_model):
+            key = (patch_model.mesh.tolerance, *_kind(patch_model))
+            groups.setdefault(key, []).append(case)
+    return list(groups.values())
+
+
+def solved_patches(patch_models, tolerance: float) -> list:
     """Return each of alike `PatchModel`s as SolvedPatch; None for those not solved here.
 
-    They are alike in their pieces and in `pressing_kind`. tolerance: see `pressed_together`.
+    They are alike in their pieces and in `pressing_kind`. tolerance: see `solve_together`.
     """
-    pairs = shared_pairs(patches[0])
-    found = pressed_together(collect_loads(patches), tolerance)
-    return [
-        SolvedPatch(
-            found.measures(k),
-            found.band(one, k),
-            tuple(_make_patch(one, pair, level, k) for pair, level in zip(pairs, found.levels)),
+    pairs = shared_pairs(patch_models[0])
+    solution = solve_together(collect_loads(patch_models), tolerance)
+    out = [None] * len(patch_models)
+    for case in np.flatnonzero(solution.is_solved).tolist():
+        patch_model = patch_models[case]
+        out[case] = SolvedPatch(
+            solution.measures(case),
+            solution.plane_sentences(patch_model, case),
+            tuple(
+                _make_patch(patch_model, pair, level, case)
+                for pair, level in zip(pairs, solution.levels)
+            ),
         )
-        if found.good[k]
-        else None
-        for k, one in enumerate(patches)
-    ]
+    return out
 
 
-def max_error_ratios(patches, pairs: list, tolerance: float) -> list:
+def max_error_ratios(patch_models, pairs: list, tolerance: float) -> list:
     """Return the largest error over the tolerance of each `PatchModel`; None if not solved here.
 
     Parameters
     ----------
-    patches : sequence of PatchModel
+    patch_models : sequence of PatchModel
         Of one geometry.
     pairs : list of Pair
         Condensed pieces, fine to coarse.
     tolerance : float
+
+    Returns
+    -------
+    list of float
     """
-    out = [None] * len(patches)
-    groups = {}
-    grids = all(
-        isinstance(body, TensorGrid) for pair in pairs for body in (pair.grid, pair.upper_grid)
-    )
-    for k, patch_model in enumerate(patches if grids and len(pairs) > 2 else ()):
-        if patch_model.gap.profile is None and not _not_of_one_stretch(patch_model):
-            groups.setdefault((patch_model.mesh.tolerance, *_kind(patch_model)), []).append(k)
-    for cases in groups.values():
-        found = pressed_together(collect_loads([patches[k] for k in cases]), tolerance, pairs)
-        for place in np.flatnonzero(found.good).tolist():
-            out[cases[place]] = one_by_one.max_error_ratio(found.measures(place), tolerance)
+    out = [None] * len(patch_models)
+    if len(pairs) < 3 or not all(map(_has_plain_grids, pairs)):
+        return out
+    for cases in _group_alike(patch_models):
+        if patch_models[cases[0]].gap.profile is not None:  # equal for one geometry
+            continue
+        alike = [patch_models[case] for case in cases]
+        solution = solve_together(collect_loads(alike), tolerance, pairs)
+        for row in np.flatnonzero(solution.is_solved).tolist():
+            out[cases[row]] = max_error_ratio(solution.measures(row), tolerance)
     return out
 
 
-def pressed_together(
-    patch_model: PatchLoads, tolerance: float, pieces: list | None = None
-) -> BatchSolution:
+def solve_together(loads: PatchLoads, tolerance: float, pairs: list | None = None) -> BatchSolution:
     """Solve patches on the meshes that they share, and estimate their errors.
 
     Parameters
     ----------
-    patch_model : PatchLoads
+    loads : PatchLoads
     tolerance : float
         Relative error above which values are extrapolated.
-    pieces : list of Pair, optional
+    pairs : list of Pair, optional
         Pieces, fine to coarse, that replace the shared ones; the other plane state is then not
         solved.
+
+    Returns
+    -------
+    BatchSolution
     """
-    pairs = pieces or shared_pairs(patch_model.first)
-    first = patch_model.first
-    level = None
+    first = loads.first
+    other_model = other_plane(first) if pairs is None else None
+    pairs = pairs or shared_pairs(first)
     levels = []
+    other_level = None
     with one_thread():
         for pair in reversed(pairs):
-            level = solve_on_pair(patch_model, pair, level)
-            levels.insert(0, level)
-        theirs = () if pieces else _in_other_plane(patch_model, levels[1])
+            levels.insert(0, solve_on_pair(loads, pair, levels[0] if levels else None))
+        if other_model is not None:
+            other_loads = loads._replace(first=other_model)
+            other_level = solve_on_pair(other_loads, shared_pair(other_model, 1), levels[1])
     fine = levels[0]
-    pair = pairs[0]
-    good = np.logical_and.reduce([level.is_solved for level in (*levels, *theirs)])
-    good &= (fine.contacts.n_nodes > one_by_one.UNRESOLVED_NODES) & (
-        not any(one.closing.any() for one in pairs)
-    )
-    hidden = one_by_one.hidden_by_meshes(
-        pair,
-        _with_asperities(first, pair),
+    is_solved = fine.contacts.n_nodes > UNRESOLVED_NODES
+    for level in levels if other_level is None else (*levels, other_level):
+        is_solved = is_solved & level.is_solved
+    if any(pair.closing.any() for pair in pairs):
+        is_solved = np.zeros_like(is_solved)
+    resolution = resolution_of_patches(
+        pairs[0],
+        with_linear_skin(first.interface.skin, pairs[0].compliance),
         fine.contacts.force,
         fine.gap_range,
         first.loading.moment is not None,
     )
-    found = one_by_one.converge(
+    estimates = converge(
         [level.values for level in reversed(levels)],
-        one_by_one.shared_errors(hidden, fine.values),
+        shared_errors(resolution, fine.values),
         (first.mesh.tolerance or tolerance) if first.mesh.is_automatic else None,
-        all(one_by_one.cells_halved(a, b) for a, b in pairwise(pairs)),
-        max(one_by_one.MIN_ERROR, pair.round_off_error),
+        all(cells_halved(a, b) for a, b in pairwise(pairs)),
+        max(MIN_ERROR, pairs[0].round_off_error),
     )
-    return BatchSolution(
-        found.values,
-        found.errors,
-        good,
-        fine.pressure.sigma_n.max(axis=1),
-        fine.values["approach"],
-        tuple(level.values for level in (levels[1], *theirs)) if theirs else (),
-        levels,
-    )
+    plane_values = () if other_level is None else (levels[1].values, other_level.values)
+    return BatchSolution(estimates, is_solved, plane_values, levels)
 
 
-def _make_patch(patch_model, pair: Pair, level: Level, k: int):
-    """Return the k-th patch of a level, of PatchModel `patch_model`, as `press.press_patch` returns it."""
+def _make_patch(patch_model, pair: Pair, level: Level, case: int):
+    """Return a patch of a level as `press.press_patch` returns it."""
     gap, notes, seconds = patch_model.gap.evaluate(level.x)
     rows = level.pressure
     pressure = ContactState(
-        frozen_array(rows.sigma_n[k]),
-        frozen_array(rows.gap[k]),
-        float(rows.approach[k]),
-        float(rows.rotation[k]),
-        float(rows.load[k]),
-        float(rows.moment[k]),
+        frozen_array(rows.sigma_n[case]),
+        frozen_array(rows.gap[case]),
+        float(rows.approach[case]),
+        float(rows.rotation[case]),
+        float(rows.load[case]),
+        float(rows.moment[case]),
         Outcome.DONE,
         1,
         MappingProxyType({}),
     )
-    return as_patch(
-        patch_model,
-        pair,
-        gap + pair.rise,
-        notes,
-        seconds,
-        (_with_asperities(patch_model, pair), pressure, None, None),
-    )
+    pieces = with_linear_skin(patch_model.interface.skin, pair.compliance)
+    contact = SolvedContact(pieces, pressure)
+    return make_patch(patch_model, pair, gap + pair.rise, contact, notes, seconds)
 
 
-def _with_asperities(patch_model, pair: Pair):
-    """Return the Compliance of a pair, in series with a linear asperity layer if there is one."""
-    skin = patch_model.interface.skin
-    return pair.compliance if skin is None else with_linear_skin(skin, pair.compliance)
-
-
-def _in_other_plane(patch_model: PatchLoads, known: Level) -> tuple:
-    """Return the patches on the second mesh in the other plane state; () if it is not needed."""
-    other = one_by_one.other_plane(patch_model.first)
-    return (
-        ()
-        if other is None
-        else (solve_on_pair(patch_model._replace(first=other), shared_pair(other, 1), known),)
-    )
-
-
-def solve_on_pair(patch_model: PatchLoads, pair: Pair, coarse: Level | None = None) -> Level:
+def solve_on_pair(loads: PatchLoads, pair: Pair, coarse: Level | None = None) -> Level:
     """Solve patches on one Pair.
 
     Parameters
     ----------
-    patch_model : PatchLoads
+    loads : PatchLoads
     pair : Pair
     coarse : Level, optional
         The same patches on coarser cells, near whose ends of contact the search starts.
+
+    Returns
+    -------
+    Level
     """
     bare = pair.compliance
-    pieces = _with_asperities(patch_model.first, pair)
+    skin = loads.first.interface.skin
+    pieces = with_linear_skin(skin, bare)
     x = bare.interface.x
-    held = patch_model.moment is None
-    gap = patch_model.gaps(x) + pair.rise
+    has_fixed_rotation = loads.moment is None
+    gap = loads.gaps(x) + pair.rise
     gap_range = np.ptp(gap, axis=1)
-    turned = np.zeros(patch_model.load.size) if held else patch_model.angle
+    angle = np.zeros(loads.load.size) if has_fixed_rotation else loads.angle
     # the rotation of a free piece is measured from zero, so that it keeps its digits
-    gap = gap - turned[:, None] * x
-    low = gap.min(axis=1)
+    gap = gap - angle[:, None] * x
+    min_gap = gap.min(axis=1)
     normal = Intervals(pieces.normal, x)
     tangential = Intervals(pieces.tangential, x)
     contacts = normal.press(
-        gap - low[:, None],
-        patch_model.load,
-        None if held else patch_model.moment - patch_model.spring * turned,
-        patch_model.spring,
+        gap - min_gap[:, None],
+        loads.load,
+        None if has_fixed_rotation else loads.moment - loads.spring * angle,
+        loads.spring,
         coarse and _about(x, coarse),
     )
     tangential.fill_sums(contacts.first)
@@ -418,8 +424,8 @@ def solve_on_pair(patch_model: PatchLoads, pair: Pair, coarse: Level | None = No
     pressure = ContactState(
         sigma,
         contacts.opening,
-        low + contacts.closing,
-        contacts.theta + patch_model.angle - turned,
+        min_gap + contacts.closing,
+        contacts.theta + loads.angle - angle,
         contacts.force.sum(axis=1),
         contacts.force @ x,
         Outcome.DONE,
@@ -436,14 +442,11 @@ def solve_on_pair(patch_model: PatchLoads, pair: Pair, coarse: Level | None = No
         tangential.stiffness(contacts),
         normal.stiffness(contacts, is_rotation=True),
     )
-    peak = peak_pressures(
-        x,
-        sigma,
-        None if patch_model.first.interface.skin is None else softness / normal.c.diagonal(),
-    )
-    return Level(
-        static_values(bare.interface, pressure, peak, edge_values), pressure, contacts, gap_range, x
-    )
+    skin_fraction = None if skin is None else softness / normal.c.diagonal()
+    peak = peak_pressures(x, sigma, skin_fraction)
+    area = bare.interface.weight.sum()
+    values = static_values(np.ptp(x), area, pressure, peak, edge_values)
+    return Level(values, pressure, contacts, gap_range, x)
 
 
 def _about(x, coarse: Level) -> tuple:

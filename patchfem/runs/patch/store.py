@@ -21,6 +21,20 @@ def reuse(key: tuple, make: Callable):
     return result
 
 
+def reuse_in_sweep(patch_model, key: tuple, make: Callable):
+    """Return the result of a key, kept only if other cases of a sweep may need it (`may_be_shared`).
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch to which the result belongs.
+    key : tuple
+    make : callable
+        Function without parameters that computes the result.
+    """
+    return reuse(key, make) if may_be_shared(patch_model) else make()
+
+
 def keep(key: tuple, result) -> None:
     """Keep a result under a key as the most recently used one.
 

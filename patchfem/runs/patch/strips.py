@@ -1,13 +1,13 @@
 """Patch in strips over its width, pressed by a holder that may roll.
 
-In: a `PatchModel` with strips and its condensed pieces. Out: the contact of all strips, and the
-measures that depend on them.
+In: a `PatchModel` with strips and its condensed pieces. Out: the contact of all strips, and its
+extent and stiffness.
 """
 
 import numpy as np
 
 from ...contact import edges, stiffness
-from ...contact.asperity_laws import LinearAsperities, SmoothAsperities
+from ...contact.asperity_laws import SmoothAsperities
 from ...contact.strip_compliance import StripCompliance
 from ...contact.strips import (
     HolderLoads,
@@ -23,12 +23,11 @@ from .skin import MIN_RELATIVE_PRESSURE, cut_off_pressure, skin_law
 
 
 def press_strips_of_patch(
-    patch_model, pieces: Compliance, gap, held: tuple, added=None, warm_start=None
+    patch_model, pieces: Compliance, gap, added=None, warm_start=None
 ) -> tuple:
     """Solve the contact of a pair in strips.
 
-    The Compliance is that of the pieces in full contact over the width; measures of stiffness are
-    computed from the strips.
+    Measures of stiffness are computed from the strips.
 
     Parameters
     ----------
@@ -36,37 +35,32 @@ def press_strips_of_patch(
     pieces : Compliance
     gap : (m,) or (s, m)
         Unloaded gap [m].
-    held : tuple
-        Rotation [rad], moment [N m] or None, and rotational stiffness of the holder [N m/rad].
     added, warm_start
         Parameters of `StripCompliance`.
 
     Returns
     -------
     tuple
-        Compliance of all strips, ContactState of the means over the width, smooth skin or None, and
-        StripsState.
+        ContactState of the means over the width, smooth skin or None, and StripsState.
     """
-    (count, roll, offset), interface, (angle, moment, spring) = (
-        patch_model.interface.strips,
-        pieces.interface,
-        held,
-    )
-    skin = make_asperities(patch_model)
-    by = patch_model.loading.approach
-    one = split_into_strips(pieces, count)
-    layout = StripLayout(interface.x, one.weight, strip_offsets(patch_model.pieces.width, count))
-    strips = StripModel(StripCompliance(one.normal, added, warm_start), layout, skin)
-    roll_moment = None if offset is None else patch_model.loading.load * offset
+    count, roll, offset = patch_model.interface.strips
+    loading = patch_model.loading
+    skin = None if patch_model.interface.skin is None else skin_law(patch_model)
+    strip = split_into_strips(pieces, count)
+    offsets = strip_offsets(patch_model.pieces.width, count)
+    layout = StripLayout(pieces.interface.x, strip.weight, offsets)
+    strips = StripModel(StripCompliance(strip.normal, added, warm_start), layout, skin)
+    roll_moment = None if offset is None else loading.load * offset
     loads = HolderLoads(roll_moment=roll_moment)
-    if by is None:
-        loads = HolderLoads(patch_model.loading.load, moment, roll_moment, spring)
-    state = press_strips(strips, gap, loads, approach=by, rotation=angle, roll=roll)
-    mean = (
-        cut_off_pressure(state.pressure) if isinstance(skin, SmoothAsperities) else state.pressure
-    ).mean(axis=0)
-    answer = ContactState(
-        frozen_array(mean),
+    if loading.approach is None:
+        loads = HolderLoads(loading.load, loading.moment, roll_moment, loading.rotational_stiffness)
+    state = press_strips(
+        strips, gap, loads, approach=loading.approach, rotation=patch_model.gap.angle, roll=roll
+    )
+    is_smooth = isinstance(skin, SmoothAsperities)
+    pressure = cut_off_pressure(state.pressure) if is_smooth else state.pressure
+    mean_state = ContactState(
+        frozen_array(pressure.mean(axis=0)),
         frozen_array(state.gap.min(axis=0)),
         state.delta,
         state.theta,
@@ -76,17 +70,7 @@ def press_strips_of_patch(
         state.iterations,
         state.residuals,
     )
-    return pieces, answer, skin if isinstance(skin, SmoothAsperities) else None, state
-
-
-def make_asperities(patch_model):
-    """Return the asperity layer between the strips; None if they are bare."""
-    if patch_model.interface.skin is None:
-        return None
-    if patch_model.interface.skin.law == "linear":
-        return LinearAsperities(patch_model.interface.skin.normal_stiffness)
-
-    return skin_law(patch_model)
+    return mean_state, skin if is_smooth else None, state
 
 
 def rotational_stiffness(state, c, x, weight) -> float:
@@ -115,95 +99,67 @@ def rotational_stiffness(state, c, x, weight) -> float:
     return out
 
 
-def strip_values(patch) -> dict:
-    """Return the values of the measures that depend on strips, by name.
+def strip_edge_values(patch) -> edges.EdgeValues:
+    """Return the extent of contact and the stiffnesses of a pressed patch in strips."""
+    weight = patch.pair.compliance.interface.weight / len(patch.strips.offsets)
+    if isinstance(patch.skin, SmoothAsperities):
+        return _behind_skin(patch, weight)
+    return _between_nodes(patch, weight)
 
-    These are the extent of the contact, the stiffnesses, the lateral centre of pressure and the
-    roll moment.
-    """
+
+def _behind_skin(patch, weight) -> edges.EdgeValues:
+    """Return the edge values of strips with a smooth asperity layer."""
     state = patch.strips
-    weight = patch.pair.compliance.interface.weight / len(state.offsets)
-    out = {
-        "pressure_centre_lateral": state.centre_y,
-        "roll_moment": state.roll_moment,
-        "roll": state.roll,
-    }
-    if not state.load > 0:
-        return out
-    return out | (_behind_skin if isinstance(patch.skin, SmoothAsperities) else _between_nodes)(
-        patch, weight
+    x = patch.x
+    count = len(state.offsets)
+    normal = patch.pair.compliance.normal * count
+    tangential = patch.pair.compliance.tangential * count
+    peak = state.pressure.max()
+    is_loaded = state.pressure > MIN_RELATIVE_PRESSURE * peak
+    intervals = []
+    for pressure, nodes in zip(state.pressure, is_loaded, strict=True):
+        if nodes.any():
+            ends = edges.find_pressure_edges(x, pressure, MIN_RELATIVE_PRESSURE, peak)
+            intervals.append(edges.contact_intervals(x, nodes, ends))
+    ratio = patch.model.interface.skin.tangential_ratio
+    first = min(interval[0, 0] for interval in intervals)
+    last = max(interval[-1, 1] for interval in intervals)
+    return edges.EdgeValues(
+        length=float(sum(np.diff(interval).sum() for interval in intervals) / count),
+        width=float(last - first),
+        normal=strips_stiffness(normal, weight, state),
+        tangential=strips_stiffness(tangential, weight, state, np.inf if ratio is None else ratio),
+        rotational=rotational_stiffness(state, normal, x, weight),
     )
 
 
-def _behind_skin(patch, weight) -> dict:
-    """Return extent of contact and stiffnesses, by name, of strips with a smooth asperity layer."""
+def _between_nodes(patch, weight) -> edges.EdgeValues:
+    """Return the edge values of strips whose contact ends between nodes (`contact.edges`)."""
     state = patch.strips
-    pieces = patch.pair.compliance
-    count = len(patch.strips.offsets)
-    ratio = patch.tangential_ratio if patch.tangential_ratio is not None else np.inf
     x = patch.x
-    bears = state.pressure > MIN_RELATIVE_PRESSURE * state.pressure.max()
-    stretches = [
-        edges.contact_intervals(
-            x,
-            bears[k],
-            edges.find_pressure_edges(x, row, MIN_RELATIVE_PRESSURE, state.pressure.max()),
-        )
-        for k, row in enumerate(state.pressure)
-        if bears[k].any()
-    ]
-    return {
-        "contact_fraction": float(
-            sum(np.diff(stretch).sum() for stretch in stretches) / (count * np.ptp(x))
-        ),
-        "contact_half_width": float(
-            max(stretch[-1, 1] for stretch in stretches)
-            - min(stretch[0, 0] for stretch in stretches)
-        )
-        / 2,
-        "normal_stiffness": strips_stiffness(pieces.normal * count, weight, state),
-        "rotational_stiffness": rotational_stiffness(state, pieces.normal * count, patch.x, weight),
-        "tangential_stiffness": strips_stiffness(pieces.tangential * count, weight, state, ratio),
-    }
-
-
-def _between_nodes(patch, weight) -> dict:
-    """Return the extent of contact and the stiffnesses of strips with sharp edges, by name.
-
-    The contact ends between nodes (`contact.edges`).
-    """
-    state = patch.strips
-    pieces = patch.pair.compliance
-    x = patch.x
-    count = len(patch.strips.offsets)
-    normal = pieces.normal * count
-    tangential = pieces.tangential * count
+    count = len(state.offsets)
+    normal = patch.pair.compliance.normal * count
+    tangential = patch.pair.compliance.tangential * count
     softness = None
     if state.stiffness is not None:
         softness = 1 / (state.stiffness.max() * weight)
         normal = normal + np.diag(softness)
-        if patch.tangential_ratio is not None:
-            tangential = tangential + np.diag(softness / patch.tangential_ratio)
-    sums = np.zeros(3)
+        ratio = patch.model.interface.skin.tangential_ratio
+        if ratio is not None:
+            tangential = tangential + np.diag(softness / ratio)
+    unit = np.ones(x.size)
+    stiffnesses = np.zeros(3)
     length = 0.0
-    low = x[-1]
-    high = x[0]
+    first = x[-1]
+    last = x[0]
     for force, gap in zip(state.force, state.gap, strict=True):
         if not force.any():
             continue
-        found = edges.find_edges(normal, x, force, gap, softness, patch.pair.row)
-        stretches = edges.contact_intervals(x, force, found)
-        one = np.ones(x.size)
-        length += np.diff(stretches).sum()
-        low = min(low, stretches[0, 0])
-        high = max(high, stretches[-1, 1])
-        sums += [
-            edges.set_stiffness(c, force > 0, motion, found)
-            for c, motion in ((normal, one), (tangential, one), (normal, x))
-        ]
-    names = ("normal_stiffness", "tangential_stiffness", "rotational_stiffness")
-    return {
-        "contact_fraction": float(length / (count * np.ptp(x))),
-        "contact_half_width": float(high - low) / 2,
-        **dict(zip(names, map(float, sums), strict=True)),
-    }
+        ends = edges.find_edges(normal, x, force, gap, softness, patch.pair.row)
+        intervals = edges.contact_intervals(x, force, ends)
+        length += np.diff(intervals).sum()
+        first = min(first, intervals[0, 0])
+        last = max(last, intervals[-1, 1])
+        motions = ((normal, unit), (tangential, unit), (normal, x))
+        stiffnesses += [edges.set_stiffness(c, force > 0, motion, ends) for c, motion in motions]
+    return edges.EdgeValues(float(length / count), float(last - first), *map(float, stiffnesses))

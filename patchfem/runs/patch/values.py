@@ -4,30 +4,28 @@ In: a `Patch`. Out: values by name: peak pressure, edges, half-width, stiffnesse
 pressure at rounded ends that the cells do not resolve.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ...closed_forms import contact
 from ...contact import edges, stiffness
-from ...core import ContactState, Outcome
+from ...core import Outcome
 from ...elasticity.lapack import one_thread
 from . import strips
 from .press import Patch
 
 # a parabola may have at most this many times the curvature of its neighbour on a smooth curve
-LIKE = 2.0
+MAX_CURVATURE_RATIO = 2.0
 # cells within the contact on a rounding with which its peak converges
-ROUNDING_CELLS = 4
+MIN_ROUNDING_CELLS = 4
 
 
-def peak_pressures(x, sigma, skin=None) -> np.ndarray:
+def peak_pressures(x, sigma, node_fraction=None) -> np.ndarray:
     """Return the largest pressures (q,) [Pa] of patches from their nodal pressures.
 
     Inside the interface it is the vertex of the parabola through the largest node and its
-    neighbours (`vertex`). At an end of the interface the nodal forces of bare pieces are means over
-    half a cell, so that it is the end of the curve that has these means; with a skin it is the
-    pressure of the node.
+    neighbours. At an end of the interface the nodal forces of bare pieces are means over half a
+    cell, so that it is the end of the curve that has these means; with a skin it is the pressure
+    of the node.
 
     Parameters
     ----------
@@ -35,22 +33,23 @@ def peak_pressures(x, sigma, skin=None) -> np.ndarray:
         Positions of the nodes [m].
     sigma : (q, m) ndarray
         Nodal pressures [Pa].
-    skin : (m,) ndarray or None
-        Fraction [1] of the skin in the compliance of a node; None without a skin.
+    node_fraction : (m,) ndarray or None
+        Weight [1] of the pressure of a node at an end: the fraction of the skin in its compliance.
+        None for bare pieces.
     """
     top = np.argmax(sigma, axis=1)
     peaks = sigma.max(axis=1)
-    inner = (top > 0) & (top < x.size - 1)
-    peaks[inner] = vertex(x, sigma[inner], top[inner])
+    is_inner = (top > 0) & (top < x.size - 1)
+    peaks[is_inner] = _vertices(x, sigma[is_inner], top[is_inner])
     for border, step in ((0, 1), (x.size - 1, -1)):
         rows = np.flatnonzero(top == border)
         bare = _border_pressures(np.abs(x[::step] - x[border]), sigma[rows, ::step])
-        fraction = 0.0 if skin is None else skin[border]
+        fraction = 0.0 if node_fraction is None else node_fraction[border]
         peaks[rows] = fraction * peaks[rows] + (1 - fraction) * bare
     return peaks
 
 
-def vertex(x, sigma, top) -> np.ndarray:
+def _vertices(x, sigma, top) -> np.ndarray:
     """Return the vertices (q,) [Pa] of parabolas through the largest nodal pressures.
 
     A parabola passes through the largest node and its neighbours, if the parabolas of the next
@@ -68,18 +67,20 @@ def vertex(x, sigma, top) -> np.ndarray:
     """
     # at an end of the interface, the parabola itself replaces its missing neighbour
     rows = np.arange(top.size)
-    at = np.clip(top[:, None] + [-1, 0, 1], 1, x.size - 2)
-    left = x[at] - x[at - 1]
-    right = x[at + 1] - x[at]
-    here = sigma[rows[:, None], at]
-    before = (here - sigma[rows[:, None], at - 1]) / left
-    after = (sigma[rows[:, None], at + 1] - here) / right
-    bend = (after - before) / (left + right)
-    slope = (before * right + after * left)[:, 1] / (left + right)[:, 1]
-    loaded = (sigma[rows, top - 1] > 0) & (sigma[rows, top + 1] > 0) & (bend[:, 1] < 0)
-    own = np.where(loaded, bend[:, 1], -1.0)
-    alike = np.clip(LIKE * np.minimum(bend[:, 0] / own, bend[:, 2] / own), 0.0, 1.0)
-    return sigma[rows, top] + np.where(loaded, alike * slope**2 / (-4 * own), 0.0)
+    nodes = np.clip(top[:, None] + [-1, 0, 1], 1, x.size - 2)
+    left = x[nodes] - x[nodes - 1]
+    right = x[nodes + 1] - x[nodes]
+    pressure = sigma[rows[:, None], nodes]
+    slope_left = (pressure - sigma[rows[:, None], nodes - 1]) / left
+    slope_right = (sigma[rows[:, None], nodes + 1] - pressure) / right
+    curvature = (slope_right - slope_left) / (left + right)
+    slope = (slope_left * right + slope_right * left)[:, 1] / (left + right)[:, 1]
+    has_vertex = (sigma[rows, top - 1] > 0) & (sigma[rows, top + 1] > 0) & (curvature[:, 1] < 0)
+    middle = np.where(has_vertex, curvature[:, 1], -1.0)
+    similar = np.minimum(curvature[:, 0] / middle, curvature[:, 2] / middle)
+    fraction = np.clip(MAX_CURVATURE_RATIO * similar, 0.0, 1.0)
+    rise = np.where(has_vertex, fraction * slope**2 / (-4 * middle), 0.0)
+    return sigma[rows, top] + rise
 
 
 def _border_pressures(x, sigma) -> np.ndarray:
@@ -89,61 +90,52 @@ def _border_pressures(x, sigma) -> np.ndarray:
     """
     peaks = sigma[:, 0].copy()
     # number of loaded nodes from the end of the interface to the first open one
-    loaded = np.argmin(np.pad(sigma > 0, ((0, 0), (0, 1))), axis=1)
-    counts = np.minimum(loaded, min(3, x.size - 1))
+    n_loaded = np.argmin(np.pad(sigma > 0, ((0, 0), (0, 1))), axis=1)
+    n_used = np.minimum(n_loaded, min(3, x.size - 1))
     for count in (2, 3):
-        rows = counts == count
+        rows = n_used == count
         if rows.any():
-            cuts = np.concatenate([[0.0], (x[1 : count + 1] + x[:count]) / 2]) / x[1]
+            borders = np.concatenate([[0.0], (x[1 : count + 1] + x[:count]) / 2]) / x[1]
             power = np.arange(1, count + 1)
-            means = np.diff(cuts[:, None] ** power, axis=0) / power / np.diff(cuts)[:, None]
+            means = np.diff(borders[:, None] ** power, axis=0) / power / np.diff(borders)[:, None]
             peaks[rows] = np.linalg.solve(means, sigma[rows, :count].T)[0]
     return peaks
 
 
-class EdgeValues(NamedTuple):
-    """Quantities that depend on where a contact ends, numbers or (q,).
-
-    - length: length in contact [m].
-    - width: distance between the first and the last end [m].
-    - normal, tangential: stiffness [N/m].
-    - rotational: stiffness [N m/rad].
-    """
-
-    length: float
-    width: float
-    normal: float
-    tangential: float
-    rotational: float
-
-
-def static_values(interface, pressed: ContactState, peak, edge_values: EdgeValues) -> dict:
+def static_values(length: float, area: float, state, peak, edge_values: edges.EdgeValues) -> dict:
     """Return the values of the static measures by name, numbers or (q,) of q patches.
 
     Parameters
     ----------
-    interface : Interface
-    pressed : ContactState
-        Its load, moment, rotation and approach are numbers or (q,).
+    length, area : float
+        Length [m] and area [m2] of the interface.
+    state : object
+        Its load, moment, rotation and approach are numbers or (q,), as in a ContactState.
     peak : float or (q,) ndarray
         Largest pressure [Pa].
     edge_values : EdgeValues
+
+    Returns
+    -------
+    dict
     """
-    is_loaded = np.greater(pressed.load, 0)
-    out = np.zeros(np.shape(peak))
-    force = interface.weight.sum() * peak
+    is_loaded = np.greater(state.load, 0)
+
+    def divide_by(divisor, numerator):
+        """Return a quotient; 0 without a load."""
+        zero = np.zeros(np.shape(peak))
+        return np.divide(numerator, divisor, out=zero, where=is_loaded)[()]
+
     return {
-        "normal_load": pressed.load,
-        "contact_fraction": edge_values.length / np.ptp(interface.x),
+        "normal_load": state.load,
+        "contact_fraction": edge_values.length / length,
         "pressure_peak": peak,
-        "moment": pressed.moment,
-        "rotation": pressed.rotation,
-        "approach": pressed.approach,
+        "moment": state.moment,
+        "rotation": state.rotation,
+        "approach": state.approach,
         "contact_half_width": edge_values.width / 2,
-        "pressure_centre": np.divide(pressed.moment, pressed.load, out=out.copy(), where=is_loaded)[
-            ()
-        ],
-        "loaded_fraction": np.divide(pressed.load, force, out=out.copy(), where=is_loaded)[()],
+        "pressure_centre": divide_by(state.load, state.moment),
+        "loaded_fraction": divide_by(area * peak, state.load),
         "normal_stiffness": edge_values.normal,
         "tangential_stiffness": edge_values.tangential,
         "rotational_stiffness": edge_values.rotational,
@@ -156,51 +148,61 @@ def values(patch: Patch) -> dict:
     A node at the edge of a step represents half a cell on either side: the value is the weighted
     mean of the patches with and without contact of this node. `patch_rows` has the definitions.
     """
-    parts = [(weight, _values(part)) for weight, part in patch.either or ((1.0, patch),)]
+    weights, patches = zip(*(patch.either or ((1.0, patch),)))
+    parts = [_values(part) for part in patches]
     return {
-        name: float(sum(weight * found[name] for weight, found in parts)) for name in parts[0][1]
+        name: float(sum(weight * part[name] for weight, part in zip(weights, parts)))
+        for name in parts[0]
     }
 
 
 def _values(patch: Patch) -> dict:
     """Return the values of a patch without a node at a step."""
-    pressure = patch.pressure
-    interface = patch.pieces.interface
-    if patch.strips is not None:
-        peak = peak_pressures(patch.x, patch.strips.pressure, patch.skin_share).max()
-        found = static_values(interface, pressure, peak, EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0))
-        return found | strips.strip_values(patch)
-    peak = peak_pressures(patch.x, pressure.sigma_n[None], patch.skin_share)[0]
-    if pressure.outcome is Outcome.NO_CONTACT:
-        return static_values(interface, pressure, peak, EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0))
-    with one_thread():
-        return static_values(interface, pressure, peak, _edge_values(patch))
+    state = patch.strips
+    sigma = patch.pressure.sigma_n[None] if state is None else state.pressure
+    edge_values = edges.EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0)
+    if state is None and patch.pressure.outcome is not Outcome.NO_CONTACT:
+        with one_thread():
+            edge_values = _edge_values(patch)
+    elif state is not None and state.load > 0:
+        edge_values = strips.strip_edge_values(patch)
+    out = static_values(
+        np.ptp(patch.x),
+        patch.pieces.interface.weight.sum(),
+        patch.pressure,
+        peak_pressures(patch.x, sigma, patch.skin_fraction).max(),
+        edge_values,
+    )
+    if state is not None:
+        out |= {
+            "pressure_centre_lateral": state.centre_y,
+            "roll_moment": state.roll_moment,
+            "roll": state.roll,
+        }
+    return out
 
 
-def _edge_values(patch: Patch) -> EdgeValues:
-    """Return the quantities of a patch that depend on where its contact ends."""
+def _edge_values(patch: Patch) -> edges.EdgeValues:
+    """Return the quantities of a patch without strips that depend on where its contact ends."""
     x = patch.x
-    normal = patch.pieces.normal
-    active = patch.active
-    found = contact_ends(patch)
-    stretches = contact_intervals(patch, found)
-    return EdgeValues(
-        length=float(np.diff(stretches).sum()),
-        width=float(stretches[-1, 1] - stretches[0, 0]),
-        normal=edges.set_stiffness(normal, active, np.ones(x.size), found),
-        tangential=shear_stiffness(patch, found),
-        rotational=edges.set_stiffness(normal, active, x, found),
+    ends = contact_ends(patch)
+    intervals = contact_intervals(patch, ends)
+    return edges.EdgeValues(
+        length=float(np.diff(intervals).sum()),
+        width=float(intervals[-1, 1] - intervals[0, 0]),
+        normal=edges.set_stiffness(patch.pieces.normal, patch.active, np.ones(x.size), ends),
+        tangential=_shear_stiffness(patch, ends),
+        rotational=edges.set_stiffness(patch.pieces.normal, patch.active, x, ends),
     )
 
 
-def contact_intervals(patch: Patch, found: list) -> np.ndarray:
+def contact_intervals(patch: Patch, ends: list) -> np.ndarray:
     """Return the parts of the interface in contact (k, 2) [m], by increasing x.
 
-    found: ends of the contact from `contact_ends`.
+    ends: ends of the contact from `contact_ends`.
     """
-    return edges.contact_intervals(
-        patch.x, patch.pressure.sigma_n * patch.pieces.interface.weight, found
-    )
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    return edges.contact_intervals(patch.x, force, ends)
 
 
 def contact_ends(patch: Patch) -> list:
@@ -210,45 +212,46 @@ def contact_ends(patch: Patch) -> list:
     """
     if patch.strips is not None:
         return []
-    found = _ends_without_steps(patch)
-    return edges.snap_to_steps(found, patch.x, patch.gap, patch.jumps) if patch.jumps else found
-
-
-def _ends_without_steps(patch: Patch) -> list:
-    """Return the ends of `contact_ends` without regard to steps of the gap."""
+    x = patch.x
     if patch.skin is not None:
-        return edges.find_pressure_edges(
-            patch.x, patch.skin.pressure[0], edges.MIN_RELATIVE_PRESSURE
-        )
-    own = patch.pieces.normal
-    bare = patch.pair.compliance.normal
-    softness = None if own is bare else np.diag(own) - np.diag(bare)
-    force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    return edges.find_edges(own, patch.x, force, patch.pressure.gap, softness, patch.pair.row)
+        minimum = edges.MIN_RELATIVE_PRESSURE
+        ends = edges.find_pressure_edges(x, patch.skin.pressure[0], minimum)
+    else:
+        normal = patch.pieces.normal
+        bare = patch.pair.compliance.normal
+        softness = None if normal is bare else np.diag(normal) - np.diag(bare)
+        force = patch.pressure.sigma_n * patch.pieces.interface.weight
+        ends = edges.find_edges(normal, x, force, patch.gap, softness, patch.pair.row)
+    jumps = patch.model.gap.jumps
+    return edges.snap_to_steps(ends, x, patch.unloaded_gap, jumps) if jumps else ends
 
 
-def shear_stiffness(patch: Patch, found: list) -> float:
+def _shear_stiffness(patch: Patch, ends: list) -> float:
     """Return the tangential stiffness dT/d(slide) [N/m] in stick.
 
     Approach and rotation are fixed. For unlike pieces it contains the closing that shear causes.
-    found: ends of the contact.
+    ends: ends of the contact.
     """
+    active = patch.active
     if not patch.pair.closing.any():
-        return edges.set_stiffness(
-            patch.pieces.tangential, patch.active, np.ones(patch.x.size), found
+        return edges.set_stiffness(patch.pieces.tangential, active, np.ones(patch.x.size), ends)
+
+    def coupled_stiffness(contact_set) -> float:
+        """Return the stiffness [N/m] of a contact set (m,)."""
+        return stiffness.coupled_stiffness(patch.pieces, patch.pair.closing, contact_set)
+
+    at_nodes = coupled_stiffness(active)
+    out = at_nodes
+    for end in ends if active.sum() > 2 else ():
+        larger = active.copy()
+        smaller = active.copy()
+        larger[end.node + end.side] = True
+        smaller[end.node] = False
+        out += edges.parabola_change(
+            end.fraction - 0.5,
+            coupled_stiffness(larger) - at_nodes,
+            at_nodes - coupled_stiffness(smaller),
         )
-
-    def of(active) -> float:
-        """Return the coupled stiffness [N/m] of a contact set (m,)."""
-        return stiffness.coupled_stiffness(patch.pieces, patch.pair.closing, active)
-
-    whole = out = of(patch.active)
-    for end in found if patch.active.sum() > 2 else ():
-        more = patch.active.copy()
-        less = patch.active.copy()
-        more[end.node + end.side] = True
-        less[end.node] = False
-        out += edges.parabola_change(end.fraction - 0.5, of(more) - whole, whole - of(less))
     return float(out)
 
 
@@ -273,20 +276,18 @@ def unresolved_rounding(patch: Patch) -> float:
         return 0.0
     flat = min(body.half_flat_length for body in rounded)
     radius = 1 / sum(1 / body.end.size for body in rounded)
-    modulus = 1 / sum(
-        (1 - nu**2) / young
-        for young, nu in (piece.layers.coating for piece in (pair.piece, pair.upper))
-    )
-    found = 0.0
-    for at in (loaded[0], loaded[-1]):
-        cell = np.diff(x)[max(at - 1, 0) : at + 1].max()
-        if abs(abs(x[at]) - flat) > 2 * cell:  # the contact does not end at the rounding
+    coatings = [piece.layers.coating for piece in (pair.piece, pair.upper)]
+    modulus = 1 / sum((1 - nu**2) / young for young, nu in coatings)
+    largest = 0.0
+    for node in (loaded[0], loaded[-1]):
+        cell = np.diff(x)[max(node - 1, 0) : node + 1].max()
+        if abs(abs(x[node]) - flat) > 2 * cell:  # the contact does not end at the rounding
             continue
-        reach, peak = contact.rounded_corner_contact(
-            sigma[max(at - 2, 0) : at + 3].max() * np.sqrt(cell), radius, modulus
-        )
-        found = max(found, peak if ROUNDING_CELLS * cell > reach else 0.0)
-    return found
+        sharp_end = sigma[max(node - 2, 0) : node + 3].max() * np.sqrt(cell)
+        reach, peak = contact.rounded_corner_contact(sharp_end, radius, modulus)
+        if MIN_ROUNDING_CELLS * cell > reach:
+            largest = max(largest, peak)
+    return largest
 
 
 def open_ends(patch: Patch) -> float:
@@ -295,11 +296,10 @@ def open_ends(patch: Patch) -> float:
     It counts an end whose last node is in contact.
     """
     rounded = _rounded_bodies(patch.pair)
-    return (
-        patch.active[[0, -1]].sum() * (patch.x[-1] - min(body.half_flat_length for body in rounded))
-        if rounded
-        else 0.0
-    )
+    if not rounded:
+        return 0.0
+    rounded_length = patch.x[-1] - min(body.half_flat_length for body in rounded)
+    return patch.active[[0, -1]].sum() * rounded_length
 
 
 def reaches_steep_end(patch: Patch) -> bool:

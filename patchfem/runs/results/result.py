@@ -113,7 +113,7 @@ def at_rest(patch) -> dict:
     They are normal_stress [Pa], gap [m] and status of its finest solution, on the points of a
     profile if it has these.
     """
-    return _pressed_frame(patch.fine or patch.on_mesh)
+    return _pressed_frame(patch.finest_surface)
 
 
 def _pressed_frame(surface) -> dict:
@@ -132,9 +132,9 @@ def patch_surface(patch, fields: dict):
     A motion moves the nodes of the mesh; without one the fields are those of `at_rest`. None
     without a patch.
     """
-    if patch is None or patch.fine is None or "shear_stress" in fields:
-        return patch and patch.on_mesh
-    return patch.fine
+    if patch is None:
+        return None
+    return patch.surface if "shear_stress" in fields else patch.finest_surface
 
 
 def interface_frames(patch, time, tau, local, slide) -> dict:
@@ -155,7 +155,7 @@ def interface_frames(patch, time, tau, local, slide) -> dict:
     dict
         Arrays (f + 1, m); status is 0 for open, 1 for stick and 2 for slip.
     """
-    first = _pressed_frame(patch.on_mesh)
+    first = _pressed_frame(patch.surface)
     count = len(time) + 1
     tau = np.concatenate([np.zeros((1, tau.shape[1])), tau])
     slip = np.concatenate([np.zeros((1, tau.shape[1])), local])

@@ -114,7 +114,7 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
         "N/m",
         AT_MOST,
     )
-    if patch.active.all() and not patch.skinned and patch.strips is None:
+    if patch.active.all() and not patch.has_skin and patch.strips is None:
         yield Finding(
             "normal_stiffness",
             normal,

@@ -365,7 +365,7 @@ def _with_earlier_wear(model, patch, area):
     begun = model.wear.start
     if begun is None:
         return patch
-    begun.require_same_surfaces(patch.x, patch.gap)
+    begun.require_same_surfaces(patch.x, patch.unloaded_gap)
     depth = frozen_array(model.wear.compute_earlier_depth(patch.x, area))
     if (gone := worn_through(model, depth)) is not None:
         raise PatchfemError(
