@@ -145,7 +145,7 @@ def _run(
             inputs = _worn_inputs(inputs, evolved)
         try:
             with _saving_context(kept, what, meshes.patch):
-                result = SOLVERS[what.kind](inputs)
+                result = _solve(inputs)
         except NotConverged as error:
             if meshes.patch is not None and what.kind != "patch":
                 at_rest = solve_static(replace(inputs, plan=what, warnings=[*warnings, AT_REST]))
@@ -198,31 +198,22 @@ def solve_static(inputs: RunInputs) -> Result:
     )
 
 
-def _solve_bench(inputs: RunInputs) -> Result:
-    """Return the Result of a prescribed slide."""
-    return bench_result.run_prescribed(
-        inputs.plan,
-        inputs.patch,
-        inputs.coarse,
-        inputs.seconds,
-        inputs.warnings,
-        inputs.say,
-        inputs.progress,
-        inputs.estimate,
-    )
-
-
-def _solve_rig(inputs: RunInputs) -> Result:
-    """Return the Result of a rig."""
+def _solve(inputs: RunInputs) -> Result:
+    """Run a plan by the function of its kind, whose module is loaded here."""
+    if inputs.plan.kind == "patch":
+        return solve_static(inputs)
+    if inputs.plan.kind == "bench":
+        return bench_result.run_prescribed(
+            inputs.plan,
+            inputs.patch,
+            inputs.coarse,
+            inputs.seconds,
+            inputs.warnings,
+            inputs.say,
+            inputs.progress,
+            inputs.estimate,
+        )
     return rig.run_coupled(inputs)
-
-
-SOLVERS = {
-    "patch": solve_static,
-    "bench": _solve_bench,
-    "rig": _solve_rig,
-    "linear": _solve_rig,
-}
 
 
 def _result_without_load(inputs: RunInputs) -> Result:
