@@ -1,4 +1,6 @@
-"""summary.json names what computed each measure."""
+"""summary.json names what computed each measure, and the patch of a result has its arrays."""
+
+import numpy as np
 
 from patchfem import run
 from patchfem.export.summary import summarise_run
@@ -16,6 +18,15 @@ substrate = "Ti-8Al-1Mo-1V"
 radius = "1 m"
 [accuracy]
 tolerance = {}
+"""
+SLIDE = """
+[friction]
+law = "coulomb"
+static = 0.3
+[slide]
+kind = "sine"
+amplitude = "5 um"
+frequency = "143 Hz"
 """
 
 
@@ -36,18 +47,26 @@ def test_always_a_value_of_another_engine_is_not_that_of_the_mesh():
 
 
 def test_always_a_motion_has_the_engine_of_its_run():
-    bench = (
-        PATCH.format(1e-2)
-        + """
-[friction]
-law = "coulomb"
-static = 0.3
-[slide]
-kind = "sine"
-amplitude = "5 um"
-frequency = "143 Hz"
-"""
-    )
-    numerics = summarise_run(run(bench))["numerics"]
+    numerics = summarise_run(run(PATCH.format(1e-2) + SLIDE))["numerics"]
     assert numerics["measures"]["secant_stiffness"] == numerics["engine"]
     assert numerics["measures"]["normal_stiffness"].startswith("finite elements")
+
+
+def test_exact_the_arrays_of_a_static_patch_balance_its_load():
+    result = run(PATCH.format(1e-2))
+    patch = result.patch
+    force = patch.pieces.interface.weight @ patch.normal_stress
+    assert abs(force / result.measures["normal_load"].value - 1) < 1e-10
+    assert np.array_equal(patch.normal_stress, result.fields["normal_stress"][-1])
+    assert np.array_equal(patch.gap, result.fields["gap"][-1])
+    assert (patch.gap[patch.normal_stress > 0] == 0).all() and patch.gap.max() > 0
+    assert not patch.shear_stress.any() and not patch.slip.any()
+    assert patch.shear_stress.shape == patch.slip.shape == patch.x.shape
+
+
+def test_exact_the_arrays_of_a_moving_patch_are_those_of_its_last_frame():
+    bench = PATCH.replace("[accuracy]", "[contact.shear]\n[accuracy]").format(1e-2) + SLIDE
+    result = run(bench)
+    for name in ("shear_stress", "slip"):
+        assert np.array_equal(getattr(result.patch, name), result.fields[name][-1])
+    assert result.patch.shear_stress.any() and result.patch.slip.any()
