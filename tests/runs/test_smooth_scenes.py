@@ -17,46 +17,34 @@ GROWTH = 'bond_length = "5 um"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_gr
 LENGTH = 'bond_length = "5 um"'
 
 
-def engine(text, **keys):
-    return choose(pf.build(text, **keys)).engine
+SHORT = 'bond_length = "0.1 nm"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.01 nm"'
+NAME = 'law = "nonlocal"'
+STEPS = "cycles = 30\n[accuracy]\n"
 
 
 @pytest.mark.parametrize(
-    "old, new",
+    "name, old, new",
     [
-        ("", ""),
-        (LENGTH, GROWTH),
-        (LENGTH, LENGTH + "\nbreakaway = 0.3"),
-        ('law = "nonlocal"', 'law = "lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 cm/s"'),
-        ('law = "nonlocal"', 'law = "bouc-wen"\nstiffness = "1e7 N/m"'),
+        ("smooth", LENGTH, LENGTH),
+        ("smooth", LENGTH, GROWTH),
+        ("smooth", LENGTH, LENGTH + "\nbreakaway = 0.3"),
+        ("smooth", NAME, 'law = "lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 cm/s"'),
+        ("smooth", NAME, 'law = "bouc-wen"\nstiffness = "1e7 N/m"'),
+        ("march", LENGTH, SHORT),
+        ("march", LENGTH, GROWTH + "\nbreakaway = 0.3"),
+        ("march", LENGTH, LENGTH + "\norder = 0.5"),
+        ("march", LENGTH, LENGTH + '\nreading = "report"'),
+        ("march", "cycles = 30", STEPS + "steps_per_cycle = 400"),
+        ("march", "cycles = 30", STEPS + 'method = "march"'),
+        ("march", 'waveform = "sine"', 'waveform = "levels"\nlevels = ["3 g", "5 g"]'),
+        ("march", "slide = 1.0", 'slide = 1.0\n[structure.stiffening]\ncubic = "1e12 N/m^3"'),
     ],
 )
-def test_exact_smooth_laws_are_integrated_at_high_order(old, new):
-    text = SCENE.replace(old, new) if old else SCENE
-    text = text.replace(LENGTH, "") if "stiffness" in new else text
-    assert engine(text) == "smooth"
-
-
-@pytest.mark.parametrize(
-    "old, new",
-    [
-        (
-            LENGTH,
-            'bond_length = "0.1 nm"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.01 nm"',
-        ),
-        (LENGTH, GROWTH + "\nbreakaway = 0.3"),
-        (LENGTH, LENGTH + "\norder = 0.5"),
-        (LENGTH, LENGTH + '\nreading = "report"'),
-        ("cycles = 30", "cycles = 30\n[accuracy]\nsteps_per_cycle = 400"),
-        ("cycles = 30", 'cycles = 30\n[accuracy]\nmethod = "march"'),
-        ('waveform = "sine"', 'waveform = "levels"\nlevels = ["3 g", "5 g"]'),
-        ("slide = 1.0", 'slide = 1.0\n[structure.stiffening]\ncubic = "1e12 N/m^3"'),
-    ],
-)
-def test_exact_what_the_integrator_lacks_is_marched(old, new):
+def test_exact_smooth_laws_are_integrated_at_high_order_and_others_marched(name, old, new):
     text = SCENE.replace(old, new)
+    text = text.replace(LENGTH, "") if old == NAME else text
     text = text.replace('acceleration = "5 g"\n', "") if "levels" in new else text
-    assert engine(text) == "march"
+    assert choose(pf.build(text)).engine == name
 
 
 @pytest.mark.parametrize("law", [LENGTH, GROWTH])
