@@ -557,16 +557,16 @@ def compare_areal_scans(
     filled = tuple(fill_scan(scan) for scan in scans)
     change = compare_scans(before, after, keep_spikes)
     notes = tuple(dict.fromkeys((*change.before.notes, *change.after.notes)))
-    first = _compare_waves(scans, filled, direction)
+    first = compare_waves(scans, filled, direction)
     first = replace(first, change=change, notes=notes, removed=change.removed)
-    return [first, _compare_waves(scans, filled, _other_direction(direction))]
+    return [first, compare_waves(scans, filled, _other_direction(direction))]
 
 
 def _other_direction(direction: str) -> str:
     return "y" if direction == "x" else "x"
 
 
-def _compare_waves(scans: tuple, filled: tuple, direction: str) -> Comparison:
+def compare_waves(scans: tuple, filled: tuple, direction: str) -> Comparison:
     """Compare the waves of two scans in one direction.
 
     `filled` holds the result of `fill_scan` for each scan.

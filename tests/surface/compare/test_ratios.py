@@ -8,9 +8,9 @@ from synthetic import report_area
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface.areal import Areal
 from patchfem.surface.compare.compare import (
-    _compare_waves,
     compare_directions,
     compare_traces,
+    compare_waves,
     fill_scan,
 )
 from patchfem.surface.compare.ratios import Size, divide_sizes, measure_size
@@ -103,7 +103,7 @@ def test_always_an_areal_scan_shows_which_direction_is_smoother():
     after = scan(3, 4)
     # no search for a place, which they do not share
     filled = tuple(map(fill_scan, (before, after)))
-    parts = [_compare_waves((before, after), filled, name) for name in ("x", "y")]
+    parts = [compare_waves((before, after), filled, name) for name in ("x", "y")]
     found = compare_directions(parts)
     assert [describe_ratio_change(one[1]) for one in found] == ["no change shown", "increased"]
     text = compose_verdict(parts, found)[1]
