@@ -64,14 +64,23 @@ def test_exact_a_fit_finds_the_friction_of_its_own_loop(tmp_path):
         + "".join(",".join(map(repr, row)) + "\n" for row in loop.tolist()),
         "utf-8",
     )
-    told = pf.load(bench).friction.static
-    found = pf.fit(
-        bench, to=path, free={"friction.static": (told / 2, 2 * told)}, out=tmp_path / "fit"
-    )
-    assert found["values"]["friction.static"]["value"] == pytest.approx(told, rel=1e-6)
-    assert (tmp_path / "fit" / "fit.json").is_file()
+    static = pf.load(bench).friction.static
+    free = {"friction.static": (static / 2, 2 * static)}
+    options = pf.FitOptions(offset=["force"])
+    fit = pf.fit(bench, path, options, free=free, out=tmp_path / "fit")
+    assert fit["values"]["friction.static"]["value"] == pytest.approx(static, rel=1e-6)
+    assert (tmp_path / "fit" / "fit.json").is_file() and set(fit["offsets"]) == {"force"}
+    for arguments, keywords in (
+        ((), {"to": path, "offset": "force"}),
+        ((path,), {"offset": ["force"]}),
+        ((path, pf.FitOptions(hold="cycle=1")), {"offset": ("force",), "hold": ()}),
+    ):
+        again = pf.fit(bench, *arguments, free=free, **keywords)
+        assert again | {"seconds": 0} == fit | {"seconds": 0}
     with pytest.raises(pf.SceneError, match=r"friction\.statc"):
-        pf.fit(bench, to=path, free={"friction.statc": (0.1, 0.2)})
+        pf.fit(bench, path, free={"friction.statc": (0.1, 0.2)})
+    with pytest.raises(pf.PatchfemError, match="FitOptions are needed"):
+        pf.fit(bench, path, {"hold": ()}, free=free)
 
 
 def test_a_verb_and_a_folder_of_one_name_stand_beside_each_other(tmp_path):

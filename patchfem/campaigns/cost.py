@@ -29,7 +29,6 @@ from ..runs.patch.measures import measures
 from ..runs.plan import plan
 from ..runs.run import run as run_plan
 from .numerical_settings import (
-    NUMERICAL_SETTINGS,
     Setting,
     applicable_settings,
     list_settings,
@@ -37,18 +36,6 @@ from .numerical_settings import (
     with_tolerance,
 )
 
-__all__ = [
-    "NUMERICAL_SETTINGS",
-    "TOLERANCE",
-    "Cost",
-    "applicable_settings",
-    "changed_measures",
-    "cost_sentence",
-    "fastest_by_measure",
-    "fastest_run",
-    "setting_curve",
-    "tolerance_curve",
-]
 TOLERANCE = "tolerance"  # name of the curve over tolerances, which is accepted in addition to NUMERICAL_SETTINGS
 # Timings of a short run; the shortest one counts, because other work on the machine only adds time.
 TIMINGS = 3
@@ -295,10 +282,8 @@ def setting_curve(model: Model, knob: str, say=None) -> list:
                 "",
             )
     best = _best_run(runs)
-    curve = []
-    for cost in runs:
-        curve.append(cost if cost is best else replace(cost, distances=_distances(cost, best)))
-    return curve
+    others = [replace(run, distances=_distances(run, best)) for run in runs]
+    return [best if run is best else other for run, other in zip(runs, others)]
 
 
 def _best_run(runs: list) -> Cost:

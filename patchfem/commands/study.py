@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from ..campaigns import cost as cost_curves
+from ..campaigns import numerical_settings
 from ..campaigns.backbone import curves as backbones
 from ..export import backbone as backbone_files
 from ..export import cost as cost_files
@@ -54,13 +55,13 @@ def cost(
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
     scene_model = load_model(scene, set_)
-    if over and over not in cost_curves.NUMERICAL_SETTINGS:
+    if over and over not in numerical_settings.NUMERICAL_SETTINGS:
         raise Refused(
-            f"cost --over {over}: unknown key; use one of {', '.join(cost_curves.NUMERICAL_SETTINGS)}"
+            f"cost --over {over}: unknown key; use one of {', '.join(numerical_settings.NUMERICAL_SETTINGS)}"
         )
     knobs = [over or cost_curves.TOLERANCE]
     if verbose and not over:
-        knobs += cost_curves.applicable_settings(scene_model)
+        knobs += numerical_settings.applicable_settings(scene_model)
     target = choose_folder(out, f"{scene_model.source.path.stem}-cost")
     curves = {}
     data = {}

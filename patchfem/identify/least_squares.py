@@ -95,20 +95,18 @@ class Problem:
     - residual: function of values (n,) that returns the residual (r,), each row divided by its weight. If it
       raises a PatchfemError or is not finite, the evaluation is counted as failed.
     - low, high: bounds (n,).
-    - log: whether each value is searched in logarithms (n,); by default as `space.make_space` chooses.
     - start: values (n,) from which the first descent starts, or None.
     """
 
     residual: Callable
     low: Sequence
     high: Sequence
-    log: Sequence | None = None
     start: Sequence | None = None
 
     @property
     def space(self) -> SearchSpace:
         """The space of the values; ValueError if the bounds are wrong."""
-        return make_space(self.low, self.high, self.log)
+        return make_space(self.low, self.high)
 
     def solve(self, max_descents: int = 3, interval_kind: str = "rows") -> Fit:
         """Minimize the sum of squares of the residual within the bounds.

@@ -54,14 +54,12 @@ class SearchSpace:
         return slope
 
 
-def make_space(low, high, log=None) -> SearchSpace:
-    """Build the unit cube of bounds.
+def make_space(low, high) -> SearchSpace:
+    """Build the unit cube of bounds; a positive value with a wide range is searched in logarithms.
 
     Parameters
     ----------
     low, high : (n,) array_like
-    log : (n,) array_like of bool, optional
-        Whether a value is searched in logarithms; by default if it is positive and its range is wide.
 
     Returns
     -------
@@ -70,7 +68,7 @@ def make_space(low, high, log=None) -> SearchSpace:
     Raises
     ------
     ValueError
-        If bounds are not finite and in order, or if a logarithm has a bound that is not positive.
+        If bounds are not finite and in order.
     """
     low = np.array(low, float)
     high = np.array(high, float)
@@ -81,13 +79,7 @@ def make_space(low, high, log=None) -> SearchSpace:
         )
     if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
         raise ValueError("bounds must be finite with low < high")
-    is_wide = (low > 0) & (high > MIN_LOG_RATIO * low)
-    log = is_wide if log is None else np.array(log, bool)
-    if log.shape != low.shape or (log & (low <= 0)).any():
-        raise ValueError(
-            "'log' needs one flag per parameter, and 'low' must be > 0 wherever the flag is set"
-        )
-    return SearchSpace(low, high, log)
+    return SearchSpace(low, high, (low > 0) & (high > MIN_LOG_RATIO * low))
 
 
 class CubeResidual:

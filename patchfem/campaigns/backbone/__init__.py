@@ -5,22 +5,23 @@ In: a rig, a mode, amplitudes at the output. Out: a `records.Backbone`, one `rec
 The equation of motion is q'' + D q' + Omega^2 q + B^T f[B q] = 0: modal coordinates q, damping matrix D,
 interface rows B, friction and joint forces f of the history of the relative displacement B q.
 
-============== ============================= ========================= ========================== ========
-module         equation                      what it neglects          where it holds             cost
-============== ============================= ========================= ========================== ========
-`balance`      motion with period 2 pi/omega the change of the         steady loops in closed     0.01 to
-               that a negative damping       amplitude within a cycle  form; one mode also under  1 s per
-               -g q' keeps up; g/(2 omega)                             rigid friction, exactly    point
-               is the damping ratio
-`decay`        the equation itself, released nothing; it gives means   any law, from the largest   seconds
-               from the largest amplitude,   over a cycle, and other   amplitude from which the   to
-               read from reversal to         modes may move            motion falls               minutes
-               reversal
-`quasi_static` Omega^2 q + B^T f[B q] = P s  inertia of the bending by laws of any kind with a     0.1 ms to
-               with the shape s of the       friction: the shape of    finite stiffness; closest  1 s per
-               sticking mode; secant and     the force is fixed        in micro-slip              point
-               loop area of the load P
-============== ============================= ========================= ========================== ========
+============== ============================= ======================== ========================= ==========
+module         equation                      what it neglects         where it holds            CPU s
+============== ============================= ======================== ========================= ==========
+`balance`      period 2 pi/omega with a      change of the amplitude  laws whose steady loops   0.06..0.17
+               negative damping -g q' that   within a cycle           have a closed form; rigid
+               keeps the motion up; the                               friction, for motion that
+               damping ratio is g/(2 omega)                           never sticks
+`decay`        the equation itself, released nothing; its values are  amplitudes from which the 0.02..0.10
+               from the largest amplitude    means over a cycle       motion falls and stays
+                                                                      one of this mode
+`quasi_static` Omega^2 q + B^T f[B q] = P s, the bending of the force laws of finite stiffness; 0.0001..
+               s the shape of the sticking   by friction, harmonics   closest in micro-slip     0.003
+               mode; secant and loop area
+============== ============================= ======================== ========================= ==========
+
+The last column is the time of a point for one mode with law "elastic-plastic" or "iwan" and for two modes.
+A static curve of a law without a closed loop is run on a bench and takes longer.
 
 - `balance`: extended periodic motion (Krack, Comput. Struct. 154, 59, 2015). A slow decay shows this curve.
 - `decay`: also contains what a swing loses within a cycle.

@@ -17,7 +17,7 @@ from ...dynamics.harmonic.point import find_peak, make_balance
 from ...formatting import format_length
 from ...response.errors import error_of_change
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
-from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve
+from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 
 # Numbers of harmonics that are tried in turn, each with four times the samples of the one before.
 HARMONICS = (9, 19, 39)
@@ -62,21 +62,12 @@ def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
     known = np.isfinite(values + error).all(axis=0)
     if not known.any():
         raise NotConverged("no free motion of these amplitudes was found")
-    frequency, damping, loss = values
-    oscillates = known & (damping < 1)
+    oscillates = known & (values[1] < 1)
     if not oscillates.any():
         raise NotConverged(
             "the mode does not oscillate at these amplitudes: its damping ratio is above 1"
         )
-    curve = Curve(
-        amplitude=amplitudes,
-        frequency=frequency,
-        frequency_error=error[0],
-        damping=damping,
-        damping_error=error[1],
-        loss=loss,
-    )
-    return curve.at(oscillates)
+    return make_curve(amplitudes, values, error).at(oscillates)
 
 
 def _read_motions(
@@ -311,11 +302,7 @@ def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:
     # its error.
     structure_rate = modes.damping_matrix[joint.mode, joint.mode]
     friction_damping = damping - structure_rate / (4 * np.pi * frequency)
-    return Curve(
-        amplitude=amplitude,
-        frequency=frequency,
-        frequency_error=(relative_error + ROUND_OFF_ERROR) * frequency,
-        damping=damping,
-        damping_error=relative_error * np.abs(friction_damping) + ROUND_OFF_ERROR * np.abs(damping),
-        loss=loss,
-    )
+    frequency_error = (relative_error + ROUND_OFF_ERROR) * frequency
+    damping_error = relative_error * np.abs(friction_damping) + ROUND_OFF_ERROR * np.abs(damping)
+    errors = (frequency_error, damping_error)
+    return make_curve(amplitude, (frequency, damping, loss), errors)

@@ -12,7 +12,7 @@ from ...runs.rig import decays, solve
 from ...runs.rig.engines import ENGINES, SMOOTH
 from .decay_reading import measure_other_modes, read_decay
 from .joint import Joint
-from .records import ROUND_OFF_ERROR, Curve
+from .records import ROUND_OFF_ERROR, Curve, make_curve
 from .release import Release, release_from_largest_decaying, run_release
 
 MAX_DOUBLINGS = 3  # Largest number of times that the time steps are halved.
@@ -80,15 +80,8 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
         *_note_growing(amplitudes[n_decaying:]),
         *_note_unknown_modes(joint, known, other_modes),
     ]
-    curve = Curve(
-        amplitude=amplitudes,
-        frequency=reading.value[0],
-        frequency_error=error[0],
-        damping=reading.value[1],
-        damping_error=error[1],
-        loss=np.full(amplitudes.size, np.nan),
-        notes=tuple(notes),
-        other_modes=other_modes,
+    curve = make_curve(
+        amplitudes, reading.value, error, notes=tuple(notes), other_modes=other_modes
     )
     return curve.at(known)
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from ...core import NotConverged
 from .joint import Joint
-from .records import ROUND_OFF_ERROR, Curve
+from .records import ROUND_OFF_ERROR, Curve, make_curve
 
 # Fixed-point steps to the negative damping that maintains the motion; they converge fast.
 N_STEPS = 8
@@ -36,16 +36,8 @@ def compute_level_curve(joint: Joint, amplitudes, method: str) -> Curve:
     if method == "decay":
         omega = abs(damped_root.imag)
         damping = -damped_root.real / abs(damped_root)
-    frequency = np.full(amplitudes.size, omega / (2 * np.pi))
-    damping = np.full(amplitudes.size, damping)
-    return Curve(
-        amplitude=amplitudes,
-        frequency=frequency,
-        frequency_error=ROUND_OFF_ERROR * frequency,
-        damping=damping,
-        damping_error=ROUND_OFF_ERROR * np.abs(damping),
-        loss=np.full(amplitudes.size, np.nan),
-    )
+    values = np.outer([omega / (2 * np.pi), damping], np.ones(amplitudes.size))
+    return make_curve(amplitudes, values, ROUND_OFF_ERROR * np.abs(values))
 
 
 def _find_root(joint: Joint, negative_damping: float) -> complex:

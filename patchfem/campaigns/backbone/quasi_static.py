@@ -10,7 +10,7 @@ from ...runs.bench.errors import estimate_pass_errors
 from ...runs.rig import decays
 from .bench_loops import LOOP_MEASURES, settle_loop
 from .joint import Joint
-from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve
+from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 
 N_SAMPLES = 4096  # Samples of a cycle of a loop; half as many give the error.
 MAX_STEPS = 60  # Maximum number of corrections of the displacement until the amplitude is the requested one.
@@ -68,15 +68,7 @@ def _rising_part(best, error) -> Curve:
             "no static force with the shape of the mode holds the rig in equilibrium at these "
             "amplitudes; use --method balance"
         )
-    curve = Curve(
-        amplitude=best[0],
-        frequency=best[1],
-        frequency_error=error[1],
-        damping=best[2],
-        damping_error=error[2],
-        loss=best[3],
-    )
-    return curve.at(slice(count))
+    return make_curve(best[0], best[1:], error[1:]).at(slice(count))
 
 
 def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:

@@ -51,6 +51,25 @@ class Curve(NamedTuple):
         return {name: np.interp(amplitudes, self.amplitude, getattr(self, name)) for name in names}
 
 
+def make_curve(amplitude, values, errors, **columns) -> Curve:
+    """Return a curve with an unknown loss, if it is not the last row of the values.
+
+    Parameters
+    ----------
+    amplitude : (k,) array
+        [m]
+    values : sequence of (k,) arrays
+        Frequency [Hz], damping ratio, and the loss [J] if it is known.
+    errors : sequence of (k,) arrays
+        Errors of the frequency and of the damping ratio; further rows are ignored.
+    **columns
+        Other fields of the curve.
+    """
+    frequency, damping, *loss = values
+    loss = loss[0] if loss else np.full(amplitude.size, np.nan)
+    return Curve(amplitude, frequency, errors[0], damping, errors[1], loss, **columns)
+
+
 class ModeFrequencies(NamedTuple):
     """Frequencies [Hz] of a mode without its contact and with a contact that sticks.
 

@@ -407,9 +407,8 @@ def _include_missing_modes(
     space = problem.space
     ends = fit.intervals.ends + moved[:, None] * [-1, 1]
     ends = frozen_array(np.clip(ends, space.low[:, None], space.high[:, None]))
-    moves = []
-    for bound, move, value in zip(ranges, moved, fit.values):
-        moves.append(f"{bound.key} by {_format_fraction(move, value)}")
+    fractions = map(_format_fraction, moved, fit.values)
+    moves = [f"{bound.key} by {fraction}" for bound, fraction in zip(ranges, fractions)]
     frequency, damping = 100 * np.nanmax(np.abs(change / reference), axis=1)
     note = (
         "the intervals contain the error of the modes left out of the structure; a computation "

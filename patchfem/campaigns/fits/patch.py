@@ -267,10 +267,8 @@ def _check_model(model: Model) -> None:
             "and either [slide] or [structure] with [drive]",
             "contact" if model.patch is None else "friction",
         )
-    possible = []
-    for law, record in LAWS.items():
-        if law_has_trait(law, "timeless") and "shear" in record.supports.split():
-            possible.append(law)
+    sheared = [law for law, record in LAWS.items() if "shear" in record.supports.split()]
+    possible = [law for law in sheared if law_has_trait(law, "timeless")]
     if friction.law not in possible:
         raise PatchfemError(
             f"a patch with law '{friction.law}' cannot be represented by elements that stick or "

@@ -35,7 +35,6 @@ class ModelReadings:
             self.gains = (instrument.acceleration_gain, instrument.displacement_gain)
         keys = [bound.key for bound in models.ranges]
         self.free_gains = [keys.index(key) if key in keys else None for key in GAIN_KEYS]
-        self.continues_motions = True
 
     def forget(self) -> None:
         """Let the next motions start from rest."""
@@ -72,8 +71,7 @@ class ModelReadings:
                     model_at_k = self.models.at(model, k)
                     observer = MotionObserver(model_at_k, patch, self.say, needs_cycle)
                 drive = self.models.sine(k)
-                near = self.last_motions.get(k) if self.continues_motions else None
-                motion = observer(drive, near)
+                motion = observer(drive, self.last_motions.get(k))
                 if motion is None:
                     self.last_motions.pop(k, None)
                     readings[k] = np.inf, np.inf

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,7 +49,7 @@ class SweepScene:
 
     def scene(self, sets: Sequence[str]) -> Scene:
         """Return the scene with `table.key=value` strings; SceneError names every mistake."""
-        base = _parse_base_scene(self)
+        base = _get_base(self).scene
         return base.override(sets) if base is not None else self._read(sets)
 
     def _read(self, sets: Sequence[str]) -> Scene:
@@ -102,15 +103,14 @@ class SweepScene:
             Numbers of the cases.
         """
         keys = tuple(keys)
-        known = _model_cache(self)
-        if keys not in known:
-            base = _parse_base_scene(self)
+        base, models = _get_base(self)
+        if keys not in models:
             scene = base and self.scene(sets(int(cases[0])))
             plain = base and base.plain_numbers(scene, keys)
-            known[keys] = plain and (plain, build(scene))
-        if not known[keys] or not known[keys][0].are_plain(values):
+            models[keys] = plain and (plain, build(scene))
+        if not models[keys] or not models[keys][0].are_plain(values):
             return None
-        return SimilarModels(*known[keys], values, sets, cases)
+        return SimilarModels(*models[keys], values, sets, cases)
 
     def _like(self, sets: Sequence[str], values: Sequence) -> Model | None:
         """Return the model of a case, derived from the first valid one with the same keys.
@@ -180,25 +180,24 @@ class SweepScene:
         return " ".join(sign for _, sign in hash_named_files([text], self.path.parent))
 
 
-@lru_cache(maxsize=2)
-def _parse_base_scene(asked: SweepScene) -> BaseScene | None:
-    """Return the scene from which those of all cases derive.
+class _SweepBase(NamedTuple):
+    """What the scenes and models of all cases of a sweep derive from.
 
-    None if the text is no valid scene without the values of a case.
+    scene: None if the text is no valid scene without the values of a case; models: by the names of
+    the keys of the cases, None if no models can be derived.
     """
+
+    scene: BaseScene | None
+    models: dict[tuple, tuple | None]
+
+
+@lru_cache(maxsize=2)
+def _get_base(asked: SweepScene) -> _SweepBase:
+    """Return the base of the cases of a sweep; that of the last two sweeps is kept."""
     try:
-        return BaseScene(asked._read(()))
+        return _SweepBase(BaseScene(asked._read(())), {})
     except SceneError:
-        return None
-
-
-@lru_cache(maxsize=2)
-def _model_cache(asked: SweepScene) -> dict[tuple, tuple | None]:
-    """Return the cache of what models of similar cases derive from, by the names of their keys.
-
-    An entry is None if no models can be derived.
-    """
-    return {}
+        return _SweepBase(None, {})
 
 
 def _case_mistakes(error: SceneError) -> list[str]:
