@@ -133,7 +133,7 @@ def _run(
         what, meshes.patch, meshes.coarse, seconds, warnings, say, progress, estimate
     )
     if _is_open(meshes.patch) and model.kind != "patch":
-        result = solve_static(replace(inputs, warnings=[*warnings, NO_MOTION]))
+        result = patch_result.static(replace(inputs, warnings=[*warnings, NO_MOTION]))
     elif _has_no_load(model):
         result = _result_without_load(inputs)
     else:
@@ -148,12 +148,15 @@ def _run(
                 result = _solve(inputs)
         except NotConverged as error:
             if meshes.patch is not None and what.kind != "patch":
-                at_rest = solve_static(replace(inputs, plan=what, warnings=[*warnings, AT_REST]))
+                at_rest = patch_result.static(
+                    replace(inputs, plan=what, warnings=[*warnings, AT_REST])
+                )
                 at_rest = replace(at_rest, outcome=Outcome.NOT_CONVERGED)
                 unworn = PatchMeshes(meshes.patch, meshes.coarse)
                 error.partial_result = _complete_result(at_rest, notes, begin, unworn)
             raise
-        result = _add_static_measures(result, model, meshes)
+        if model.kind != "patch":
+            result = _add_static_measures(result, model, meshes)
         if model.wear is not None:
             result = measures.add_wear_measures(replace(result, plan=what), evolved, estimate)
     if what.compile_seconds and estimate:
@@ -191,17 +194,10 @@ def _warn_of_patch(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list
     return warnings
 
 
-def solve_static(inputs: RunInputs) -> Result:
-    """Return the Result of a patch that does not move."""
-    return patch_result.static(
-        inputs.plan, inputs.patch, inputs.coarse, inputs.seconds, inputs.warnings
-    )
-
-
 def _solve(inputs: RunInputs) -> Result:
     """Run a plan by the function of its kind, whose module is loaded here."""
     if inputs.plan.kind == "patch":
-        return solve_static(inputs)
+        return patch_result.static(inputs)
     if inputs.plan.kind == "bench":
         return bench_result.run_prescribed(
             inputs.plan,
@@ -253,7 +249,7 @@ def _worn_inputs(inputs: RunInputs, evolved) -> RunInputs:
 
 def _add_static_measures(result: Result, model: Model, meshes: PatchMeshes) -> Result:
     """Return the result of a motion with the measures of its pressed patches."""
-    if meshes.patch is not None and model.kind != "patch":
+    if meshes.patch is not None:
         motion = {name: m for name, m in result.measures.items() if name != "normal_load"}
         patch, *coarse = meshes.static or (meshes.patch, *meshes.coarse)
         static = patch_result.static_measures(model, patch, tuple(coarse))

@@ -17,7 +17,7 @@ from ...model.pieces import make_piece_meshes
 from ...model.source import locate_errors
 from ...surface import nodes
 from ..results.patch_rows import TABLE
-from ..results.result import Result, at_rest
+from ..results.result import Result, RunInputs, at_rest
 from . import skin, store
 from .ladder import solve_all, solve_static_ladder
 from .measures import add_strip_errors, measures, plane_band
@@ -134,25 +134,25 @@ def floors(patch_model, tolerance: float, values: dict) -> dict:
     }
 
 
-def static(what, patch, coarse, seconds, warnings, *_) -> Result:
-    """Return the Result of a plan whose patch does not move, or of a patch without contact.
-
-    The parameters are those of `run.run`.
-    """
+def static(inputs: RunInputs) -> Result:
+    """Return the Result of a plan whose patch does not move, or of a patch without contact."""
+    patch = inputs.patch
     pressure = patch.pressure
+    extra = {"residuals": dict(pressure.residuals), "iterations": pressure.iterations}
+    warnings = inputs.warnings
     if pressure.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
     return Result(
-        what,
-        pressure.outcome,
-        static_measures(what.model, patch, coarse),
-        None,
-        None,
-        patch,
-        at_rest(patch),
-        seconds,
-        warnings,
-        {"residuals": dict(pressure.residuals), "iterations": pressure.iterations},
+        plan=inputs.plan,
+        outcome=pressure.outcome,
+        measures=static_measures(inputs.plan.model, patch, inputs.coarse),
+        response=None,
+        window=None,
+        patch=patch,
+        fields=at_rest(patch),
+        seconds=inputs.seconds,
+        warnings=warnings,
+        extra=extra,
     )
 
 

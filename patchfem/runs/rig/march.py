@@ -174,7 +174,7 @@ class MarchReader(Reader):
         run, drive, stuck
             See `Reader.further_fields`.
         """
-        if not self.rubs:
+        if not self.has_friction:
             return {}
         rig = self.model.rig
         jumps = self.contact.set_valued

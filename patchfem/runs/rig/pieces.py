@@ -163,7 +163,7 @@ class PieceReader(Reader):
 
     def sticks(self, run) -> bool:
         """Return whether the interface sticks, or all of its strips if they slide independently."""
-        if self.apart and self.rubs:
+        if self.apart and self.has_friction:
             return run_events.is_all_stuck(run.window, self.held)
         return super().sticks(run)
 
@@ -194,7 +194,7 @@ class PieceReader(Reader):
             size=find_max_acceleration(drive),
         )
         known = {name: None if np.isnan(value) else float(value) for name, value in values.items()}
-        if not self.rubs:
+        if not self.has_friction:
             return {"known": {name: known[name] for name in (*OF_MOTION, "drift_per_cycle")}}
         if not self.rigid:
             return {"known": known}
@@ -213,7 +213,7 @@ class PieceReader(Reader):
         It is known in closed form for a single element, and if every interface sticks until the end
         of a run without a sine. For a periodic motion, the stick intervals of one cycle are used.
         """
-        if not self.rubs:
+        if not self.has_friction:
             return {}, {}
         if run.ring is not None:
             return make_ring(*run.ring, run.acceleration), {}
@@ -241,7 +241,7 @@ class PieceReader(Reader):
         """
         springs = [group.stiffness for group in self.groups]
         held = (
-            self.rubs
+            self.has_friction
             and not self.rigid
             and all(spring.size == 1 for spring in springs)
             and not any(loop.slip_range for loop in run.loops)

@@ -49,9 +49,9 @@ class Reader:
         self.patch = patch
         self.contact = contact
         self.steps = steps or numerics.steps
-        self.rubs = model.friction is not None
+        self.has_friction = model.friction is not None
         # such a law never sticks
-        self.creeps = self.rubs and law_has_trait(model.friction.law, "creeps")
+        self.creeps = self.has_friction and law_has_trait(model.friction.law, "creeps")
         self.held = 0.0 if self.creeps else held
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
@@ -94,7 +94,7 @@ class Reader:
             "integrated": self.integrated_measures(run, drive),
             "run": self.whole_run(run, drive),
         }
-        if self.rubs:
+        if self.has_friction:
             fields |= {"by": reversal_evaluation(model), "ledger": ledger}
         fields |= self.further_fields(run, drive, stuck=stuck)
         window = fields["window"]
@@ -116,7 +116,7 @@ class Reader:
     def sticks(self, run) -> bool:
         """Return whether no interface slips in the last cycles by more than `held` or round-off."""
         loops = self.integrated_measures(run, self.model.rig.drive.signal).loops
-        if not self.rubs or self.creeps:
+        if not self.has_friction or self.creeps:
             return False
         if loops:
             limit = max(self.held, slip_round_off(run.window))
@@ -125,7 +125,7 @@ class Reader:
 
     def rings(self, run, drive) -> tuple:
         """Return the measures of the ringing during stick by name, and their errors."""
-        if not self.rubs or self.creeps:
+        if not self.has_friction or self.creeps:
             return {}, {}
         return run_events.measure_rings(
             run.window, self.model.rig.modes, drive, getattr(run, "log", None), self.held

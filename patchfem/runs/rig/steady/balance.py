@@ -58,7 +58,7 @@ class Balanced(Reader):
             See `Reader.further_fields`.
         """
         loop = sampled_loop(run.window, drive, run.ledger["friction"])
-        if not self.rubs or not self.turns:
+        if not self.has_friction or not self.turns:
             return {"loop": loop}
         _, turn_forces, turn_slips = zip(*self.turns)
         forces = np.append(turn_forces, run.window.force)
