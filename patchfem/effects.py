@@ -28,7 +28,7 @@ Traits of laws:
 - `cells`: a density of elements that is cut into cells;
 - `overshoots`: after a reversal the force exceeds that of steady sliding for less than a time step of a march.
 
-`runs.rig.varying_load` and `runs.batch.lumped.lanes` name the laws that they serve themselves.
+`runs.rig.varying_load` and `runs.batch.lumped.lane_numbers` name the laws that they serve themselves.
 
 A gap shape has a table in `scene.keys.contact` and a function in `contact.gaps`. A waveform has a function in the table
 `DRIVE_BUILDERS` of its module; its traits are listed at `Waveform`.
@@ -36,6 +36,8 @@ A gap shape has a table in `scene.keys.contact` and a function in `contact.gaps`
 
 from importlib import import_module
 from typing import NamedTuple
+
+from .exceptions import PatchfemError
 
 # masses or modes of a rig; their matrices are full. The limit is here because reading a scene must not load numpy
 MAX_COORDINATES = 2000
@@ -385,8 +387,19 @@ def import_effect(name: str):
 
 
 def list_absent_effects(names) -> list:
-    """Return the effects that are not among `names`, in the order of EFFECTS."""
+    """Return the effects that are not among `names`, in the order of EFFECTS.
+
+    Raises
+    ------
+    PatchfemError
+        If a name has no entry in EFFECTS.
+    """
     present = set(names)
+    if unknown := sorted(present - set(EFFECTS)):
+        raise PatchfemError(
+            f"{unknown[0]}: a scene can ask for this effect, but it has no entry in EFFECTS of "
+            "patchfem/effects.py; add an entry with its module and equation"
+        )
     return [name for name in EFFECTS if name not in present]
 
 

@@ -16,6 +16,12 @@ from pathlib import Path
 import pytest
 from import_graph import FUNCTIONS, import_cycles, import_graph, imports, sources, syntax_nodes
 
+from patchfem.exceptions import PatchfemError
+from patchfem.scene.keys.contact import Material, OnePiece
+from patchfem.scene.keys.tables import Tables
+from patchfem.scene.keys.types import find_inner_table, is_array_attribute, list_allowed_values
+from patchfem.scene.text import EFFECT_KEYS
+
 HERE = Path(__file__).parents[1]
 # may know a Scene
 SCENE = (
@@ -283,6 +289,39 @@ def test_exact_effects_name_modules_that_exist():
 
     for name, effect in EFFECTS.items():
         assert not effect.module or find_spec(effect.module), name
+
+
+def effect_names(model, key):
+    """Names of the effects that a table of a scene can ask for."""
+    selectors = [name for name in EFFECT_KEYS if name in model.model_fields]
+    if not selectors:
+        yield key
+    for selector in selectors:
+        for value in list_allowed_values(model, selector):
+            yield f"{key}.{selector}={value}"
+    for name in () if issubclass(model, OnePiece) else model.model_fields:
+        inner = find_inner_table(model, name)
+        if inner is not None and not issubclass(inner, Material):
+            for effect in effect_names(inner, f"{key}.{name}"):
+                # an array of tables names the values of its selectors alone
+                if not is_array_attribute(model, name) or (
+                    "=" in effect and ".contact" not in effect
+                ):
+                    yield effect
+
+
+def test_always_every_table_of_a_scene_has_an_effect():
+    """Else `check` accepts a scene with this table, and `plan` cannot say what it computes."""
+    from patchfem.effects import EFFECTS, list_absent_effects
+
+    tables = [key for key in Tables.model_fields if find_inner_table(Tables, key)]
+    names = {name for key in tables for name in effect_names(find_inner_table(Tables, key), key)}
+    assert len(names) > 50
+    # the default of these is no effect, see scene.text
+    missing = names - set(EFFECTS) - {"accuracy", "measured.reading=peak"}
+    assert not missing, f"add entries to patchfem/effects.py: {sorted(missing)}"
+    with pytest.raises(PatchfemError, match=r"contact\.ripple: .* no entry in EFFECTS"):
+        list_absent_effects(["contact.tilt", "contact.ripple"])
 
 
 if __name__ == "__main__":

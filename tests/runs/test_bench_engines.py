@@ -10,7 +10,7 @@ from patchfem.core import Missing
 from patchfem.friction.bonds.parameters import MAX_LIST_SECONDS
 from patchfem.friction.record import steady_loop
 from patchfem.runs.bench import bench
-from patchfem.runs.bench.ledger import BLOCK, DEFAULT_OPTIONS, PassOptions
+from patchfem.runs.bench.ledger import BLOCK, PassOptions, Slide
 from patchfem.runs.bench.stepped import slide_step_by_step
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.run import run
@@ -59,7 +59,7 @@ def sum_of(reading, order, growth):
 def both(model, steps, patch=None, frames=0):
     time, slide = model.slide.samples(steps)[:2]
     return bench.run(model, patch, steps, frames), slide_step_by_step(
-        model, patch, time, slide, frames, DEFAULT_OPTIONS
+        Slide(model, patch, time, slide, frames)
     )
 
 

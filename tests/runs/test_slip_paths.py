@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchfem.runs.wear.slip import _read, frames_for
+from patchfem.runs.wear.slip import Frames, frames_for, slip_of_frames
 
 PHASES = np.linspace(0, 1, 41)
 
@@ -39,11 +39,10 @@ def test_always_the_error_of_a_path_holds_what_its_frames_hide(slip, path, energ
         for phase in PHASES:
             angle = 2 * np.pi * (np.arange(count) + phase) / count
             local = np.outer(slip(angle), [1.0, 1.0])
-            found = _read(
-                model, patch, local, np.tile(patch.pressure.sigma_n, (count, 1)), True, {}, None
-            )
+            tau = np.tile(patch.pressure.sigma_n, (count, 1))
+            found = slip_of_frames(model, patch, Frames(local, tau, is_closed=True))
             off = abs(found.path[0] / path - 1)
-            assert off <= found.miss + 1e-12 and found.miss < 5 / count
+            assert off <= found.error + 1e-12 and found.error < 5 / count
             assert found.path[1] == pytest.approx(found.path[0], rel=1e-12)
 
 

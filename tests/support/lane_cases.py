@@ -15,7 +15,7 @@ import patchfem as pf
 from patchfem.api import get_base_scene
 from patchfem.response.rows import TABLE as MOTION
 from patchfem.runs.batch import meshes, one_by_one
-from patchfem.runs.batch.lumped import lanes
+from patchfem.runs.batch.lumped import lane_ringing, lanes
 from patchfem.runs.results.patch_rows import TABLE as STATIC
 from patchfem.scene.sets import format_assignments
 
@@ -162,7 +162,7 @@ def rows(found, ones) -> list[list]:
                 float(one.errors[name][case]) if name in one.errors else np.nan
                 for one in (found, ones)
             )
-            if np.isnan(truth) and (np.isnan(value) or name in lanes.RING):
+            if np.isnan(truth) and (np.isnan(value) or name in lane_ringing.RINGING_MEASURES):
                 continue
             error, doubt = np.nan_to_num([error, doubt]).tolist()
             some.append(Row(name, value, error, FLOORS[strip_number(name)], truth, doubt))
@@ -186,7 +186,7 @@ def compare_cases(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     ]
     ones = one_by_one.solve([singles[case] for case in mine])
     same = [found.outcome[case] == outcome for case, outcome in zip(mine, ones.outcome)]
-    pairs = rows(found.some(np.array(mine)), ones)
+    pairs = rows(found.select(np.array(mine)), ones)
     return {
         "group": group,
         "engine": "lanes",

@@ -18,11 +18,11 @@ Jenkins elements (`table`)   Hermite's rule, order 4      reversal, closing of a
 tanh, Bouc-Wen, LuGre, bonds Runge-Kutta rule of order 4  reversal, kink, layer of speeds    4
 ============================ ============================ ================================== =====
 
-The numerical error of a case follows from a second march with half the steps, which `runs.batch.lumped.lanes` makes. A
+The numerical error of a case follows from a second march with half the steps, which `runs.batch.lumped` makes. A
 motion that settles is extrapolated to its steady state by the linear map of its cycle (`extrapolation_kernels`).
 
 Refused: more than one mode or interface, a load that varies, bonds that grow or need a list, and drives that are not a
-sine; `runs.batch.lumped.lanes.no_lanes` says so. Cost per step and case: 4 to 6 ns for Coulomb, elastic-plastic and tanh, 9
+sine; `runs.batch.lumped.lanes` says so. Cost per step and case: 4 to 6 ns for Coulomb, elastic-plastic and tanh, 9
 to 12 ns for bonds and LuGre, 25 to 40 ns for Iwan and Jenkins elements, 200 ns for Bouc-Wen. A cycle of 96 steps takes 0.4
 to 4 us, and 20 us for Bouc-Wen.
 

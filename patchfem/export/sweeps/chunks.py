@@ -237,7 +237,7 @@ class Chunks:
                 order = np.argsort(names)
                 yield (
                     numbers_in_file,
-                    results.some(
+                    results.select(
                         order[np.searchsorted(names, self.names[numbers_in_file], sorter=order)]
                     ),
                 )
@@ -256,7 +256,7 @@ class Chunks:
                 numbers = numbers_with_result[first : first + MAX_CASES_PER_FILE]
                 results = CaseResults.blank(numbers.size)
                 for part_numbers, part in self.parts(numbers):
-                    results.place(np.searchsorted(numbers, part_numbers), part)
+                    results.insert(np.searchsorted(numbers, part_numbers), part)
                 new_files.add(
                     write_chunk(self.folder, numbers.tolist(), self.names[numbers], results)
                 )

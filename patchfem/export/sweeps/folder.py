@@ -363,7 +363,7 @@ class Folder:
         self.chunks.look()
         for at, part in self.chunks.parts(np.arange(len(total))):
             part.reasons.clear()  # no table contains the reasons
-            total.place(at, part)
+            total.insert(at, part)
         return total
 
     def keys(self) -> list[str]:

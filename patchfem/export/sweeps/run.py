@@ -134,7 +134,7 @@ def sweep_into(
             return total
         folder.answers(total)
         for numbers, found in dead_cases:
-            total.place(numbers, found)
+            total.insert(numbers, found)
         sign = hash_tables(sweep_scene, cases, folder, place.page)
         if remaining.size or not _tables_are_current(sign, folder, place.page):
             write_tables(
@@ -255,7 +255,7 @@ def compute_in_memory(
     ):
         for part in (results.warnings, results.notes, results.numerics):  # no table contains these
             part.clear()
-        total.place(numbers, results)
+        total.insert(numbers, results)
     return total
 
 

@@ -6,8 +6,8 @@ in groups.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
 from functools import cache, partial
 from importlib import import_module
 from typing import NamedTuple
@@ -23,84 +23,60 @@ from . import one_by_one
 from .case_results import CaseResults
 
 
-class Batch(NamedTuple):
-    """Method that computes many models together.
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Method that computes many models together, with a module of this folder.
 
-    - name: name of its module.
-    - refuses: function (model) -> "" or a sentence that says why it cannot compute the model.
-    - group: function (model) -> key that is equal for models that can share work.
-    - solve: function (models, say) -> CaseResults of a group, equal to those of single runs to
-      1e-12, errors included, whatever else is in the group.
+    The module is imported when it is first needed. Its functions are the methods of this class.
+
+    - name: name of the module.
+    - kind: kind of the models that it takes.
     - share: seconds of a case over those of a single run; 0 if negligible.
     - compile: CPU seconds of compiling for the first group.
     - least: smallest number of cases of a study that it takes; such a batch has its own error
       estimates, which do not depend on what else is in the group.
-    - parts: function (models) -> {group: indices} of those that it takes, if it reads columns; else
-      None.
+    - reads_columns: whether it reads the numbers of similar models as columns.
     - together: smallest number of cases in a chunk of a sweep for which the shared work pays.
     """
 
     name: str
-    refuses: Callable[[Model], str]
-    group: Callable[[Model], Hashable]
-    solve: Callable[..., CaseResults]
+    kind: str
     share: float = 0.0
     compile: float = 0.0
     least: int = 0
-    parts: Callable | None = None
+    reads_columns: bool = False
     together: int = 1
 
+    @property
+    def _module(self):
+        """Module of the batch."""
+        return import_module(f"patchfem.runs.batch.{self.name}")
 
-def _batch(
-    name: str,
-    kind: str,
-    share: float = 0.0,
-    compile: float = 0.0,
-    least: int = 0,
-    columns: bool = False,
-    together: int = 1,
-) -> Batch:
-    """Return the Batch of a module of this folder, which is imported when first needed.
+    def refuses(self, model: Model) -> str:
+        """Return a sentence that says why the batch cannot compute a model; "" if it can."""
+        if model.kind != self.kind:
+            return f"it is a {model.kind}"
+        return _why_run_singly(self.kind) or self._module.refuses(model)
 
-    name: name of the module.
+    def group(self, model: Model) -> Hashable:
+        """Return a key that is equal for models that can share work."""
+        return self._module.group(model)
 
-    kind: kind of the models that it takes; the other parameters are fields of `Batch`.
-    """
+    def solve(self, models: Sequence[Model], say: Callable | None) -> CaseResults:
+        """Return the results of a group.
 
-    @cache
-    def module():
-        """Import and return the module of the batch."""
-        return import_module(f"patchfem.runs.batch.{name}")
+        They equal those of single runs to 1e-12, errors included, whatever else is in the group.
+        """
+        return self._module.solve(models, say)
 
-    def of(function: str) -> Callable:
-        """Return a function that calls the function of this name in the module."""
-        return lambda *given: getattr(module(), function)(*given)
-
-    def parts(models: Sequence) -> dict:
+    def parts(self, models: Sequence) -> dict:
         """Return {group: indices} of the models whose numbers the batch reads as columns."""
-        some_of = [models.first] if isinstance(models, SimilarModels) else models
-        if not any(getattr(one, "kind", "") == kind for one in some_of) or _why_run_singly(kind):
+        candidates = [models.first] if isinstance(models, SimilarModels) else models
+        if not self.reads_columns or _why_run_singly(self.kind):
             return {}
-        return module().parts(models)
-
-    def refuses(model: Model) -> str:
-        """Return why the batch does not take a model; "" if it does."""
-        return (
-            _why_run_singly(kind) or asked(model) if model.kind == kind else f"it is a {model.kind}"
-        )
-
-    asked = of("refuses")
-    return Batch(
-        name,
-        refuses,
-        of("group"),
-        of("solve"),
-        share,
-        compile,
-        least,
-        parts if columns else None,
-        together,
-    )
+        if not any(getattr(model, "kind", "") == self.kind for model in candidates):
+            return {}
+        return self._module.parts(models)
 
 
 @cache
@@ -113,26 +89,31 @@ def _why_run_singly(kind: str) -> str:
     return f"the measure {rows[0].name} is computed only by single runs" if rows else ""
 
 
+# note on a case whose batch failed, before the error
+BATCH_FAILED = (
+    "this case was run by itself, because computing it together with other cases failed with an "
+    "internal fault; its results are not affected, but please report it"
+)
 # the first batch that does not refuse a model takes it
 BATCHES: tuple[Batch, ...] = (
-    _batch("patches", "patch", compile=6.0, columns=True, together=2048),
-    _batch("benches", "bench", 0.4, together=64),
-    _batch("lumped.lanes", "rig", compile=6.0, least=64, columns=True, together=1024),
-    _batch("lumped.lumped", "rig", compile=12.0),
-    _batch("lumped.tabled", "rig", 0.2, 18.0, least=64, together=512),
-    _batch("lumped.sheared", "rig", 0.4, 12.0, together=64),
-    _batch("gathered", "rig", 0.05, 10.0, least=32, together=128),
+    Batch("patches", "patch", compile=6.0, reads_columns=True, together=2048),
+    Batch("benches", "bench", share=0.4, together=64),
+    Batch("lumped.lanes", "rig", compile=6.0, least=64, reads_columns=True, together=1024),
+    Batch("lumped.lumped", "rig", compile=12.0),
+    Batch("lumped.tabled", "rig", share=0.2, compile=18.0, least=64, together=512),
+    Batch("lumped.sheared", "rig", share=0.4, compile=12.0, together=64),
+    Batch("gathered", "rig", share=0.05, compile=10.0, least=32, together=128),
 )
 
 
 def batch_compile_seconds(batch: Batch, model: Model) -> float:
     """Return the CPU seconds of compiling for a model; 0 if one of its kind has been computed."""
-    if batch.compile:
-        return 0.0 if compiled.has_run(_kind(batch, model)) else batch.compile
+    if batch.compile and not compiled.has_run(_compiled_kind(batch, model)):
+        return batch.compile
     return 0.0
 
 
-def _kind(batch: Batch, model: Model) -> str:
+def _compiled_kind(batch: Batch, model: Model) -> str:
     """Return the properties on which the compiled code of a batch depends, as text."""
     rig = model.rig
     if rig is None:
@@ -143,7 +124,22 @@ def _kind(batch: Batch, model: Model) -> str:
 
 def choose_batch(model: Model, study: int = 1) -> Batch | None:
     """Return the batch of a model in a study of `study` cases; None if it is run by itself."""
-    return next((one for one in BATCHES if study >= one.least and not one.refuses(model)), None)
+    for batch in BATCHES:
+        if study >= batch.least and not batch.refuses(model):
+            return batch
+    return None
+
+
+class Assignment(NamedTuple):
+    """How a model is computed.
+
+    - batch, group: None if the model is run by itself.
+    - failure: the batch and its error, if it failed to assign the model; else "".
+    """
+
+    batch: Batch | None = None
+    group: Hashable = None
+    failure: str = ""
 
 
 def solve_models(
@@ -154,6 +150,9 @@ def solve_models(
     study: int = 0,
 ) -> CaseResults:
     """Return the case results of models in their order.
+
+    If a batch fails, its cases are run one by one. A note of each of them names the batch and the
+    error, unless the error is that of a case (`one_by_one.CASE_ERRORS`).
 
     Parameters
     ----------
@@ -170,40 +169,27 @@ def solve_models(
     study : int
         Number of cases of which these are a part; 0 if they are all.
     """
-    models = (
-        models
-        if isinstance(models, SimilarModels)
-        else [_model_without_joint(one) for one in models]
-    )
-    found = CaseResults.blank(len(models))
-    groups = {}
-    failures = Counter()
-    left = np.arange(len(models))
+    if not isinstance(models, SimilarModels):
+        models = [_model_without_joint(model) for model in models]
+    results = CaseResults.blank(len(models))
     study = study or len(models)
+    groups = {}
+    remaining = np.arange(len(models))
     if keep is None:
-        left, groups = _by_columns(models, study)
-    for case in left.tolist():
+        remaining, groups = _assign_columns(models, study)
+    for case in remaining.tolist():
         model = models[case]
         if isinstance(model, PatchfemError):
-            found.fail(case, str(model))
+            results.fail(case, str(model))
             continue
-        place = _place(model, study) if keep is None else NO_BATCH
-        groups.setdefault(place[:2], []).append(case)
-        if place.failure:
-            failures[place.failure] += 1
-    for failure, count in failures.items():
-        _say_failure(say, count, failure)
-    for (batch, _), cases in groups.items():
-        found.place(
-            cases,
-            _solve_cases(
-                batch,
-                select_models(models, cases),
-                partial(one_by_one.solve, keep=_with_case_indices(keep, cases), estimate=estimate),
-                say,
-            ),
-        )
-    return found
+        assignment = _assign(model, study) if keep is None else Assignment()
+        groups.setdefault(assignment, []).append(case)
+    for assignment, cases in groups.items():
+        keep_case = keep and partial(_keep_case, keep, cases)
+        run_singly = partial(one_by_one.solve, say=say, keep=keep_case, estimate=estimate)
+        part = _solve_group(assignment, select_models(models, cases), run_singly, say)
+        results.insert(cases, part)
+    return results
 
 
 def _model_without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
@@ -220,51 +206,42 @@ def _model_without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
         return error
 
 
-def _by_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
-    """Divide models by the batch that reads their numbers as columns.
+def _assign_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
+    """Assign models to the batches that read their numbers as columns.
 
-    Return the indices of models that no batch reads as columns, and those of all others in a dict
-    by batch and group.
+    Return the indices of the models that are not assigned, and those of all others in a dict by
+    Assignment.
     """
-    out = {}
-    left = np.arange(len(models))
+    groups = {}
+    remaining = np.arange(len(models))
     for batch in BATCHES:
-        if batch.parts is None or study < batch.least or not left.size:
+        if study < batch.least or not remaining.size:
             continue
         try:
-            parts = batch.parts(select_models(models, left))
-        except Exception:  # the model is run again by itself, which reports its error
+            parts = batch.parts(select_models(models, remaining))
+        except one_by_one.CASE_ERRORS:  # a single run of the case reports its error
             continue
-        out |= {(batch, group): left[np.asarray(cases)].tolist() for group, cases in parts.items()}
-        left = np.setdiff1d(
-            left, [case for cases in parts.values() for case in left[np.asarray(cases)].tolist()]
-        )
-    return left, out
+        except Exception as error:
+            cases = [case for case in remaining.tolist() if isinstance(models[case], Model)]
+            groups[Assignment(failure=_describe_failure(batch, error))] = cases
+            return np.setdiff1d(remaining, cases), groups
+        assigned = [remaining[np.asarray(indices)] for indices in parts.values()]
+        for group, cases in zip(parts, assigned):
+            groups[Assignment(batch, group)] = cases.tolist()
+        remaining = np.setdiff1d(remaining, np.concatenate([[], *assigned]))
+    return remaining, groups
 
 
-class Place(NamedTuple):
-    """Batch and group of a model.
-
-    - batch, group: None if the model is run by itself.
-    - failure: batch and error, if the search for the group failed; else "".
-    """
-
-    batch: Batch | None
-    group: Hashable
-    failure: str = ""
-
-
-NO_BATCH = Place(None, None)
-
-
-def _place(model: Model, study: int) -> Place:
-    """Return the batch and the group of a model in a study of `study` cases."""
+def _assign(model: Model, study: int) -> Assignment:
+    """Assign a model in a study of `study` cases to a batch and a group."""
     batch = None
     try:
         batch = choose_batch(model, study)
-        return NO_BATCH if batch is None else Place(batch, batch.group(model))
-    except Exception as error:  # the model is run again by itself, which reports its error
-        return NO_BATCH._replace(failure=_describe_failure(batch, error))
+        return Assignment() if batch is None else Assignment(batch, batch.group(model))
+    except one_by_one.CASE_ERRORS:  # a single run of the case reports its error
+        return Assignment()
+    except Exception as error:
+        return Assignment(failure=_describe_failure(batch, error))
 
 
 def _describe_failure(batch: Batch | None, error: Exception) -> str:
@@ -273,27 +250,32 @@ def _describe_failure(batch: Batch | None, error: Exception) -> str:
     return f"{name}{type(error).__name__}: {error}"
 
 
-def _say_failure(say: Callable | None, count: int, failure: str) -> None:
-    """Say that cases are run one by one, with the batch and the error that caused this."""
-    if say is not None:
-        say(f"{count} cases are run one by one, because running them together failed: {failure}")
+def _keep_case(keep: Callable, cases: list, index: int, result) -> None:
+    """Call `keep` with a case, given by its index in `cases`, and its Result."""
+    keep(cases[index], result)
 
 
-def _with_case_indices(keep: Callable | None, cases: list) -> Callable | None:
-    """Return a callback that calls `keep` with an index in all cases instead of one in `cases`."""
-    return keep and (lambda case, result: keep(cases[case], result))
-
-
-def _solve_cases(
-    batch: Batch | None, models: list, alone: Callable, say: Callable | None
+def _solve_group(
+    assignment: Assignment, models: Sequence[Model], run_singly: Callable, say: Callable | None
 ) -> CaseResults:
     """Return the results of a group by its batch, or one by one if the batch fails."""
+    batch, _, failure = assignment
     if batch is not None:
         try:
-            out = batch.solve(models, say)
+            results = batch.solve(models, say)
             if batch.compile and batch_compile_seconds(batch, models[0]):
-                compiled.record_run(_kind(batch, models[0]))
-            return out
-        except Exception as error:  # each case is run again by itself, which names the one at fault
-            _say_failure(say, len(models), _describe_failure(batch, error))
-    return alone(models, say)
+                compiled.record_run(_compiled_kind(batch, models[0]))
+            return results
+        except one_by_one.CASE_ERRORS:  # a single run names the case with the error
+            pass
+        except Exception as error:
+            failure = _describe_failure(batch, error)
+    if failure and say is not None:
+        say(
+            f"{len(models)} cases are run one by one, because running them together failed: {failure}"
+        )
+    results = run_singly(models)
+    if failure:
+        for case in range(len(models)):
+            results.notes[case] = [*results.notes.get(case, ()), f"{BATCH_FAILED} ({failure})"]
+    return results

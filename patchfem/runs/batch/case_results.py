@@ -14,6 +14,7 @@ from weakref import finalize
 
 import numpy as np
 
+from ...core import Measure
 from ...inputs import measured
 from ...model.model import Model
 
@@ -48,8 +49,8 @@ class OnDisk:
         return self.shape[0]
 
     def __array__(self, dtype=None, copy=None) -> np.ndarray:
-        held = np.memmap(self.file, float, "r+", shape=self.shape).view(np.ndarray)
-        return held if dtype in (None, held.dtype) and not copy else held.astype(dtype or float)
+        array = np.memmap(self.file, float, "r+", shape=self.shape).view(np.ndarray)
+        return array if dtype in (None, array.dtype) and not copy else array.astype(dtype or float)
 
     def __getitem__(self, at) -> np.ndarray:
         return np.array(np.asarray(self)[at])
@@ -111,17 +112,15 @@ class CaseResults:
         """Add columns of NaN for a measure, unless the results have this measure already."""
         if name not in self.values:
             self.units[name] = unit
-            for columns in (self.values, self.errors, self.floors):
+            for columns in self._columns:
                 columns[name] = self._column()
                 columns[name][:] = np.nan
 
     def _column(self) -> np.ndarray | OnDisk:
         """Return an empty column (n,), in memory or on disk."""
-        return (
-            np.empty(len(self))
-            if self.room is None
-            else OnDisk(TemporaryFile(dir=self.room), (len(self),))
-        )
+        if self.room is None:
+            return np.empty(len(self))
+        return OnDisk(TemporaryFile(dir=self.room), (len(self),))
 
     def fail(self, case: int, message: str) -> None:
         """Mark a case as failed."""
@@ -146,67 +145,91 @@ class CaseResults:
 
     def fill(self, case: int, measures: dict) -> None:
         """Set measures of a case, replacing those it has; measures: core.Measure by name."""
-        for name, one in measures.items():
-            self.measure(name, one.unit)
-            if one.value is None:
-                self.reasons.setdefault(name, {})[case] = one.reason
-            self.values[name][case] = np.nan if one.value is None else one.value
-            self.errors[name][case] = np.nan if one.error is None else one.error
-            self.floors[name][case] = one.floor
+        for name, measure in measures.items():
+            self.measure(name, measure.unit)
+            if measure.value is None:
+                self.reasons.setdefault(name, {})[case] = measure.reason
+            self.values[name][case] = np.nan if measure.value is None else measure.value
+            self.errors[name][case] = np.nan if measure.error is None else measure.error
+            self.floors[name][case] = measure.floor
 
-    def place(self, cases: Sequence[int], part: CaseResults) -> None:
+    @property
+    def _columns(self) -> tuple[dict, ...]:
+        """The dicts of columns by measure."""
+        return self.values, self.errors, self.floors
+
+    @property
+    def _texts(self) -> tuple[dict, ...]:
+        """The dicts with further results by case."""
+        return self.messages, self.warnings, self.notes, self.numerics
+
+    def insert(self, cases: Sequence[int], part: CaseResults) -> None:
         """Insert the results `part` of these cases, in their order."""
-        at = np.asarray(cases, int)
-        self.outcome[at] = part.outcome
-        self.seconds[at] = part.seconds
+        indices = np.asarray(cases, int)
+        self.outcome[indices] = part.outcome
+        self.seconds[indices] = part.seconds
         for name, unit in part.units.items():
             self.measure(name, unit)
-            for columns, given in (
-                (self.values, part.values),
-                (self.errors, part.errors),
-                (self.floors, part.floors),
-            ):
-                columns[name][at] = given.get(name, np.nan)
+            for columns, part_columns in zip(self._columns, part._columns):
+                columns[name][indices] = part_columns.get(name, np.nan)
+        numbers = dict(enumerate(indices.tolist()))
         for name, reasons in part.reasons.items():
-            self.reasons.setdefault(name, {}).update(
-                {int(at[case]): why for case, why in reasons.items()}
-            )
-        for mine, given in (
-            (self.messages, part.messages),
-            (self.warnings, part.warnings),
-            (self.notes, part.notes),
-            (self.numerics, part.numerics),
-        ):
-            mine.update({int(at[case]): found for case, found in given.items()})
+            self.reasons.setdefault(name, {}).update(_renumber(reasons, numbers))
+        for texts, part_texts in zip(self._texts, part._texts):
+            texts.update(_renumber(part_texts, numbers))
 
-    def some(self, cases: np.ndarray) -> CaseResults:
-        """Return the results of some cases, in their order, as `place` takes them."""
-        out = CaseResults(self.outcome[cases], units=self.units, seconds=self.seconds[cases])
-        at = {case: place for place, case in enumerate(np.asarray(cases).tolist())}
-        for mine, columns in (
-            (out.values, self.values),
-            (out.errors, self.errors),
-            (out.floors, self.floors),
-        ):
-            mine.update({name: column[cases] for name, column in columns.items()})
+    def remove(self, cases: Sequence[int]) -> None:
+        """Remove the results of cases, and the measures that no other case has."""
+        for columns in self._columns:
+            for column in columns.values():
+                column[cases] = np.nan
+        for case in cases:
+            for texts in (self.warnings, self.notes, self.numerics, *self.reasons.values()):
+                texts.pop(case, None)
+        for name, column in list(self.values.items()):
+            if np.isnan(column).all() and not self.reasons.get(name):
+                for columns in (*self._columns, self.units):
+                    columns.pop(name)
+
+    def select(self, cases: np.ndarray) -> CaseResults:
+        """Return measures, outcomes and messages of some cases, as `insert` takes them."""
+        results = CaseResults(self.outcome[cases], units=self.units, seconds=self.seconds[cases])
+        for columns, all_columns in zip(results._columns, self._columns):
+            columns.update({name: column[cases] for name, column in all_columns.items()})
+        numbers = {case: index for index, case in enumerate(np.asarray(cases).tolist())}
         for name, reasons in self.reasons.items():
-            out.reasons[name] = {at[case]: why for case, why in reasons.items() if case in at}
-        out.messages.update({at[case]: text for case, text in self.messages.items() if case in at})
-        return out
+            results.reasons[name] = _renumber(reasons, numbers)
+        results.messages.update(_renumber(self.messages, numbers))
+        return results
+
+    def known_measures(self, case: int) -> dict:
+        """Return the measures of a case whose errors are known, by name."""
+        measures = {}
+        for name, errors in self.errors.items():
+            if not np.isnan(errors[case]):
+                numbers = self.values[name][case], errors[case], self.floors[name][case]
+                value, error, floor = map(float, numbers)
+                measures[name] = Measure(value, self.units[name], error, floor)
+        return measures
 
     def has(self, name: str, case: int) -> bool:
         """Return whether a case has a value of a measure, or a reason why it has none."""
         return not np.isnan(self.values[name][case]) or case in self.reasons.get(name, ())
 
 
+def _renumber(texts: dict, numbers: dict) -> dict:
+    """Return a dict by case with other numbers of its cases, without those that have none."""
+    return {numbers[case]: text for case, text in texts.items() if case in numbers}
+
+
 def join_case_results(
     count: int, parts: Iterable[tuple[Sequence[int], CaseResults]]
 ) -> CaseResults:
     """Return the results of `count` cases from parts, each with the indices of its cases."""
-    out = CaseResults.blank(count)
+    results = CaseResults.blank(count)
     for cases, part in parts:
-        out.place(cases, part)
-    return out
+        results.insert(cases, part)
+    return results
 
 
 def has_unreadable_table(model: Model) -> bool:

@@ -8,12 +8,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from time import perf_counter
 
+import numpy as np
+
 from ...core import PatchfemError
 from ...model.model import Model
+from ...model.similar_models import select_models
 from ..plan import plan
 from ..results.result import choices
 from ..run import run
 from .case_results import CaseResults
+
+CASE_ERRORS = (PatchfemError, MemoryError)  # errors of a case itself, not faults of the program
+NO_MEMORY = "not enough memory; make contact.element_size larger, or make the run shorter"
 
 
 def solve(
@@ -36,31 +42,45 @@ def solve(
     estimate : bool
         If False, coarse runs and errors are omitted.
     """
-    found = CaseResults.blank(len(models))
+    results = CaseResults.blank(len(models))
     for case, model in enumerate(models):
         begin = perf_counter()
         try:
             result = run(plan(model), say, estimate=estimate)
             if keep is not None:
                 keep(case, result)
-        except (PatchfemError, MemoryError) as error:
-            found.fail(
-                case,
-                str(error)
-                or "not enough memory; make contact.element_size larger, or make the run shorter",
-            )
-        except (
-            Exception
-        ) as error:  # a defect of one case must not lose the results of a thousand others
-            found.fail(case, f"internal fault, please report it: {type(error).__name__}: {error}")
+        except CASE_ERRORS as error:
+            results.fail(case, str(error) or NO_MEMORY)
+        # a defect of one case must not lose the results of a thousand others
+        except Exception as error:
+            results.fail(case, f"internal fault, please report it: {type(error).__name__}: {error}")
         else:
-            found.put(case, result.outcome, result.measures, 0.0)
-            found.numerics[case] = choices(result)
-            for kept, said in (
-                (found.warnings, result.warnings),
-                (found.notes, result.extra.get("notes")),
-            ):
-                if said:
-                    kept[case] = list(said)
-        found.seconds[case] = perf_counter() - begin
-    return found
+            results.put(case, result.outcome, result.measures, 0.0)
+            results.numerics[case] = choices(result)
+            if result.warnings:
+                results.warnings[case] = list(result.warnings)
+            if notes := result.extra.get("notes"):
+                results.notes[case] = list(notes)
+        results.seconds[case] = perf_counter() - begin
+    return results
+
+
+def solve_rest(
+    results: CaseResults, models: Sequence[Model], cases: np.ndarray, say: Callable | None = None
+) -> None:
+    """Replace the results of some cases by those of single runs.
+
+    Parameters
+    ----------
+    results : CaseResults
+        Results of the models, which are changed.
+    models : sequence of Model
+    cases : (n,) of bool
+        Cases that are run singly.
+    say : callable, optional
+        Callback for a line of text.
+    """
+    indices = np.flatnonzero(cases)
+    if indices.size:
+        results.remove(indices.tolist())
+        results.insert(indices, solve(select_models(models, indices), say))

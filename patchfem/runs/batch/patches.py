@@ -95,7 +95,7 @@ def pressed_first(models: Sequence[Model], together: int, solve: Callable) -> Ca
         # for these small systems several BLAS threads wait longer for each other than the solution takes
         with one_thread():
             part = solved_together(models[first : first + together])
-            out.place(range(first, first + len(part)), solve(part))
+            out.insert(range(first, first + len(part)), solve(part))
     return out
 
 
@@ -104,7 +104,7 @@ def solve(models: Sequence[Model], say: Callable | None = None) -> CaseResults:
     out = CaseResults.blank(len(models))
     for start in range(0, len(models), AT_ONCE):
         cases = range(start, min(start + AT_ONCE, len(models)))
-        out.place(cases, _solve_cases(select_models(models, cases), say))
+        out.insert(cases, _solve_cases(select_models(models, cases), say))
     return out
 
 
@@ -177,5 +177,5 @@ def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
     single = np.flatnonzero(~good)
     out.seconds[:] = (perf_counter() - begin) / len(models)
     if single.size:
-        out.place(single, one_by_one.solve(select_models(models, single), say))
+        out.insert(single, one_by_one.solve(select_models(models, single), say))
     return out

@@ -261,7 +261,7 @@ class Samples:
             "slip_start_phase": mean_slip_phase(count, *sums),
         }
 
-    def window_of(self, run: int, acceleration) -> Response:
+    def response(self, run: int, acceleration) -> Response:
         """Return the samples of one run for the search for ringing.
 
         acceleration: (s,) [m s-2].

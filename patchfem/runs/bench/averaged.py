@@ -55,17 +55,31 @@ def limit_share(model, patch) -> float:
 
 
 def limit_tractions(model, patch, force) -> np.ndarray:
-    """Return the tractions (f, m) [Pa] of a rigid block under resultants force (f,) [N].
+    """Return the tractions of a rigid block under resultants of the friction.
 
     They are proportional to the averaged pressure in the direction of the force.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    force : (f,)
+        Resultants [N].
+
+    Returns
+    -------
+    (f, m)
+        Tractions [Pa].
     """
-    f = model.friction
+    friction = model.friction
     x = patch.x
     sigma = patch.pressure.sigma_n
     weight = patch.pieces.interface.weight
-    one = []
-    for way in (1.0, -1.0):
-        average = _law().average_pressure(x, x, sigma, way, f.bond_length, f.order)
-        part = np.where(sigma > 0, average, 0.0)
-        one.append(part / max(weight @ part, 1e-300))
-    return np.array([value * one[0 if value >= 0 else 1] for value in force])
+    unit_tractions = []
+    for direction in (1.0, -1.0):
+        average = _law().average_pressure(
+            x, x, sigma, direction, friction.bond_length, friction.order
+        )
+        traction = np.where(sigma > 0, average, 0.0)
+        unit_tractions.append(traction / max(weight @ traction, 1e-300))
+    return np.array([value * unit_tractions[0 if value >= 0 else 1] for value in force])

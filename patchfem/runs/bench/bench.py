@@ -22,12 +22,12 @@ from ...response.measures import (
     compute_step_harmonic,
     work_difference,
 )
-from . import rigid, shear
-from . import stepped as stepping
 from .closed import closed_form
-from .engine import CLOSED, STEPPED, BenchEngine, bench_engine
-from .ledger import DEFAULT_OPTIONS, PassOptions
-from .stepped import slide_step_by_step
+from .engine import BenchEngine, Method, bench_engine
+from .ledger import DEFAULT_OPTIONS, PassOptions, Slide, SlideHistories
+from .rigid import slide_rigidly
+from .shear import slide_in_shear
+from .stepped import slide_in_plane, slide_step_by_step
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -96,74 +96,89 @@ def run(
         time, slide = model.point.refine_samples(model.slide, time, slide, steps)
         first = int(np.searchsorted(time, start))
     engine = bench_engine(model, slide, 1 if patch is None else patch.x.size, watch.choice)
-    out, more = _slid(model, patch, (time, slide), frames, engine, watch)
-    values = _values(model, time, slide, out, first, omega) | {
-        "work_check": work_difference(
-            out.ledger[0],
-            [(slide, out.force), *more.pop("pairs", ())],
-            reversal_evaluation(model) == "jumps",
-        )
-    }
+    histories, lateral = _solve(Slide(model, patch, time, slide, frames, engine, watch))
+    loops = [(slide, histories.force)]
+    if lateral:
+        loops.append((lateral["lateral"], lateral["lateral_force"]))
+    jumps = reversal_evaluation(model) == "jumps"
+    values = _measure(model, time, slide, histories, first)
+    values |= _measure_loop(model, time, slide, histories, first, omega) if omega else {}
+    values["work_check"] = work_difference(histories.ledger[0], loops, jumps)
     span = time[-1]  # the division by the span avoids overflow for an extremely slow slide
-    rate = np.gradient(slide, time / span) / span if time.size > 2 else np.zeros(time.size)
-    return BenchRun(time, slide, rate, *out, values, perf_counter() - begin, first, engine, **more)
-
-
-def _slid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: PassOptions) -> tuple:
-    """Return the SlideHistories of a pass along (time, slide), and histories of the lateral direction."""
-    if model.slide.across is not None:
-        return stepping.run_plane(model, patch, *path, frames, watch)
-    if model.partial_slip:
-        return shear.with_shear(model, patch, *path, frames, watch, engine), {}
-    if engine.kind == STEPPED:
-        return slide_step_by_step(model, patch, *path, frames, watch), {}
-    if engine.kind == CLOSED:
-        return closed_form(model, patch, path, frames, watch), {}
-
-    return rigid.rigid(model, patch, path, frames, engine, watch), {}
-
-
-def _values(model, time, slide, out, first, omega) -> dict:
-    """Return the measures of a pass by name."""
-    # the ratio refers to the applied load: friction is lost where the piece slides off the pressure
-    applied = out.load if model.load_varies else np.full_like(out.load, out.load[0])
-    ratio = np.divide(
-        out.force,
-        applied,
-        out=np.zeros_like(out.force),
-        where=applied > 1e-3 * applied.max(initial=0.0),
+    rate = np.zeros(time.size)
+    if time.size > 2:
+        rate = np.gradient(slide, time / span) / span
+    return BenchRun(
+        time, slide, rate, *histories, values, perf_counter() - begin, first, engine, **lateral
     )
-    work, stored, dissipated, created = out.ledger
-    power = np.abs(np.diff(work)).sum()
-    miss = abs(work[-1] - (stored[-1] - stored[0]) - dissipated[-1] + created[-1])
-    found = {
-        "normal_load": float(model.point.load if model.load_varies else out.load[0]),
-        "friction_force_peak": float(np.abs(out.force).max()),
+
+
+def _solve(task: Slide) -> tuple[SlideHistories, dict]:
+    """Return the histories of a pass, and those of the lateral direction by name."""
+    if task.model.slide.across is not None:
+        return slide_in_plane(task)
+    if task.model.partial_slip:
+        return slide_in_shear(task), {}
+    if task.engine.method is Method.STEPPED:
+        return slide_step_by_step(task), {}
+    if task.engine.method is Method.CLOSED:
+        return closed_form(task), {}
+    return slide_rigidly(task), {}
+
+
+def _measure(model, time, slide, histories: SlideHistories, first: int) -> dict:
+    """Return the measures of a pass by name, except those of its loop."""
+    force = histories.force
+    load = histories.load
+    # the ratio refers to the applied load: friction is lost where the piece slides off the pressure
+    applied = load if model.load_varies else np.full_like(load, load[0])
+    is_loaded = applied > 1e-3 * applied.max(initial=0.0)
+    ratio = np.divide(force, applied, out=np.zeros_like(force), where=is_loaded)
+    work, stored, dissipated, created = histories.ledger
+    exchanged = np.abs(np.diff(work)).sum()
+    imbalance = abs(work[-1] - (stored[-1] - stored[0]) - dissipated[-1] + created[-1])
+    balance = 0.0
+    if exchanged > 0:
+        balance = float(imbalance / (exchanged + np.abs(stored).max()))
+    return {
+        "normal_load": float(model.point.load if model.load_varies else load[0]),
+        "friction_force_peak": float(np.abs(force).max()),
         "friction_ratio_end": float(ratio[-1]),
         "friction_ratio_peak": float(np.abs(ratio).max()),
-        "slip_amplitude": float(out.slip[first:].max() - out.slip[first:].min()) / 2,
-        "energy_balance": float(miss / (power + np.abs(stored).max())) if power > 0 else 0.0,
-        **compute_ledger_measures(out.ledger),
+        "slip_amplitude": float(histories.slip[first:].max() - histories.slip[first:].min()) / 2,
+        "energy_balance": balance,
+        **compute_ledger_measures(histories.ledger),
     }
-    if omega:
-        t = time[first:]
-        q = slide[first:]
-        f = out.force[first:]
-        weight = np.zeros(t.size)
-        weight[1:] += np.diff(t) / 2
-        weight[:-1] += np.diff(t) / 2
-        means = np.divide(
-            np.diff(work[first:]), np.diff(q), out=(f[1:] + f[:-1]) / 2, where=np.diff(q) != 0
-        )
-        turns = find_reversals(t, q, np.zeros(t.size), f, t[-1] - t[0], reversal_evaluation(model))
-        found |= interface_loop(
-            mean_half_range(turns),
-            compute_harmonic(t, weight, q - q.mean(), omega),
-            compute_step_harmonic(t, means, omega),
-            work[-1] - work[first],
-            0.0,
-        )
-        secant = secant_stiffness(turns)
-        found |= {"secant_stiffness": secant} if secant is not None else {}
-        found["drift_per_cycle"] = float(q[-1] - q[0])
-    return found
+
+
+def _measure_loop(model, time, slide, histories: SlideHistories, first: int, omega: float) -> dict:
+    """Return the measures of the loop of the last cycle, which starts at sample `first`, by name."""
+    time = time[first:]
+    slide = slide[first:]
+    force = histories.force[first:]
+    work = histories.ledger[0, first:]
+    weight = np.zeros(time.size)
+    weight[1:] += np.diff(time) / 2
+    weight[:-1] += np.diff(time) / 2
+    moves = np.diff(slide)
+    mean_force = (force[1:] + force[:-1]) / 2
+    means = np.divide(np.diff(work), moves, out=mean_force, where=moves != 0)
+    reversals = find_reversals(
+        time,
+        slide,
+        np.zeros(time.size),
+        force,
+        time[-1] - time[0],
+        reversal_evaluation(model),
+    )
+    measures = interface_loop(
+        mean_half_range(reversals),
+        compute_harmonic(time, weight, slide - slide.mean(), omega),
+        compute_step_harmonic(time, means, omega),
+        work[-1] - work[0],
+        0.0,
+    )
+    secant = secant_stiffness(reversals)
+    if secant is not None:
+        measures["secant_stiffness"] = secant
+    return measures | {"drift_per_cycle": float(slide[-1] - slide[0])}

@@ -8,125 +8,106 @@ of the slide.
 import numpy as np
 
 from .law import ends_of_rest, law_for, nodal_pressure
-from .ledger import (
-    PassOptions,
-    SlideHistories,
-    elastic_slip,
-    frame_numbers,
-    local_slip,
-    make_ledger,
-)
+from .ledger import Slide, SlideHistories, elastic_slip, local_slip, make_ledger
 
-GAUSS = 8  # Gauss points in a step over a flank
+N_GAUSS_POINTS = 8  # Gauss points in a step over a flank
 
 
-def closed_form(model, patch, path: tuple, frames: int, watch: PassOptions) -> SlideHistories:
-    """Slide the interface of a law without memory along a path, in closed form.
-
-    Parameters
-    ----------
-    model : Model
-    patch : Patch or None
-    path : tuple
-        time (k,) [s] and slide (k,) [m].
-    frames : int
-        Number of frames of the tractions.
-    watch : PassOptions
-
-    Returns
-    -------
-    SlideHistories
-    """
-    if model.grooves is not None:
-        return closed_form_on_grooves(model, patch, path, frames, watch)
-    (time, slide), (sigma, weight), law = path, nodal_pressure(model, patch), law_for(model, patch)
+def closed_form(task: Slide) -> SlideHistories:
+    """Slide the interface of a law without memory along its path, in closed form."""
+    if task.model.grooves is not None:
+        return _closed_form_on_grooves(task)
+    slide = task.slide
+    sigma, weight = nodal_pressure(task.model, task.patch)
+    law = law_for(task.model, task.patch)
     limits = np.stack([law.limit(sigma, -1.0), law.limit(sigma, 1.0)])
-    move = np.diff(slide)
-    share = law.limit_fraction(move, np.diff(time))
+    increments = np.diff(slide)
+    fraction = law.limit_fraction(increments, np.diff(task.time))
     if law.has_force_at_rest:  # the last traction persists during rest
-        last = np.maximum.accumulate(np.where(move != 0, np.arange(move.size), -1))
-        share = np.where(last < 0, 0.0, share[last])
-    share = np.concatenate([[0.0], share])
-    way = (share > 0).astype(int)
-    force = share * (limits @ weight)[way]
-    spent = np.append(0.0, force[1:] * move)
-    losses = np.stack([np.zeros(share.size), spent], axis=1)
-    at = frame_numbers(slide.size, frames)
-    tau = share[at, None] * limits[way[at]]
-    for k, side in ends_of_rest(model, slide).items():
-        broken = law.breakaway_traction(sigma, side)
-        force[k] = weight @ broken
-        tau[at == k] = broken
-    watch.tell(1.0)
+        last = _last_moving_steps(increments)
+        fraction = np.where(last < 0, 0.0, fraction[last])
+    fraction = np.concatenate([[0.0], fraction])
+    direction = (fraction > 0).astype(int)
+    force = fraction * (limits @ weight)[direction]
+    work = np.append(0.0, force[1:] * increments)
+    losses = np.stack([np.zeros(fraction.size), work], axis=1)
+    frames = task.frame_numbers
+    tau = fraction[frames, None] * limits[direction[frames]]
+    for sample, sign in ends_of_rest(task.model, slide).items():
+        breakaway = law.breakaway_traction(sigma, sign)
+        force[sample] = weight @ breakaway
+        tau[frames == sample] = breakaway
+    task.options.report(1.0)
     load = np.full(slide.size, float(weight @ sigma))
     return SlideHistories(
         force,
         load,
-        elastic_slip(model, slide, force, load),
-        make_ledger(np.cumsum(spent), np.zeros(share.size), losses),
-        at,
+        elastic_slip(task.model, slide, force, load),
+        make_ledger(np.cumsum(work), np.zeros(fraction.size), losses),
+        frames,
         tau,
-        local_slip(model, slide[at], tau, sigma),
+        local_slip(task.model, slide[frames], tau, sigma),
     )
 
 
-def closed_form_on_grooves(
-    model, patch, path: tuple, frames: int, watch: PassOptions
-) -> SlideHistories:
+def _closed_form_on_grooves(task: Slide) -> SlideHistories:
     """Slide a law without memory slowly over grooves, in closed form.
 
     The force is N (t + phi)/(1 - phi t), with the slope t and phi = f/R along the flank. The lift
     of the load is stored energy, the friction work along the flank is dissipated; no mass is
-    lifted. The parameters are those of `closed_form`.
+    lifted.
     """
-    (time, slide), (sigma, weight), law, grooves = (
-        path,
-        nodal_pressure(model, patch),
-        law_for(model, patch),
-        model.grooves,
-    )
+    model = task.model
+    slide = task.slide
+    grooves = model.grooves
+    sigma, weight = nodal_pressure(model, task.patch)
+    law = law_for(model, task.patch)
     load = float(weight @ sigma)
-    move = np.diff(slide)
+    increments = np.diff(slide)
     if law.has_force_at_rest:
-        last = np.maximum.accumulate(np.where(move != 0, np.arange(move.size), -1))
-        way = np.append(0.0, np.where(last < 0, 0.0, np.sign(move)[last]))
-        ratio = grooves.force_ratio(slide, way, law.kinetic)
+        last = _last_moving_steps(increments)
+        direction = np.append(0.0, np.where(last < 0, 0.0, np.sign(increments)[last]))
+        ratio = grooves.force_ratio(slide, direction, law.kinetic)
         lowest, highest = (
-            grooves.force_ratio(slide[0], side, model.friction.static) for side in (-1.0, 1.0)
+            grooves.force_ratio(slide[0], sign, model.friction.static) for sign in (-1.0, 1.0)
         )
         # at rest before the motion, friction on the flank takes the value that balances the load
-        ratio[way == 0] = np.clip(0.0, lowest, highest)
-        own = load * grooves.friction_loss(slide[:-1], slide[1:], law.kinetic)
+        ratio[direction == 0] = np.clip(0.0, lowest, highest)
+        loss = load * grooves.friction_loss(slide[:-1], slide[1:], law.kinetic)
     else:
-        duration = np.diff(time)
-        speed = np.divide(move, duration, out=np.zeros_like(move), where=duration > 0)
-        t, phi = _along_flank(grooves, law, slide, np.append(0.0, speed))
-        ratio = (t + phi) / (1 - phi * t)
+        duration = np.diff(task.time)
+        speed = np.divide(increments, duration, out=np.zeros_like(increments), where=duration > 0)
+        slope, phi = _along_flank(grooves, law, slide, np.append(0.0, speed))
+        ratio = (slope + phi) / (1 - phi * slope)
 
-        def own_force(q):
+        def dissipated_force(places):
             """Return the dissipated work per slide [N] at slides (k - 1,) [m]."""
-            t, phi = _along_flank(grooves, law, q, speed)
-            return load * phi * (1 + t**2) / (1 - phi * t)
+            slope, phi = _along_flank(grooves, law, places, speed)
+            return load * phi * (1 + slope**2) / (1 - phi * slope)
 
-        own = integrate_steps(slide, own_force)
+        loss = integrate_steps(slide, dissipated_force)
     rise = load * grooves.height_difference(slide[:-1], slide[1:])
-    for k, side in ends_of_rest(model, slide).items():
-        ratio[k] = grooves.force_ratio(slide[k], side, model.friction.static)
-    at = frame_numbers(slide.size, frames)
-    watch.tell(1.0)
-    losses = np.stack([np.zeros(slide.size), np.append(0.0, own)], axis=1)
-    ledger = make_ledger(
-        np.append(0.0, np.cumsum(rise + own)), load * grooves.height(slide), losses
-    )
+    for sample, sign in ends_of_rest(model, slide).items():
+        ratio[sample] = grooves.force_ratio(slide[sample], sign, model.friction.static)
+    frames = task.frame_numbers
+    task.options.report(1.0)
+    losses = np.stack([np.zeros(slide.size), np.append(0.0, loss)], axis=1)
+    work = np.append(0.0, np.cumsum(rise + loss))
     return SlideHistories(
         load * ratio,
-        np.full(time.size, load),
+        np.full(slide.size, load),
         slide.copy(),
-        ledger,
-        at,
-        ratio[at, None] * sigma,
-        np.repeat(slide[at, None], sigma.size, axis=1),
+        make_ledger(work, load * grooves.height(slide), losses),
+        frames,
+        ratio[frames, None] * sigma,
+        np.repeat(slide[frames, None], sigma.size, axis=1),
     )
+
+
+def _last_moving_steps(increments) -> np.ndarray:
+    """Return the last step with a motion up to each step (k - 1,); -1 if there is none."""
+    steps = np.where(increments != 0, np.arange(increments.size), -1)
+    return np.maximum.accumulate(steps)
 
 
 def integrate_steps(slide, integrand) -> np.ndarray:
@@ -141,7 +122,7 @@ def integrate_steps(slide, integrand) -> np.ndarray:
     """
     move = np.diff(slide)
     out = np.zeros_like(move)
-    for place, weight in zip(*np.polynomial.legendre.leggauss(GAUSS)):
+    for place, weight in zip(*np.polynomial.legendre.leggauss(N_GAUSS_POINTS)):
         out += 0.5 * weight * integrand(slide[:-1] + 0.5 * (1 + place) * move) * move
     return out
 

@@ -6,6 +6,7 @@ the pressure of a point changes during the slide, the law is evaluated sample by
 """
 
 from dataclasses import dataclass, replace
+from enum import Enum
 from math import ceil
 
 import numpy as np
@@ -19,51 +20,58 @@ from ...friction.bonds import parameters
 from ...slip import shear_modes
 from ..cost import MARCH_CODE, NO_CODE, SHORT_CODE, Cost, MemoryPart
 
-CLOSED, ELEMENTS, POINTS, RECURSION, LIST, STEPPED, PLANE, LISTS = range(8)
-NAMES = {
-    CLOSED: "closed form",
-    ELEMENTS: "parallel elements",
-    POINTS: "bond points",
-    RECURSION: "recursion",
-    STEPPED: "law step by step",
-    PLANE: "two directions",
-}
-MOST_STEPS = 200_000  # most steps per cycle over grooves
-FLANK = 20  # samples per radian of grooves
-CODES = {
-    CLOSED: NO_CODE,
-    STEPPED: NO_CODE,
-    PLANE: NO_CODE,
-    ELEMENTS: SHORT_CODE,
-    RECURSION: SHORT_CODE,
-    POINTS: MARCH_CODE,
-    LIST: MARCH_CODE,
-    LISTS: MARCH_CODE,
-}
+MAX_GROOVE_STEPS = 200_000  # most steps per cycle over grooves
+GROOVE_SAMPLES = 20  # samples per radian of grooves
 SAMPLE_BYTES = 250.0  # memory of a sample of the slide [bytes]
 # passes over the list relative to those in a rig: a prescribed slide needs no search for the
 # increment
-PASSES = 1 / 3
+LIST_PASSES = 1 / 3
+
+
+class Method(Enum):
+    """Method that computes the slide of a bench; the value is its name in summaries and plans."""
+
+    CLOSED = "closed form"
+    ELEMENTS = "parallel elements"
+    POINTS = "bond points"
+    RECURSION = "recursion"
+    LIST = "bond list"
+    LISTS = "bond lists"
+    STEPPED = "law step by step"
+    PLANE = "two directions"
+
+
+LIST_METHODS = (Method.LIST, Method.LISTS)
 
 
 @dataclass(frozen=True, slots=True)
 class BenchEngine:
     """Method with which a bench slides its interface.
 
-    - kind: one of the constants above.
+    - method: Method.
     - seconds: CPU seconds per sample.
     - choice: engine of the sum over bonds, with its settings; None without a sum.
     """
 
-    kind: int
+    method: Method
     seconds: float
     choice: "bond_engines.EngineChoice | None" = None
 
     @property
     def name(self) -> str:
         """Name of the engine in summaries and plans."""
-        several = {LIST: "bond list", LISTS: "bond lists"}.get(self.kind)
-        return "bench, " + (f"{self.choice.engine} {several}" if several else NAMES[self.kind])
+        if self.method in LIST_METHODS:
+            return f"bench, {self.choice.engine} {self.method.value}"
+        return f"bench, {self.method.value}"
+
+    @property
+    def compiled_code(self):
+        """Compiled code that the method needs."""
+        if self.method in (Method.ELEMENTS, Method.RECURSION):
+            return SHORT_CODE
+        if self.method in (Method.POINTS, *LIST_METHODS):
+            return MARCH_CODE
+        return NO_CODE
 
 
 def bench_engine(
@@ -87,31 +95,28 @@ def bench_engine(
         If the sum over bonds would take too long.
     """
     f = model.friction
-    soft = bool(model.partial_slip)
     if model.slide.across is not None:
-        return BenchEngine(PLANE, _stepped_seconds(model, slide, 1))
-    if soft and (law_has_trait(f.law, "bonds") or model.grooves is not None):
+        return BenchEngine(Method.PLANE, _stepped_seconds(model, slide, 1))
+    if model.partial_slip and (law_has_trait(f.law, "bonds") or model.grooves is not None):
         modes = model.accuracy.shear_modes or shear_modes.N_SHEAR_MODES
         varies = model.grooves is not None or pressure_changes(model)
         if model.grooves is None and (
             is_bond_list(f) or requested_engine(model) not in ("auto", "recursion")
         ):
-            return _choose_sum_engine(
-                model, slide, points, choice or choose_bond_sum(model, slide), points
-            )
+            choice = choice or choose_bond_sum(model, slide)
+            return _choose_sum_engine(model, slide, points, choice, points)
+        seconds = cost_model.predict_shear_mode_step(points, modes, load_varies=varies)
+        return BenchEngine(Method.POINTS, seconds)
+    if model.partial_slip:
         return BenchEngine(
-            POINTS, cost_model.predict_shear_mode_step(points, modes, load_varies=varies)
-        )
-    if soft:
-        return BenchEngine(
-            ELEMENTS, cost_model.SLIP_NODE_SECONDS * points + cost_model.SAMPLE_SECONDS
+            Method.ELEMENTS, cost_model.SLIP_NODE_SECONDS * points + cost_model.SAMPLE_SECONDS
         )
     if pressure_changes(model) and model.grooves is None:
         return _stepped_engine(model, slide, points)
     if law_has_trait(f.law, "memoryless"):
-        return BenchEngine(CLOSED, cost_model.SAMPLE_SECONDS)
+        return BenchEngine(Method.CLOSED, cost_model.SAMPLE_SECONDS)
     if not law_has_trait(f.law, "bonds"):
-        return BenchEngine(ELEMENTS, cost_model.SAMPLE_SECONDS)
+        return BenchEngine(Method.ELEMENTS, cost_model.SAMPLE_SECONDS)
     return _choose_sum_engine(model, slide, points, choice or choose_bond_sum(model, slide))
 
 
@@ -122,12 +127,9 @@ def steps_per_cycle(model) -> int:
     steps = slide.steps(accuracy.tolerance, accuracy.steps_per_cycle, model.friction.bond_length)
     if model.grooves is None or accuracy.steps_per_cycle is not None:
         return steps
-    turns = (
-        model.grooves.wave_number
-        * float(np.abs(np.diff(slide.samples(steps)[1])).sum())
-        / max(1.0, slide.cycles or 1.0)
-    )
-    return max(steps, min(4 * ceil(FLANK * turns / 4), MOST_STEPS))
+    path = float(np.abs(np.diff(slide.samples(steps)[1])).sum()) / max(1.0, slide.cycles or 1.0)
+    phase = model.grooves.wave_number * path
+    return max(steps, min(4 * ceil(GROOVE_SAMPLES * phase / 4), MAX_GROOVE_STEPS))
 
 
 def pressure_changes(model) -> bool:
@@ -181,43 +183,38 @@ def choose_smooth_bond_sum(model, slide) -> "bond_engines.EngineChoice | None":
         or model.accuracy.merge is not None
     ):
         return None
-    found = choose_bond_sum(model, slide)
-    return (
-        replace(found, engine="truncated", merge=0.0, error=found.tail)
-        if found.engine == "merged"
-        else found
-    )
+    choice = choose_bond_sum(model, slide)
+    if choice.engine != "merged":
+        return choice
+    return replace(choice, engine="truncated", merge=0.0, error=choice.tail)
 
 
 def mean_stroke(slide) -> tuple:
     """Return mean path [m] and mean number of moving steps between two reversals of a slide."""
-    move = np.diff(slide)
-    way = np.sign(move[move != 0])
-    count = 1 + np.count_nonzero(way[1:] != way[:-1])
-    return float(np.abs(move).sum()) / count, max(way.size / count, 1.0)
+    moves = np.diff(slide)
+    directions = np.sign(moves[moves != 0])
+    count = 1 + np.count_nonzero(directions[1:] != directions[:-1])
+    return float(np.abs(moves).sum()) / count, max(directions.size / count, 1.0)
 
 
 def _choose_sum_engine(
-    model, slide, points: int, found: "bond_engines.EngineChoice", lists: int = 1
+    model, slide, points: int, choice: "bond_engines.EngineChoice", lists: int = 1
 ) -> BenchEngine:
     """Return the engine of a sum over bonds.
 
     lists: number of lists, one per point with shear modes, else 1.
     """
     law = model.bonds
-    if found.engine == "recursion":
-        return BenchEngine(RECURSION, cost_model.RECURSION_STEP_SECONDS, found)
+    if choice.engine == "recursion":
+        return BenchEngine(Method.RECURSION, cost_model.RECURSION_STEP_SECONDS, choice)
     if law.breakaway and lists == 1:  # a list cannot represent an elastic range
         return _stepped_engine(model, slide, points)
     size = slide.size
-    strips = min(
-        found.strips, size * max(1.0, 4 * float(np.abs(np.diff(slide)).max()) / law.length)
-    )
-    seconds = (
-        (PASSES if lists == 1 else lists)
-        * found.seconds
-        * (strips / found.strips if found.strips else 1.0)
-    )
+    max_move = float(np.abs(np.diff(slide)).max())
+    strips = min(choice.strips, size * max(1.0, 4 * max_move / law.length))
+    seconds = (LIST_PASSES if lists == 1 else lists) * choice.seconds
+    if choice.strips:
+        seconds *= strips / choice.strips
     if size * seconds > parameters.MAX_LIST_SECONDS:
         raise Missing(
             f"the sum over the list of bonds (about {strips:.0f} entries) would need a computing time of "
@@ -225,12 +222,12 @@ def _choose_sum_engine(
             "accuracy.steps_per_cycle or slide.cycles, or raise accuracy.tail or accuracy.merge",
             "",
         )
-    return BenchEngine(LIST if lists == 1 else LISTS, seconds, found)
+    return BenchEngine(Method.LIST if lists == 1 else Method.LISTS, seconds, choice)
 
 
 def _stepped_engine(model, slide, points: int) -> BenchEngine:
     """Return the engine that evaluates a law sample by sample."""
-    return BenchEngine(STEPPED, _stepped_seconds(model, slide, points))
+    return BenchEngine(Method.STEPPED, _stepped_seconds(model, slide, points))
 
 
 def _stepped_seconds(model, slide, points: int) -> float:
@@ -272,7 +269,8 @@ def cost(model, points: int) -> Cost:
     engine = bench_engine(model, slide, points)
     # The run and its passes with half and a quarter of the steps take about as long as two runs; a
     # sum over bonds or cells needs a further pass.
-    passes = 3 if law_has_trait(model.friction.law, "cells") and engine.kind == ELEMENTS else 2
+    has_cells = law_has_trait(model.friction.law, "cells") and engine.method is Method.ELEMENTS
+    passes = 3 if has_cells else 2
     steps = passes * time.size
     samples = MemoryPart(
         SAMPLE_BYTES * steps / 2, f"{steps // 2} samples of the slide", _samples_key(model)
@@ -286,7 +284,7 @@ def cost(model, points: int) -> Cost:
     motion = Cost(
         {"motion": steps * engine.seconds}, (samples, *lists), (), steps, sizes, engine.name
     )
-    return motion + CODES[engine.kind].cost()
+    return motion + engine.compiled_code.cost()
 
 
 def _samples_key(model) -> str:

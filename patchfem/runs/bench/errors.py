@@ -21,13 +21,13 @@ from ...response.errors import (
 )
 from ...slip import shear_modes
 from . import bench, rigid, shear
-from .engine import ELEMENTS, LIST, LISTS, PLANE, STEPPED, slips_by_elements
+from .engine import LIST_METHODS, Method, slips_by_elements
 from .law import estimate_tail_loss
 from .ledger import PassOptions
 
 # tolerance that sets the steps of passes on coarser meshes; elements follow any path exactly
 MESH_TOL = 1e-2
-FINER = 0.5  # factor of the merge width in the pass that shows the error of merging
+FINER_MERGE_FACTOR = 0.5  # factor of the merge width in the pass that shows the error of merging
 
 
 class Pass(NamedTuple):
@@ -46,7 +46,20 @@ class Pass(NamedTuple):
     modes: int | None = None
 
 
-def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> tuple:
+class PassErrors(NamedTuple):
+    """Errors of a bench from coarse passes.
+
+    - errors: errors by measure name, one dict per kind.
+    - seconds: CPU seconds.
+    - open_kinds: see `coarser.find_open_kinds`.
+    """
+
+    errors: list
+    seconds: float
+    open_kinds: dict
+
+
+def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> PassErrors:
     """Estimate the errors of a bench from coarse passes along its path.
 
     Parameters
@@ -60,28 +73,22 @@ def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> tu
         Its steps per cycle.
     say : callable, optional
         Callback for a line of text.
-
-    Returns
-    -------
-    tuple
-        Errors by measure name, one dict per kind; CPU seconds; and `coarser.find_open_kinds`.
     """
 
     def solve(variant: Pass):
         """Return the BenchRun of a Pass."""
-        on = patches[variant.level]
         watch = PassOptions(variant.choice, say, springs=variant.springs, modes=variant.modes)
-        return bench.run(model, on, variant.steps, watch=watch)
+        return bench.run(model, patches[variant.level], variant.steps, watch=watch)
 
     ladder = list_coarse_passes(model, patches, fine, steps)
-    made = {}
-    errors, seconds = estimate_errors(solve, fine.values, ladder, made)
-    kinds = [one.of for one in ladder]
+    coarse_passes = {}
+    errors, seconds = estimate_errors(solve, fine.values, ladder, coarse_passes)
+    kinds = [coarser.of for coarser in ladder]
     if sum_error(model, fine.engine):
         errors = [*errors, _sum_errors(model, fine)]
         kinds = [*kinds, "bonds"]
-    runs = [fine.values, *(made[run].values for run in ladder[0].runs)]
-    return errors, seconds, find_open_kinds(kinds, errors, runs)
+    runs = [fine.values, *(coarse_passes[run].values for run in ladder[0].runs)]
+    return PassErrors(errors, seconds, find_open_kinds(kinds, errors, runs))
 
 
 def list_coarse_passes(model, patches: list, fine, steps: int) -> list:
@@ -122,23 +129,21 @@ def list_coarse_passes(model, patches: list, fine, steps: int) -> list:
                     few._replace(modes=shear_modes.comparison_mode_count(count)), few, "modes"
                 )
             )
-    if law_has_trait(model.friction.law, "cells") and fine.engine.kind == ELEMENTS:
+    if law_has_trait(model.friction.law, "cells") and fine.engine.method is Method.ELEMENTS:
         out.append(rigid.coarser_cells(few))
-    if fine.engine.kind in (LIST, LISTS) and choice.merge > 0:
-        narrow = few._replace(choice=replace(choice, merge=FINER * choice.merge))
+    if fine.engine.method in LIST_METHODS and choice.merge > 0:
+        narrow = few._replace(choice=replace(choice, merge=FINER_MERGE_FACTOR * choice.merge))
         out.append(CoarserRuns((narrow,), finer_errors, few, "bonds"))
     return out
 
 
 def sum_error(model, engine) -> float:
     """Return the error bound of the sum over bonds over the friction limit [1]; 0 without a sum."""
-    if engine.kind in (LIST, LISTS):
+    if engine.method in LIST_METHODS:
         return engine.choice.error
-    return (
-        estimate_tail_loss(model)
-        if engine.kind in (STEPPED, PLANE) and is_bond_list(model.friction)
-        else 0.0
-    )
+    if engine.method in (Method.STEPPED, Method.PLANE) and is_bond_list(model.friction):
+        return estimate_tail_loss(model)
+    return 0.0
 
 
 def _sum_errors(model, fine) -> dict:

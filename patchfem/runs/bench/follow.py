@@ -1,129 +1,122 @@
 """Contact of the compiled loops that follows a prescribed slide, in blocks of samples.
 
-In: a ContactModel and samples of time and slide. Out: `Followed`.
+In: a ContactModel and a `Slide`. Out: `Followed`.
 """
 
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
+from ...core import NotConverged
 from ...dynamics.march.capacity import copy_state, enlarge_list, is_full
 from ...dynamics.march.faces import STEP_TOL
 from ...dynamics.march.models import load_instances
-from .ledger import BLOCK, PassOptions, frame_numbers, make_ledger
+from .ledger import BLOCK, Slide, SlideHistories, make_ledger
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Followed:
+class Followed(NamedTuple):
     """Histories of a contact along a slide, at k samples.
 
-    - slide (k,): [m].
-    - force (k,): force at the samples [N].
-    - mean (k,): mean force over the following step [N].
-    - stored (k,): stored energy [J].
-    - slip (k,): [m].
-    - lost (k - 1,): energy that a step dissipates [J]; negative if it creates energy.
-    - at (f,): samples of the frames.
+    - force, slip (k,): [N], [m].
+    - ledger (4, k): energies of `make_ledger` [J].
+    - frames (f,): samples of the frames.
     - states: contact state in each frame.
-    - missed: number of steps with too large a residual.
+    - n_failed: number of steps with too large a residual.
     """
 
-    slide: np.ndarray
     force: np.ndarray
-    mean: np.ndarray
-    stored: np.ndarray
     slip: np.ndarray
-    lost: np.ndarray
-    at: np.ndarray
+    ledger: np.ndarray
+    frames: np.ndarray
     states: list
-    missed: int
+    n_failed: int
 
-    @property
-    def ledger(self) -> np.ndarray:
-        """Energy balance of the pass (4, k) [J], as of `make_ledger`."""
-        work = np.concatenate([[0.0], np.cumsum(self.mean[:-1] * np.diff(self.slide))])
-        losses = np.zeros((self.slide.size, 2))
-        losses[1:, 0], losses[1:, 1] = -np.minimum(self.lost, 0.0), np.maximum(self.lost, 0.0)
-        return make_ledger(work, self.stored, losses)
+    def require_convergence(self) -> None:
+        """Raise NotConverged if the residual of a step was too large."""
+        if self.n_failed:
+            raise NotConverged(
+                f"in {self.n_failed} time steps of the prescribed slide the friction force has an error "
+                "above the limit; raise accuracy.steps_per_cycle",
+                "",
+            )
+
+    def histories(self, load: float, tau, local) -> SlideHistories:
+        """Return the histories of a pass under a constant load [N].
+
+        Parameters
+        ----------
+        load : float
+        tau, local : (f, m)
+            Traction [Pa] and slip [m] of the nodes in the frames.
+        """
+        loads = np.full(self.force.size, load)
+        return SlideHistories(self.force, loads, self.slip, self.ledger, self.frames, tau, local)
 
 
-def follow_path(
-    model, time, slide, frames: int, watch: PassOptions, paced: bool = False
-) -> Followed:
-    """Slide a ContactModel along samples of time and slide.
+def follow_path(model, task: Slide, paced: bool = False) -> Followed:
+    """Slide a ContactModel along its path.
 
     Parameters
     ----------
     model : ContactModel
-    time, slide : (k,)
-        [s], [m].
-    frames : int
-        Number of copies of its state that are kept.
-    watch : PassOptions
+    task : Slide
     paced : bool
         Whether the law depends on the speed.
-
-    Returns
-    -------
-    Followed
 
     Raises
     ------
     Missing
         If a list of bonds exceeds its memory.
     """
-    loops = load_instances(watch.say)
+    loops = load_instances(task.options.say)
+    time = task.time
+    slide = task.slide
     contact = model.build()
-    at = frame_numbers(slide.size, frames)
-    turns = _new_pace(time) if paced else np.zeros(0, int)
+    frames = task.frame_numbers
+    pace_changes = _pace_changes(time) if paced else np.zeros(0, int)
     last = slide.size - 1
-    edges = np.unique(np.concatenate([np.arange(0, last, BLOCK), at, turns, [last]]))
+    ends = np.unique(np.concatenate([np.arange(0, last, BLOCK), frames, pace_changes, [last]]))
     forces = np.zeros((slide.size, 3))
     energies = np.zeros((slide.size, 2))
+
+    def follow_block(contact, begin: int, end: int) -> int:
+        """Follow the samples of a block; return the number of steps with too large a residual."""
+        block = slice(begin, end + 1)
+        return loops.follow_path(
+            slide[block].copy(),
+            float(time[end] - time[begin]) / float(end - begin),
+            model.kind,
+            contact,
+            STEP_TOL * model.limit,
+            energies[block],
+            forces[block],
+        )
+
     states = []
-    missed = 0
-    told = 0
-    for a, b in pairwise(edges):
-        kept = copy_state(contact)
-
-        def slid(contact, a=a, b=b):
-            """Follow the samples a to b; return the number of steps with too large a residual."""
-            dt = float(time[b] - time[a]) / float(b - a)
-            return loops.follow_path(
-                slide[a : b + 1].copy(),
-                dt,
-                model.kind,
-                contact,
-                STEP_TOL * model.limit,
-                energies[a : b + 1],
-                forces[a : b + 1],
-            )
-
-        failed = slid(contact)
-        while failed and is_full(contact):
-            contact = enlarge_list(contact, kept, f"before sample {b} of the prescribed slide")
-            failed = slid(contact)
-        missed += failed
-        if b in at:
-            states.append((slide[b], next(iter(model.picture_fields(contact).values()), None)))
-        if b == last or b - told >= BLOCK:
-            watch.tell(b / last)
-            told = b
-    return Followed(
-        slide,
-        forces[:, 0],
-        forces[:, 1],
-        energies[:, 1],
-        forces[:, 2],
-        energies[:-1, 0],
-        at,
-        states,
-        missed,
-    )
+    n_failed = 0
+    reported = 0
+    for begin, end in pairwise(ends):
+        start = copy_state(contact)
+        n_failed_in_block = follow_block(contact, begin, end)
+        while n_failed_in_block and is_full(contact):
+            contact = enlarge_list(contact, start, f"before sample {end} of the prescribed slide")
+            n_failed_in_block = follow_block(contact, begin, end)
+        n_failed += n_failed_in_block
+        if end in frames:
+            states.append((slide[end], next(iter(model.picture_fields(contact).values()), None)))
+        if end == last or end - reported >= BLOCK:
+            task.options.report(end / last)
+            reported = end
+    work = np.concatenate([[0.0], np.cumsum(forces[:-1, 1] * np.diff(slide))])
+    losses = np.zeros((slide.size, 2))
+    losses[1:, 0] = -np.minimum(energies[:-1, 0], 0.0)
+    losses[1:, 1] = np.maximum(energies[:-1, 0], 0.0)
+    ledger = make_ledger(work, energies[:, 1], losses)
+    return Followed(forces[:, 0], forces[:, 2], ledger, frames, states, n_failed)
 
 
-def _new_pace(time) -> np.ndarray:
+def _pace_changes(time) -> np.ndarray:
     """Return the samples at which the length of the time step changes."""
     step = np.diff(time)
     return 1 + np.flatnonzero(np.abs(np.diff(step)) > 1e-6 * np.minimum(step[1:], step[:-1]))

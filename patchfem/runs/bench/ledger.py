@@ -1,4 +1,4 @@
-"""Options of a pass of a bench, its histories, its energy balance and its frames.
+"""Slide of a bench as its engines take it, its histories, and its energy balance.
 
 In: forces, losses and samples of a pass. Out: `SlideHistories`, the ledger (4, k), and slip of the
 interface and of its points.
@@ -59,12 +59,6 @@ def gains_and_losses(losses) -> tuple:
     return -np.minimum(losses, 0.0).sum(axis=-1), np.maximum(losses, 0.0).sum(axis=-1)
 
 
-def frame_numbers(count: int, frames: int) -> np.ndarray:
-    """Return the samples of the frames; the first sample, the pressed state, is not among them."""
-    at = np.linspace(0, count - 1, frames + 1).round().astype(int)[1:]
-    return np.unique(at[at > 0]) if frames else np.zeros(0, int)
-
-
 def elastic_slip(model, slide, force, load) -> np.ndarray:
     """Return the slip (k,) [m] of the whole interface: the slide minus the stretch of the bonds.
 
@@ -105,8 +99,9 @@ def local_slip(model, slide, tau, sigma) -> np.ndarray:
 
 def _length(model) -> float:
     """Return the bond length [m]; 0 for a law that does not stretch."""
-    f = model.friction
-    return (f.bond_length or 0.0) if not law_has_trait(f.law, "averaged") else 0.0
+    if law_has_trait(model.friction.law, "averaged"):
+        return 0.0
+    return model.friction.bond_length or 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,10 +122,37 @@ class PassOptions:
     springs: object = None
     modes: int | None = None
 
-    def tell(self, share: float) -> None:
+    def report(self, fraction: float) -> None:
         """Report the completed fraction (0 to 1) to `progress`, if there is one."""
         if self.progress is not None:
-            self.progress(share)
+            self.progress(fraction)
 
 
 DEFAULT_OPTIONS = PassOptions()
+
+
+class Slide(NamedTuple):
+    """Slide of an interface along samples of its path, which an engine computes.
+
+    - model, patch: Model and its pressed Patch; None under [normal].
+    - time, slide (k,): samples [s], [m].
+    - frames: number of frames of the fields.
+    - engine: BenchEngine.
+    - options: PassOptions.
+    """
+
+    model: object
+    patch: object
+    time: np.ndarray
+    slide: np.ndarray
+    frames: int = 0
+    engine: object = None
+    options: PassOptions = DEFAULT_OPTIONS
+
+    @property
+    def frame_numbers(self) -> np.ndarray:
+        """Samples of the frames; the first sample, the pressed state, is not among them."""
+        if not self.frames:
+            return np.zeros(0, int)
+        numbers = np.linspace(0, self.slide.size - 1, self.frames + 1).round().astype(int)[1:]
+        return np.unique(numbers[numbers > 0])

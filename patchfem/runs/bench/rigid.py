@@ -1,6 +1,6 @@
 """Rigid slide under a pressure that moves with the upper piece, by the compiled engines.
 
-In: a model, its patch and a path. Out: `SlideHistories`. Every point has the same slide, and the laws are
+In: a `Slide`. Out: `SlideHistories`. Every point has the same slide, and the laws are
 linear in the pressure, so that the traction of a point is that of a single point with the whole
 load, times the fraction of the load at the point.
 """
@@ -19,52 +19,38 @@ from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.record import make_law
 from ...response.coarser import CoarserRuns
 from ...response.errors import merged_cell_errors
-from .engine import ELEMENTS, BenchEngine
+from .engine import Method
 from .follow import follow_path
 from .law import nodal_pressure
-from .ledger import PassOptions, SlideHistories, elastic_slip, local_slip
+from .ledger import Slide, SlideHistories, elastic_slip, local_slip
 
 
-def rigid(
-    model, patch, path: tuple, frames: int, engine: BenchEngine, watch: PassOptions
-) -> SlideHistories:
-    """Slide the interface rigidly along a path by a compiled engine.
-
-    Parameters
-    ----------
-    model : Model
-    patch : Patch or None
-    path : tuple
-        time (k,) [s] and slide (k,) [m].
-    frames : int
-        Number of frames of the tractions.
-    engine : BenchEngine
-    watch : PassOptions
-
-    Returns
-    -------
-    SlideHistories
-    """
-    (time, slide), f = path, model.friction
-    sigma, weight = nodal_pressure(model, patch)
+def slide_rigidly(task: Slide) -> SlideHistories:
+    """Slide the interface rigidly along its path by a compiled engine."""
+    model = task.model
+    law = model.friction.law
+    sigma, weight = nodal_pressure(model, task.patch)
     load = float(weight @ sigma)
-    paced = (
-        f.rest_growth is not None
+    is_paced = (
+        model.friction.rest_growth is not None
         or model.load_varies
-        or not (law_has_trait(f.law, "bonds") or law_has_trait(f.law, "timeless"))
+        or not (law_has_trait(law, "bonds") or law_has_trait(law, "timeless"))
     )
-    done = follow_path(
-        one_point(model, load, engine, watch.springs), time, slide, frames, watch, paced
-    )
-    tau = np.outer(done.force[done.at] / load if load > 0 else np.zeros(done.at.size), sigma)
-    loads = model.point.evaluate(time) if model.load_varies else np.full(time.size, load)
-    if engine.kind == ELEMENTS or model.grooves is not None:
-        slip = done.slip
-        local = np.where(sigma > 0, done.slip[done.at, None], slide[done.at, None])
+    followed = follow_path(_one_point(task, load), task, is_paced)
+    frames = followed.frames
+    slide = task.slide
+    ratio = followed.force[frames] / load if load > 0 else np.zeros(frames.size)
+    tau = np.outer(ratio, sigma)
+    loads = np.full(slide.size, load)
+    if model.load_varies:
+        loads = model.point.evaluate(task.time)
+    if task.engine.method is Method.ELEMENTS or model.grooves is not None:
+        slip = followed.slip
+        local = np.where(sigma > 0, slip[frames, None], slide[frames, None])
     else:
-        slip = elastic_slip(model, slide, done.force, loads)
-        local = local_slip(model, slide[done.at], tau, sigma)
-    return SlideHistories(done.force, loads, slip, done.ledger, done.at, tau, local)
+        slip = elastic_slip(model, slide, followed.force, loads)
+        local = local_slip(model, slide[frames], tau, sigma)
+    return SlideHistories(followed.force, loads, slip, followed.ledger, frames, tau, local)
 
 
 def climbing(model, load: float, patch=None, count: int | None = None):
@@ -87,42 +73,35 @@ def climbing(model, load: float, patch=None, count: int | None = None):
         law = varying_load.make_bonds_law(model.bonds)
     else:
         law = varying_load.make_elastic_plastic_law(f.static, f.bond_length or 0.0)
+    grooves = model.grooves
+    modes = None
     if model.rig is None:
-        found = flank_climbing.make_model(replace(model.grooves, lifted_mass=0.0), load, law, None)
+        grooves = replace(grooves, lifted_mass=0.0)
     else:
-        found = flank_climbing.make_model(model.grooves, load, law, model.rig.modes)
-    return (
-        flank_climbing.with_shear_modes(found, patch, count, model.accuracy.tolerance)
-        if model.partial_slip
-        else found
-    )
+        modes = model.rig.modes
+    contact = flank_climbing.make_model(grooves, load, law, modes)
+    if not model.partial_slip:
+        return contact
+    return flank_climbing.with_shear_modes(contact, patch, count, model.accuracy.tolerance)
 
 
-def one_point(model, load: float, engine: BenchEngine, springs=None) -> ContactModel:
-    """Return one point with the whole load as a contact of the compiled loops.
-
-    Parameters
-    ----------
-    model : Model
-    load : float
-        Normal load [N].
-    engine : BenchEngine
-    springs : callable, optional
-        See `PassOptions`.
-    """
-    f = model.friction
+def _one_point(task: Slide, load: float) -> ContactModel:
+    """Return one point with the whole load [N] as a contact of the compiled loops."""
+    model = task.model
+    friction = model.friction
+    engine = task.engine
     if model.grooves is not None:
         return climbing(model, load)
-    if engine.kind == ELEMENTS:
-        one = make_law(f, load).element(load)
-        return element_model(
-            one if springs is None else parallel_element(*springs(*np.split(one.numbers[2:], 2)))
-        )
+    if engine.method is Method.ELEMENTS:
+        element = make_law(friction, load).element(load)
+        if task.options.springs is not None:
+            element = parallel_element(*task.options.springs(*np.split(element.numbers[2:], 2)))
+        return element_model(element)
     law = model.bonds
-    found = engine.choice
-    if found.engine == "recursion":
+    if engine.choice.engine == "recursion":
         return points_model(law, [1.0], [load])
-    return bond_list_model(law, f.static * load, found.reach(law.order), found.merge)
+    choice = engine.choice
+    return bond_list_model(law, friction.static * load, choice.reach(law.order), choice.merge)
 
 
 def coarser_cells(few) -> CoarserRuns:
@@ -130,5 +109,5 @@ def coarser_cells(few) -> CoarserRuns:
 
     few: the Pass with which they are compared.
     """
-    runs = tuple(few._replace(springs=partial(join_cells, *one)) for one in CELL_MERGES)
+    runs = tuple(few._replace(springs=partial(join_cells, *merge)) for merge in CELL_MERGES)
     return CoarserRuns(runs, merged_cell_errors, few, "cells")

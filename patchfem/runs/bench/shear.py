@@ -1,12 +1,11 @@
 """Slide of pieces that deform in shear: parallel elements, or bond points with shear modes.
 
-In: a model with [contact.shear], its pressed patch and a path. Out: `SlideHistories`, and the coarse
-passes that show the error of the mesh of elements.
+In: a `Slide` of a model with [contact.shear]. Out: `SlideHistories`, and the coarse passes that
+show the error of the mesh of elements.
 """
 
 import numpy as np
 
-from ...core import NotConverged
 from ...dynamics.march.models import (
     jenkins_model,
     lower_pressure_fields,
@@ -20,84 +19,53 @@ from ...response.errors import ERROR_MEASURES, absolute_change, convergence_erro
 from ...slip.fields import bond_shear_modes, element_fields, point_fields
 from ..patch.jenkins_elements import elements
 from .follow import follow_path
-from .ledger import PassOptions, SlideHistories
+from .ledger import Slide, SlideHistories
 from .rigid import climbing
 
 # fraction of the mean pressure assumed at nodes that the lower piece does not press at first
-OPEN = 1e-3
+OPEN_PRESSURE_FRACTION = 1e-3
 
 
-def with_shear(
-    model, patch, time, slide, frames: int, watch: PassOptions, engine=None
-) -> SlideHistories:
-    """Slide the holders along samples of time and slide.
-
-    Parameters
-    ----------
-    model : Model
-    patch : Patch
-    time, slide : (k,)
-        [s], [m].
-    frames : int
-        Number of frames of the tractions.
-    watch : PassOptions
-    engine : BenchEngine, optional
-        Needed for bonds.
+def slide_in_shear(task: Slide) -> SlideHistories:
+    """Slide the holders of pieces that deform in shear.
 
     Raises
     ------
     NotConverged
         If the residual of a step is too large.
     """
-    if model.grooves is not None:
-        return _climbing(model, patch, time, slide, frames, watch)
-    if law_has_trait(model.friction.law, "bonds"):
-        return _points(model, patch, time, slide, frames, watch, engine)
-    return _elements(model, patch, time, slide, frames, watch)
+    if task.model.grooves is not None:
+        return _slide_over_grooves(task)
+    if law_has_trait(task.model.friction.law, "bonds"):
+        return _slide_bond_points(task)
+    return _slide_elements(task)
 
 
-def _elements(model, patch, time, slide, frames, watch) -> SlideHistories:
+def _slide_elements(task: Slide) -> SlideHistories:
     """Slide Coulomb and elastic-plastic points as parallel elements."""
-    f = model.friction
-    length = make_law(f).element(1.0).length
-    found = elements(patch, f.static, length)
-    springs = found.stiffness, found.yield_displacement
-    model = jenkins_model(*(watch.springs(*springs) if watch.springs else springs))
-    done = follow_path(model, time, slide, frames, watch)
-    tau, local = element_fields(patch, found, done.states, length)
-    return SlideHistories(
-        done.force,
-        np.full(time.size, patch.pressure.load),
-        done.slip,
-        done.ledger,
-        done.at,
-        tau,
-        local,
-    )
+    patch = task.patch
+    friction = task.model.friction
+    length = make_law(friction).element(1.0).length
+    reduction = elements(patch, friction.static, length)
+    springs = reduction.stiffness, reduction.yield_displacement
+    if task.options.springs:
+        springs = task.options.springs(*springs)
+    followed = follow_path(jenkins_model(*springs), task)
+    tau, local = element_fields(patch, reduction, followed.states, length)
+    return followed.histories(patch.pressure.load, tau, local)
 
 
-def _climbing(model, patch, time, slide, frames, watch) -> SlideHistories:
+def _slide_over_grooves(task: Slide) -> SlideHistories:
     """Slide pieces over grooves, with points that share the height and have shear modes."""
+    model = task.model
+    patch = task.patch
     load = patch.pressure.load
     contact = climbing(model, load, patch, model.accuracy.shear_modes)
-    done = follow_path(
-        contact, time, slide, frames, watch, not law_has_trait(model.friction.law, "timeless")
-    )
-    refuse_missed(done)
-    tau, local = climbed_fields(patch, contact, done.states)
-    return SlideHistories(
-        done.force, np.full(time.size, load), done.slip, done.ledger, done.at, tau, local
-    )
-
-
-def refuse_missed(done) -> None:
-    """Raise NotConverged if the residual of a step was too large."""
-    if done.missed:
-        raise NotConverged(
-            f"in {done.missed} time steps of the prescribed slide the friction force has an error "
-            "above the limit; raise accuracy.steps_per_cycle",
-            "",
-        )
+    is_paced = not law_has_trait(model.friction.law, "timeless")
+    followed = follow_path(contact, task, is_paced)
+    followed.require_convergence()
+    tau, local = climbed_fields(patch, contact, followed.states)
+    return followed.histories(load, tau, local)
 
 
 def climbed_fields(patch, contact, states) -> tuple:
@@ -127,40 +95,31 @@ def climbed_fields(patch, contact, states) -> tuple:
     return tau, local
 
 
-def _points(model, patch, time, slide, frames, watch, engine) -> SlideHistories:
+def _slide_bond_points(task: Slide) -> SlideHistories:
     """Slide bond points, or lists of bonds, with shear modes."""
+    model = task.model
+    patch = task.patch
     law = model.bonds
-    shear = shear_modes_of_points(model, patch, watch.modes)
-    found = engine.choice
+    choice = task.engine.choice
+    shear = shear_modes_of_points(model, patch, task.options.modes)
     if model.side == "lower":
-        contact = lists_on_lower_piece(model, patch, found, shear)
+        contact = lists_on_lower_piece(model, patch, choice, shear)
+    elif choice is not None:
+        contact = sheared_lists(patch, law, shear, choice)
     else:
         weight = patch.pieces.interface.weight
-        sigma = patch.pressure.sigma_n
-        contact = (
-            points_model(law, weight, sigma, shear)
-            if found is None
-            else sheared_lists(patch, law, shear, found)
-        )
-    done = follow_path(contact, time, slide, frames, watch, law.has_growth)
-    refuse_missed(done)
-    tau, local = point_fields(patch, law, contact.reduction, done.states)
-    return SlideHistories(
-        done.force,
-        np.full(time.size, patch.pressure.load),
-        done.slip,
-        done.ledger,
-        done.at,
-        tau,
-        local,
-    )
+        contact = points_model(law, weight, patch.pressure.sigma_n, shear)
+    followed = follow_path(contact, task, law.has_growth)
+    followed.require_convergence()
+    tau, local = point_fields(patch, law, contact.reduction, followed.states)
+    return followed.histories(patch.pressure.load, tau, local)
 
 
 def shear_modes_of_points(model, patch, count: int | None = None):
     """Return the ShearModes of the points of a sum over bonds.
 
     If the pressure belongs to the lower piece, the points are all nodes; a node without pressure at
-    first counts as if under OPEN times the mean pressure of the others.
+    first counts as if under OPEN_PRESSURE_FRACTION times the mean pressure of the others.
 
     Parameters
     ----------
@@ -178,7 +137,11 @@ def shear_modes_of_points(model, patch, count: int | None = None):
     # this call refuses a patch that could jump without a slide
     bond_shear_modes(patch, law, 1, 1.0)
     return bond_shear_modes(
-        patch, law, count, tolerance, sigma=np.maximum(sigma, OPEN * mean_pressure(patch))
+        patch,
+        law,
+        count,
+        tolerance,
+        sigma=np.maximum(sigma, OPEN_PRESSURE_FRACTION * mean_pressure(patch)),
     )
 
 
@@ -189,10 +152,13 @@ def mean_pressure(patch) -> float:
 
 def count_shear_modes(model, patch) -> int | None:
     """Return the number of shear modes of a bench with bonds; None if there are none."""
-    behind = (
-        model.partial_slip and law_has_trait(model.friction.law, "bonds") and model.grooves is None
-    )
-    return shear_modes_of_points(model, patch).stiffness.size if behind else None
+    if (
+        not model.partial_slip
+        or not law_has_trait(model.friction.law, "bonds")
+        or model.grooves is not None
+    ):
+        return None
+    return shear_modes_of_points(model, patch).stiffness.size
 
 
 def lists_on_lower_piece(model, patch, found, shear):
@@ -261,7 +227,7 @@ def mesh_errors(*values: dict) -> dict:
 
     The residual of a balance is an error itself; its change is used.
     """
-    missed = absolute_change(values[0], values[1])
-    return convergence_errors(*values) | {
-        name: missed[name] for name in ERROR_MEASURES if name in missed
-    }
+    changes = absolute_change(values[0], values[1])
+    errors = convergence_errors(*values)
+    errors.update({name: changes[name] for name in ERROR_MEASURES if name in changes})
+    return errors

@@ -1,84 +1,66 @@
 """Rigid slide with the NumPy laws, sample by sample, for varying pressure or two directions.
 
-In: a model, its patch and a path. Out: `SlideHistories`. This reference implementation of the compiled
+In: a `Slide`. Out: `SlideHistories`. This reference implementation of the compiled
 engines takes every law and every bench with a rigid slide.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from ...core import Missing
+from ...friction.protocol import Step
 from .law import ends_of_rest, law_for, nodal_pressure
 from .ledger import (
     BLOCK,
-    PassOptions,
+    Slide,
     SlideHistories,
     elastic_slip,
-    frame_numbers,
     gains_and_losses,
     local_slip,
     make_ledger,
 )
 
-MAX_STRIP_POINT_PRODUCTS = (
-    2e11  # most strip-point products of a direct quadrature; a bench with more is refused
-)
+# most strip-point products of a direct quadrature; a bench with more is refused
+MAX_STRIP_POINT_PRODUCTS = 2e11
 
 
-def slide_step_by_step(
-    model, patch, time, slide, frames: int, watch: PassOptions
-) -> SlideHistories:
-    """Slide every point along samples of time and slide.
+def slide_step_by_step(task: Slide) -> SlideHistories:
+    """Slide every point along its path.
 
     The pressure moves with the upper piece, belongs to the lower one, or the load changes with
     time.
-
-    Parameters
-    ----------
-    model : Model
-    patch : Patch or None
-    time, slide : (k,)
-        [s], [m].
-    frames : int
-        Number of frames of the tractions.
-    watch : PassOptions
-
-    Returns
-    -------
-    SlideHistories
 
     Raises
     ------
     Missing
         If the sum over bonds would take too long.
     """
-    law, (weight, pressure) = law_for(model, patch), _pressures(model, patch, time, slide)
-    refuse_long_sum(model, law, time.size, weight.size, slide)
-    peaks = ends_of_rest(model, slide)
-    at = frame_numbers(time.size, frames)
+    model = task.model
+    law = law_for(model, task.patch)
+    points = _pressed_points(task)
+    refuse_long_sum(model, law, task.slide.size, points.weight.size, task.slide)
+    take_step = _step_under_changing_load if model.load_varies else _step_law
     found = _evaluate_law(
-        (law, _step_under_changing_load if model.load_varies else _step_law),
-        (time, slide[:, None]),
-        (weight, pressure),
-        at,
-        peaks,
-        watch,
+        task, law, take_step, task.slide[:, None], points, ends_of_rest(model, task.slide)
     )
+    frames = task.frame_numbers
     force = found.force[:, 0]
     tau = found.tau[:, 0]
+    sigma = np.array([points.pressure(sample) for sample in frames]).reshape(tau.shape)
     return SlideHistories(
         force,
         found.load,
-        elastic_slip(model, slide, force, found.load),
+        elastic_slip(model, task.slide, force, found.load),
         found.ledger,
-        at,
+        frames,
         tau,
-        local_slip(model, slide[at], tau, np.array([pressure(k) for k in at]).reshape(tau.shape)),
+        local_slip(model, task.slide[frames], tau, sigma),
     )
 
 
-def run_plane(model, patch, time, slide, frames: int, watch: PassOptions) -> tuple:
+def slide_in_plane(task: Slide) -> tuple[SlideHistories, dict]:
     """Slide an interface in two directions, along the displacement and `lateral` of slide.file.
 
     The pressure of a rigid upper piece is constant at every point, and the law is linear in it, so
@@ -86,57 +68,50 @@ def run_plane(model, patch, time, slide, frames: int, watch: PassOptions) -> tup
     yaw_moment [N m] is the sum of y f_x - x f_y, the moment about +z of the friction on the upper
     piece, with f positive against its slip; strips have their positions y over the width.
 
-    Parameters
-    ----------
-    model : Model
-    patch : Patch or None
-    time, slide : (k,)
-        [s], [m].
-    frames : int
-        Number of frames of the tractions.
-    watch : PassOptions
-
     Returns
     -------
     tuple
-        SlideHistories along x, and histories of the lateral direction by name; `pairs` are (slide, force) in
-        this direction.
+        SlideHistories along x, and histories of the lateral direction by name.
     """
+    model = task.model
+    patch = task.patch
+    slide = task.slide
     law = law_for(model)
-    refuse_long_sum(model, law, time.size, 1, slide)
-    across = np.interp(time, model.slide.corners[0], model.slide.across)
-    one = np.ones(1)
-    at = frame_numbers(time.size, frames)
-    found = _evaluate_law(
-        (law, _step_law),
-        (time, np.stack([slide, across], axis=1)),
-        (one, lambda k: one),
-        at,
-        {},
-        watch,
-    )
-    load, moment, roll = _moments(model, patch)
-    sigma = patch.pressure.sigma_n if patch is not None else np.array([load])
-    unit = found.force
-    give = law.law.length / law.law.static if law.law.static > 0 else 0.0
-    slip = slide - give * unit[:, 0]
-    local = np.where(sigma > 0, slip[at, None], slide[at, None])
-    more = {
-        "lateral": across,
-        "lateral_force": load * unit[:, 1],
-        "pairs": [(across, load * unit[:, 1])],
-    }
-    if patch is not None:
-        more["yaw_moment"] = roll * unit[:, 0] - moment * unit[:, 1]
-    return SlideHistories(
-        load * unit[:, 0],
-        np.full(time.size, load),
+    refuse_long_sum(model, law, slide.size, 1, slide)
+    lateral = np.interp(task.time, model.slide.corners[0], model.slide.across)
+    unit_point = _Points(np.ones(1), lambda sample: np.ones(1))
+    unit = _evaluate_law(task, law, _step_law, np.stack([slide, lateral], axis=1), unit_point, {})
+    sums = _pressure_sums(model, patch)
+    sigma = np.array([sums.load]) if patch is None else patch.pressure.sigma_n
+    compliance = law.law.length / law.law.static if law.law.static > 0 else 0.0
+    slip = slide - compliance * unit.force[:, 0]
+    frames = task.frame_numbers
+    histories = SlideHistories(
+        sums.load * unit.force[:, 0],
+        np.full(slide.size, sums.load),
         slip,
-        load * found.ledger,
-        at,
-        np.outer(unit[at, 0], sigma),
-        local,
-    ), more
+        sums.load * unit.ledger,
+        frames,
+        np.outer(unit.force[frames, 0], sigma),
+        np.where(sigma > 0, slip[frames, None], slide[frames, None]),
+    )
+    lateral_histories = {"lateral": lateral, "lateral_force": sums.load * unit.force[:, 1]}
+    if patch is not None:
+        lateral_histories["yaw_moment"] = (
+            sums.roll * unit.force[:, 0] - sums.moment * unit.force[:, 1]
+        )
+    return histories, lateral_histories
+
+
+class _Points(NamedTuple):
+    """Points of an interface.
+
+    - weight (m,): areas [m2].
+    - pressure: function from the index of a sample to the pressure (m,) [Pa].
+    """
+
+    weight: np.ndarray
+    pressure: Callable
 
 
 class _LawHistories(NamedTuple):
@@ -154,58 +129,65 @@ class _LawHistories(NamedTuple):
 
 
 def _evaluate_law(
-    laws: tuple, path: tuple, points: tuple, at, peaks: dict, watch: PassOptions
+    task: Slide, law, take_step: Callable, path, points: _Points, breakaways: dict
 ) -> _LawHistories:
     """Evaluate a law along a path, sample by sample.
 
     Parameters
     ----------
-    laws : tuple
-        Law, and function that takes one step of it.
-    path : tuple
-        time (k,) [s] and slide (k, d) [m].
-    points : tuple
-        Weights (m,) [m2], and function from the index of a sample to the pressure (m,) [Pa].
-    at : (f,)
-        Samples of the frames.
-    peaks : dict
+    task : Slide
+    law
+    take_step : callable
+        Function that takes one step of the law.
+    path : (k, d)
+        Slide in d directions [m].
+    points : _Points
+    breakaways : dict
         Sign of the motion that starts, by the sample at the end of a rest.
-    watch : PassOptions
     """
-    (law, move), (time, slide), (weight, pressure) = laws, path, points
-    size, width = slide.shape
-    s0 = pressure(0)
-    pick = set(at.tolist())
-    state = law.start(s0) if width == 1 else law.start(s0, width)
-    force = np.zeros((size, width))
+    weight = points.weight
+    size, n_directions = path.shape
+    frames = set(task.frame_numbers.tolist())
+    sigma = points.pressure(0)
+    state = law.start(sigma) if n_directions == 1 else law.start(sigma, n_directions)
+    force = np.zeros((size, n_directions))
     load = np.zeros(size)
     work = np.zeros(size)
     stored = np.zeros(size)
     losses = np.zeros((size, 2))
     tau = []
-    for k in range(size):
-        if k:
-            dq = slide[k] - slide[k - 1]
-            s1 = pressure(k)
-            mean, lost, state = move(
-                law, state, dq if width > 1 else dq[0], s0, s1, time[k] - time[k - 1]
+    for sample in range(size):
+        if sample:
+            increment = path[sample] - path[sample - 1]
+            before = sigma
+            sigma = points.pressure(sample)
+            mean, dissipated, state = take_step(
+                law,
+                state,
+                increment if n_directions > 1 else increment[0],
+                before,
+                sigma,
+                task.time[sample] - task.time[sample - 1],
             )
-            s0 = s1
-            losses[k] = gains_and_losses(weight * lost)
-            work[k] = work[k - 1] + dq @ np.atleast_2d(mean) @ weight
-        here = np.atleast_2d(
-            law.breakaway_traction(s0, peaks[k]) if k in peaks else law.traction(state)
-        )
-        force[k], load[k], stored[k] = here @ weight, weight @ s0, weight @ law.stored_energy(state)
-        if k in pick:
-            tau.append(here)
-        if k % BLOCK == 0 or k == size - 1:
-            watch.tell(k / (size - 1))
+            losses[sample] = gains_and_losses(weight * dissipated)
+            work[sample] = work[sample - 1] + increment @ np.atleast_2d(mean) @ weight
+        if sample in breakaways:
+            traction = law.breakaway_traction(sigma, breakaways[sample])
+        else:
+            traction = law.traction(state)
+        traction = np.atleast_2d(traction)
+        force[sample] = traction @ weight
+        load[sample] = weight @ sigma
+        stored[sample] = weight @ law.stored_energy(state)
+        if sample in frames:
+            tau.append(traction)
+        if sample % BLOCK == 0 or sample == size - 1:
+            task.options.report(sample / (size - 1))
     return _LawHistories(
         force,
         load,
         make_ledger(work, stored, losses),
-        np.array(tau).reshape(len(tau), width, weight.size),
+        np.array(tau).reshape(len(tau), n_directions, weight.size),
     )
 
 
@@ -236,41 +218,56 @@ def refuse_long_sum(model, law, samples: int, points: int, slide) -> None:
         )
 
 
-def _pressures(model, patch, time, slide) -> tuple:
-    """Return weights (m,) [m2], and a function from a sample index to the pressure (m,) [Pa]."""
+def _pressed_points(task: Slide) -> _Points:
+    """Return the points of an interface with their pressure along the path."""
+    model = task.model
     if model.load_varies:
-        loads = model.point.evaluate(time)
-        return np.ones(1), lambda k: loads[k : k + 1]
-    sigma, weight = nodal_pressure(model, patch)
-    if patch is None or model.side != "lower":
-        return weight, lambda k: sigma
-    return weight, lambda k: np.interp(patch.x + slide[k], patch.x, sigma, left=0.0, right=0.0)
+        loads = model.point.evaluate(task.time)
+        return _Points(np.ones(1), lambda sample: loads[sample : sample + 1])
+    sigma, weight = nodal_pressure(model, task.patch)
+    if task.patch is None or model.side != "lower":
+        return _Points(weight, lambda sample: sigma)
+    x = task.patch.x
+
+    def moved_pressure(sample: int) -> np.ndarray:
+        """Return the pressure of the lower piece at the points of the upper one."""
+        return np.interp(x + task.slide[sample], x, sigma, left=0.0, right=0.0)
+
+    return _Points(weight, moved_pressure)
 
 
-def _step_law(law, state, dq: float, s0, s1, dt: float) -> tuple:
+def _step_law(law, state, increment: float, before, after, duration: float) -> Step:
     """Take one step of a law at constant or given pressure."""
-    return law.step(state, dq, s0, s1, dt)
+    return law.step(state, increment, before, after, duration)
 
 
-def _step_under_changing_load(law, state, dq: float, s0, s1, dt: float) -> tuple:
-    """Take one step of a law while the load changes from s0 to s1.
+def _step_under_changing_load(law, state, increment: float, before, after, duration: float) -> Step:
+    """Take one step of a law while the load changes from `before` to `after`.
 
     Half of the change is applied before the motion, half after it (order 1 if bonds are released,
     else 2). A law without stretch takes the change during the motion.
     """
-    if dq != 0 and getattr(law, "can_change_load", False):
-        return law.step(state, dq, s0, s1, dt)
-    half = (s0 + s1) / 2
-    before = law.press(state, s0, half)
-    step = law.step(before.state, dq, half, half, dt)
-    after = law.press(step.state, half, s1)
-    return step.mean, before.dissipated + step.dissipated + after.dissipated, after.state
+    if increment != 0 and getattr(law, "can_change_load", False):
+        return law.step(state, increment, before, after, duration)
+    half = (before + after) / 2
+    first = law.press(state, before, half)
+    step = law.step(first.state, increment, half, half, duration)
+    last = law.press(step.state, half, after)
+    return Step(step.mean, first.dissipated + step.dissipated + last.dissipated, last.state)
 
 
-def _moments(model, patch) -> tuple:
-    """Return load [N], sum f x and sum f y [N m] of the pressure; y from the strips, else 0."""
+class _PressureSums(NamedTuple):
+    """Load [N], and sums f x (moment) and f y (roll) [N m] of the pressure."""
+
+    load: float
+    moment: float = 0.0
+    roll: float = 0.0
+
+
+def _pressure_sums(model, patch) -> _PressureSums:
+    """Return the sums of the pressure; y is known for strips only, else 0."""
     if patch is None:
-        return model.point.load, 0.0, 0.0
+        return _PressureSums(model.point.load)
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    roll = patch.strips.roll_moment if patch.strips is not None else 0.0
-    return float(force.sum()), float(force @ patch.x), roll
+    roll = 0.0 if patch.strips is None else patch.strips.roll_moment
+    return _PressureSums(float(force.sum()), float(force @ patch.x), roll)

@@ -12,6 +12,7 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,11 +28,13 @@ from ..patch.values import values
 from ..rig import numerics
 from .slip import CycleSlip, frames_for, slip_of_cycle, slips_uniformly, strips_slide_independently
 
-STATE = tuple(WearState.__slots__)
+STATE_FIELDS = tuple(WearState.__slots__)  # fields of the state in a saved file
+MOMENT_FIELDS = ("cycle", "depth", "used", "pressure", "gap", "miss")  # arrays of a saved moment
 # fraction of the thickness of a coating that may remain where it counts as worn through
-THIN = 1e-6
-MOST_TRIES = 60  # most jumps of the search for the cycle at which a coating is worn through
-MOMENT = ("cycle", "depth", "used", "pressure", "gap", "miss")
+THIN_FRACTION = 1e-6
+MAX_SEARCH_JUMPS = 60  # most jumps of the search for the cycle at which a coating is worn through
+# of the distance of two rows of the table of friction; a nearer row is passed
+MIN_ROW_DISTANCE = 0.1
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -66,7 +69,7 @@ class Evolved:
     - depths: worn depths (k,), of strips (s, k) [m], on the nodes of each coarser mesh.
     - stripped: (patch, depth (t, m) [m]) in another number of strips, by the same jumps
       (`measures.other_strips`); None without strips.
-    - miss: relative error of the slip path due to the number of frames.
+    - frame_error: relative error of the slip path due to the number of frames.
     - seconds: CPU seconds.
     - stopped: reason of an early end, else "".
     """
@@ -77,7 +80,7 @@ class Evolved:
     moments: tuple
     depths: tuple
     stripped: tuple | None
-    miss: float
+    frame_error: float
     seconds: float
     stopped: str
 
@@ -110,10 +113,10 @@ class _Motion:
         if self.last is None or not self.same:
             worn = np.zeros_like(worn) if self.same else worn
             patch = press_patch(self.model.patch, self.pair, worn)
-            found = slip_of_cycle(worn_model(self.model, patch, worn), patch, self.frames)
-            if found.outcome is not None:
-                raise _Unbounded(found.outcome.sentence)
-            self.last = found
+            slip = slip_of_cycle(worn_model(self.model, patch, worn), patch, self.frames)
+            if slip.outcome is not None:
+                raise _Unbounded(slip.outcome.sentence)
+            self.last = slip
         return self.last.path
 
 
@@ -183,45 +186,34 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         )
         raise PatchfemError(text, "wear")
     clock = perf_counter()
-    wear = model.wear
     motion = _Motion(model, patch)
-    stopped = ""
-    asked = WearProblem(
+    problem = WearProblem(
         make_force_function(model.patch, patch.pair),
         motion,
         areas(model.patch, patch.pieces.interface),
-        wear.coefficient,
-        wear.cycles,
+        model.wear.coefficient,
+        model.wear.cycles,
     )
-    patch = (
-        _with_earlier_wear(model, patch, asked.area)
-        if begin is None
-        else press_patch(model.patch, patch.pair, frozen_array(begin[0].depth))
-    )
+    stopped = ""
     try:
-        state, moments = begin or _start_state(model, patch, asked, motion)
-    except _Unbounded as why:
-        coarse = (
-            one and _with_earlier_wear(model, one, areas(model.patch, one.pieces.interface))
-            for one in coarse
-        )
-        return Evolved(
-            patch,
-            tuple(coarse),
-            None,
-            (),
-            (),
-            None,
-            0.0,
-            perf_counter() - clock,
-            f"nothing was worn: {why}",
-        )
-    while state.cycle < wear.cycles and worn_through(model, state.depth) is None:
+        if begin is None:
+            patch = _with_earlier_wear(model, patch)
+            state, moments = _start_state(model, patch, problem, motion)
+        else:
+            state, moments = begin
+            patch = press_patch(model.patch, patch.pair, frozen_array(state.depth))
+    except _Unbounded as reason:
+        worn = tuple(mesh and _with_earlier_wear(model, mesh) for mesh in coarse)
+        stopped = f"nothing was worn: {reason}"
+        seconds = perf_counter() - clock
+        return Evolved(patch, worn, None, (), (), None, 0.0, seconds, stopped)
+    while state.cycle < model.wear.cycles and worn_through(model, state.depth) is None:
         try:
-            state = _jump(model, asked, state)
-        except _Unbounded as why:
+            state = _jump(model, problem, state)
+        except _Unbounded as reason:
             stopped = (
-                f"wear was computed only up to cycle {state.cycle:.6g} of {wear.cycles:.6g}: {why}"
+                f"wear was computed only up to cycle {state.cycle:.6g} of {model.wear.cycles:.6g}: "
+                f"{reason}"
             )
             break
         patch = press_patch(model.patch, patch.pair, frozen_array(state.depth))
@@ -229,25 +221,20 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         if keep is not None:
             keep(state, moments)
         if progress is not None:
-            progress(state.cycle / wear.cycles)
-    others = [one for one in coarse if one is not None]
-    worn, depths = (
-        zip(*(_replay_on(model.patch, model, patch, other, moments) for other in others))
-        if others
-        else ((), ())
-    )
-    other, _ = other_strips(model.patch)
-    stripped = (
-        _replay_on(other, model, patch, patch, moments)
-        if other is not model.patch and others
-        else None
-    )
+            progress(state.cycle / model.wear.cycles)
+    replayed = [
+        _replay(model.patch, model, patch, mesh, moments) for mesh in coarse if mesh is not None
+    ]
+    strips_model, _ = other_strips(model.patch)
+    stripped = None
+    if replayed and strips_model is not model.patch:
+        stripped = _replay(strips_model, model, patch, patch, moments)
     return Evolved(
         patch,
-        (*worn, *(None for one in coarse if one is None)),
+        (*(worn for worn, _ in replayed), *(None for mesh in coarse if mesh is None)),
         state,
         moments,
-        depths,
+        tuple(depth for _, depth in replayed),
         stripped,
         moments[-1].miss,
         perf_counter() - clock,
@@ -255,72 +242,88 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
     )
 
 
-def worn_through(model, depth) -> tuple | None:
-    """Return (name, thickness [m]) of a piece whose coating is worn through, else None.
+class WornCoating(NamedTuple):
+    """Coating of a piece.
+
+    - fraction: worn fraction at the deepest point.
+    - piece: "upper" or "lower".
+    - thickness: [m].
+    """
+
+    fraction: float
+    piece: str
+    thickness: float
+
+
+def worn_through(model, depth) -> WornCoating | None:
+    """Return the coating that is worn through, else None.
 
     depth: depth worn off both pieces, (m,) or (s, m) [m].
     """
-    share, name, thickness = max(_wear_fractions(model, depth), default=(0.0, "", 0.0))
-    return (name, thickness) if share >= 1 - THIN else None
+    coating = _most_worn_coating(model, depth)
+    return coating if coating.fraction >= 1 - THIN_FRACTION else None
 
 
-def _wear_fractions(model, depth) -> list:
-    """Return (worn fraction of the coating at the deepest point, name, thickness [m]) per piece.
-
-    Only coated pieces are listed.
-    """
-    deepest = float(depth.max(initial=0.0))
-    upper = model.wear.upper_share
-    asked = model.patch
-    return [
-        (part * deepest / piece.thickness, name, piece.thickness)
-        for part, piece, name in (
-            (upper, asked.pieces.upper, "upper"),
-            (1 - upper, asked.pieces.lower, "lower"),
-        )
-        if piece.coating is not None
-    ]
+def _most_worn_coating(model, depth) -> WornCoating:
+    """Return the coating of which the largest fraction is worn; of fraction 0 without coatings."""
+    max_depth = float(depth.max(initial=0.0))
+    upper_share = model.wear.upper_share
+    pieces = model.patch.pieces
+    coatings = [WornCoating(0.0, "", 0.0)]
+    for share, piece, name in (
+        (upper_share, pieces.upper, "upper"),
+        (1 - upper_share, pieces.lower, "lower"),
+    ):
+        if piece.coating is not None:
+            fraction = share * max_depth / piece.thickness
+            coatings.append(WornCoating(fraction, name, piece.thickness))
+    return max(coatings)
 
 
-def _jump(model, asked: WearProblem, state: WearState) -> WearState:
+def _jump(model, problem: WearProblem, state: WearState) -> WearState:
     """Return the state after the next jump, or where a coating is worn through.
 
     The latter is found by the Illinois variant of regula falsi.
     """
 
-    def ahead(one: WearState) -> float:
+    def excess(state: WearState) -> float:
         """Return the largest worn fraction of a coating minus 1."""
-        return max(_wear_fractions(model, one.depth), default=(0.0,))[0] - 1
+        return _most_worn_coating(model, state.depth).fraction - 1
+
+    def jump_to(cycle: float) -> WearState:
+        """Return the state after a jump up to a cycle, or less far."""
+        return take_jump(problem, state, model.accuracy.tolerance, model.wear.jumps, until=cycle)
 
     if model.patch.interface.strips is not None:
-        asked.press.begin(state.force)
-    how = asked, state, model.accuracy.tolerance, model.wear.jumps
-    found = take_jump(*how, until=next_row(model.wear, asked, state))
+        problem.press.begin(state.force)
+    after = jump_to(next_row(model.wear, problem, state))
     low = state.cycle
     high = np.inf
-    last = 0.0
-    below = ahead(state)
-    above = ahead(found)
-    end = found.cycle
-    for _ in range(MOST_TRIES):
-        over = ahead(found)
-        if abs(over) <= THIN or (over < 0 and (found.cycle < end or high == np.inf)):
-            return found
-        if over > 0:
-            below = below / 2 if high < np.inf and last > 0 else below
-            high = found.cycle
-            above = over
+    previous = 0.0
+    low_value = excess(state)
+    high_value = excess(after)
+    end = after.cycle
+    for _ in range(MAX_SEARCH_JUMPS):
+        value = excess(after)
+        if abs(value) <= THIN_FRACTION or (value < 0 and (after.cycle < end or high == np.inf)):
+            return after
+        if value > 0:
+            if high < np.inf and previous > 0:
+                low_value = low_value / 2
+            high = after.cycle
+            high_value = value
         else:
-            above = above / 2 if last < 0 else above
-            low = found.cycle
-            below = over
-        last = over
-        end = low - below * (high - low) / (above - below)
-        found = take_jump(*how, until=end)
-    return found
+            if previous < 0:
+                high_value = high_value / 2
+            low = after.cycle
+            low_value = value
+        previous = value
+        end = low - low_value * (high - low) / (high_value - low_value)
+        after = jump_to(end)
+    return after
 
 
-def next_row(wear, asked: WearProblem, state: WearState) -> float:
+def next_row(wear, problem: WearProblem, state: WearState) -> float:
     """Return the cycle up to which an automatic jump may go, to use each row of friction.
 
     It is the cycle at which the current wear rate reaches the next row of the table, or the row
@@ -331,7 +334,7 @@ def next_row(wear, asked: WearProblem, state: WearState) -> float:
     ----------
     wear
         Wear of the model.
-    asked : WearProblem
+    problem : WearProblem
     state : WearState
 
     Returns
@@ -339,20 +342,22 @@ def next_row(wear, asked: WearProblem, state: WearState) -> float:
     float
         inf if there is no further row.
     """
-    change = wear.friction
-    weight = asked.area / asked.area.sum()
-    mean = float(np.vdot(state.depth, weight))
-    ahead = [] if change is None or wear.jumps else [row for row in change.depth if row > mean]
-    if not ahead:
+    if wear.friction is None or wear.jumps:
         return np.inf
-    near = len(ahead) > 1 and ahead[0] - mean < 0.1 * (ahead[1] - ahead[0])
-    rate = float(
-        np.vdot(wear_rates(asked.coefficient, state.path, asked.area) * state.force, weight)
-    )
-    return state.cycle + (ahead[near] - mean) / rate if rate > 0 else np.inf
+    weight = problem.area / problem.area.sum()
+    depth = float(np.vdot(state.depth, weight))
+    rows = [row for row in wear.friction.depth if row > depth]
+    if not rows:
+        return np.inf
+    is_near = len(rows) > 1 and rows[0] - depth < MIN_ROW_DISTANCE * (rows[1] - rows[0])
+    rates = wear_rates(problem.coefficient, state.path, problem.area) * state.force
+    rate = float(np.vdot(rates, weight))
+    if rate <= 0:
+        return np.inf
+    return state.cycle + (rows[is_near] - depth) / rate
 
 
-def _with_earlier_wear(model, patch, area):
+def _with_earlier_wear(model, patch):
     """Return the patch with the depth that was worn before the first cycle.
 
     It is unchanged if there is none.
@@ -362,77 +367,89 @@ def _with_earlier_wear(model, patch, area):
     PatchfemError
         If this depth was worn on other surfaces, or through a coating.
     """
-    begun = model.wear.start
-    if begun is None:
+    start = model.wear.start
+    if start is None:
         return patch
-    begun.require_same_surfaces(patch.x, patch.unloaded_gap)
+    start.require_same_surfaces(patch.x, patch.unloaded_gap)
+    area = areas(model.patch, patch.pieces.interface)
     depth = frozen_array(model.wear.compute_earlier_depth(patch.x, area))
-    if (gone := worn_through(model, depth)) is not None:
+    if (coating := worn_through(model, depth)) is not None:
         raise PatchfemError(
-            f"{begun.path}: in that run the coating of the {gone[0]} piece was worn through; choose a "
+            f"{start.path}: in that run the coating of the {coating.piece} piece was worn through; choose a "
             "run in which this coating was not worn through",
             "wear.start",
         )
     return press_patch(model.patch, patch.pair, depth)
 
 
-def _start_state(model, patch, asked: WearProblem, motion: _Motion) -> tuple:
+def _start_state(model, patch, problem: WearProblem, motion: _Motion) -> tuple:
     """Return (state, moments) before any wear except that of `_with_earlier_wear`."""
-    state = start_wear(asked, model.wear.compute_earlier_depth(patch.x, asked.area))
+    state = start_wear(problem, model.wear.compute_earlier_depth(patch.x, problem.area))
     return state, (_record_moment(patch, state, motion),)
 
 
 def _record_moment(patch, state: WearState, motion: _Motion) -> Moment:
     """Return the Moment of a worn patch."""
-    area = areas(motion.model.patch, patch.pieces.interface)
-    worn = {
-        "worn_volume": float(np.vdot(state.depth, area)),
-        "worn_depth_max": float(state.depth.max(initial=0.0)),
-    }
-    after_wear = worn_model(motion.model, patch, state.depth)
-    if motion.model.grooves is not None:
-        left = after_wear.grooves
-        worn["groove_amplitude"] = 0.0 if left is None else left.amplitude
-    if motion.model.wear.friction is not None:
-        law = after_wear.friction
-        worn |= {"static_coefficient": law.static} | (
-            {} if law.bond_length is None else {"bond_length": law.bond_length}
-        )
+    model = motion.model
+    area = areas(model.patch, patch.pieces.interface)
+    worn = worn_model(model, patch, state.depth)
+    measures = values(patch) | motion.last.values
+    measures["worn_volume"] = float(np.vdot(state.depth, area))
+    measures["worn_depth_max"] = float(state.depth.max(initial=0.0))
+    if model.grooves is not None:
+        measures["groove_amplitude"] = 0.0 if worn.grooves is None else worn.grooves.amplitude
+    if model.wear.friction is not None:
+        measures["static_coefficient"] = worn.friction.static
+        if worn.friction.bond_length is not None:
+            measures["bond_length"] = worn.friction.bond_length
     return Moment(
         state.cycle,
         state.depth,
         state.jump_path,
         patch.pressure.sigma_n,
         patch.pressure.gap,
-        motion.last.miss,
-        values(patch) | motion.last.values | worn,
+        motion.last.error,
+        measures,
     )
 
 
-def _replay_on(asked, model, patch, other, moments) -> tuple:
-    """Return (patch, worn depth) on another mesh, or in other strips, by the same slip paths.
+def _replay(patch_model, model, patch, other, moments) -> tuple:
+    """Wear another mesh, or the same in other strips, by the same jumps and slip paths.
 
-    The jumps are the same, too.
+    Return its worn patch and its worn depth [m].
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        With the strips of the other patch.
+    model : Model
+    patch, other : Patch
+        Patch of the moments, and the unworn patch that is worn.
+    moments : sequence of Moment
     """
-    area = areas(asked, other.pieces.interface)
+    area = areas(patch_model, other.pieces.interface)
 
-    def path(used) -> np.ndarray:
+    def interpolate(path) -> np.ndarray:
         """Return a slip path on the nodes and strips of the other patch."""
-        if asked.interface.strips is None:
-            return np.interp(other.x, patch.x, used)
-        rows = np.array([np.interp(other.x, patch.x, row) for row in used])
-        y, own = (strips.strip_offsets(asked.pieces.width, len(one)) for one in (area, rows))
-        return np.array([np.interp(y, own, column) for column in rows.T]).T
+        if patch_model.interface.strips is None:
+            return np.interp(other.x, patch.x, path)
+        rows = np.array([np.interp(other.x, patch.x, row) for row in path])
+        width = patch_model.pieces.width
+        offsets = strips.strip_offsets(width, len(area))
+        row_offsets = strips.strip_offsets(width, len(rows))
+        return np.array([np.interp(offsets, row_offsets, column) for column in rows.T]).T
 
-    legs = [(two.cycle - one.cycle, path(two.used)) for one, two in pairwise(moments)]
+    jumps = [
+        (after.cycle - before.cycle, interpolate(after.used)) for before, after in pairwise(moments)
+    ]
     depth = replay_jumps(
-        make_force_function(asked, other.pair),
+        make_force_function(patch_model, other.pair),
         area,
         model.wear.coefficient,
-        legs,
+        jumps,
         model.wear.compute_earlier_depth(other.x, area),
     )
-    return press_patch(asked, other.pair, frozen_array(depth)), depth
+    return press_patch(patch_model, other.pair, frozen_array(depth)), depth
 
 
 def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved:
@@ -464,10 +481,9 @@ def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
     state : WearState
     moments : tuple of Moment
     """
-    arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE}
-    arrays |= {
-        f"moment_{name}": np.array([getattr(moment, name) for moment in moments]) for name in MOMENT
-    }
+    arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE_FIELDS}
+    for name in MOMENT_FIELDS:
+        arrays[f"moment_{name}"] = np.array([getattr(moment, name) for moment in moments])
     values = json.dumps([moment.values for moment in moments], default=float)
     with write_atomically(path) as partial, open(partial, "wb") as file:
         np.savez(file, key=np.array(key), values=np.array(values), **arrays)
@@ -493,20 +509,21 @@ def load_state(path: Path, key: str) -> tuple:
     """
     try:
         with np.load(path, allow_pickle=False) as file:
-            found = {name: file[name] for name in file.files}
-        if str(found["key"]) != key:
+            arrays = {name: file[name] for name in file.files}
+        if str(arrays["key"]) != key:
             raise PatchfemError(
                 f"{path.parent.name}: the state saved there belongs to another scene or to another "
                 "version of patchfem; run without --resume"
             )
-        whole = {name: found[f"state_{name}"] for name in STATE}
-        state = WearState(
-            **{name: float(value) if value.ndim == 0 else value for name, value in whole.items()}
-        )
-        columns = [found[f"moment_{name}"] for name in MOMENT]
+        fields = {name: arrays[f"state_{name}"] for name in STATE_FIELDS}
+        for name, value in fields.items():
+            if value.ndim == 0:
+                fields[name] = float(value)
+        state = WearState(**fields)
+        columns = [arrays[f"moment_{name}"] for name in MOMENT_FIELDS]
         moments = tuple(
             Moment(float(row[0]), *row[1:-1], float(row[-1]), values)
-            for *row, values in zip(*columns, json.loads(str(found["values"])), strict=True)
+            for *row, values in zip(*columns, json.loads(str(arrays["values"])), strict=True)
         )
     except FileNotFoundError:
         raise nothing_kept(path) from None

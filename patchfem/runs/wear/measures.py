@@ -16,86 +16,89 @@ from ..patch.measures import other_strips
 from ..patch.press import areas, press_patch
 from ..patch.values import values
 from ..results.patch_rows import TABLE, WORN_SOURCE
-from .evolve import THIN, mean_depth, worn_through
+from .evolve import THIN_FRACTION, mean_depth, worn_through
 from .slip import UNBOUNDED_OUTCOMES, slip_path_of_point
 
-FRAMES = 24  # frames of the interface during the wear
-# name of the peak at an edge of the contact in the history; nodes next to an edge that count as the
-# edge
-EDGE_PEAK, N_EDGE_NODES = (
-    "pressure_peak_at_edge",
-    2,
-)
+N_FRAMES = 24  # frames of the interface during the wear
+EDGE_PEAK = "pressure_peak_at_edge"  # name of the peak at an edge of the contact in the history
+N_EDGE_NODES = 2  # nodes next to an edge of the contact that count as the edge
+# worn depth over the thickness of a coating, or the height of a piece, above which the stiffness of
+# the unworn piece is not valid
+MAX_WORN_FRACTION = 0.2
+ROUND_OFF = 1e-12  # relative error of a worn volume or depth due to round-off
 HOLDER = {"closing": "approach", "rotation": "rotation"}
 
 
-def add_wear_measures(result, found, estimate: bool = True):
+def add_wear_measures(result, evolved, estimate: bool = True):
     """Return the Result of a run on the worn patch with the measures of wear.
 
     Parameters
     ----------
     result : Result
-    found : Evolved or None
+    evolved : Evolved or None
         None for a single point.
     estimate : bool
         Whether errors are computed.
     """
     model = result.plan.model
-    if found is None and result.outcome in UNBOUNDED_OUTCOMES:
-        return replace(
-            result, warnings=[*result.warnings, f"nothing was worn: {result.outcome.sentence}"]
-        )
-    if found is None:
-        return replace(result, measures=result.measures | volume_of_point(model, result, estimate))
-    seconds = result.seconds | {"wear": found.seconds}
-    warnings = [*result.warnings, *([found.stopped] if found.stopped else [])]
-    if found.state is None:
-        return replace(result, seconds=seconds, warnings=warnings)
-    period = find_period(model, result)
-    fields = frames(found, result.fields, period)
-    shown = {"period": period, "states": len(fields["time"]) - len(result.fields["time"])}
-    static = widen_by_jumps(model, found, result.measures) if estimate else {}
-    lost = measure_patch_wear(model, found, result.measures, estimate)
+    if evolved is None:
+        if result.outcome in UNBOUNDED_OUTCOMES:
+            warning = f"nothing was worn: {result.outcome.sentence}"
+            return replace(result, warnings=[*result.warnings, warning])
+        volume = _measure_volume_of_point(model, result, estimate=estimate)
+        return replace(result, measures=result.measures | volume)
+    warnings = [*result.warnings, *([evolved.stopped] if evolved.stopped else [])]
+    result = replace(result, seconds=result.seconds | {"wear": evolved.seconds}, warnings=warnings)
+    if evolved.state is None:
+        return result
+    worn = _measure_patch_wear(model, evolved, result.measures, estimate=estimate)
     if model.wear.friction is not None:
-        lost |= worn_friction(model, found, result.measures, lost["worn_volume"].error)
-    gone = _worn_through_cycle(model, found, lost["worn_depth_max"].error)
-    notes = result.extra.get("notes", [])
-    outcome = (
-        Outcome.WORN_THROUGH
-        if gone and result.outcome not in UNBOUNDED_OUTCOMES
-        else result.outcome
-    )
+        worn |= _measure_worn_friction(model, evolved, result.measures, worn["worn_volume"].error)
+    worn |= _measure_worn_through_cycle(model, evolved, worn["worn_depth_max"].error)
+    if estimate:
+        result = _widen_by_jumps(result, evolved)
+    result = _add_frames(replace(result, measures=result.measures | worn), evolved)
+    notes = [*result.extra.get("notes", []), *_note_on_start(model)]
+    if "worn_through_cycle" in worn:
+        notes += _note_on_coating(model, evolved)
+        if result.outcome not in UNBOUNDED_OUTCOMES:
+            result = replace(result, outcome=Outcome.WORN_THROUGH)
     return replace(
         result,
-        outcome=outcome,
-        measures=result.measures | static | lost | gone,
-        fields=fields,
-        seconds=seconds,
-        warnings=[*warnings, *_warn_of_depth(model, found), *_beyond_table_sentence(model, found)],
-        extra=result.extra
-        | {
-            "wear": history(found),
-            "wear_shown": shown,
-            "notes": [*notes, *_note_on_start(model), *_note_on_coating(model, found, gone)],
-        },
+        warnings=[*warnings, *_warn_of_depth(model, evolved), *_warn_of_table(model, evolved)],
+        extra=result.extra | {"wear": _history(evolved), "notes": notes},
     )
 
 
-def _worn_through_cycle(model, found, error: float | None) -> dict:
+def _make_measure(name: str, value: float, error: float | None, engine: str = "") -> Measure:
+    """Return a measure of wear.
+
+    Parameters
+    ----------
+    name : str
+    value : float
+    error : float or None
+    engine : str
+        Source of the value.
+    """
+    row = TABLE[name]
+    return Measure(value, row.unit, error, row.floor, engine=engine)
+
+
+def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
     """Return worn_through_cycle by name if a coating is worn through.
 
     error: of the largest depth [m].
     """
-    if worn_through(model, found.state.depth) is None:
+    if worn_through(model, evolved.state.depth) is None:
         return {}
-    before, last = found.moments[-2:]
+    before, last = evolved.moments[-2:]
     deepest = int(np.argmax(last.depth))
-    rate = float(last.depth.flat[deepest] - before.depth.flat[deepest]) / (
-        last.cycle - before.cycle
-    )
-    off = None if error is None else (error + THIN * float(last.depth.flat[deepest])) / rate
-    row = TABLE["worn_through_cycle"]
-    return {row.name: Measure(last.cycle, row.unit, off, row.floor)}
+    depth = float(last.depth.flat[deepest])
+    rate = (depth - float(before.depth.flat[deepest])) / (last.cycle - before.cycle)
+    cycle_error = None if error is None else (error + THIN_FRACTION * depth) / rate
+    name = "worn_through_cycle"
+    return {name: _make_measure(name, last.cycle, cycle_error)}
 
 
 def _note_on_start(model) -> list:
@@ -103,27 +106,25 @@ def _note_on_start(model) -> list:
     return [] if model.wear.start is None else [model.wear.start.sentence]
 
 
-def _note_on_coating(model, found, gone: dict) -> list:
+def _note_on_coating(model, evolved) -> list:
     """Return a note on the coating that is worn through."""
-    if not gone:
-        return []
-    (name, thickness), depth = worn_through(model, found.state.depth), found.state.depth
-    strip, node = divmod(int(np.argmax(depth)), found.patch.x.size)
-    place = f"x = {format_length(float(found.patch.x[node]), 3)}"
+    depth = evolved.state.depth
+    coating = worn_through(model, depth)
+    strip, node = divmod(int(np.argmax(depth)), evolved.patch.x.size)
+    place = f"x = {format_length(float(evolved.patch.x[node]), 3)}"
     if model.patch.interface.strips is not None:
-        place += (
-            f" of the strip at y = {format_length(float(found.patch.strips.offsets[strip]), 3)}"
-        )
+        offset = float(evolved.patch.strips.offsets[strip])
+        place += f" of the strip at y = {format_length(offset, 3)}"
     return [
-        f"the coating of the {name} piece, {format_length(thickness)}, is worn through at {place} after "
-        f"{format_number(found.state.cycle, 4)} of {format_number(model.wear.cycles, 7)} cycles; "
+        f"the coating of the {coating.piece} piece, {format_length(coating.thickness)}, is worn through at {place} after "
+        f"{format_number(evolved.state.cycle, 4)} of {format_number(model.wear.cycles, 7)} cycles; "
         "the measures are those of the "
         "patch at that cycle"
     ]
 
 
-def widen_by_jumps(model, found, measures: dict) -> dict:
-    """Return measures of the worn patch whose errors include those due to the length of the jumps.
+def _widen_by_jumps(result, evolved):
+    """Return the Result of the worn patch with errors that include those due to the jumps.
 
     They follow, at first order, from the change if the depth is computed by the same jumps without
     subdivision, and from the change to another number of strips: an edge of contact that moves
@@ -131,27 +132,23 @@ def widen_by_jumps(model, found, measures: dict) -> dict:
 
     Parameters
     ----------
-    model : Model
-    found : Evolved
-    measures : dict
-        Measures by name.
+    result : Result
+    evolved : Evolved
     """
-    rough = values(
-        press_patch(model.patch, found.patch.pair, frozen_array(found.state.coarse_depth))
-    )
-    here = values(found.patch)
-    other = values(found.stripped[0]) if found.stripped else here
-    ratio = other_strips(model.patch)[1]
-    added = {
-        name: error_of_change(here[name] - rough[name])
-        + error_of_change(here[name] - other[name], ratio)
-        for name in here
-    }
-    return {
-        name: replace(m, error=float(m.error + added[name]))
-        for name, m in measures.items()
-        if name in here and m.error is not None
-    }
+    patch_model = result.plan.model.patch
+    coarse_depth = frozen_array(evolved.state.coarse_depth)
+    coarse = values(press_patch(patch_model, evolved.patch.pair, coarse_depth))
+    fine = values(evolved.patch)
+    other = values(evolved.stripped[0]) if evolved.stripped else fine
+    ratio = other_strips(patch_model)[1]
+    measures = dict(result.measures)
+    for name, value in fine.items():
+        measure = measures.get(name)
+        if measure is not None and measure.error is not None:
+            error = error_of_change(value - coarse[name])
+            error = error + error_of_change(value - other[name], ratio)
+            measures[name] = replace(measure, error=float(measure.error + error))
+    return replace(result, measures=measures)
 
 
 def find_period(model, result) -> float:
@@ -164,94 +161,94 @@ def find_period(model, result) -> float:
     return model.slide.period or float(result.response.time[-1])
 
 
-def _warn_of_depth(model, found) -> list:
+def _warn_of_depth(model, evolved) -> list:
     """Return warnings of a worn depth that invalidates the stiffness of the unworn pieces."""
-    depth = float(found.state.depth.max(initial=0.0))
-    asked = model.patch
-    out = []
-    for share, piece, name in (
-        (model.wear.upper_share, asked.pieces.upper, "upper"),
-        (1 - model.wear.upper_share, asked.pieces.lower, "lower"),
+    depth = float(evolved.state.depth.max(initial=0.0))
+    pieces = model.patch.pieces
+    warnings = []
+    for fraction, piece, name in (
+        (model.wear.upper_share, pieces.upper, "upper"),
+        (1 - model.wear.upper_share, pieces.lower, "lower"),
     ):
-        if share * depth > 0.2 * (piece.thickness or piece.height):
-            out.append(
-                f"up to {format_length(share * depth, 3)} is worn off the {name} piece, more than 0.2 of "
-                f"{'the thickness of its coating' if piece.coating is not None else 'its height'}, but the "
+        if fraction * depth > MAX_WORN_FRACTION * (piece.thickness or piece.height):
+            size = "its height" if piece.coating is None else "the thickness of its coating"
+            warnings.append(
+                f"up to {format_length(fraction * depth, 3)} is worn off the {name} piece, more than 0.2 of "
+                f"{size}, but the "
                 "computation still uses the stiffness of the unworn piece"
             )
-    return out
+    return warnings
 
 
-def slip_miss(measures: dict) -> float:
+def _slip_error(measures: dict) -> float:
     """Return the relative error of the slip of a run.
 
     It is that of the slip amplitude, or else of the displacement.
     """
     for name in ("slip_amplitude", "relative_displacement_amplitude"):
-        found = measures.get(name)
-        if found is not None and found.value and found.error is not None:
-            return abs(found.error / found.value)
+        measure = measures.get(name)
+        if measure is not None and measure.value and measure.error is not None:
+            return abs(measure.error / measure.value)
     return 0.0
 
 
-def measure_patch_wear(model, found, motion: dict, estimate: bool = True) -> dict:
+def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) -> dict:
     """Return worn_volume and worn_depth_max with errors that include earlier runs.
 
     Parameters
     ----------
     model : Model
-    found : Evolved
+    evolved : Evolved
     motion : dict
         Measures of the run on the worn patch by name.
     estimate : bool
         Whether errors are computed.
     """
-    state = found.state
-    area = areas(model.patch, found.patch.pieces.interface)
-    share = found.miss + slip_miss(motion) + _coarser(found, motion)
-    mine, *others = [
-        _worn_measures(model.patch, *one)
-        for one in [(found.patch, state.depth), *zip(found.coarse, found.depths)]
+    state = evolved.state
+    area = areas(model.patch, evolved.patch.pieces.interface)
+    slip_error = evolved.frame_error + _slip_error(motion) + _change_of_slip(evolved, motion)
+    fine = _measure_depths(model.patch, evolved.patch, state.depth)
+    coarse = [
+        _measure_depths(model.patch, patch, depth)
+        for patch, depth in zip(evolved.coarse, evolved.depths)
     ]
-    asked, ratio = other_strips(model.patch)
-    strips = _worn_measures(asked, *found.stripped) if found.stripped else mine
-    jumps = {
+    other_model, ratio = other_strips(model.patch)
+    strips = fine
+    if evolved.stripped:
+        strips = _measure_depths(other_model, *evolved.stripped)
+    jump_errors = {
         "worn_volume": float(np.vdot(np.abs(state.depth - state.coarse_depth), area))
         + state.path_error * float(area.sum()),
         "worn_depth_max": state.error,
     }
-    out = {}
-    before = found.moments[0].values
-    first = model.wear.start
-    meshes = convergence_errors(mine, *others) if others else {}
-    for name, value in mine.items():
+    mesh_errors = convergence_errors(fine, *coarse) if coarse else {}
+    before = evolved.moments[0].values
+    start = model.wear.start
+    measures = {}
+    for name, value in fine.items():
         error = None
-        more = 0.0 if first is None else first.measure_error(name, before[name])
-        if others and estimate and more is not None:
+        start_error = 0.0 if start is None else start.measure_error(name, before[name])
+        if coarse and estimate and start_error is not None:
             error = (
-                jumps[name]
-                + share * max(value - before[name], 0.0)
-                + float(meshes[name])
-                + 1e-12 * value
-                + more
+                jump_errors[name]
+                + slip_error * max(value - before[name], 0.0)
+                + float(mesh_errors[name])
+                + ROUND_OFF * value
+                + start_error
                 + float(error_of_change(strips[name] - value, ratio))
             )
-        out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor, engine=WORN_SOURCE)
-    left = found.moments[-1].values.get("groove_amplitude")
-    if left is not None:
-        lost = out["worn_volume"].error
-        row = TABLE["groove_amplitude"]
-        out[row.name] = Measure(
-            left,
-            row.unit,
-            None if lost is None else lost / float(area.sum()),
-            row.floor,
-            engine=WORN_SOURCE,
+        measures[name] = _make_measure(name, value, error, WORN_SOURCE)
+    amplitude = evolved.moments[-1].values.get("groove_amplitude")
+    if amplitude is not None:
+        error = measures["worn_volume"].error
+        error = None if error is None else error / float(area.sum())
+        measures["groove_amplitude"] = _make_measure(
+            "groove_amplitude", amplitude, error, WORN_SOURCE
         )
-    return out
+    return measures
 
 
-def worn_friction(model, found, motion: dict, error: float | None) -> dict:
+def _measure_worn_friction(model, evolved, motion: dict, error: float | None) -> dict:
     """Return the parameters of the friction law after wear, and measures with wider errors.
 
     The error of the mean depth changes the measures of the motion, at the rate of the last two
@@ -260,87 +257,92 @@ def worn_friction(model, found, motion: dict, error: float | None) -> dict:
     Parameters
     ----------
     model : Model
-    found : Evolved
+    evolved : Evolved
     motion : dict
         Measures of the run on the worn patch by name.
     error : float or None
         Error of the worn volume [m3].
     """
-    change = model.wear.friction
-    area = float(found.patch.pieces.interface.weight.sum())
-    deep = [mean_depth(found.patch, moment.depth) for moment in found.moments[-3:]]
-    off = None if error is None else error / area
-    depths = () if off is None else (deep[-1] - off, deep[-1] + off)
-    ends = [change.compute_worn_law(model.friction, max(depth, 0.0)) for depth in depths]
-    law = change.compute_worn_law(model.friction, deep[-1])
-    out = {}
+    table = model.wear.friction
+    area = float(evolved.patch.pieces.interface.weight.sum())
+    last_moments = evolved.moments[-3:]
+    depths = [mean_depth(evolved.patch, moment.depth) for moment in last_moments]
+    depth = depths[-1]
+    depth_error = None if error is None else error / area
+    bounds = [] if error is None else [depth - depth_error, depth + depth_error]
+    bound_laws = [table.compute_worn_law(model.friction, max(bound, 0.0)) for bound in bounds]
+    law = table.compute_worn_law(model.friction, depth)
+    measures = {}
     for name, key in (("static_coefficient", "static"), ("bond_length", "bond_length")):
         value = getattr(law, key)
-        row = TABLE[name]
         if value is not None:
-            spread = max((abs(getattr(end, key) - value) for end in ends), default=None)
-            out[name] = Measure(value, row.unit, spread, row.floor)
-    steps = [
-        (one, two, b - a) for (one, a), (two, b) in pairwise(zip(found.moments[-3:], deep)) if b > a
-    ]
-    for name, m in motion.items():
-        if off is not None and m.error is not None and name not in values(found.patch):
-            rates = [
-                abs(two.values[name] - one.values[name]) / step
-                for one, two, step in steps
-                if name in one.values and name in two.values
-            ]
-            out[name] = replace(m, error=m.error + off * max(rates, default=0.0))
-    return out
+            changes = [abs(getattr(bound_law, key) - value) for bound_law in bound_laws]
+            measures[name] = _make_measure(name, value, max(changes, default=None))
+    if depth_error is None:
+        return measures
+    jumps = []
+    for pair in pairwise(zip(last_moments, depths)):
+        (before, depth_before), (after, depth_after) = pair
+        if depth_after > depth_before:
+            jumps.append((before.values, after.values, depth_after - depth_before))
+    static_names = values(evolved.patch)
+    for name, measure in motion.items():
+        if measure.error is None or name in static_names:
+            continue
+        rates = [0.0]
+        for before, after, change in jumps:
+            if name in before and name in after:
+                rates.append(abs(after[name] - before[name]) / change)
+        measures[name] = replace(measure, error=measure.error + depth_error * max(rates))
+    return measures
 
 
-def _beyond_table_sentence(model, found) -> list:
+def _warn_of_table(model, evolved) -> list:
     """Return warnings of wear beyond the table of friction, and of jumps past its rows."""
-    change = model.wear.friction
-    if change is None:
+    table = model.wear.friction
+    if table is None:
         return []
-    deep = [mean_depth(found.patch, moment.depth) for moment in found.moments]
-    out = []
-    if deep[-1] > change.depth[-1]:
-        out.append(
-            f"the mean worn depth, {format_length(deep[-1], 3)}, is larger than the last value of wear.friction.depth, "
-            f"{format_length(change.depth[-1], 3)}, and beyond that depth friction is taken as constant; extend the table "
-            f"wear.friction to a depth of at least {format_length(deep[-1], 3)}"
+    depths = [mean_depth(evolved.patch, moment.depth) for moment in evolved.moments]
+    warnings = []
+    if depths[-1] > table.depth[-1]:
+        warnings.append(
+            f"the mean worn depth, {format_length(depths[-1], 3)}, is larger than the last value of wear.friction.depth, "
+            f"{format_length(table.depth[-1], 3)}, and beyond that depth friction is taken as constant; extend the table "
+            f"wear.friction to a depth of at least {format_length(depths[-1], 3)}"
         )
-    past = (
-        max(sum(one < row < two for row in change.depth) for one, two in pairwise(deep))
-        if len(deep) > 1
-        else 0
-    )
-    if model.wear.jumps and past > 1:
-        out.append(
-            f"one jump of the wear passes {past} rows of the table wear.friction at once, so the values of some "
+    rows_passed = [
+        sum(before < row < after for row in table.depth) for before, after in pairwise(depths)
+    ]
+    n_passed = max(rows_passed, default=0)
+    if model.wear.jumps and n_passed > 1:
+        warnings.append(
+            f"one jump of the wear passes {n_passed} rows of the table wear.friction at once, so the values of some "
             "rows are not used; leave out wear.jumps"
         )
-    return out
+    return warnings
 
 
-def _worn_measures(asked, patch, depth) -> dict:
+def _measure_depths(patch_model, patch, depth) -> dict:
     """Return worn volume [m3] and largest depth [m] of a `PatchModel` by name."""
     return {
-        "worn_volume": float(np.vdot(depth, areas(asked, patch.pieces.interface))),
+        "worn_volume": float(np.vdot(depth, areas(patch_model, patch.pieces.interface))),
         "worn_depth_max": float(depth.max(initial=0.0)),
     }
 
 
-def _coarser(found, motion: dict) -> float:
+def _change_of_slip(evolved, motion: dict) -> float:
     """Return the relative difference of the slip in the last cycle of wear from that of the run.
 
     The run on the worn patch may have used smaller steps for its tolerance.
     """
-    used = found.moments[-1].values.get("slip_amplitude")
+    used = evolved.moments[-1].values.get("slip_amplitude")
     last = motion.get("slip_amplitude")
-    return (
-        abs(used / last.value - 1) if used is not None and last is not None and last.value else 0.0
-    )
+    if used is None or last is None or not last.value:
+        return 0.0
+    return abs(used / last.value - 1)
 
 
-def volume_of_point(model, result, estimate: bool = True) -> dict:
+def _measure_volume_of_point(model, result, *, estimate: bool = True) -> dict:
     """Return worn_volume of a single point under [normal] by name.
 
     It is coefficient times load times slip path, over all cycles of wear.
@@ -352,74 +354,65 @@ def volume_of_point(model, result, estimate: bool = True) -> dict:
     estimate : bool
         Whether the error is computed.
     """
-    path, miss = slip_path_of_point(
-        model, result.window, {name: m.value for name, m in result.measures.items()}
-    )
-    value = model.wear.coefficient * model.point.load * path * model.wear.cycles
-    error = (miss + slip_miss(result.measures) + 1e-12) * value if estimate else None
-    return {
-        "worn_volume": Measure(
-            value, TABLE["worn_volume"].unit, error, TABLE["worn_volume"].floor, engine=WORN_SOURCE
-        )
-    }
+    motion = {name: measure.value for name, measure in result.measures.items()}
+    path, path_error = slip_path_of_point(model, result.window, motion)
+    volume = model.wear.coefficient * model.point.load * path * model.wear.cycles
+    error = None
+    if estimate:
+        error = (path_error + _slip_error(result.measures) + ROUND_OFF) * volume
+    return {"worn_volume": _make_measure("worn_volume", volume, error, WORN_SOURCE)}
 
 
-def frames(found, fields: dict, period: float) -> dict:
-    """Return the fields (frame, x) of the wear and of the last cycle by name.
+def _add_frames(result, evolved):
+    """Return the Result with the fields (frame, x) of the wear before those of the last cycle.
 
     The states after some of the jumps come first, then the motion. The time of a state is its cycle
     times the period, and the last cycle follows. The worn depth of strips is (frame, strip, x).
-
-    Parameters
-    ----------
-    found : Evolved
-    fields : dict
-        Fields of the last cycle.
-    period : float
-        Period [s].
     """
-    pick = np.unique(np.linspace(0, len(found.moments) - 1, FRAMES).round().astype(int))
-    shown = [found.moments[k] for k in pick[:-1]] if len(pick) > 1 else []
-    count = len(shown)
-    m = found.patch.x.size
-    depth = np.repeat(found.state.depth[None], len(fields["time"]), axis=0)
-    states = {
-        "time": np.array([one.cycle for one in shown]) * period,
-        "normal_stress": np.array([one.pressure for one in shown]).reshape(count, m),
-        "gap": np.array([one.gap for one in shown]).reshape(count, m),
-        "status": np.array([one.pressure > 0 for one in shown], np.int8).reshape(count, m),
-        "worn_depth": np.array([one.depth for one in shown]).reshape(
-            count, *found.state.depth.shape
-        ),
+    period = find_period(result.plan.model, result)
+    motion = result.fields
+    n_motion = len(motion["time"])
+    numbers = np.linspace(0, len(evolved.moments) - 1, N_FRAMES).round().astype(int)
+    states = [evolved.moments[number] for number in np.unique(numbers)[:-1]]
+    n_states = len(states)
+    depth = evolved.state.depth
+    pressure = np.array([state.pressure for state in states])
+    pressure = pressure.reshape(n_states, evolved.patch.x.size)
+    wear = {
+        "time": np.array([state.cycle for state in states]) * period,
+        "normal_stress": pressure,
+        "gap": np.array([state.gap for state in states]).reshape(pressure.shape),
+        "status": (pressure > 0).astype(np.int8),
+        "worn_depth": np.array([state.depth for state in states]).reshape(n_states, *depth.shape),
     }
-    moving = fields | {
-        f"holder_{name}": np.full(len(fields["time"]), getattr(found.patch.pressure, of))
-        for name, of in HOLDER.items()
+    motion = motion | {
+        "time": motion["time"] + evolved.state.cycle * period,
+        "worn_depth": np.repeat(depth[None], n_motion, axis=0),
     }
-    states |= {
-        f"holder_{name}": np.array([one.values[of] for one in shown]) for name, of in HOLDER.items()
-    }
-    moving |= {"time": fields["time"] + found.state.cycle * period, "worn_depth": depth}
-    return {
-        name: np.concatenate([states.get(name, np.zeros((count, *np.shape(values)[1:]))), values])
-        for name, values in moving.items()
-    }
+    for field, name in HOLDER.items():
+        wear[f"holder_{field}"] = np.array([state.values[name] for state in states])
+        value = getattr(evolved.patch.pressure, name)
+        motion[f"holder_{field}"] = np.full(n_motion, value)
+    fields = {}
+    for name, field in motion.items():
+        zeros = np.zeros((n_states, *np.shape(field)[1:]))
+        fields[name] = np.concatenate([wear.get(name, zeros), field])
+    shown = {"period": period, "states": n_states}
+    return replace(result, fields=fields, extra=result.extra | {"wear_shown": shown})
 
 
-def history(found) -> dict:
+def _history(evolved) -> dict:
     """Return measures over the cycles (j,) by name, with `cycle` and `EDGE_PEAK`.
 
     They are those that all moments have.
     """
-    moments = found.moments
-    names = [
-        name for name in moments[-1].values if all(name in moment.values for moment in moments)
-    ]
-    return (
-        {"cycle": np.array([moment.cycle for moment in moments])}
-        | {name: np.array([moment.values[name] for moment in moments], float) for name in names}
-        | {EDGE_PEAK: np.array([edge_peak(moment.pressure) for moment in moments])}
-    )
+    moments = evolved.moments
+    history = {"cycle": np.array([moment.cycle for moment in moments])}
+    for name in moments[-1].values:
+        if all(name in moment.values for moment in moments):
+            history[name] = np.array([moment.values[name] for moment in moments], float)
+    history[EDGE_PEAK] = np.array([edge_peak(moment.pressure) for moment in moments])
+    return history
 
 
 def edge_peak(pressure) -> float:
@@ -429,12 +422,12 @@ def edge_peak(pressure) -> float:
     between two nodes moves as the pieces wear, and the element at the edge carries part of the load
     of its neighbours: the error of such a peak is this excess. pressure: (m,) [Pa].
     """
-    bears = np.asarray(pressure) > 0
-    top = int(np.argmax(pressure))
-    inside = (
-        np.convolve(np.pad(bears, N_EDGE_NODES, "edge"), np.ones(2 * N_EDGE_NODES + 1), "valid")
-        > 2 * N_EDGE_NODES
-    )
-    if inside[top] or not (bears & inside).any():
+    pressure = np.asarray(pressure)
+    is_loaded = pressure > 0
+    width = 2 * N_EDGE_NODES + 1
+    padded = np.pad(is_loaded, N_EDGE_NODES, "edge")
+    is_inside = np.convolve(padded, np.ones(width), "valid") > width - 1
+    peak = int(np.argmax(pressure))
+    if is_inside[peak] or not (is_loaded & is_inside).any():
         return 0.0
-    return float(pressure[top] - np.asarray(pressure)[inside].max())
+    return float(pressure[peak] - pressure[is_inside].max())

@@ -13,23 +13,21 @@ from ..cost import Cost
 from .evolve import next_row
 
 SOLVES_PER_JUMP = 20  # contact solutions per jump, with its corrections
-SOLVES_PER_STRIP = (
-    7  # contact solutions per jump and strip, because each starts from the previous one
-)
+# contact solutions per jump and strip, because each starts from the previous one
+SOLVES_PER_STRIP = 7
 # fraction of the cost of a motion with its coarse runs that the fine run has; includes more active
 # nodes by wear
 FINE_RUN_FRACTION = 0.7
 # CPU seconds per squared number of interface points of a contact solution, including its measures
 SOLVE_SECONDS = 1.2e-8
-# springs of the row whose jumps are counted; most of them for a prescribed mesh
-ROW, FINE = 192, 1000
-# thickness of the springs over the length in contact, inside a patch; factor of the same at an end
-# of it
-INNER_THICKNESS, END_THICKNESS = (
-    0.3,
-    0.44,
-)
-SMOOTH = 8  # jumps of a patch whose asperities touch everywhere
+JUMP_SECONDS = 5e-3  # CPU seconds of a jump besides its contact solutions
+N_SPRINGS = 192  # springs of the row whose jumps are counted
+MAX_SPRINGS = 1000  # most springs of the row for a prescribed mesh
+# thickness of the springs over the length in contact, inside a patch
+INNER_THICKNESS_RATIO = 0.3
+# the same at an end of it, over the root of this length and the height of a piece
+END_THICKNESS_RATIO = 0.44
+N_SMOOTH_JUMPS = 8  # jumps of a patch whose asperities touch everywhere
 MAX_COUNTED_JUMPS = 1500  # most jumps that are counted
 
 
@@ -41,98 +39,107 @@ def jumps_about(model) -> int:
     freely with the drive; multiplied by 0.6 tolerance^-0.18, because the edges of a contact of
     pieces need more (193 nodes, tilts and crowns, 1e4 to 1e8 cycles, tolerances of 1e-2 and 1e-3).
     """
-    asked = model.patch
+    patch = model.patch
     wear = model.wear
     if wear.jumps:
         return wear.jumps
-    skin = asked.interface.skin
-    pieces = asked.pieces
-    size = asked.mesh.element_size
-    if (skin is not None and skin.law != "linear") or not asked.loading.load:
-        return SMOOTH
-    most = max(ROW, min(int(pieces.length / size), FINE)) if size else ROW
-    x = np.linspace(-pieces.length / 2, pieces.length / 2, most + 1)
+    skin = patch.interface.skin
+    pieces = patch.pieces
+    size = patch.mesh.element_size
+    if (skin is not None and skin.law != "linear") or not patch.loading.load:
+        return N_SMOOTH_JUMPS
+    count = max(N_SPRINGS, min(int(pieces.length / size), MAX_SPRINGS)) if size else N_SPRINGS
+    x = np.linspace(-pieces.length / 2, pieces.length / 2, count + 1)
     area = np.gradient(x) * pieces.width * pieces.pairs
-    press = _springs(asked, x, area)
-    path = np.full(x.size, _path_about(model))
+    springs = _SpringRow(patch, x, area)
     law = model.friction
-    path = path * (law.static if wear.uses_friction_work else 1.0)
+    path = np.full(x.size, _path_about(model))
+    if wear.uses_friction_work:
+        path = path * law.static
 
-    def changing(worn):
+    def slip_path(depth):
         """Return the slip path with the friction coefficient at the mean worn depth."""
-        mean = float(worn @ area / area.sum())
-        if not law.static:
+        if not wear.uses_friction_work or wear.friction is None or not law.static:
             return path
+        mean = float(depth @ area / area.sum())
         return path * (wear.friction.compute_worn_law(law, mean).static / law.static)
 
-    slides = (
-        changing if wear.uses_friction_work and wear.friction is not None else lambda worn: path
-    )
-    row = WearProblem(press, slides, area, wear.coefficient, wear.cycles)
+    row = WearProblem(springs.press, slip_path, area, wear.coefficient, wear.cycles)
     state = start_wear(row, wear.compute_earlier_depth(x, area))
-    count = 0
-    while state.cycle < wear.cycles and count < MAX_COUNTED_JUMPS:
+    jumps = 0
+    while state.cycle < wear.cycles and jumps < MAX_COUNTED_JUMPS:
         state = take_jump(row, state, model.accuracy.tolerance, until=next_row(wear, row, state))
-        count = count + 1
-    least = min(count, 6)
-    return round(least + (count - least) * 0.6 * model.accuracy.tolerance**-0.18)
+        jumps = jumps + 1
+    first_jumps = min(jumps, 6)
+    return round(first_jumps + (jumps - first_jumps) * 0.6 * model.accuracy.tolerance**-0.18)
 
 
 def _path_about(model) -> float:
     """Return the slip path [m] of a cycle, without friction on the mass of a rig."""
     if model.rig is None:
         return (4.0 if model.slide.period else 1.0) * model.slide.amplitude
-    return (
-        4
-        * find_max_acceleration(model.rig.drive.signal)
-        / find_drive_omega(model.rig.drive.signal) ** 2
-    )
+    signal = model.rig.drive.signal
+    return 4 * find_max_acceleration(signal) / find_drive_omega(signal) ** 2
 
 
-def _springs(asked, x, area):
-    """Return the forces of a row of springs under the load of a `PatchModel`.
+class _SpringRow:
+    """Row of springs that carries the load of a patch.
 
-    They are a function of worn depth and softening; x: positions (m,) [m], area: (m,) [m2].
+    Parameters
+    ----------
+    patch : PatchModel
+    x, area : (m,)
+        Positions [m] and areas [m2] of the springs.
     """
-    try:
-        gap = asked.gap.evaluate(x).heights
-    except PatchfemError:  # the profile is too fine for the row
-        gap = np.zeros_like(x)
-    gap = gap - np.polyval(np.polyfit(x, gap, 1), x) if asked.loading.can_rotate else gap
-    compliance = asked.pieces.series_compliance(
-        lambda m: (1 + m.poisson) * (1 - 2 * m.poisson) / (1 - m.poisson) / m.young
-    )
-    solid = compliance * area.sum()
-    # the depth that deforms is proportional to the length in contact
-    share = 1.0
-    height = max(asked.pieces.lower.height, asked.pieces.upper.height)
-    for _ in range(12):
-        soft = solid * min(share, 1.0) + (
-            1 / asked.interface.skin.normal_stiffness if asked.interface.skin is not None else 0.0
+
+    def __init__(self, patch, x, area):
+        self.area = area
+        self.load = patch.loading.load
+        self.gap = _row_gap(patch, x)
+        pieces = patch.pieces
+        skin = patch.interface.skin
+        skin_compliance = 0.0 if skin is None else 1 / skin.normal_stiffness
+        solid = area.sum() * pieces.series_compliance(
+            lambda m: (1 + m.poisson) * (1 - 2 * m.poisson) / (1 - m.poisson) / m.young
         )
+        height = max(pieces.lower.height, pieces.upper.height)
+        # the depth that deforms is proportional to the length in contact
+        fraction = 1.0
+        unworn = np.zeros_like(x)
+        for _ in range(12):
+            self.compliance = solid * min(fraction, 1.0) + skin_compliance
+            is_loaded = self.press(unworn, unworn) > 0
+            length = pieces.length * float(is_loaded @ area) / area.sum()
+            if is_loaded[0] or is_loaded[-1]:
+                new_fraction = END_THICKNESS_RATIO * (length / height) ** 0.5
+            else:
+                new_fraction = INNER_THICKNESS_RATIO * length / height
+            fraction = (fraction + new_fraction) / 2
 
-        def press(worn, softening, soft=soft):
-            """Return the forces (m,) [N] of the springs."""
-            stiff = 1 / (soft / area + softening)
-            level = gap + worn
-            order = np.argsort(level)
-            rising = level[order]
-            carried = np.cumsum(stiff[order])
-            depth = (asked.loading.load + np.cumsum(stiff[order] * rising)) / carried
-            last = np.flatnonzero(depth[:-1] <= rising[1:])
-            return stiff * np.maximum(depth[last[0] if last.size else -1] - level, 0.0)
+    def press(self, worn, softening) -> np.ndarray:
+        """Return the forces (m,) [N] at a worn depth (m,) [m].
 
-        bears = press(np.zeros_like(x), np.zeros_like(x)) > 0
-        long = asked.pieces.length * float(bears @ area) / area.sum()
-        share = (
-            share
-            + (
-                END_THICKNESS * (long / height) ** 0.5
-                if bears[0] or bears[-1]
-                else INNER_THICKNESS * long / height
-            )
-        ) / 2
-    return press
+        softening: additional compliance (m,) [m/N].
+        """
+        stiffness = 1 / (self.compliance / self.area + softening)
+        level = self.gap + worn
+        order = np.argsort(level)
+        levels = level[order]
+        carried = np.cumsum(stiffness[order])
+        depth = (self.load + np.cumsum(stiffness[order] * levels)) / carried
+        ends = np.flatnonzero(depth[:-1] <= levels[1:])
+        return stiffness * np.maximum(depth[ends[0] if ends.size else -1] - level, 0.0)
+
+
+def _row_gap(patch, x) -> np.ndarray:
+    """Return the gap (m,) [m] of a row of springs, without its tilt if the piece can rotate."""
+    try:
+        gap = patch.gap.evaluate(x).heights
+    except PatchfemError:  # the profile is too fine for the row
+        return np.zeros_like(x)
+    if patch.loading.can_rotate:
+        gap = gap - np.polyval(np.polyfit(x, gap, 1), x)
+    return gap
 
 
 def _changes_motion(model) -> bool:
@@ -159,18 +166,16 @@ def cost(model, points: int, motion: float) -> Cost:
     """
     jumps = jumps_about(model)
     strips = model.patch.interface.strips
-    again = FINE_RUN_FRACTION * motion if _changes_motion(model) else 0.0
-    pressings = (
-        SOLVES_PER_JUMP if strips is None else max(SOLVES_PER_JUMP, SOLVES_PER_STRIP * strips.count)
-    )
-    seconds = jumps * (pressings * SOLVE_SECONDS * points**2 + 5e-3 + again)
-    number = (
-        f"{jumps} jumps"
-        if model.wear.jumps
-        else f"about {jumps} jumps (the run chooses their number)"
-    )
-    once = "with the motion computed only once, because wear does not change it"
-    shared = "with the motion computed again after each jump" if _changes_motion(model) else once
-    return Cost(
-        {"wear": seconds}, words=(f"wear: {model.wear.cycles:.6g} cycles in {number} {shared}",)
-    )
+    solves = SOLVES_PER_JUMP
+    if strips is not None:
+        solves = max(solves, SOLVES_PER_STRIP * strips.count)
+    jump_seconds = solves * SOLVE_SECONDS * points**2 + JUMP_SECONDS
+    repetition = "with the motion computed only once, because wear does not change it"
+    if _changes_motion(model):
+        jump_seconds += FINE_RUN_FRACTION * motion
+        repetition = "with the motion computed again after each jump"
+    number = f"{jumps} jumps"
+    if not model.wear.jumps:
+        number = f"about {jumps} jumps (the run chooses their number)"
+    words = f"wear: {model.wear.cycles:.6g} cycles in {number} {repetition}"
+    return Cost({"wear": jumps * jump_seconds}, words=(words,))

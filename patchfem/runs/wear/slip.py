@@ -23,7 +23,10 @@ UNBOUNDED_OUTCOMES = (
     Outcome.LEAVES_GROOVES,
     Outcome.NOT_CONVERGED,
 )
-LEAST_FRAMES, MOST_FRAMES = 64, 800
+MIN_FRAMES = 64  # smallest number of frames per cycle
+MAX_FRAMES = 800  # largest number of frames per cycle
+# error by reversals between samples over the mean change without two of three samples (`_thinned_error`)
+THINNING_FACTOR = 1.5
 
 
 class CycleSlip(NamedTuple):
@@ -31,16 +34,16 @@ class CycleSlip(NamedTuple):
 
     - path: slip path of each node (m,), of strips (s, m) [m]. With form 'energy' it is friction
       work per area over pressure, and over grooves it is along their flanks.
-    - miss: relative error due to the number of frames and to differences between the cycles of the
+    - error: relative error due to the number of frames and to differences between the cycles of the
       window.
     - values: measures of the motion by name.
     - outcome: reason why no cycle is periodic, else None.
     """
 
     path: np.ndarray
-    miss: float
-    values: dict
-    outcome: Outcome | None
+    error: float
+    values: dict | None = None
+    outcome: Outcome | None = None
 
 
 def frames_for(tolerance: float) -> int:
@@ -48,7 +51,7 @@ def frames_for(tolerance: float) -> int:
 
     A reversal between two of k frames of a sine hides up to (pi/k)^2/2 of the amplitude.
     """
-    return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), LEAST_FRAMES, MOST_FRAMES))
+    return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), MIN_FRAMES, MAX_FRAMES))
 
 
 def slips_uniformly(model, per_point: bool = False) -> bool:
@@ -68,85 +71,126 @@ def strips_slide_independently(model) -> bool:
 def slip_of_cycle(model, patch, frames: int) -> CycleSlip:
     """Return the slip of one converged cycle of a model on a patch.
 
-    frames: number of frames of the interface from which it is computed.
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    frames : int
+        Number of frames of the interface from which it is computed.
     """
-    return _bench(model, patch, frames) if model.rig is None else _rig(model, patch, frames)
+    if model.rig is None:
+        return _slip_of_bench(model, patch, frames)
+    return _slip_of_rig(model, patch, frames)
 
 
-def _bench(model, patch, frames: int) -> CycleSlip:
+class _Cycle(NamedTuple):
+    """Samples (k,) of a cycle.
+
+    - slide, slip: [m].
+    - force, load: [N].
+    """
+
+    slide: np.ndarray
+    slip: np.ndarray
+    force: np.ndarray
+    load: np.ndarray
+
+
+class Frames(NamedTuple):
+    """Frames of the interface in a cycle, in its f samples.
+
+    - slip, tau (f, m): local slip [m] and shear stress [Pa].
+    - is_closed: whether the last frame is followed by the first one.
+    """
+
+    slip: np.ndarray
+    tau: np.ndarray
+    is_closed: bool
+
+
+def _slip_of_bench(model, patch, frames: int) -> CycleSlip:
     """Return the slip of the last cycle of a bench."""
     cycles = max(1, round(model.slide.cycles or 1))
-    steps = steps_per_cycle(model)
-    shaped = not slips_uniformly(model)
-    found = bench.run(model, patch, steps, frames * cycles if shaped else 0)
-    outcome = outcome_on_piece(None, model.patch, patch, found.slide)
-    if shaped:
-        last = found.frames >= found.first
-        local = found.local[last]
-        tau = found.tau[last]
-        slide = found.slide[found.frames[last]]
-        if found.first == 0:
-            local, tau = (
-                np.concatenate([np.zeros((1, part.shape[1])), part]) for part in (local, tau)
-            )
-            slide = np.append(0.0, slide)
-            if model.grooves is not None:  # at the start the load rests on the flank of a groove
-                tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
-        if model.grooves is not None:
-            local, tau = slip_path(
-                model, patch, slide, np.full(slide.size, patch.pressure.load), local, tau
-            )
-        return _read(model, patch, local, tau, False, found.values, outcome)
-    last = [part[found.first :] for part in (found.slide, found.slip, found.force, found.load)]
-    return _uniform_slip(model, patch, last, last[-1][0], found.values, outcome)
+    is_uniform = slips_uniformly(model)
+    run = bench.run(model, patch, steps_per_cycle(model), 0 if is_uniform else frames * cycles)
+    outcome = outcome_on_piece(None, model.patch, patch, run.slide)
+    if is_uniform:
+        cycle = _last_bench_cycle(run)
+        slip = _uniform_slip(model, patch, cycle, cycle.load[0])
+        return slip._replace(values=run.values, outcome=outcome)
+    is_last = run.frames >= run.first
+    local = run.local[is_last]
+    tau = run.tau[is_last]
+    slide = run.slide[run.frames[is_last]]
+    if run.first == 0:
+        start = np.zeros((1, patch.x.size))
+        local = np.concatenate([start, local])
+        tau = np.concatenate([start, tau])
+        slide = np.append(0.0, slide)
+        if model.grooves is not None:  # at the start the load rests on the flank of a groove
+            tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
+    if model.grooves is not None:
+        load = np.full(slide.size, patch.pressure.load)
+        local, tau = slip_path(model, patch, slide, load, local, tau)
+    slip = slip_of_frames(model, patch, Frames(local, tau, is_closed=False))
+    return slip._replace(values=run.values, outcome=outcome)
 
 
-def _rig(model, patch, frames: int) -> CycleSlip:
+def _slip_of_rig(model, patch, frames: int) -> CycleSlip:
     """Return the slip of the last cycle of a rig."""
     chosen = numerics.choose(model)
-    shaped = not slips_uniformly(model, chosen.per_point and model.grooves is None)
-    found = solve.solve(model, chosen, patch, frames if shaped else 0)
-    amplitude = Measure(found.values["relative_displacement_amplitude"], "m", 0.0)
-    wanted = {"relative_displacement_amplitude": amplitude}
-    settled, _ = judge_outcome(found, wanted, model.accuracy.tolerance, model.rig.drive.signal)
-    last = _last_cycle(model, found.window, patch.pressure.load)
-    beat = _beat(found.values, last[1])
-    outcome = outcome_on_piece(
-        settled if settled in UNBOUNDED_OUTCOMES else None, model.patch, patch, found.response.slide
+    is_uniform = slips_uniformly(model, chosen.per_point and model.grooves is None)
+    solution = solve.solve(model, chosen, patch, 0 if is_uniform else frames)
+    amplitude = Measure(solution.values["relative_displacement_amplitude"], "m", 0.0)
+    outcome, _ = judge_outcome(
+        solution,
+        {"relative_displacement_amplitude": amplitude},
+        model.accuracy.tolerance,
+        model.rig.drive.signal,
     )
-    if shaped:
-        slip_frames = fields.collect_frames(model, chosen, patch, found)
-        local = slip_frames["slip"][1:]
-        tau = slip_frames["shear_stress"][1:]
-        if model.grooves is not None:
-            slide = slip_frames["holder_slide"][1:]
-            time = slip_frames["time"][1:]
-            window = found.response
-            lifted = np.interp(
-                time,
-                window.time,
-                window.extra.get("normal_load", np.full(window.time.size, patch.pressure.load)),
-            )
-            local, tau = slip_path(model, patch, slide, lifted, local, tau)
-        out = _read(model, patch, local, tau, True, found.values, outcome)
-    elif strips_slide_independently(model):
-        out = _slip_of_strips(model, patch, found, outcome)
+    outcome = outcome_on_piece(
+        outcome if outcome in UNBOUNDED_OUTCOMES else None,
+        model.patch,
+        patch,
+        solution.response.slide,
+    )
+    cycle = _last_rig_cycle(model, solution.window, patch.pressure.load)
+    if strips_slide_independently(model) and is_uniform:
+        slip = _slip_of_strips(model, patch, solution.window)
+    elif is_uniform:
+        slip = _uniform_slip(model, patch, cycle, patch.pressure.load)
     else:
-        out = _uniform_slip(model, patch, last, patch.pressure.load, found.values, outcome)
-    return out._replace(miss=out.miss + beat)
+        frame_fields = fields.collect_frames(model, chosen, patch, solution)
+        frame_fields = {name: values[1:] for name, values in frame_fields.items()}
+        local = frame_fields["slip"]
+        tau = frame_fields["shear_stress"]
+        if model.grooves is not None:
+            response = solution.response
+            constant = np.full(response.time.size, patch.pressure.load)
+            load = np.interp(
+                frame_fields["time"],
+                response.time,
+                response.extra.get("normal_load", constant),
+            )
+            local, tau = slip_path(model, patch, frame_fields["holder_slide"], load, local, tau)
+        slip = slip_of_frames(model, patch, Frames(local, tau, is_closed=True))
+    error = slip.error + _beat_error(solution.values, cycle)
+    return slip._replace(error=error, values=solution.values, outcome=outcome)
 
 
-def _beat(values: dict, slip) -> float:
+def _beat_error(values: dict, cycle: _Cycle) -> float:
     """Return the relative difference between the slip amplitudes of the last cycle and the window.
 
-    It is due to a mode that still beats. slip: (k,) [m] of the last cycle.
+    It is due to a mode that still beats.
     """
-    own = float(np.ptp(slip)) / 2
-    whole = values.get("slip_amplitude")
-    return abs(whole / own - 1) if whole is not None and own > 0 else 0.0
+    amplitude = float(np.ptp(cycle.slip)) / 2
+    window_amplitude = values.get("slip_amplitude")
+    if window_amplitude is None or amplitude <= 0:
+        return 0.0
+    return abs(window_amplitude / amplitude - 1)
 
 
-def slip_path_of_point(model, window, values: dict) -> tuple:
+def slip_path_of_point(model, window, values: dict) -> tuple[float, float]:
     """Return the slip path [m] of one cycle of a point under [normal], and its relative error.
 
     It is weighted with the load if that changes. The error is that by differences between the
@@ -160,87 +204,102 @@ def slip_path_of_point(model, window, values: dict) -> tuple:
     values : dict
         Measures by name.
     """
-    beat = 0.0
-    if model.rig is not None:
-        last = _last_cycle(model, window, model.point.load)
-        beat = _beat(values, last[1])
+    beat_error = 0.0
+    if model.rig is None:
+        cycle = _last_bench_cycle(window)
     else:
-        last = [
-            part[window.first :] for part in (window.slide, window.slip, window.force, window.load)
-        ]
-    found = _uniform_slip(model, None, last, last[-1][0], {}, None)
-    return float(found.path[0]), found.miss + beat
+        cycle = _last_rig_cycle(model, window, model.point.load)
+        beat_error = _beat_error(values, cycle)
+    slip = _uniform_slip(model, None, cycle, cycle.load[0])
+    return float(slip.path[0]), slip.error + beat_error
 
 
-def _last_cycle(model, window, load: float) -> list:
-    """Return slide [m], slip [m], force [N] and load [N] (k,) of the last cycle of a rig.
+def _last_bench_cycle(run) -> _Cycle:
+    """Return the last cycle of a bench."""
+    histories = (run.slide, run.slip, run.force, run.load)
+    return _Cycle(*(history[run.first :] for history in histories))
 
-    Over grooves the load is the vertical force.
-    """
-    last = window.time >= window.time[-1] - model.rig.drive.signal.period * (1 + 1e-9)
+
+def _last_rig_cycle(model, window, load: float) -> _Cycle:
+    """Return the last cycle of a rig under a load [N]; over grooves it is the vertical force."""
+    is_last = _is_in_last_cycle(model, window)
     loads = window.extra.get("normal_load", np.full(window.time.size, load))
-    return [part[last] for part in (window.slide, window.slip, window.force, loads)]
+    histories = (window.slide, window.slip, window.force, loads)
+    return _Cycle(*(history[is_last] for history in histories))
 
 
-def _slip_of_strips(model, patch, found, outcome) -> CycleSlip:
+def _is_in_last_cycle(model, window) -> np.ndarray:
+    """Return which samples of a window are in its last cycle."""
+    period = model.rig.drive.signal.period
+    return window.time >= window.time[-1] - period * (1 + 1e-9)
+
+
+def _slip_of_strips(model, patch, window) -> CycleSlip:
     """Return the slip of every strip of a rig with yaw, along x.
 
-    An open strip has the slip of the nearest strip in contact. Every third sample shows the error
-    by reversals between samples, as in `_read`.
+    An open strip has the slip of the nearest strip in contact.
     """
-    window = found.window
     loads = patch.strips.force.sum(axis=1)
-    last = window.time >= window.time[-1] - model.rig.drive.signal.period * (1 + 1e-9)
-    slips = window.extra.get("slips", window.extra["slides"])[last]
-    forces = window.extra["forces"][last]
-    weight = (
-        np.abs(forces) / np.where(loads > 0, loads, 1.0)
-        if model.wear.uses_friction_work
-        else np.ones_like(slips)
-    )
+    is_last = _is_in_last_cycle(model, window)
+    slips = window.extra.get("slips", window.extra["slides"])[is_last]
+    weight = np.ones_like(slips)
+    if model.wear.uses_friction_work:
+        forces = window.extra["forces"][is_last]
+        weight = np.abs(forces) / np.where(loads > 0, loads, 1.0)
 
-    def path(some) -> np.ndarray:
+    def path(samples) -> np.ndarray:
         """Return the slip path (s,) [m] of the strips from some samples."""
-        return np.array(
-            [_integrate(slip, heavy) for slip, heavy in zip(slips[some].T, weight[some].T)]
-        )
+        columns = zip(slips[samples].T, weight[samples].T)
+        return np.array([_integrate(slip, strip_weight) for slip, strip_weight in columns])
 
-    whole = path(np.arange(len(slips)))
-    ends = [0, len(slips) - 1]
-    lost = [
-        (whole - path(np.unique([*ends, *range(first, len(slips), 3)]))) @ loads
-        for first in range(3)
-    ]
-    total = float(whole @ loads)
+    paths = path(np.arange(len(slips)))
+    error = _thinned_error(path, len(slips), paths, loads)
     nearest = _nearest(patch.strips.offsets, loads > 0)
-    return CycleSlip(
-        np.repeat(whole[nearest, None], patch.x.size, axis=1),
-        1.5 * float(np.mean(np.abs(lost))) / total if total > 0 else 0.0,
-        found.values,
-        outcome,
-    )
+    return CycleSlip(np.repeat(paths[nearest, None], patch.x.size, axis=1), error)
 
 
-def _uniform_slip(model, patch, last: list, scale: float, values: dict, outcome) -> CycleSlip:
-    """Return the slip that is the same at every point, over `scale` [N].
+def _thinned_error(path, count: int, fine, weight, is_closed: bool = False) -> float:
+    """Return the relative error of a slip path by reversals between samples.
 
-    last: slide, slip, force and load (k,) of the last cycle.
+    A reversal between two samples hides f(d) of the path, d <= 1/2 of their distance. Every third
+    sample hides f(d), f(1 - d) or f(1 + d), for the first, second or third choice: 3/2 of the mean
+    excess contains f(d) for any d, for a corner f = c d as well as for a smooth reversal f = c d^2.
+
+    Parameters
+    ----------
+    path : callable
+        Function from indices of samples to the slip paths (m,) [m].
+    count : int
+        Number of samples.
+    fine, weight : (m,)
+        Slip paths from all samples [m], and their weights.
+    is_closed : bool
+        Whether the last sample is followed by the first one.
     """
-    slide, slip, force, load = last
+    total = float(fine @ weight)
+    if total <= 0:
+        return 0.0
+    ends = [] if is_closed else [0, count - 1]
+    changes = []
+    for first in range(3):
+        samples = np.unique([*ends, *range(first, count, 3)]).astype(int)
+        changes.append(abs(float((fine - path(samples)) @ weight)))
+    return THINNING_FACTOR * float(np.mean(changes)) / total
+
+
+def _uniform_slip(model, patch, cycle: _Cycle, load: float) -> CycleSlip:
+    """Return the slip of a cycle that is the same at every point, over a load [N]."""
+    slip = cycle.slip
     # friction opposes the slip, also in a step with a reversal
-    weight = np.abs(force) if model.wear.uses_friction_work else load
-    miss = 0.0
+    weight = np.abs(cycle.force) if model.wear.uses_friction_work else cycle.load
+    error = 0.0
     if model.grooves is not None:
-        weight = along_flanks(model, slide, force, load)
-    path = _integrate(slip, weight) / scale if scale > 0 else 0.0
+        weight = along_flanks(model, cycle.slide, cycle.force, cycle.load)
+    path = _integrate(slip, weight) / load if load > 0 else 0.0
     if model.grooves is not None and path > 0:
-        miss = abs(path - _integrate(slip[::2], weight[::2]) / scale) / path
-    return CycleSlip(
-        np.full(1 if patch is None else areas(model.patch, patch.pieces.interface).shape, path),
-        miss,
-        values,
-        outcome,
-    )
+        error = abs(path - _integrate(slip[::2], weight[::2]) / load) / path
+    shape = 1 if patch is None else areas(model.patch, patch.pieces.interface).shape
+    return CycleSlip(np.full(shape, path), error)
 
 
 def _integrate(slip, weight) -> float:
@@ -287,63 +346,43 @@ def slip_path(model, patch, slide, vertical, local, tau) -> tuple:
     local, tau : (f, m)
         Slip [m] and resultant traction [Pa].
     """
-    g = model.grooves
+    grooves = model.grooves
     sigma = patch.pressure.sigma_n
-    t = g.slope(slide)[:, None]
-    long = np.sqrt(1 + t * t)
+    slope = grooves.slope(slide)[:, None]
+    stretch = np.sqrt(1 + slope**2)  # length of the flank over the slide
     carried = (vertical / patch.pressure.load)[:, None] * sigma
-    steps = integrate_steps(slide, lambda q: np.hypot(1, g.slope(q)))
+    steps = integrate_steps(slide, lambda places: np.hypot(1, grooves.slope(places)))
     path = np.append(0.0, np.cumsum(steps))
     if model.wear.uses_friction_work:
-        worn = np.abs(tau - t * carried)
+        stress = np.abs(tau - slope * carried)
     else:
-        worn = np.maximum(carried + tau * t, 0.0)
-    return path[:, None] - (slide[:, None] - local) * long, worn / long
+        stress = np.maximum(carried + tau * slope, 0.0)
+    return path[:, None] - (slide[:, None] - local) * stretch, stress / stretch
 
 
-def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> CycleSlip:
-    """Return the slip path of every node from frames of local slip and shear stress.
+def slip_of_frames(model, patch, frames: Frames) -> CycleSlip:
+    """Return the slip path of every node; over grooves, the frames are those of `slip_path`."""
+    count = len(frames.slip)
 
-    Over grooves, the frames are those of `slip_path`. A reversal between two frames hides f(d)
-    of the path, d <= 1/2 of their distance. Every third frame hides f(d), f(1 - d) or f(1 + d), for
-    the first, second or third choice: 3/2 of the mean excess contains f(d) for any d, for a corner
-    f = c d as well as for a smooth reversal f = c d^2.
+    def path(indices) -> np.ndarray:
+        """Return the slip path (m,) [m] of the nodes from some frames."""
+        return _path(model, patch, frames, indices)
 
-    Parameters
-    ----------
-    model : Model
-    patch : Patch
-    local, tau : (f, m)
-        Local slip [m] and shear stress [Pa].
-    closed : bool
-        Whether the last frame is followed by the first one.
-    values : dict
-        Measures by name.
-    outcome : Outcome or None
-    """
-    path = _path(model, patch, local, tau, closed)
+    paths = path(np.arange(count))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    ends = [] if closed else [0, len(local) - 1]
-    thirds = [np.unique([*ends, *range(first, len(local), 3)]).astype(int) for first in range(3)]
-    lost = [
-        abs(float((path - _path(model, patch, local[at], tau[at], closed)) @ force))
-        for at in thirds
-    ]
-    total = float(path @ force)
-    return CycleSlip(
-        path, 1.5 * float(np.mean(lost)) / total if total > 0 else 0.0, values, outcome
-    )
+    return CycleSlip(paths, _thinned_error(path, count, paths, force, frames.is_closed))
 
 
-def _path(model, patch, local, tau, closed: bool) -> np.ndarray:
-    """Return the slip path (m,) [m] of the nodes from frames."""
-    if closed:
-        local, tau = (np.concatenate([part[-1:], part]) for part in (local, tau))
-    steps = np.abs(np.diff(local, axis=0))
+def _path(model, patch, frames: Frames, indices) -> np.ndarray:
+    """Return the slip path (m,) [m] of the nodes from some frames."""
+    if frames.is_closed:
+        indices = np.append(indices[-1:], indices)
+    steps = np.abs(np.diff(frames.slip[indices], axis=0))
     sigma = patch.pressure.sigma_n
     path = steps.sum(axis=0)
     if model.wear.uses_friction_work or model.grooves is not None:
-        work = np.sum(steps * (np.abs(tau[1:]) + np.abs(tau[:-1])) / 2, axis=0)
+        tau = np.abs(frames.tau[indices])
+        work = np.sum(steps * (tau[1:] + tau[:-1]) / 2, axis=0)
         path = np.divide(work, sigma, out=np.zeros_like(work), where=sigma > 0)
     return path[_nearest(patch.x, sigma > 0)]
 

@@ -85,7 +85,7 @@ def test_exact_cases_are_found_by_their_names_in_any_order(tmp_path):
     assert (wanted.held >= 0).tolist() == [True] * 5 + [False]
     total = CaseResults.blank(6)
     for at, part in wanted.parts(np.arange(6)):
-        total.place(at, part)
+        total.insert(at, part)
     want = [second.values["loop_area"][k] for k in (3, 0)]
     np.testing.assert_array_equal(
         total.values["loop_area"],
@@ -112,7 +112,7 @@ def test_exact_small_files_are_packed(tmp_path):
             tmp_path,
             range(first, first + 3),
             names[first : first + 3],
-            found.some(np.arange(first, first + 3)),
+            found.select(np.arange(first, first + 3)),
         )
     foreign = chunks.write_chunk(tmp_path, [0], np.array([3], np.uint64), some(1, 3))
     wanted = Chunks(tmp_path, names)

@@ -46,7 +46,7 @@ def held(law: str, seed: int, count: int, most: int | None = None) -> None:
     mine = mine[:most]
     some = [cases[case] for case in mine]
     ones = lumped_answers(some) if law in EXACT else one_by_one.solve(some)
-    lanes_of = found.some(np.array(mine))
+    lanes_of = found.select(np.array(mine))
     assert (lanes_of.outcome == ones.outcome).all()
     assert np.mean([row.holds for some in rows(lanes_of, ones) for row in some]) >= 0.97
 
@@ -58,7 +58,7 @@ def lumped_answers(cases):
     for case, model in enumerate(cases):
         groups.setdefault(lumped.group(model), []).append(case)
     for places in groups.values():
-        found.place(places, lumped.solve([cases[case] for case in places]))
+        found.insert(places, lumped.solve([cases[case] for case in places]))
     return found
 
 

@@ -62,7 +62,7 @@ def batch(cases):
         assert lumped.refuses(model) == ""
         groups.setdefault(lumped.group(model), []).append(case)
     for places in groups.values():
-        found.place(places, lumped.solve([cases[case] for case in places]))
+        found.insert(places, lumped.solve([cases[case] for case in places]))
     return found
 
 

@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 from lane_cases import draw_patches, draw_points
-from scene_texts import SMALL_PATCH
+from scene_texts import BENCH, COULOMB, POINT, SHORT, SMALL_PATCH
 
 import patchfem as pf
-from patchfem.runs.batch import batches
+from patchfem.runs.batch import batches, gathered, one_by_one
+from patchfem.runs.batch.lumped import lane_runs, lumped, sheared
 from patchfem.runs.batch.meshes import with_shared_meshes
 
 STUDIES = Path(__file__).parents[3] / "studies"
@@ -29,6 +30,7 @@ frequency = "10 Hz"
 [accuracy]
 tolerance = 1e-2
 """
+RIG = POINT + COULOMB + SHORT
 
 
 def vary(text: str, key: str, values) -> list:
@@ -49,6 +51,22 @@ MODELS = {  # name of the batch -> function that makes its models
         [0.2 + 0.005 * case for case in range(32)],
     ),
 }
+LANES = {"lumped.lanes", "lumped.tabled"}  # these leave some cases to the exact engine
+
+
+@pytest.fixture
+def single_runs(monkeypatch) -> list:
+    """Plans that are run by themselves, while the folder is that of the shipped rig."""
+    plans = []
+    run = one_by_one.run
+
+    def record(plan, *given, **options):
+        plans.append(plan)
+        return run(plan, *given, **options)
+
+    monkeypatch.setattr(one_by_one, "run", record)
+    monkeypatch.chdir(STUDIES / "rig")
+    return plans
 
 
 def test_exact_every_batch_is_asked():
@@ -56,19 +74,61 @@ def test_exact_every_batch_is_asked():
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_always_a_batch_computes_its_cases_together(name, monkeypatch):
-    monkeypatch.chdir(STUDIES / "rig")
+def test_always_a_batch_computes_its_cases_together(name, single_runs):
+    """No case is run by itself; of benches, which slide by themselves, the patches are pressed together."""
     models = MODELS[name]()
-    batch = batches.choose_batch(models[0], len(models))
-    assert batch.name == name
-    counts = []
-
-    def solve(some, say):
-        counts.append(len(some))
-        return batch.solve(some, say)
-
-    monkeypatch.setattr(batches, "BATCHES", (batch._replace(solve=solve),))
+    assert batches.choose_batch(models[0], len(models)).name == name
     said = []
-    batches.solve_models(models, say=said.append)
-    assert sum(counts) == len(models)
+    results = batches.solve_models(models, say=said.append)
     assert not [line for line in said if "one by one" in line]
+    if name == "benches":
+        assert all(plan.model.patch.solved is not None for plan in single_runs)
+    else:
+        assert len(single_runs) == 0
+    if name in LANES:
+        engines = [numerics["engine"] for numerics in results.numerics.values()]
+        assert engines.count("lanes") > 0.7 * len(models)
+    assert not results.messages
+    assert not [note for notes in results.notes.values() for note in notes if "fault" in note]
+
+
+@pytest.mark.parametrize(
+    ("name", "module", "function"),
+    [
+        ("lumped.lanes", lane_runs, "collect_runs"),
+        ("lumped.lumped", lumped, "assemble_results"),
+        ("lumped.sheared", sheared, "YieldingElements"),
+        ("gathered", gathered, "few_points"),
+    ],
+)
+def test_always_a_fault_of_a_batch_stands_in_the_notes_of_its_cases(
+    name, module, function, single_runs, monkeypatch
+):
+    """Wherever it fails, the cases are computed, and everybody who reads their notes learns why it took so long."""
+    models = MODELS[name]()
+    monkeypatch.setattr(module, function, lambda *given, **options: 1 / 0)
+    monkeypatch.setattr(
+        one_by_one, "run", lambda plan, *given, **options: pf.run(BENCH)
+    )  # a result, whichever
+    results = batches.solve_models(models)
+    for case in range(len(models)):
+        assert f"{name}: ZeroDivisionError: division by zero" in results.notes[case][-1]
+
+
+def test_always_a_fault_while_models_are_divided_stands_in_the_notes(single_runs, monkeypatch):
+    """A batch that reads columns, and one that reads model by model; the error of a case is no fault."""
+    alone = pf.run(RIG)
+    for module, function in ((lumped, "not_one_point"), (lumped, "group")):
+        with monkeypatch.context() as patched:
+            patched.setattr(module, function, lambda *given: 1 / 0)
+            results = batches.solve_models([pf.build(RIG)], study=64 if function != "group" else 1)
+        assert "ZeroDivisionError" in results.notes[0][-1]
+        assert results.values["loop_area"][0] == alone.measures["loop_area"].value
+
+    def refuse(models, say):
+        raise pf.PatchfemError("friction.static: refused here")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(lumped, "solve", refuse)
+        results = batches.solve_models([pf.build(RIG)])
+    assert not results.notes and not results.messages

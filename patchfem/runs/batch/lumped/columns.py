@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core import Measure, Outcome
+from ....core import Outcome
 from ....effects import law_has_trait
 from ....model.similar_models import SimilarModels, collect_columns
 from ....response.errors import total_error
@@ -48,22 +48,23 @@ from ...rig.motion_warnings import law_warnings
 from ..case_results import CaseResults
 
 N_FINAL_WINDOWS = 5  # last windows whose phasors determine a steady motion (response.settling)
-MAIN_MEASURE, PHASE_MEASURE = "relative_displacement_amplitude", "slip_start_phase"
+MAIN_MEASURE = "relative_displacement_amplitude"
+PHASE_MEASURE = "slip_start_phase"
 
 
 class Sizes(NamedTuple):
     """Scales of n models from their scenes, (n,) each.
 
     - tolerance: [1].
-    - moved: expected displacement [m].
-    - largest: largest acceleration of the drive [m s-2].
+    - displacement: expected displacement [m].
+    - acceleration: largest acceleration of the drive [m s-2].
     - period: of the drive [s].
     - decay: smallest decay rate of a mode [1/s].
     """
 
     tolerance: np.ndarray
-    moved: np.ndarray
-    largest: np.ndarray
+    displacement: np.ndarray
+    acceleration: np.ndarray
     period: np.ndarray
     decay: np.ndarray
 
@@ -130,7 +131,23 @@ class Runs:
         return (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
 
 
-def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = None) -> tuple:
+class Assembled(NamedTuple):
+    """Case results of n runs.
+
+    - results: CaseResults.
+    - runs_singly: which cases (n,) must be run by themselves.
+    - is_resolved: which (n,) have all errors, except that of the steady estimate, within the
+      tolerance.
+    """
+
+    results: CaseResults
+    runs_singly: np.ndarray
+    is_resolved: np.ndarray
+
+
+def assemble_results(
+    models, runs: Runs, numerics: dict, is_repeated: Callable | None = None
+) -> Assembled:
     """Return the case results of models from their Runs.
 
     Parameters
@@ -139,271 +156,259 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     runs : Runs
     numerics : dict
         Settings as in `results.result.choices`.
-    again : callable, optional
+    is_repeated : callable, optional
         Function of the results that returns which cases (n,) are computed again; these have no
         warnings of large errors.
-
-    Returns
-    -------
-    tuple
-        CaseResults; which cases (n,) must be run by themselves; which (n,) have all errors, except
-        that of the steady estimate, within the tolerance.
     """
     n = len(models)
-    values = dict(runs.values)
-    values[MAIN_MEASURE] = runs.values.get(MAIN_MEASURE, runs.amplitudes)
-    values["energy_balance"] = energy_balance(runs.book)
-    nothing = np.zeros(n)
-    errors = {
-        name: total_error(
-            name,
-            value,
-            [runs.errors.get(name, nothing)],
-            runs.min_relative_error,
-            values[MAIN_MEASURE],
-        )
-        for name, value in values.items()
-    }
     sizes = collect_sizes(models)
-    tolerance = sizes.tolerance
-    moved = sizes.moved
-    outcome, (steady, error) = _outcome(
+    values, errors = _values_and_errors(runs)
+    outcomes, steady, steady_error = _judge_outcomes(
         sizes,
         runs,
         is_drifting(
             values["drift_per_cycle"],
             errors["drift_per_cycle"],
             values[MAIN_MEASURE],
-            tolerance,
-            error_floor("drift_per_cycle", moved),
+            sizes.tolerance,
+            error_floor("drift_per_cycle", sizes.displacement),
         ),
     )
-    found = CaseResults.blank(n)
-    found.outcome[:] = [str(one) for one in outcome]
-    alone = (
+    results = CaseResults.blank(n)
+    results.outcome[:] = [str(outcome) for outcome in outcomes]
+    runs_singly = (
         runs.lost
         | (values["energy_balance"] > runs.max_balance_error)
         | (values["work_check"] > MAX_WORK_CHECK)
     )
-    grows = np.array([one is Outcome.GROWS for one in outcome])
+    is_transient = np.array([outcome is Outcome.TRANSIENT for outcome in outcomes])
     with np.errstate(invalid="ignore"):
-        on = is_still_changing(steady, error, values[MAIN_MEASURE], tolerance) & np.array(
-            [one is Outcome.STEADY for one in outcome]
-        )
-    still = (
-        (on | np.array([one is Outcome.TRANSIENT for one in outcome]))
-        & ~np.isnan(steady)
-        & ~runs.stuck
-    )
-    values[STEADY_AMPLITUDE] = np.where(still, steady, np.nan)
+        changes = np.array([outcome is Outcome.STEADY for outcome in outcomes])
+        changes &= is_still_changing(steady, steady_error, values[MAIN_MEASURE], sizes.tolerance)
+    has_estimate = (changes | is_transient) & ~np.isnan(steady) & ~runs.stuck
+    values[STEADY_AMPLITUDE] = np.where(has_estimate, steady, np.nan)
     errors[STEADY_AMPLITUDE] = error_of_steady(
-        steady, error, values[MAIN_MEASURE], errors[MAIN_MEASURE]
+        steady, steady_error, values[MAIN_MEASURE], errors[MAIN_MEASURE]
     )
-    resolved = np.ones(n, bool)
-    wide_of = np.zeros(n, bool)
-    for name, value in values.items():
-        there = ~np.isnan(value)
-        if not there.any():
-            continue
-        row = TABLE[name]
-        floor = error_floor(name, moved)
-        wide = there & (errors[name] > tolerance * np.abs(value) + floor)
-        floor = np.fmax(floor, tolerance * larger_term(name, values))
-        wide_of |= wide & (errors[name] > tolerance * np.abs(value) + floor) & ~grows
-        if name == MAIN_MEASURE and runs.again:
-            alone |= wide & ~grows
-        if not name.endswith("_steady"):
-            resolved &= ~wide
-        found.units[name] = row.unit
-        found.values[name] = value
-        found.errors[name] = np.where(there & ~grows, errors[name], np.nan)
-        found.floors[name] = np.where(there, floor, np.nan)
-    _reasons(models, sizes, runs, found)
-    unseen = np.isnan(values[STEADY_AMPLITUDE]) & np.array(
-        [one is Outcome.TRANSIENT for one in outcome]
-    )
-    if unseen.any():
-        found.measure(STEADY_AMPLITUDE, TABLE[STEADY_AMPLITUDE].unit)
-        found.floors[STEADY_AMPLITUDE][unseen] = TABLE[STEADY_AMPLITUDE].floor
-        found.reasons.setdefault(STEADY_AMPLITUDE, {}).update(
-            dict.fromkeys(np.flatnonzero(unseen).tolist(), CHANGE_NOT_RESOLVED)
+    is_resolved, is_wide = _insert_measures(results, values, errors, sizes)
+    if runs.again:
+        main_floor = error_floor(MAIN_MEASURE, sizes.displacement)
+        allowed = sizes.tolerance * np.abs(values[MAIN_MEASURE]) + main_floor
+        runs_singly |= (errors[MAIN_MEASURE] > allowed) & (results.outcome != str(Outcome.GROWS))
+    _insert_reasons(models, sizes, runs, results)
+    is_unknown = np.isnan(values[STEADY_AMPLITUDE]) & is_transient
+    if is_unknown.any():
+        results.measure(STEADY_AMPLITUDE, TABLE[STEADY_AMPLITUDE].unit)
+        results.floors[STEADY_AMPLITUDE][is_unknown] = TABLE[STEADY_AMPLITUDE].floor
+        results.reasons.setdefault(STEADY_AMPLITUDE, {}).update(
+            dict.fromkeys(np.flatnonzero(is_unknown).tolist(), CHANGE_NOT_RESOLVED)
         )
     if law_has_trait(models[0].friction.law, "set-valued") and not (
         models[0].partial_slip or models[0].rig.friction.has_partial_slip
     ):
-        _stops(found)
-    found.numerics.update(
-        {case: numerics | runs.chosen[case] for case in range(n)}
-        if runs.chosen
-        else dict.fromkeys(range(n), numerics)
-    )
-    wide_of &= True if again is None else ~again(found)
-    alike = isinstance(models, SimilarModels)
-    remarks = _remarks(models[0], numerics["engine"]) if alike else ()
-    rings = _rings(sizes, runs, outcome, values[MAIN_MEASURE])
-    told = wide_of | _by_law(models, found) if alike else wide_of
-    told = told | np.isin(np.arange(n), list(rings))
-    for case in range(n) if remarks or not alike else np.flatnonzero(told).tolist():
+        _remove_secant_of_rigid_stick(results)
+    for case in range(n):
+        results.numerics[case] = numerics | runs.chosen[case] if runs.chosen else numerics
+    if is_repeated is not None:
+        is_wide &= ~is_repeated(results)
+    rings = _rings(sizes, runs, outcomes, values[MAIN_MEASURE])
+    _insert_warnings(models, results, outcomes, is_wide, rings)
+    return Assembled(results, runs_singly, is_resolved)
+
+
+def _values_and_errors(runs: Runs) -> tuple[dict, dict]:
+    """Return the measures of runs and their errors, (n,) by name."""
+    values = dict(runs.values)
+    values.setdefault(MAIN_MEASURE, runs.amplitudes)
+    values["energy_balance"] = energy_balance(runs.book)
+    errors = {}
+    for name, value in values.items():
+        parts = [runs.errors.get(name, np.zeros(len(runs.stuck)))]
+        errors[name] = total_error(
+            name, value, parts, runs.min_relative_error, values[MAIN_MEASURE]
+        )
+    return values, errors
+
+
+def _insert_measures(results: CaseResults, values: dict, errors: dict, sizes: Sizes) -> tuple:
+    """Insert columns of measures, with their errors, in the results.
+
+    Return which cases (n,) have all errors, except that of the steady estimate, within the
+    tolerance, and which have an error that a warning states.
+    """
+    grows = results.outcome == str(Outcome.GROWS)
+    is_resolved = np.ones(len(grows), bool)
+    has_wide_error = np.zeros(len(grows), bool)
+    for name, value in values.items():
+        is_known = ~np.isnan(value)
+        if not is_known.any():
+            continue
+        floor = error_floor(name, sizes.displacement)
+        allowed = sizes.tolerance * np.abs(value)
+        if not name.endswith("_steady"):
+            is_resolved &= ~(is_known & (errors[name] > allowed + floor))
+        final_floor = np.fmax(floor, sizes.tolerance * larger_term(name, values))
+        is_wide = is_known & (errors[name] > allowed + final_floor)
+        has_wide_error |= is_wide & ~grows
+        results.units[name] = TABLE[name].unit
+        results.values[name] = value
+        results.errors[name] = np.where(is_known & ~grows, errors[name], np.nan)
+        results.floors[name] = np.where(is_known, final_floor, np.nan)
+    return is_resolved, has_wide_error
+
+
+def _insert_warnings(
+    models, results: CaseResults, outcomes: list, is_wide: np.ndarray, rings: dict
+) -> None:
+    """Insert the warnings of all cases, as single runs give them.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    results : CaseResults
+    outcomes : list of Outcome
+    is_wide : (n,) of bool
+        Cases with an error above the tolerance.
+    rings : dict
+        Warnings of `warn_of_ringing` by case.
+    """
+    engine = results.numerics[0]["engine"]
+    first = models[0]
+    if not isinstance(models, SimilarModels):
+        cases = range(len(models))
+    elif _model_warnings(first, engine):
+        cases = range(len(models))
+    else:
+        is_warned = is_wide | _may_need_law_warnings(models, results)
+        is_warned[list(rings)] = True
+        cases = np.flatnonzero(is_warned).tolist()
+    for case in cases:
         model = models[case]
-        said = remarks if alike else _remarks(model, numerics["engine"])
-        if warnings := [
-            *said,
-            *warnings_of_case(
-                model, outcome[case], found, case, wide_of[case], rings.get(case, ())
-            ),
-        ]:
-            found.warnings[case] = shorten_file_names(warnings, model.source.path)
-    return found, alone, resolved
+        warnings = _model_warnings(model, engine)
+        if is_wide[case] or law_has_trait(model.friction.law, "bonds"):
+            measures = results.known_measures(case)
+            drift = {name: measures[name] for name in ("drift_per_cycle",) if name in measures}
+            warnings += law_warnings(model, outcomes[case], drift, 0.0)
+            warnings += rings.get(case, ())
+            warnings += tolerance_warnings(Finding(model, measures))
+        else:
+            warnings += rings.get(case, ())
+        if warnings:
+            results.warnings[case] = shorten_file_names(warnings, model.source.path)
 
 
-def _remarks(model, engine: str) -> list:
+def _model_warnings(model, engine: str) -> list:
     """Return the warnings on a model that do not depend on its run."""
     return [*model.source.remarks, *unused_settings(model, engine), *model.rig.structure.notes]
 
 
-def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
-    """Return the outcomes (n), and the steady amplitudes and their errors (n,) [m].
+class _SteadyOutcomes(NamedTuple):
+    """Outcomes of n runs, and their steady amplitudes with errors (n,) [m]."""
 
-    moves: which motions (n,) have a midpoint that drifts, so that they are not steady.
+    outcomes: list
+    steady: np.ndarray
+    error: np.ndarray
+
+
+def _judge_outcomes(sizes: Sizes, runs: Runs, drifts) -> _SteadyOutcomes:
+    """Return the outcomes of runs, and their steady amplitudes.
+
+    drifts: which motions (n,) have a midpoint that drifts, so that they are not steady.
     """
-    pick = np.arange(runs.cycles - 1, -1, -runs.window)[::-1]
-    ends = (runs.extremes[:, pick, 1] - runs.extremes[:, pick, 0]) / 2
-    floor = AMPLITUDE_ROUND_OFF * (sizes.largest / (2 * np.pi / sizes.period) ** 2)
+    last_cycles = np.arange(runs.cycles - 1, -1, -runs.window)[::-1]
+    amplitudes = (runs.extremes[:, last_cycles, 1] - runs.extremes[:, last_cycles, 0]) / 2
+    floor = AMPLITUDE_ROUND_OFF * (sizes.acceleration / (2 * np.pi / sizes.period) ** 2)
     decay = sizes.decay * runs.window * sizes.period
     with np.errstate(all="ignore"):
         steady = extrapolate_steady_amplitudes(
-            ends[:, -N_FINAL_WINDOWS:], runs.phasors[:, -N_FINAL_WINDOWS:]
+            amplitudes[:, -N_FINAL_WINDOWS:], runs.phasors[:, -N_FINAL_WINDOWS:]
         )
-        bounded = False
+        is_bounded = False
         if runs.steady is not None:
-            bounded = ~np.isnan(runs.steady[0])
-            steady = [np.where(bounded, known, seen) for known, seen in zip(runs.steady, steady)]
-        number, *steady = classify_periodic(
+            is_bounded = ~np.isnan(runs.steady[0])
+            steady = [
+                np.where(is_bounded, known, value) for known, value in zip(runs.steady, steady)
+            ]
+        numbers, *steady = classify_periodic(
             window_amplitude_means(runs.extremes, runs.window)[0],
             runs.extremes,
             runs.window,
             steady,
             (sizes.tolerance, floor, decay),
-            bounded,
+            is_bounded,
         )
-    number = np.where((number == STEADY_CLASS) & moves, 0, number)
-    ends = [Outcome.STUCK if stuck else CLASSES[k] for stuck, k in zip(runs.stuck, number)]
-    return [
-        Outcome.TRANSIENT if loads else one
-        for loads, one in zip(np.broadcast_to(runs.loads, len(ends)), ends)
-    ], steady
+    numbers = np.where((numbers == STEADY_CLASS) & drifts, 0, numbers)
+    loads = np.broadcast_to(runs.loads, len(numbers))
+    outcomes = []
+    for number, is_stuck, is_loading in zip(numbers, runs.stuck, loads):
+        outcome = Outcome.STUCK if is_stuck else CLASSES[number]
+        outcomes.append(Outcome.TRANSIENT if is_loading else outcome)
+    return _SteadyOutcomes(outcomes, *steady)
 
 
-def _rings(sizes: Sizes, runs: Runs, outcome, amplitude) -> dict:
+def _rings(sizes: Sizes, runs: Runs, outcomes: list, amplitude) -> dict:
     """Return the warnings of `warn_of_ringing` for the cases that stick but still vibrate, by case."""
     n = len(amplitude)
-    cases = np.flatnonzero([one is Outcome.STUCK for one in outcome] & (amplitude != 0))
-    tolerance, decay, floor = (
-        np.broadcast_to(one, n)[cases]
-        for one in (
-            sizes.tolerance,
-            sizes.decay * sizes.period,
-            error_floor(MAIN_MEASURE, sizes.moved),
-        )
-    )
-    left = remaining_ringing(runs.extremes[cases], runs.window, decay)
-    columns = zip(
-        cases.tolist(),
-        left.tolist(),
-        amplitude[cases].tolist(),
-        floor.tolist(),
-        tolerance.tolist(),
-        decay.tolist(),
-    )
-    found = {
-        case: warn_of_ringing(one, (size, least), limits, runs.cycles)
-        for case, one, size, least, *limits in columns
-    }
-    return {case: one for case, one in found.items() if one}
+    floor = np.broadcast_to(error_floor(MAIN_MEASURE, sizes.displacement), n)
+    decay = np.broadcast_to(sizes.decay * sizes.period, n)
+    is_stuck = np.array([outcome is Outcome.STUCK for outcome in outcomes], bool)
+    cases = np.flatnonzero(is_stuck & (amplitude != 0))
+    ringing = remaining_ringing(runs.extremes[cases], runs.window, decay[cases])
+    warnings = {}
+    for case, amplitude_left in zip(cases.tolist(), ringing.tolist()):
+        ends = float(amplitude[case]), float(floor[case])
+        limits = [float(sizes.tolerance[case]), float(decay[case])]
+        warning = warn_of_ringing(amplitude_left, ends, limits, runs.cycles)
+        if warning:
+            warnings[case] = warning
+    return warnings
 
 
-def _stops(found: CaseResults) -> None:
+def _remove_secant_of_rigid_stick(results: CaseResults) -> None:
     """Remove the secant stiffness of rigid friction that sticks at the largest slide.
 
     See `response.reasons.find_missing_secant`.
     """
-    stuck, secant = (found.values.get(name) for name in ("stick_fraction", "secant_stiffness"))
-    if stuck is None or secant is None:
+    name = "secant_stiffness"
+    if name not in results.values or "stick_fraction" not in results.values:
         return
     with np.errstate(invalid="ignore"):
-        holds = ~np.isnan(secant) & (
-            stuck > TABLE["stick_fraction"].floor + np.nan_to_num(found.errors["stick_fraction"])
+        min_fraction = TABLE["stick_fraction"].floor + np.nan_to_num(
+            results.errors["stick_fraction"]
         )
-    if not holds.any():
-        return
-    found.values["secant_stiffness"] = np.where(holds, np.nan, secant)
-    found.errors["secant_stiffness"] = np.where(holds, np.nan, found.errors["secant_stiffness"])
-    found.reasons.setdefault("secant_stiffness", {}).update(
-        dict.fromkeys(np.flatnonzero(holds).tolist(), STICKS_AT_REVERSAL)
-    )
+        sticks = ~np.isnan(results.values[name]) & (results.values["stick_fraction"] > min_fraction)
+    if sticks.any():
+        for columns in (results.values, results.errors):
+            columns[name] = np.where(sticks, np.nan, columns[name])
+        results.reasons.setdefault(name, {}).update(
+            dict.fromkeys(np.flatnonzero(sticks).tolist(), STICKS_AT_REVERSAL)
+        )
 
 
-def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
-    """Add the reasons why measures of the cases lack a value."""
+def _insert_reasons(models, sizes: Sizes, runs: Runs, results: CaseResults) -> None:
+    """Insert the reasons why measures of the cases lack a value."""
     names = [*CYCLE_MEASURES, PHASE_MEASURE]
     for name in names:
-        found.measure(name, TABLE[name].unit)
-    lacking = np.array([np.isnan(found.values[name]) for name in names])
-    holds = (
-        found.values["stick_fraction"] == 1
-        if "stick_fraction" in found.values
-        else lacking[0] & False
-    )
-    sticks = (
-        found.values["stick_fraction"] > 0
-        if "stick_fraction" in found.values
-        else lacking[0] & False
-    )
+        results.measure(name, TABLE[name].unit)
+    is_missing = np.array([np.isnan(results.values[name]) for name in names])
+    stick_fraction = results.values.get("stick_fraction", np.zeros(len(models)))
     # all properties on which a reason depends under a sine
-    signs = np.array([*lacking, holds, sticks, sizes.largest != 0])
-    patterns, which = np.unique(signs, axis=1, return_inverse=True)
-    for place in np.flatnonzero(patterns[: len(names)].any(axis=0)).tolist():
-        cases = np.flatnonzero(which.ravel() == place).tolist()
+    properties = np.array(
+        [*is_missing, stick_fraction == 1, stick_fraction > 0, sizes.acceleration != 0]
+    )
+    patterns, pattern_of_case = np.unique(properties, axis=1, return_inverse=True)
+    for pattern in np.flatnonzero(patterns[: len(names)].any(axis=0)).tolist():
+        cases = np.flatnonzero(pattern_of_case.ravel() == pattern).tolist()
         drive = models[cases[0]].rig.drive.signal
-        here = {
-            name: values[cases[0]]
-            for name, values in found.values.items()
-            if not np.isnan(values[cases[0]])
-        }
+        values = {name: column[cases[0]] for name, column in results.values.items()}
+        values = {name: value for name, value in values.items() if not np.isnan(value)}
         window = SimpleNamespace(time=np.array([0.0, runs.window * drive.period]), extra={})
-        for name, measure in find_missing(here, window, drive, True).items():
-            found.reasons.setdefault(name, {}).update(dict.fromkeys(cases, measure.reason))
-            found.floors[name][cases] = measure.floor
+        for name, measure in find_missing(values, window, drive, True).items():
+            results.reasons.setdefault(name, {}).update(dict.fromkeys(cases, measure.reason))
+            results.floors[name][cases] = measure.floor
 
 
-def warnings_of_case(model, outcome, found: CaseResults, case: int, wide: bool, rings=()) -> list:
-    """Return the warnings of a case that a single run would give.
-
-    They concern its friction law and, if `wide`, the errors that exceed the tolerance.
-
-    Parameters
-    ----------
-    model : Model
-    outcome : Outcome
-    found : CaseResults
-    case : int
-    wide : bool
-        Whether an error exceeds the tolerance.
-    rings : sequence of str
-        Warnings of `warn_of_ringing`.
-    """
-    if not wide and not law_has_trait(model.friction.law, "bonds"):
-        return list(rings)
-    known = known_measures(found, case)
-    drift = {name: one for name, one in known.items() if name == "drift_per_cycle"}
-    return [
-        *law_warnings(model, outcome, drift, 0.0),
-        *rings,
-        *tolerance_warnings(Finding(model, known)),
-    ]
-
-
-def _by_law(models: SimilarModels, found: CaseResults) -> np.ndarray:
+def _may_need_law_warnings(models: SimilarModels, results: CaseResults) -> np.ndarray:
     """Return which cases (n,) may need a warning of `law_warnings`.
 
     These have bonds that grow, are unbounded or creep.
@@ -413,22 +418,8 @@ def _by_law(models: SimilarModels, found: CaseResults) -> np.ndarray:
         return np.zeros(len(models), bool)
     if first.bonds.has_growth or first.bonds.order < 0 or first.bonds.reading != "stretch":
         return np.ones(len(models), bool)
-    if "drift_per_cycle" not in found.values:  # runs of less than a cycle have no drift
+    if "drift_per_cycle" not in results.values:  # runs of less than a cycle have no drift
         return np.zeros(len(models), bool)
-    drift = found.values["drift_per_cycle"]
-    error = found.errors["drift_per_cycle"]
-    return (np.abs(drift) > np.nan_to_num(error)) & (found.outcome != str(Outcome.TRANSIENT))
-
-
-def known_measures(found: CaseResults, case: int) -> dict:
-    """Return the measures of a case whose errors are known, by name."""
-    return {
-        name: Measure(
-            float(column[case]),
-            found.units[name],
-            float(found.errors[name][case]),
-            float(found.floors[name][case]),
-        )
-        for name, column in found.values.items()
-        if not np.isnan(found.errors[name][case])
-    }
+    drift = results.values["drift_per_cycle"]
+    error = results.errors["drift_per_cycle"]
+    return (np.abs(drift) > np.nan_to_num(error)) & (results.outcome != str(Outcome.TRANSIENT))

@@ -14,7 +14,7 @@ from ...rig.engines import choose_engine
 from .. import one_by_one
 from ..case_results import CaseResults, has_unreadable_table
 from . import pieces
-from .columns import batch_answers
+from .columns import assemble_results
 
 MAX_CASES_PER_CALL = 1024  # cases of one compiled call, which limits the memory of their histories
 
@@ -70,12 +70,12 @@ def not_one_sine(rig) -> str:
     return ""
 
 
-def group(model: Model) -> tuple:
+def group(model: Model) -> tuple[int, str, int]:
     """Return a key that is equal for models of one compiled call."""
     return int(model.rig.drive.cycles), model.friction.law, pieces.count_first_merges(model)
 
 
-def solve(models: Sequence[Model], say=None, finer: int = 0) -> CaseResults:
+def solve(models: Sequence[Model], say=None, n_finer: int = 0) -> CaseResults:
     """Return the case results of models of one group; cases that need it are run by themselves.
 
     Parameters
@@ -83,61 +83,35 @@ def solve(models: Sequence[Model], say=None, finer: int = 0) -> CaseResults:
     models : sequence of Model
     say : callable, optional
         Callback for a line of text.
-    finer : int
+    n_finer : int
         How often the cells of a density are doubled, in a check. A check does not need the ringing,
         and does not use more cells if errors are too large.
     """
-    found = CaseResults.blank(len(models))
+    results = CaseResults.blank(len(models))
     for first in range(0, len(models), MAX_CASES_PER_CALL):
         part = models[first : first + MAX_CASES_PER_CALL]
-        pairs = max(0, pieces.count_first_merges(part[0]) - finer)
-        found.place(range(first, first + len(part)), _solve_cases(part, say, pairs, finer > 0))
-    return found
+        n_merges = max(0, pieces.count_first_merges(part[0]) - n_finer)
+        cases = range(first, first + len(part))
+        results.insert(cases, _solve_cases(part, say, n_merges, n_finer > 0))
+    return results
 
 
-def _solve_cases(models, say, pairs: int, check: bool = False) -> CaseResults:
+def _solve_cases(models, say, n_merges: int, is_check: bool = False) -> CaseResults:
     """Return the case results of at most MAX_CASES_PER_CALL models."""
     begin = perf_counter()
     cycles = int(models[0].rig.drive.cycles)
     window = min(10, cycles // 10)
-    runs = pieces.run_pieces(models, cycles, window, say, pairs)
-    found, alone, resolved = batch_answers(
-        models, runs, {"engine": choose_engine(models[0]).name, "window_cycles": window}
+    runs = pieces.run_pieces(models, cycles, window, say, n_merges)
+    numerics = {"engine": choose_engine(models[0]).name, "window_cycles": window}
+    results, runs_singly, is_resolved = assemble_results(models, runs, numerics)
+    results.seconds[:] = (perf_counter() - begin) / len(models)
+    needs_cells = ~is_resolved & ~runs.lost & (n_merges > 0)
+    one_by_one.solve_rest(
+        results, models, runs_singly & ~needs_cells & ~(runs.lost & is_check), say
     )
-    found.seconds[:] = (perf_counter() - begin) / len(models)
-    finer = ~resolved & ~runs.lost if pairs else np.zeros(len(models), bool)
-    alone &= ~finer & ~(runs.lost & check)
-    for cases, solve_again in (
-        (np.flatnonzero(alone).tolist(), lambda these: one_by_one.solve(these, say)),
-        (
-            [] if check else np.flatnonzero(finer).tolist(),
-            lambda these: _solve_cases(these, say, max(0, pairs - 2)),
-        ),
-    ):
-        if cases:
-            take_out(found, cases)
-            found.place(cases, solve_again([models[case] for case in cases]))
-    return found
-
-
-def take_out(found: CaseResults, cases: Sequence[int]) -> None:
-    """Remove the results of cases."""
-    for columns in (found.values, found.errors, found.floors):
-        for column in columns.values():
-            column[cases] = np.nan
-    for case in cases:
-        for kept in (found.warnings, found.notes, found.numerics, *found.reasons.values()):
-            kept.pop(case, None)
-    empty = [
-        name
-        for name, column in found.values.items()
-        if np.isnan(column).all() and not found.reasons.get(name)
-    ]
-    for name in empty:
-        for columns in (
-            found.values,
-            found.errors,
-            found.floors,
-            found.units,
-        ):  # only these cases had the measure
-            columns.pop(name)
+    cases = np.flatnonzero(needs_cells).tolist()
+    if cases and not is_check:
+        results.remove(cases)
+        finer_models = [models[case] for case in cases]
+        results.insert(cases, _solve_cases(finer_models, say, max(0, n_merges - 2)))
+    return results

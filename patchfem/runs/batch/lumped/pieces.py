@@ -4,6 +4,7 @@ In: models with one mode under a sine. Out: `Runs` with the measures of all case
 without histories.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -31,9 +32,11 @@ from ...rig.pieces import (
 from .columns import MAIN_MEASURE, N_FINAL_WINDOWS, Runs
 from .threads import in_threads
 
-CYCLES = 3  # cycles that contain each stick interval of a cycle completely
-# smallest and largest number of cycles of a run, whose extremes are all kept
-SHORTEST, LONGEST = 20, 4000
+STICK_CYCLES = 3  # cycles that contain each stick interval of a cycle completely
+MIN_CYCLES = 20  # smallest number of cycles of a run
+MAX_CYCLES = 4000  # largest number of cycles of a run, whose extremes are all kept
+# relative to the largest slide; the drift of rigid elements has the round-off of two means
+DRIFT_ROUND_OFF = 1e-14
 
 
 class Case(NamedTuple):
@@ -53,44 +56,46 @@ class Case(NamedTuple):
 
 def refuses(model) -> str:
     """Return why the law, the cycles or the engine of a model exclude it from the batch, or ""."""
-    f = model.friction
-    if not _holds(model) and not law_has_trait(f.law, "cells") and f.law != "elastic-plastic":
+    friction = model.friction
+    is_rigid = is_rigid_law(model)
+    if (
+        not is_rigid
+        and not law_has_trait(friction.law, "cells")
+        and friction.law != "elastic-plastic"
+    ):
         return "the friction law of the case is not a set of friction elements"
-    if not SHORTEST <= model.rig.drive.cycles <= LONGEST:
+    if not MIN_CYCLES <= model.rig.drive.cycles <= MAX_CYCLES:
         return "the case has too few or too many cycles"
-    if _holds(model) and not f.static > 0:
+    if is_rigid and not friction.static > 0:
         return "nothing rubs"
-    return (
-        ""
-        if choose_engine(model) is (EXACT if _holds(model) else PIECES)
-        else "the case is not computed by the engine from yield to yield"
-    )
+    if choose_engine(model) is not (EXACT if is_rigid else PIECES):
+        return "the case is not computed by the engine from yield to yield"
+    return ""
 
 
-def _holds(model) -> bool:
+def is_rigid_law(model) -> bool:
     """Return whether the law of a model is Coulomb's, i.e. a rigid element."""
-    return law_has_trait(model.friction.law, "set-valued") and not law_has_trait(
-        model.friction.law, "averaged"
-    )
+    law = model.friction.law
+    return law_has_trait(law, "set-valued") and not law_has_trait(law, "averaged")
 
 
 def count_first_merges(model) -> int:
     """Return how often neighbouring cells are merged in pairs in a first run."""
-    return 0 if _holds(model) else count_merges(model)
+    return 0 if is_rigid_law(model) else count_merges(model)
 
 
-def make_case(model, pairs: int = 0) -> Case:
-    """Return the Case of a model with a single point; pairs: see `Numerics`."""
-    if _holds(model):
+def make_case(model, n_merges: int = 0) -> Case:
+    """Return the Case of a model with a single point, whose cells are merged `n_merges` times."""
+    if is_rigid_law(model):
         return Case(model, RigidElements(model, None, None).groups, 0.0, model.point.load)
     element = make_law(model.friction, model.point.load).element(model.point.load)
     group = elements_of_law(element)
-    for _ in range(pairs):
+    for _ in range(n_merges):
         group = merge_elements(group)
     return Case(model, (group,), 1e-3 * element.length, model.point.load)
 
 
-def run_pieces(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
+def run_pieces(models, cycles: int, window: int, say=None, n_merges: int = 0) -> Runs:
     """Run models of this kind, each for `cycles` cycles from its initial state.
 
     Parameters
@@ -100,29 +105,21 @@ def run_pieces(models, cycles: int, window: int, say=None, pairs: int = 0) -> Ru
         Cycles of the run, and at its end those that are evaluated.
     say : callable, optional
         Callback for a line of text.
-    pairs : int
-        See `Numerics`.
-
-    Returns
-    -------
-    Runs
+    n_merges : int
+        How often neighbouring cells are merged in pairs.
     """
-    cases = [make_case(model, pairs) for model in models]
-    out = runs_of_cases(cases, cycles, window, say)
-    if law_has_trait(models[0].friction.law, "cells"):
-        fewer = [
-            [
-                case._replace(groups=tuple(merge_elements(part, *merge) for part in case.groups))
-                for case in cases
-            ]
-            for merge in CELL_MERGES
-        ]
-        return with_coarser_errors(
-            out,
-            [runs_of_cases(part, cycles, window, say, steady=False) for part in fewer],
-            merged_cell_errors,
-        )
-    return out
+    cases = [make_case(model, n_merges) for model in models]
+    fine = runs_of_cases(cases, cycles, window, say)
+    if not law_has_trait(models[0].friction.law, "cells"):
+        return fine
+    coarse_runs = []
+    for merge in CELL_MERGES:
+        coarse_cases = []
+        for case in cases:
+            groups = tuple(merge_elements(group, *merge) for group in case.groups)
+            coarse_cases.append(case._replace(groups=groups))
+        coarse_runs.append(runs_of_cases(coarse_cases, cycles, window, say, steady=False))
+    return with_coarser_errors(fine, coarse_runs, merged_cell_errors)
 
 
 def runs_of_cases(
@@ -141,160 +138,153 @@ def runs_of_cases(
         Cases of a thread (see `in_threads`).
     steady : bool
         Whether the steady motion and the ringing are computed; a coarse run does not need them.
-
-    Returns
-    -------
-    Runs
     """
     histories.load_event_kernels(say)
     rig = cases[0].model.rig
     histories.announce_runs(
         rig.modes, rig.drive.signal, cases[0].groups, cycles, window, len(cases)
     )
-    done = [None] * len(cases)
+    finished = [None] * len(cases)
 
-    def go(part: slice) -> None:
-        """Run the cases of a slice, and store their runs in `done`."""
+    def simulate(part: slice) -> None:
+        """Run the cases of a slice, and store their runs in `finished`."""
         rigs = [(case.model.rig, case.groups) for case in cases[part]]
-        done[part] = histories.simulate_batch(
+        finished[part] = histories.simulate_batch(
             ((rig.modes, rig.drive.signal, groups, rig.start) for rig, groups in rigs),
             cycles,
             window,
         )
 
-    in_threads(go, len(cases), least)
-    return _read(cases, done, cycles, window, steady)
+    in_threads(simulate, len(cases), least)
+    return _read_runs(cases, finished, cycles, window, steady)
 
 
-def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Runs:
+def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bool) -> Runs:
     """Return the Runs of finished runs, either all of rigid elements or none.
 
     Work on rigid elements is all dissipated. They keep a single mode at rest during stick, so that
     nothing rings, and their drift has the round-off of two means.
     """
-    reading = join_readings([one.reading for one in done])
+    reading = join_readings([run.reading for run in finished])
     models = [case.model for case in cases]
-    book = {name: np.array([one.ledger[name] for one in done]) for name in done[0].ledger}
-    stiffness, size, held, load, tolerance = (
-        np.array(column)
-        for column in zip(
-            *(
-                (
-                    model.rig.first_mode.stiffness,
-                    find_max_acceleration(model.rig.drive.signal),
-                    case.held,
-                    case.load,
-                    model.accuracy.tolerance,
-                )
-                for model, case in zip(models, cases)
-            )
-        )
-    )
+    energies = {
+        name: np.array([run.ledger[name] for run in finished]) for name in finished[0].ledger
+    }
+    tolerance = np.array([model.accuracy.tolerance for model in models])
     loop = reading.loop()
-    rigid = cases[0].groups[0].static > 0
-    stuck = loop.slip_range / 2 <= np.maximum(
-        held, COORDINATE_ROUND_OFF * reading.run[:, RUN.max_coordinate]
+    is_rigid = cases[0].groups[0].static > 0
+    is_stuck = loop.slip_range / 2 <= np.maximum(
+        [case.held for case in cases], COORDINATE_ROUND_OFF * reading.run[:, RUN.max_coordinate]
     )
-    lost = np.zeros(len(done), bool)
-    rings = {name: np.full(len(done), np.nan) for name in ("ring_frequency", "ring_damping")}
-    known = np.full((2, len(done)), np.nan)
-    for k, (model, one) in enumerate(zip(models, done)):
-        ring = (
-            {}
-            if rigid
-            else make_ring(*one.ring, one.acceleration)
-            if one.ring is not None
-            else _rings(cases[k], one)
-            if steady
-            else {}
-        )
-        lost[k] = ring is None
+    is_lost = np.zeros(len(finished), bool)
+    rings = {name: np.full(len(finished), np.nan) for name in ("ring_frequency", "ring_damping")}
+    steady_motions = np.full((2, len(finished)), np.nan)
+    for k, (case, run) in enumerate(zip(cases, finished)):
+        ring = {} if is_rigid else _find_ring(case, run, steady)
+        is_lost[k] = ring is None
         for name, value in (ring or {}).items():
             rings[name][k] = value
-        decay = find_min_decay_rate(model.rig.modes) * model.rig.drive.signal.period
+        rig = case.model.rig
+        decay = find_min_decay_rate(rig.modes) * rig.drive.signal.period
         if (
             steady
-            and not rigid
-            and not stuck[k]
-            and still_changes(one.amplitudes, window, tolerance[k], decay)
+            and not is_rigid
+            and not is_stuck[k]
+            and still_changes(run.amplitudes, window, tolerance[k], decay)
         ):
-            found = find_steady_motion(
-                model.rig.modes, model.rig.drive.signal, cases[k].groups, one
-            )
-            lost[k] |= found is None
-            known[:, k] = (np.nan, np.nan) if found is None else found
+            motion = find_steady_motion(rig.modes, rig.drive.signal, case.groups, run)
+            is_lost[k] |= motion is None
+            if motion is not None:
+                steady_motions[:, k] = motion
+    stiffness = np.array([model.rig.first_mode.stiffness for model in models])
+    acceleration = np.array([find_max_acceleration(model.rig.drive.signal) for model in models])
     with np.errstate(all="ignore"):
-        values = measures_from_reading(reading, book, True, True, stiffness, size) | rings
-    worked, lost_in = (
-        np.array([getattr(one.end[1], name).sum() for one in done]) for name in ("work", "loss")
-    )
-    values |= {
-        "normal_load": load,
-        "energy_created": np.zeros(len(done)),
-        "friction_work": book["friction"] if rigid else worked,
-        "energy_dissipated": book["friction"] if rigid else lost_in,
+        values = measures_from_reading(reading, energies, True, True, stiffness, acceleration)
+    work, loss = energies["friction"], energies["friction"]
+    if not is_rigid:
+        work = np.array([run.end[1].work.sum() for run in finished])
+        loss = np.array([run.end[1].loss.sum() for run in finished])
+    values |= rings | {
+        "normal_load": np.array([case.load for case in cases]),
+        "energy_created": np.zeros(len(finished)),
+        "friction_work": work,
+        "energy_dissipated": loss,
     }
-    errors = {name: np.zeros(len(done)) for name in values}
-    if rigid:
-        errors["drift_per_cycle"] = 1e-14 * np.maximum(
+    errors = {name: np.zeros(len(finished)) for name in values}
+    if is_rigid:
+        errors["drift_per_cycle"] = DRIFT_ROUND_OFF * np.maximum(
             np.abs(reading.interface_value(INTERFACE.min_slide)),
             np.abs(reading.interface_value(INTERFACE.max_slide)),
         )
     ends = np.arange(cycles - 1, -1, -window)[::-1][-N_FINAL_WINDOWS:]
-    loads = stuck & (reading.rise > tolerance * reading.interface_value(INTERFACE.max_force))
+    max_rise = tolerance * reading.interface_value(INTERFACE.max_force)
     return Runs(
         cycles,
         window,
         values,
-        book,
-        np.array([one.amplitudes for one in done]),
-        np.array([one.phasors[ends] for one in done]),
-        stuck,
-        lost,
+        energies,
+        np.array([run.amplitudes for run in finished]),
+        np.array([run.phasors[ends] for run in finished]),
+        is_stuck,
+        is_lost,
         errors,
         PIECES.min_relative_error,
         PIECES.max_balance_error,
-        loads,
-        tuple(known),
+        is_stuck & (reading.rise > max_rise),
+        tuple(steady_motions),
     )
 
 
-def _rings(case: Case, one) -> dict | None:
-    """Return the ringing of a run from its samples: {} for none, None if a single run is needed."""
+def _find_ring(case: Case, run, steady: bool) -> dict | None:
+    """Return the ringing of a run: {} for none, None if a single run is needed.
+
+    It is that of the run itself or, if `steady`, of a few more cycles with samples.
+    """
+    if run.ring is not None:
+        return make_ring(*run.ring, run.acceleration)
+    if not steady or not run.slips:  # without stick nothing rings
+        return {}
     modes = case.model.rig.modes
     drive = case.model.rig.drive.signal
-    stuck = one.reading.loop().stuck_time >= one.reading.span * (1 - 1e-12)
-    # without stick nothing rings, and in a periodic motion that sticks the ringing has decayed
-    if not one.slips or (one.repeats and stuck):
+    is_stuck = run.reading.loop().stuck_time >= run.reading.span * (1 - 1e-12)
+    if run.repeats and is_stuck:  # in a periodic motion that sticks the ringing has decayed
         return {}
-    if not one.repeats:
+    if not run.repeats:
         return None
-    start, memory = one.end
-    more = histories.simulate(modes, drive, case.groups, CYCLES, CYCLES, start=start, memory=memory)
-    return (
-        None
-        if run_events.measure_rings(more.window, modes, drive, more.log, repeats=True) != ({}, {})
-        else {}
+    start, memory = run.end
+    more = histories.simulate(
+        modes, drive, case.groups, STICK_CYCLES, STICK_CYCLES, start=start, memory=memory
     )
+    rings = run_events.measure_rings(more.window, modes, drive, more.log, repeats=True)
+    return {} if rings == ({}, {}) else None
 
 
-def with_coarser_errors(fine: Runs, coarser: list, told_by) -> Runs:
+def with_coarser_errors(fine: Runs, coarse_runs: list, estimate: Callable) -> Runs:
     """Return Runs with the errors that follow from coarse Runs.
 
-    told_by: function (fine, *coarse) of values by name that returns errors by name.
+    Parameters
+    ----------
+    fine : Runs
+        Runs whose errors are set.
+    coarse_runs : list of Runs
+    estimate : callable
+        Function (fine, *coarse) of values by name that returns errors by name.
     """
-    whole = [
-        one.values | {MAIN_MEASURE: one.amplitudes, "energy_balance": energy_balance(one.book)}
-        for one in (fine, *coarser)
-    ]
-    for case in range(len(fine.stuck)):
-        a, *others = (
-            {name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])}
-            for one in whole
-        )
-        told = told_by(a, *others)
-        for name, value in a.items():
-            fine.errors.setdefault(name, np.zeros(len(fine.stuck)))[case] = told.get(
-                name, abs(value)
-            )
+    columns = []
+    for runs in (fine, *coarse_runs):
+        others = {MAIN_MEASURE: runs.amplitudes, "energy_balance": energy_balance(runs.book)}
+        columns.append(runs.values | others)
+    n = len(fine.stuck)
+    for case in range(n):
+        values, *coarse = (known_values(measures, case) for measures in columns)
+        errors = estimate(values, *coarse)
+        for name, value in values.items():
+            column = fine.errors.setdefault(name, np.zeros(n))
+            column[case] = errors.get(name, abs(value))
     return fine
+
+
+def known_values(measures: dict, case: int) -> dict:
+    """Return the values of a case that are known, by name, from columns by name."""
+    values = {name: float(column[case]) for name, column in measures.items()}
+    return {name: value for name, value in values.items() if not np.isnan(value)}

@@ -1,57 +1,29 @@
 """Batch of patches that slip in part, with one mode under a sine.
 
-In: models of a group. Out: `CaseResults`. Patches that share their pieces are pressed together
-(`runs.patch.static`), others as in single runs. Their elements, and those of the coarser mesh
-for the error, then move without histories (`pieces`), or in lanes (`tabled`). A case that
-sticks, or rings during stick, is run by itself.
+In: models of a group. Out: `CaseResults`. The elements of the pressed patches, and those of the
+coarser mesh for the error, move without histories (`pieces`). A case that sticks, or rings
+during stick, is run by itself.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from time import perf_counter
-from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....core import Outcome
-from ....effects import law_has_trait
 from ....model.model import Model
-from ....model.source import locate_errors
 from ....response.errors import coarser_errors
-from ...accuracy_warnings import Finding, tolerance_warnings
-from ...patch import result as of_patch
-from ...results.result import shorten_file_names
-from ...results.travel import outcome_on_piece, warn_of_large_slide
 from ...rig.engines import PIECES, choose_engine
-from ...rig.numerics import choose
 from ...rig.pieces import YieldingElements
-from .. import one_by_one, patches
+from .. import pressed
 from ..case_results import CaseResults, has_unreadable_table
 from . import pieces
-from .columns import batch_answers, known_measures
-from .lumped import not_one_sine, take_out
+from .columns import assemble_results
+from .lumped import not_one_sine
 
 # cases of one compiled call, whose elements and histories of cycles are in memory together
 MAX_CASES_PER_CALL = 128
-MIN_CASES_PER_THREAD = (
-    2  # cases of a thread: a single one takes as long as hundreds of single points
-)
-
-
-class PressedCase(NamedTuple):
-    """Case whose patch is pressed.
-
-    - fine, coarse: elements on its mesh and on the coarser one.
-    - measures, warnings, notes: of its patch.
-    - patch: the pressed Patch, for lengths and positions only.
-    """
-
-    fine: YieldingElements
-    coarse: YieldingElements
-    measures: dict
-    warnings: list
-    notes: list
-    patch: Any
+# cases of a thread: a single one takes as long as hundreds of single points
+MIN_CASES_PER_THREAD = 2
 
 
 def refuses(model: Model) -> str:
@@ -67,18 +39,13 @@ def refuses(model: Model) -> str:
         return "the case has [wear] or [friction.temperature], or its table of measured responses cannot be read"
     if why := not_one_sine(model.rig):
         return why
-    if model.friction.law != "elastic-plastic" and (
-        not law_has_trait(model.friction.law, "set-valued")
-        or law_has_trait(model.friction.law, "averaged")
-    ):
+    if model.friction.law != "elastic-plastic" and not pieces.is_rigid_law(model):
         return "the points of the patch have no slip force"
-    if not pieces.SHORTEST <= model.rig.drive.cycles <= pieces.LONGEST:
+    if not pieces.MIN_CYCLES <= model.rig.drive.cycles <= pieces.MAX_CYCLES:
         return "the case has too few or too many cycles"
-    return (
-        ""
-        if choose_engine(model) is PIECES
-        else "the case is not computed by the engine from yield to yield"
-    )
+    if choose_engine(model) is not PIECES:
+        return "the case is not computed by the engine from yield to yield"
+    return ""
 
 
 def group(model: Model) -> tuple:
@@ -88,145 +55,71 @@ def group(model: Model) -> tuple:
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Return the case results of models of one group; cases that need it are run by themselves."""
-    return solve_cases(models, say, move_cases, MAX_CASES_PER_CALL)
+    batch = pressed.PatchBatch(PIECES.name, YieldingElements, move_cases, MAX_CASES_PER_CALL)
+    return pressed.solve(models, batch, say)
 
 
-def solve_cases(models: Sequence[Model], say, move: Callable, together: int) -> CaseResults:
-    """Return the case results of models of one group.
-
-    Parameters
-    ----------
-    models : sequence of Model
-    say : callable, optional
-        Callback for a line of text.
-    move : callable
-        Function like `move_cases`.
-    together : int
-        Number of cases per call.
-    """
-    return patches.pressed_first(
-        models, together, lambda part: _solve_pressed_cases(part, say, move)
-    )
-
-
-def _solve_pressed_cases(models, say, move: Callable) -> CaseResults:
-    """Return the case results of models whose patches are pressed."""
-    begin = perf_counter()
-    out = CaseResults.blank(len(models))
-    held = dict.fromkeys(range(len(models)))
-    for case in sorted(
-        held, key=lambda case: id(models[case].patch.solved)
-    ):  # cases of one patch are neighbours, because they share its elements
-        held[case] = _press_case(models[case])
-    moves = [case for case, one in held.items() if one is not None]
-    alone = set(range(len(models))) - set(moves)
-    if moves:
-        these = [models[case] for case in moves]
-        answers, lost = move(these, [held[case] for case in moves], say)
-        answers.seconds[:] = (perf_counter() - begin) / len(models)
-        alone |= {moves[k] for k in np.flatnonzero(lost)}
-        take_out(answers, np.flatnonzero(lost).tolist())
-        out.place(moves, answers)
-    if alone:
-        rest = sorted(alone)
-        out.place(rest, one_by_one.solve([models[case] for case in rest], say))
-    return out
-
-
-def _press_case(model: Model) -> PressedCase | None:
-    """Return a case with its pressed patch; None if it is run by itself."""
-    try:
-        with locate_errors(model.source):
-            patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
-            if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT:
-                return None
-            warnings = [*model.source.remarks, *of_patch.warn_of_strains(model.patch, patch)]
-            numerics = choose(model)
-            return PressedCase(
-                YieldingElements(model, numerics, patch),
-                YieldingElements(model, numerics, coarse[0]),
-                of_patch.static_measures(model, patch, coarse),
-                warnings,
-                of_patch.notes_on_neglected_effects(model, patch, coarse),
-                patch,
-            )
-    except Exception:  # the case is run by itself, which reports the error
-        return None
-
-
-def move_cases(models, held: list, say) -> tuple:
+def move_cases(
+    models: Sequence[Model], pressed_cases: list, say=None
+) -> tuple[CaseResults, np.ndarray]:
     """Return the results of pressed cases, and which (n,) must be run by themselves.
 
     Parameters
     ----------
     models : sequence of Model
-    held : list of PressedCase
-    say : callable or None
+    pressed_cases : list of pressed.PressedCase
+        With YieldingElements as contacts.
+    say : callable, optional
         Callback for a line of text.
     """
     cycles = int(models[0].rig.drive.cycles)
     window = min(10, cycles // 10)
-    cases = [
-        pieces.Case(model, one.fine.groups, one.fine.held, one.patch.pressure.load)
-        for model, one in zip(models, held)
-    ]
-    fine = pieces.runs_of_cases(cases, cycles, window, say, MIN_CASES_PER_THREAD)
-    coarser = [case._replace(groups=one.coarse.groups) for case, one in zip(cases, held)]
-    coarse = pieces.runs_of_cases(coarser, cycles, window, say, MIN_CASES_PER_THREAD, steady=False)
-    chosen = tuple(
-        {
-            "elements": int(one.fine.contact.reduction.stiffness.size),
-            "interface_nodes": int(one.patch.x.size),
-        }
-        for one in held
+    fine_cases = []
+    coarse_cases = []
+    numerics = []
+    for model, case in zip(models, pressed_cases):
+        load = case.patch.pressure.load
+        fine_cases.append(pieces.Case(model, case.fine.groups, case.fine.held, load))
+        coarse_cases.append(fine_cases[-1]._replace(groups=case.coarse.groups))
+        numerics.append(describe_sizes(case))
+    fine = pieces.runs_of_cases(fine_cases, cycles, window, say, MIN_CASES_PER_THREAD)
+    coarse = pieces.runs_of_cases(
+        coarse_cases, cycles, window, say, MIN_CASES_PER_THREAD, steady=False
     )
-    runs = replace(
-        pieces.with_coarser_errors(fine, [coarse], coarser_errors), chosen=chosen, again=False
+    runs = pieces.with_coarser_errors(fine, [coarse], coarser_errors)
+    runs = replace(runs, chosen=tuple(numerics), again=False)
+    results, runs_singly, _ = assemble_results(
+        models, runs, {"engine": PIECES.name, "window_cycles": window}
     )
-    found, alone, _ = batch_answers(models, runs, {"engine": PIECES.name, "window_cycles": window})
-    alone = alone | runs.stuck | coarse.lost
-    for case in np.flatnonzero(~alone).tolist():
-        add_patch_results(found, case, models[case], held[case], np.abs(runs.extremes[case]).max())
-    return found, alone
+    runs_singly = runs_singly | runs.stuck | coarse.lost
+    for case in np.flatnonzero(~runs_singly).tolist():
+        reach = np.abs(runs.extremes[case]).max()
+        add_patch_results(results, case, models[case], pressed_cases[case], reach)
+    return results, runs_singly
+
+
+def describe_sizes(case: pressed.PressedCase) -> dict:
+    """Return the numbers of elements and of interface nodes of a case, by name."""
+    return {
+        "elements": int(case.fine.contact.reduction.stiffness.size),
+        "interface_nodes": int(case.patch.x.size),
+    }
 
 
 def add_patch_results(
-    found: CaseResults, case: int, model: Model, one: PressedCase, reach: float
+    results: CaseResults, case: int, model: Model, pressed_case: pressed.PressedCase, reach: float
 ) -> None:
-    """Add the measures of the patch, outcome, warnings and notes, as in a single run.
+    """Add the results of the patch to a case (`pressed.add_patch_results`).
 
     Parameters
     ----------
-    found : CaseResults
+    results : CaseResults
     case : int
     model : Model
-    one : PressedCase
+    pressed_case : pressed.PressedCase
     reach : float
         Largest output [m].
     """
     modes = model.rig.modes
-    slide = np.array([reach * abs(float(modes.interfaces[0, 0]) / float(modes.output[0]))])
-    found.outcome[case] = str(
-        outcome_on_piece(Outcome(found.outcome[case]), model.patch, one.patch, slide)
-    )
-    known = known_measures(found, case)
-    found.fill(case, one.measures)
-    seen = Finding(
-        model,
-        one.measures | {name: m for name, m in known.items() if name != "normal_load"},
-        one.patch,
-    )
-    warned = shorten_file_names(
-        [
-            *one.warnings,
-            *model.rig.structure.notes,
-            *warn_of_large_slide(one.patch, slide),
-            *tolerance_warnings(seen),
-        ],
-        model.source.path,
-    )
-    found.warnings.pop(case, None)
-    if warned:
-        found.warnings[case] = warned
-    if noted := shorten_file_names(one.notes, model.source.path):
-        found.notes[case] = noted
+    slide = reach * abs(float(modes.interfaces[0, 0]) / float(modes.output[0]))
+    pressed.add_patch_results(results, case, model, pressed_case, slide)

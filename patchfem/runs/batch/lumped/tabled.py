@@ -2,8 +2,8 @@
 
 In: models of a group. Out: `CaseResults`. Under a constant load such a patch is a set of
 Jenkins elements, whose force follows from one curve by Masing's rule. The curves of each case
-and of its coarser mesh are marched as tables (`lanes.solve_and_check`). Cases that lanes cannot finish
-go to `sheared`.
+and of its coarser mesh are marched as tables (`lane_check.solve_and_check`). Cases that lanes
+cannot finish go to `sheared`.
 """
 
 from collections.abc import Sequence
@@ -13,16 +13,18 @@ import numpy as np
 from ....compiled import load
 from ....dynamics.lanes import run as march
 from ....model.model import Model
-from .. import one_by_one
+from ...rig.engines import PIECES
+from ...rig.pieces import YieldingElements
+from .. import one_by_one, pressed
 from ..case_results import CaseResults
-from . import lanes, sheared
+from . import lane_check, lane_numbers, lane_steps, lanes, sheared
 
 MAX_CASES_PER_CALL = 512  # cases of one compiled call, whose tables are in memory together
 
 
 def refuses(model: Model) -> str:
     """Return why lanes do not take a model; "" if they do."""
-    return sheared.refuses(model) or lanes.asks_more(model)
+    return sheared.refuses(model) or lanes.needs_other_accuracy(model)
 
 
 def group(model: Model) -> tuple:
@@ -32,78 +34,82 @@ def group(model: Model) -> tuple:
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Return the case results of models of one group."""
-    return sheared.solve_cases(models, say, move_cases, MAX_CASES_PER_CALL)
+    batch = pressed.PatchBatch(PIECES.name, YieldingElements, move_cases, MAX_CASES_PER_CALL)
+    return pressed.solve(models, batch, say)
 
 
-def move_cases(models, held: list, say) -> tuple:
+def move_cases(
+    models: Sequence[Model], pressed_cases: list, say=None
+) -> tuple[CaseResults, np.ndarray]:
     """Return the results of pressed cases, and which (n,) must be run by themselves.
 
-    Parameters
-    ----------
-    models : sequence of Model
-    held : list of PressedCase
-    say : callable or None
-        Callback for a line of text.
+    The parameters are those of `sheared.move_cases`.
     """
-    sets = [[one.groups[0] for one in (pressed.fine, pressed.coarse)] for pressed in held]
+    fine = [case.fine.groups[0] for case in pressed_cases]
+    coarse = [case.coarse.groups[0] for case in pressed_cases]
     rates = [
-        lanes.fastest_rate(model, fine.stiffness.sum()) for model, (fine, _) in zip(models, sets)
+        lane_steps.fastest_rate(model, elements.stiffness.sum())
+        for model, elements in zip(models, fine)
     ]
-    steps = lanes.steps_at_rate(rates, lanes.OF_TABLE)
-    most = load(f"{march.HERE}.table_curve_kernels").N_YIELDS - 1
-    fit = (steps > 0) & [max(one.stiffness.size for one in pair) < most for pair in sets]
-    found = CaseResults.blank(len(models))
-    lost = np.zeros(len(models), bool)
+    steps = lane_steps.steps_at_rate(rates, lane_steps.PATCH_STEPS)
+    max_size = load(f"{march.HERE}.table_curve_kernels").N_YIELDS - 1
+    sizes = [max(a.stiffness.size, b.stiffness.size) for a, b in zip(fine, coarse)]
+    fits = (steps > 0) & (np.array(sizes) < max_size)
+    results = CaseResults.blank(len(models))
 
-    def exactly(places) -> CaseResults:
+    def solve_exactly(cases: list, is_check: bool = False) -> CaseResults:
         """Return the results of some cases by the exact batch or by single runs."""
-        answers, alone = sheared.move_cases(
-            [models[k] for k in places], [held[k] for k in places], say
+        some_models = [models[case] for case in cases]
+        part, runs_singly = sheared.move_cases(
+            some_models, [pressed_cases[case] for case in cases], say
         )
-        answers.place(
-            np.flatnonzero(alone),
-            one_by_one.solve([models[places[k]] for k in np.flatnonzero(alone)], say),
-        )
-        return answers
+        one_by_one.solve_rest(part, some_models, runs_singly, say)
+        return part
 
-    if rest := np.flatnonzero(~fit).tolist():
-        found.place(rest, exactly(rest))
-    if here := np.flatnonzero(fit).tolist():
-        these = [models[k] for k in here]
-        cases = [
-            lanes.make_cases(
-                these, _contacts([sets[k][mesh] for k in here], [held[k] for k in here])
-            )
-            for mesh in range(2)
+    if exact_cases := np.flatnonzero(~fits).tolist():
+        results.insert(exact_cases, solve_exactly(exact_cases))
+    if lane_cases := np.flatnonzero(fits).tolist():
+        lane_models = [models[case] for case in lane_cases]
+        lane_pressed = [pressed_cases[case] for case in lane_cases]
+        contacts = [
+            _contact_numbers([elements[case] for case in lane_cases], lane_pressed)
+            for elements in (fine, coarse)
         ]
-        answers, exact, reach = lanes.solve_and_check(
-            these,
-            (*cases[0], cases[1]),
-            steps[here],
-            lambda places, _: exactly([here[k] for k in places]),
+        checked = lane_check.solve_and_check(
+            lane_models,
+            lane_numbers.LaneCases(
+                *lane_numbers.make_cases(lane_models, contacts[0]),
+                lane_numbers.make_cases(lane_models, contacts[1]),
+            ),
+            steps[lane_cases],
+            lambda indices, is_check: solve_exactly([lane_cases[index] for index in indices]),
         )
-        for place in np.flatnonzero(~exact).tolist():
-            case = here[place]
-            answers.numerics[place] = answers.numerics[place] | {
-                "elements": int(sets[case][0].stiffness.size),
-                "interface_nodes": int(held[case].patch.x.size),
-            }
-            sheared.add_patch_results(answers, place, models[case], held[case], reach[place])
-        found.place(here, answers)
-    return found, lost
+        for index in np.flatnonzero(~checked.is_exact).tolist():
+            numerics = checked.results.numerics[index]
+            sizes = sheared.describe_sizes(lane_pressed[index])
+            checked.results.numerics[index] = numerics | sizes
+            sheared.add_patch_results(
+                checked.results,
+                index,
+                lane_models[index],
+                lane_pressed[index],
+                checked.reach[index],
+            )
+        results.insert(lane_cases, checked.results)
+    return results, np.zeros(len(models), bool)
 
 
-def _contacts(sets: list, held: list) -> np.ndarray:
-    """Return the numbers (m, n) of the contacts of patches, as `lanes.make_cases` takes them."""
+def _contact_numbers(elements: list, pressed_cases: list) -> np.ndarray:
+    """Return the numbers (m, n) of the contacts of patches, as `lane_numbers.make_cases` takes them."""
     rows = [
         (
-            one.limit,
-            one.limit,
-            pressed.patch.pressure.load,
-            one.stiffness.sum(),
-            one.yield_displacement[-1],
+            group.limit,
+            group.limit,
+            case.patch.pressure.load,
+            group.stiffness.sum(),
+            group.yield_displacement[-1],
         )
-        for one, pressed in zip(sets, held)
+        for group, case in zip(elements, pressed_cases)
     ]
-    tables = march.curve_tables([(one.stiffness, one.yield_displacement) for one in sets])
+    tables = march.curve_tables([(group.stiffness, group.yield_displacement) for group in elements])
     return np.column_stack([rows, tables]).T

@@ -1,0 +1,269 @@
+"""Numbers of the cases that march in lanes, in units of the drive.
+
+In: models of one friction law. Out: `Cases` of `dynamics.lanes`, and the `Scales` that turn their
+results into SI units.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ....dynamics.lanes import run as march
+from ....effects import law_has_trait
+from ....friction.laws.iwan import max_yield_displacement
+from ....model.model import Model
+from ....model.similar_models import collect_columns
+from ....structure.drive_sizes import find_max_acceleration
+
+# friction law in `dynamics.lanes` by the law of the scene
+KINDS = {
+    "coulomb": "rigid",
+    "elastic-plastic": "yielding",
+    "iwan": "masing",
+    "tanh": "friction.laws.tanh_kernels",
+    "bouc-wen": "friction.laws.bouc_wen_kernels",
+    "lugre": "friction.laws.lugre_kernels",
+    "nonlocal": "friction.laws.stretch_kernels",
+}
+HELD_FRACTION = 1e-3  # slip over the length of a spring, below which its interface sticks
+
+
+class Scales(NamedTuple):
+    """Numbers of n cases in SI units, (n,) each.
+
+    - omega: of the drive [rad/s].
+    - energy: unit of the energies, over the squared unit of the slide [J m-2].
+    - ratio: output over slide [1].
+    - held: slip in a cycle below which a case sticks [m].
+    - stiffness: of the first mode as seen by the contact [N/m].
+    - load: normal load [N].
+    - acceleration: largest acceleration of the drive [m s-2].
+    """
+
+    omega: np.ndarray
+    energy: np.ndarray
+    ratio: np.ndarray
+    held: np.ndarray
+    stiffness: np.ndarray
+    load: np.ndarray
+    acceleration: np.ndarray
+
+
+class LaneCases(NamedTuple):
+    """Cases of one friction law for lanes.
+
+    - cases, scales: of the cases.
+    - coarse: (cases, scales) on a coarser mesh; None without a mesh.
+    """
+
+    cases: march.Cases
+    scales: Scales
+    coarse: tuple | None = None
+
+
+def select_rows(values, indices):
+    """Return the rows of some cases from arrays in a dict or a tuple; other entries are common."""
+    if isinstance(values, dict):
+        return {name: select_rows(value, indices) for name, value in values.items()}
+    if isinstance(values, tuple):
+        parts = [select_rows(value, indices) for value in values]
+        return type(values)(*parts) if hasattr(values, "_fields") else tuple(parts)
+    return values[indices] if np.ndim(values) else values
+
+
+def count_evaluated_cycles(cycles: int) -> int:
+    """Return the number of last cycles that are evaluated."""
+    return min(10, cycles // 10)
+
+
+def lane_kind(model: Model) -> str:
+    """Return the law of a model in `dynamics.lanes`; for a patch, the table of its elements."""
+    return KINDS[model.friction.law] if model.patch is None else "table"
+
+
+class StretchLaw(NamedTuple):
+    """Numbers of a law whose force follows from one stretch.
+
+    - numbers: parameters of its `rate_equation`.
+    - length: stretch at the friction limit [m]; 0 for a law without one.
+    """
+
+    numbers: tuple
+    length: float
+
+
+def law_numbers(model: Model) -> StretchLaw:
+    """Return the numbers of a stretch law."""
+    friction = model.friction
+    load = model.point.load
+    limit = model.friction_limits(load)[0]
+    if friction.law == "tanh":
+        return StretchLaw((limit, 1 / friction.reference_speed), 0.0)
+    if law_has_trait(friction.law, "bonds"):
+        length = friction.bond_length
+        return StretchLaw((limit / length, length), length)
+    length = limit / friction.stiffness
+    if friction.law == "bouc-wen":
+        return StretchLaw((limit, length, friction.exponent, friction.shape), length)
+    kinetic = friction.static if friction.kinetic is None else friction.kinetic
+    numbers = (
+        friction.stiffness,
+        kinetic * load,
+        limit,
+        friction.stribeck_speed,
+        friction.micro_damping,
+        friction.viscous,
+    )
+    return StretchLaw(numbers, length)
+
+
+class ContactNumbers(NamedTuple):
+    """Contact of a point.
+
+    - stiffness: in stick [N/m].
+    - length: stretch at the friction limit [m].
+    - others: further numbers of its law (see `Cases`).
+    """
+
+    stiffness: float
+    length: float
+    others: tuple = ()
+
+
+def contact_of_point(model: Model) -> ContactNumbers:
+    """Return the contact of a model with a single point."""
+    friction = model.friction
+    static = model.friction_limits(model.point.load)[0]
+    if friction.law == "iwan":
+        chi = friction.chi
+        fraction = 1 / (1 + friction.beta)
+        # fraction of the friction that slips before the last slider does
+        early_slip = fraction * (chi + 1) / (chi + 2 - fraction)
+        half = np.minimum(1.0, (0.5 / early_slip) ** (1 / (chi + 2)))
+        length = max_yield_displacement(static, friction.stiffness, chi, friction.beta)
+        return ContactNumbers(friction.stiffness, length, (chi + 1, fraction, half))
+    if march.has_one_stretch(KINDS[friction.law]):
+        law = law_numbers(model)
+        stiffness = 0.0 if friction.law == "tanh" else static / law.length
+        return ContactNumbers(stiffness, law.length, law.numbers)
+    if friction.law == "elastic-plastic":
+        return ContactNumbers(static / friction.bond_length, friction.bond_length)
+    return ContactNumbers(0.0, 0.0)
+
+
+def may_create_energy(model: Model):
+    """Return whether a stretch law may create energy, or its bonds differ in their stretch."""
+    friction = model.friction
+    if law_has_trait(friction.law, "bonds"):
+        return np.not_equal(friction.breakaway or 0.0, 0.0) | np.not_equal(
+            friction.initial_bonds, 1.0
+        )
+    if friction.law == "lugre":  # from this damping on, its power may be negative
+        sliding_force = law_numbers(model).numbers[1]
+        return np.greater(friction.micro_damping * model.rig.speed_scale, 4 * sliding_force)
+    return np.less(friction.shape, 0.5) if friction.law == "bouc-wen" else False
+
+
+def make_cases(models: Sequence[Model], contacts=None) -> tuple[march.Cases, Scales]:
+    """Return the Cases of models and their Scales.
+
+    contacts: numbers (m, n) of the contacts as from `_contact_row`; None: those of single points.
+    """
+    rig = _RigNumbers(*collect_columns(models, _rig_row))
+    if contacts is None:
+        contacts = collect_columns(models, _contact_row)
+    static, kinetic, load, spring, length, *others = contacts
+    law = lane_kind(models[0])
+    omega = rig.drive_omega
+    slide = rig.slide
+    scale = slide**2 / (rig.mass * omega**2)
+    numbers = np.array(others).T
+    if march.has_one_stretch(law):
+        numbers = numbers * march.number_scales(law, scale, omega)
+    else:
+        numbers = numbers.reshape(len(omega), -1)
+    cases = march.Cases(
+        rig.damping / omega,
+        (rig.mode_omega / omega) ** 2,
+        -slide * rig.base * rig.acceleration / omega**2,
+        scale * kinetic,
+        scale * static,
+        scale * spring,
+        length,
+        rig.output / slide * omega**2,
+        rig.acceleration * rig.moving,
+        slide * rig.start,
+        slide * rig.start_speed / omega,
+        numbers,
+    )
+    scales = Scales(
+        omega=omega,
+        energy=rig.mass * (omega / slide) ** 2,
+        ratio=rig.output / slide,
+        held=HELD_FRACTION * np.divide(static, spring, out=0 * omega, where=spring > 0),
+        stiffness=rig.stiffness,
+        load=load,
+        acceleration=rig.max_acceleration,
+    )
+    return cases, scales
+
+
+class _RigNumbers(NamedTuple):
+    """Numbers of a rig with one mode under a sine, in SI units.
+
+    - mode_omega, damping: natural frequency and damping rate of its mode [rad/s].
+    - slide, base, output, mass: participations of the mode, and its mass [kg].
+    - acceleration, drive_omega, moving: of the sine (`core.SineDrive`).
+    - start, start_speed: modal coordinate and its rate at t = 0.
+    - stiffness: of the first mode as seen by the contact [N/m].
+    - max_acceleration: of the drive [m s-2].
+    """
+
+    mode_omega: np.ndarray
+    damping: np.ndarray
+    slide: np.ndarray
+    base: np.ndarray
+    output: np.ndarray
+    mass: np.ndarray
+    acceleration: np.ndarray
+    drive_omega: np.ndarray
+    moving: np.ndarray
+    start: np.ndarray
+    start_speed: np.ndarray
+    stiffness: np.ndarray
+    max_acceleration: np.ndarray
+
+
+def _rig_row(model: Model) -> _RigNumbers:
+    """Return the numbers of the rig of a model."""
+    modes = model.rig.modes
+    drive = model.rig.drive.signal
+    start = model.rig.start
+    return _RigNumbers(
+        modes.omega[0],
+        modes.damping_matrix[0, 0],
+        modes.slide[0],
+        modes.base[0],
+        modes.output[0],
+        modes.mass,
+        drive.acceleration,
+        drive.omega,
+        drive.moving,
+        0.0 if start is None else start.z[0],
+        0.0 if start is None else start.v[0],
+        model.rig.first_mode.stiffness,
+        find_max_acceleration(drive),
+    )
+
+
+def _contact_row(model: Model) -> list:
+    """Return the numbers of the contact of a model for `make_cases`.
+
+    They are static and kinetic friction [N], load [N], and those of its ContactNumbers.
+    """
+    static, kinetic = model.friction_limits(model.point.load)
+    if lane_kind(model) != "rigid" or model.friction.kinetic is None:
+        kinetic = static
+    contact = contact_of_point(model)
+    return [static, kinetic, model.point.load, contact.stiffness, contact.length, *contact.others]

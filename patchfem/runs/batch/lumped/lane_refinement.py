@@ -1,0 +1,233 @@
+"""Cases that march side by side in lanes, with more steps until their errors meet the tolerance.
+
+In: `LaneCases` of models with the first steps per cycle of each. Out: `RefinedCases`.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ....dynamics.lanes import run as march
+from ....model.model import Model
+from ....model.similar_models import collect_columns, select_models
+from ....response.errors import coarser_errors
+from ....response.rows import larger_term
+from ..case_results import CaseResults
+from . import lane_runs
+from .columns import MAIN_MEASURE, assemble_results
+from .lane_numbers import LaneCases, lane_kind, select_rows
+from .lane_ringing import RINGING_MEASURES
+from .lane_runs import MeasuredMarch, march_and_measure
+from .lane_settling import SETTLING_LAWS
+from .lane_steps import POINT_STEPS, STRETCH_STEPS
+
+# relative to largest force times slide; a case with a smaller loop area sticks
+MIN_LOOP_AREA = 1e-6
+# Largest relative change of each measure on a coarser mesh that is fine enough; the loop of a small
+# slip may be completely uncertain.
+MAX_MESH_CHANGES = ((MAIN_MEASURE, 0.1), ("friction_force_peak", 0.1), ("loop_area", 10.0))
+
+
+class RefinedCases(NamedTuple):
+    """Results of n cases by lanes.
+
+    - results: CaseResults.
+    - is_exact: which cases (n,) must be computed by the exact engine.
+    - steps: steps per cycle (n,).
+    - reach: largest output (n,) [m].
+    """
+
+    results: CaseResults
+    is_exact: np.ndarray
+    steps: np.ndarray
+    reach: np.ndarray
+
+
+def march_side_by_side(models: Sequence[Model], cases: LaneCases, steps) -> RefinedCases:
+    """March models side by side, and refine the steps until their errors meet the tolerance.
+
+    All cases with the same steps march together, including those whose errors need these steps. If
+    the difference from half the steps is too large with a stretch law, a quarter of them shows how
+    the errors fall. The difference from a coarser mesh is computed with the fewest steps. More are
+    used if this difference exceeds MAX_MESH_CHANGES, or if the case sticks, because what then
+    remains of the third harmonic depends on both.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    cases : LaneCases
+    steps : (n,)
+        First number of steps per cycle.
+    """
+    return _Refinement(models, cases, steps).refine()
+
+
+class _Refinement:
+    """Cases with the measures of all their marches; see `march_side_by_side`."""
+
+    def __init__(self, models: Sequence[Model], cases: LaneCases, steps):
+        n = len(models)
+        self.models = models
+        self.cases = cases
+        self.steps = steps.copy()
+        self.min_steps = steps // 2
+        self.law = lane_kind(models[0])
+        self.cycles = int(models[0].rig.drive.cycles)
+        self.has_one_stretch = march.has_one_stretch(self.law)
+        self.results = CaseResults.blank(n)
+        self.is_exact = np.zeros(n, bool)
+        self.reach = np.zeros(n)
+        self.mesh_errors = {}
+        self.values = {}  # measures (n,) by name, by steps per cycle
+
+    def refine(self) -> RefinedCases:
+        """March with more and more steps until no case needs more."""
+        steps = int(self.min_steps.min())
+        while (self.steps >= steps).any():
+            self._march(steps)
+            steps *= 2
+        return RefinedCases(self.results, self.is_exact, self.steps, self.reach)
+
+    def _march(self, steps: int) -> None:
+        """March the cases that need this number of steps, finally or for their errors."""
+        marching = np.flatnonzero((self.min_steps <= steps) & (self.steps >= steps))
+        if not marching.size:
+            return
+        measured = self._measure(marching, steps)
+        rows = np.flatnonzero(self.steps[marching] == steps)
+        final = marching[rows]
+        final_measured = select_rows(measured, rows)
+        if self.cases.coarse is not None:
+            needs_mesh_errors = self.min_steps[marching] == steps
+            if self.mesh_errors and rows.size:
+                needs_mesh_errors[rows] |= self._needs_mesh_errors(final, final_measured.values)
+            if needs_mesh_errors.any():
+                values = select_rows(measured.values, needs_mesh_errors)
+                self._compute_mesh_errors(marching[needs_mesh_errors], values, steps)
+        if final.size:
+            self.reach[final] = np.abs(final_measured.extremes).max(axis=(1, 2))
+            self._judge(final, final_measured)
+
+    def _measure(self, indices, steps: int) -> MeasuredMarch:
+        """March some cases, and store their measures."""
+        cases = select_rows(self.cases[:2], indices)
+        measured = march_and_measure(self.law, *cases, self.cycles, steps)
+        columns = self.values.setdefault(steps, {})
+        for name, values in measured.values.items():
+            columns.setdefault(name, np.full(len(self.models), np.nan))[indices] = values
+        return measured
+
+    def _needs_mesh_errors(self, indices, values: dict) -> np.ndarray:
+        """Return which cases (n,) need the errors due to the mesh with more steps.
+
+        values: their measures, (n,) by name.
+        """
+        max_area = values["friction_force_peak"] * np.abs(values[MAIN_MEASURE])
+        is_needed = ~(np.abs(values["loop_area"]) > MIN_LOOP_AREA * max_area)
+        for name, change in MAX_MESH_CHANGES:
+            if name in self.mesh_errors:
+                error = self.mesh_errors[name][indices]
+                is_needed |= ~(error <= change * np.abs(values[name]))
+        return is_needed
+
+    def _compute_mesh_errors(self, indices, values: dict, steps: int) -> None:
+        """Store the errors of some cases due to the mesh, from the change on a coarser one.
+
+        The error of a measure that the coarser mesh does not have is its absolute value.
+        """
+        cases = select_rows(self.cases.coarse, indices)
+        coarse = march_and_measure(self.law, *cases, self.cycles, steps).values
+        with np.errstate(all="ignore"):
+            errors = coarser_errors(values, coarse)
+        for name, error in errors.items():
+            column = self.mesh_errors.setdefault(name, np.zeros(len(self.models)))
+            column[indices] = np.where(np.isnan(error), np.abs(values[name]), error)
+
+    def _judge(self, indices, measured: MeasuredMarch) -> None:
+        """Store the results of some cases, and choose those that need more steps."""
+        steps = measured.steps
+        is_wide = self._evaluate(indices, measured, [steps // 2])
+        if self.has_one_stretch and is_wide.any():
+            without_quarter = indices[is_wide & (2 * self.min_steps[indices] == steps)]
+            if without_quarter.size:
+                self._measure(without_quarter, steps // 4)
+            wide_measured = select_rows(measured, is_wide)
+            is_wide[is_wide] = self._evaluate(
+                indices[is_wide], wide_measured, [steps // 2, steps // 4]
+            )
+        is_smooth = self.has_one_stretch or self.law in march.MASING
+        max_steps = STRETCH_STEPS[-1] if is_smooth else POINT_STEPS[-1][-1]
+        is_refined = is_wide & (2 * steps <= max_steps) & (is_smooth | ~self.is_exact[indices])
+        self.steps[indices[is_refined]] = 2 * steps
+        self.is_exact[indices[is_wide]] = ~is_refined[is_wide]
+
+    def _evaluate(self, indices, measured: MeasuredMarch, coarser_steps: list) -> np.ndarray:
+        """Store the results of some cases; return which have too large errors.
+
+        coarser_steps: steps per cycle of the marches that show the errors.
+        """
+        models = select_models(self.models, indices)
+        mesh_errors = select_rows(self.mesh_errors, indices)
+        cases = select_rows(self.cases[:2], indices)
+        coarser = [select_rows(self.values[steps], indices) for steps in coarser_steps]
+        runs, is_exact, needs_more_steps = lane_runs.collect_runs(
+            models, cases, measured, coarser, mesh_errors
+        )
+
+        def is_wide(results: CaseResults) -> np.ndarray:
+            """Return which cases have an error above the tolerance."""
+            return has_large_error(models, results, mesh_errors)
+
+        numerics = {"engine": "exact", "window_cycles": measured.window}
+        assembled = assemble_results(models, runs, numerics, is_wide)
+        results = assembled.results
+        lane_numerics = {
+            "engine": "lanes",
+            "steps_per_cycle": measured.steps,
+            "window_cycles": measured.window,
+        }
+        results.numerics.update(dict.fromkeys(range(len(models)), lane_numerics))
+        self.is_exact[indices] = is_exact | (results.outcome == "grows")
+        self.results.remove(indices)  # the results with fewer steps are replaced
+        self.results.insert(indices, results)
+        return is_wide(results) | needs_more_steps | assembled.runs_singly
+
+
+def has_large_error(
+    models: Sequence[Model], results: CaseResults, mesh_errors: dict | None = None
+) -> np.ndarray:
+    """Return whether an error of a case exceeds its tolerance, (n,).
+
+    The tolerance applies to a measure or to the larger terms of which it is the difference. The
+    errors due to the mesh are not counted, because no other engine reduces them.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    results : CaseResults
+    mesh_errors : dict, optional
+        Errors due to the mesh, (n,) by name.
+    """
+    tolerance = collect_columns(models, lambda model: (model.accuracy.tolerance,))[0]
+    is_large = np.zeros(len(models), bool)
+    for name, values in results.values.items():
+        if name in RINGING_MEASURES:  # the fit of a single run is no more accurate
+            continue
+        if name.endswith("_steady") and lane_kind(models[0]) not in SETTLING_LAWS:
+            # an extrapolation has the same error with finer steps, and with the exact engine
+            continue
+        mesh_error = (mesh_errors or {}).get(name.removesuffix("_steady"), 0.0)
+        floors = np.fmax(results.floors[name], tolerance * larger_term(name, results.values))
+        # it is the loop area over an energy, and not more accurate than this area
+        if name == "equivalent_damping" and "loop_area" in results.values:
+            floors = np.fmax(floors, results.floors["loop_area"] * _damping_per_area(results))
+        is_large |= results.errors[name] - mesh_error > tolerance * np.abs(values) + floors
+    return is_large
+
+
+def _damping_per_area(results: CaseResults) -> np.ndarray:
+    """Return equivalent_damping over loop_area (n,) [1/J]; 0 without a loop."""
+    area = np.abs(results.values["loop_area"])
+    damping = np.abs(results.values["equivalent_damping"])
+    return np.divide(damping, area, out=0 * area, where=area != 0)

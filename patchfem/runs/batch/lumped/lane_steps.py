@@ -1,0 +1,76 @@
+"""Steps per cycle of the cases that march in lanes, from the fastest rate of each case.
+
+In: models of one friction law. Out: steps per cycle.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ....dynamics.lanes import run as march
+from ....model.model import Model
+from ....model.similar_models import collect_columns
+from ....structure.drive_sizes import find_max_acceleration
+from .lane_numbers import KINDS, contact_of_point, may_create_energy
+
+STRETCH_STEPS = (128, 256, 512, 1024, 2048)  # steps per cycle under a stretch law
+MAX_STEP_PHASE = 0.5  # largest phase of the fastest rate of a stretch law in a step [rad]
+# fraction of the relaxation rate of the speed in the layer of tanh, from which the errors need more
+# steps
+LAYER_RATE_FRACTION = 0.5
+# rate of the force peak of LuGre over (acceleration / Stribeck speed), the inverse time of a
+# reversal to pass this speed
+STRIBECK_RATE_FACTOR = 0.75
+# fastest rate over that of the drive, and the steps per cycle that it needs
+POINT_STEPS = ((5.0, 96), (10.0, 192), (20.0, 384))
+# the same for a patch, represented by sliders
+PATCH_STEPS = ((10.0, 96), (20.0, 192), (40.0, 384), (80.0, 768))
+
+
+def steps_per_cycle(models: Sequence[Model]) -> np.ndarray:
+    """Return the steps per cycle (n,) of models of one law; 0 if there would be too many."""
+    ends = POINT_STEPS
+    if march.has_one_stretch(KINDS[models[0].friction.law]):
+        ends = [(MAX_STEP_PHASE * steps / (2 * np.pi), steps) for steps in STRETCH_STEPS]
+    return steps_at_rate(collect_columns(models, lambda model: (_relative_rate(model),))[0], ends)
+
+
+def steps_at_rate(rates, ends) -> np.ndarray:
+    """Return the steps per cycle (n,) for ratios (n,) of the fastest rate to that of the drive.
+
+    ends: sequence of (largest rate, steps).
+    """
+    steps = np.append([steps for _, steps in ends], 0)
+    return steps[np.searchsorted([end for end, _ in ends], rates)]
+
+
+def fastest_rate(model: Model, stiffness):
+    """Return the fastest rate of a model with a contact stiffness [N/m], over that of its drive."""
+    modes = model.rig.modes
+    rate = np.sqrt(modes.omega[0] ** 2 + stiffness * modes.slide[0] ** 2 / modes.mass)
+    return (rate + modes.damping_matrix[0, 0]) / model.rig.drive.signal.omega
+
+
+def _relative_rate(model: Model):
+    """Return the fastest rate of a model over that of its drive; inf if lanes cannot follow it."""
+    friction = model.friction
+    stiffness = contact_of_point(model).stiffness
+    if not march.has_one_stretch(KINDS[friction.law]):
+        return fastest_rate(model, stiffness)
+    modes = model.rig.modes
+    omega = model.rig.drive.signal.omega
+    scale = modes.slide[0] ** 2 / modes.mass
+    rate = modes.damping_matrix[0, 0]
+    if friction.law == "tanh":
+        limit = model.friction_limits(model.point.load)[0]
+        rate = limit / friction.reference_speed * scale + rate
+        max_rate = MAX_STEP_PHASE * STRETCH_STEPS[-1] / (2 * np.pi) * omega
+        rate = np.where(rate > max_rate, np.inf, LAYER_RATE_FRACTION * rate)
+    # its force peak during a reversal lasts as long as the speed is below the Stribeck speed
+    if friction.law == "lugre":
+        acceleration = np.abs(modes.slide[0] * modes.base[0]) * find_max_acceleration(
+            model.rig.drive.signal
+        )
+        rate = np.maximum(rate, STRIBECK_RATE_FACTOR * acceleration / friction.stribeck_speed)
+    rate = np.maximum(rate, np.sqrt(modes.omega[0] ** 2 + stiffness * scale)) / omega
+    return np.where(may_create_energy(model), np.inf, rate)
