@@ -12,14 +12,23 @@ from patchfem.runs.batch.case_results import FAILED_OUTCOME, CaseResults
 RIG = POINT + COULOMB + SHORT
 
 
+class StandIn(batches.Batch):
+    """Batch whose functions a test gives."""
+
+    def __init__(self, name, refuses, group, solve):
+        super().__init__(name, "")
+        for key, function in (("refuses", refuses), ("group", group), ("solve", solve)):
+            object.__setattr__(self, key, function)
+
+
 @pytest.fixture(autouse=True)
 def use_batches(monkeypatch):
-    """Return a function that sets the batches; without a call each case runs by itself."""
+    """Return a function that sets the only batch; without a call each case runs by itself."""
 
-    def use(*chosen: batches.Batch) -> None:
-        monkeypatch.setattr(batches, "BATCHES", chosen)
+    def use(*given) -> None:
+        monkeypatch.setattr(batches, "BATCHES", (StandIn(*given),))
 
-    use()
+    monkeypatch.setattr(batches, "BATCHES", ())
     return use
 
 
@@ -55,49 +64,41 @@ def test_exact_cases_are_single_runs_in_the_order_they_were_asked():
         assert found.numerics[case]["engine"] == single.extra["engine"]
 
 
-def test_exact_a_failing_batch_is_made_up_for_by_single_runs(use_batches):
-    def breaks(models, say):
-        raise ZeroDivisionError
-
-    models = [pf.build(RIG), pf.build(BENCH)]
-    batch = batches.Batch(
-        "breaks", lambda model: "" if model.kind == "rig" else "no", lambda model: 0, breaks
+@pytest.mark.parametrize(
+    ("refuses", "group", "solve", "failure"),
+    [
+        (lambda kind: "", lambda model: 0, lambda models, say: 1 / 0, "ZeroDivisionError"),
+        (lambda kind: "", lambda model: model.no_such_name, None, "AttributeError"),
+        (lambda kind: 1 / 0, None, None, "ZeroDivisionError"),
+    ],
+    ids=["solve", "group", "refuses"],
+)
+def test_always_a_fault_of_a_batch_is_made_up_for_by_single_runs_and_noted(
+    refuses, group, solve, failure, use_batches
+):
+    """Said once, and in a note of each of the benches; the rig, which the batch refuses, is not counted."""
+    use_batches(
+        "faulty", lambda model: "no" if model.kind == "rig" else refuses(model.kind), group, solve
     )
-    use_batches(batch)
+    texts = (BENCH, RIG, BENCH, BENCH)
     said = []
-    found = batches.solve_models(models, say=said.append)
-    same(found, 0, pf.run(RIG))
-    same(found, 1, pf.run(BENCH))
-    assert "breaks: ZeroDivisionError" in said[0]
-
-
-def test_exact_a_batch_that_fails_to_look_at_a_model_leaves_it_to_a_single_run(use_batches):
-    batch = batches.Batch("blind", lambda model: 1 / 0, lambda model: 0, lambda models, say: 1 / 0)
-    use_batches(batch)
-    said = []
-    same(batches.solve_models([pf.build(BENCH)], say=said.append), 0, pf.run(BENCH))
-    (sentence,) = [text for text in said if "one by one" in text]
-    assert sentence.startswith("1 cases are run one by one") and "ZeroDivisionError" in sentence
-
-
-def test_always_a_batch_that_cannot_group_its_models_says_so_once(use_batches):
-    """Three benches whose group fails are run one by one; the rig, which the batch refuses, is not counted."""
-    batch = batches.Batch(
-        "groups",
-        lambda model: "" if model.kind == "bench" else "no",
-        lambda model: model.no_such_name,
-        lambda models, say: 1 / 0,
-    )
-    use_batches(batch)
-    models = [pf.build(text) for text in (BENCH, RIG, BENCH, BENCH)]
-    said = []
-    found = batches.solve_models(models, say=said.append)
-    for case, text in enumerate((BENCH, RIG, BENCH, BENCH)):
+    found = batches.solve_models([pf.build(text) for text in texts], say=said.append)
+    for case, text in enumerate(texts):
         same(found, case, pf.run(text))
+        has_note = any(failure in note for note in found.notes.get(case, ()))
+        assert has_note == (text is BENCH)
     (sentence,) = [text for text in said if "one by one" in text]
-    assert sentence.startswith(
-        "3 cases are run one by one, because running them together failed: groups: AttributeError"
-    )
+    assert sentence.startswith("3 cases are run one by one") and failure in sentence
+
+
+def test_exact_the_error_of_a_case_is_no_fault_of_its_batch(use_batches):
+    def refuse(models, say):
+        raise PatchfemError("friction.static: refused here")
+
+    use_batches("honest", lambda model: "", lambda model: 0, refuse)
+    found = batches.solve_models([pf.build(BENCH)])
+    same(found, 0, pf.run(BENCH))
+    assert not found.notes
 
 
 def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(use_batches):
@@ -112,8 +113,7 @@ def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(use_batches):
 
     loads = [1.0, 2.0, 3.0, 4.0]
     models = [pf.build(BENCH, **{"normal.load": load}) for load in loads]
-    batch = batches.Batch("parity", lambda model: "", lambda model: model.point.load % 2, solve)
-    use_batches(batch)
+    use_batches("parity", lambda model: "", lambda model: model.point.load % 2, solve)
     assert batches.solve_models(models).values["load"].tolist() == loads
     assert seen == [[1.0, 3.0], [2.0, 4.0]]
 

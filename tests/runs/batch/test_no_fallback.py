@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from lane_cases import draw_patches, draw_points
-from scene_texts import BENCH, COULOMB, POINT, SHORT, SMALL_PATCH
+from scene_texts import BENCH, SMALL_PATCH
 
 import patchfem as pf
 from patchfem.runs.batch import batches, gathered, one_by_one
@@ -30,7 +30,6 @@ frequency = "10 Hz"
 [accuracy]
 tolerance = 1e-2
 """
-RIG = POINT + COULOMB + SHORT
 
 
 def vary(text: str, key: str, values) -> list:
@@ -113,22 +112,3 @@ def test_always_a_fault_of_a_batch_stands_in_the_notes_of_its_cases(
     results = batches.solve_models(models)
     for case in range(len(models)):
         assert f"{name}: ZeroDivisionError: division by zero" in results.notes[case][-1]
-
-
-def test_always_a_fault_while_models_are_divided_stands_in_the_notes(single_runs, monkeypatch):
-    """A batch that reads columns, and one that reads model by model; the error of a case is no fault."""
-    alone = pf.run(RIG)
-    for module, function in ((lumped, "not_one_point"), (lumped, "group")):
-        with monkeypatch.context() as patched:
-            patched.setattr(module, function, lambda *given: 1 / 0)
-            results = batches.solve_models([pf.build(RIG)], study=64 if function != "group" else 1)
-        assert "ZeroDivisionError" in results.notes[0][-1]
-        assert results.values["loop_area"][0] == alone.measures["loop_area"].value
-
-    def refuse(models, say):
-        raise pf.PatchfemError("friction.static: refused here")
-
-    with monkeypatch.context() as patched:
-        patched.setattr(lumped, "solve", refuse)
-        results = batches.solve_models([pf.build(RIG)])
-    assert not results.notes and not results.messages

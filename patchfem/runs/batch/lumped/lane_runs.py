@@ -88,7 +88,12 @@ def march_and_measure(law: str, cases, scales: Scales, cycles: int, steps: int) 
     )
     with np.errstate(all="ignore"):
         values = measures_from_reading(
-            run_reading, energies, True, True, scales.stiffness, scales.acceleration
+            run_reading,
+            energies,
+            sine=True,
+            whole=True,
+            stiffness=scales.stiffness,
+            size=scales.acceleration,
         )
     values |= {
         "normal_load": scales.load,

@@ -10,7 +10,7 @@ import numpy as np
 from ....dynamics.lanes import rows_kernels as at
 from ....dynamics.lanes import run as march
 from ....response.settling import extrapolate_steady_amplitudes
-from ...rig.pieces import CHANGES
+from ...rig.pieces import MAX_CHANGE_RATIO
 from .lane_numbers import count_evaluated_cycles, select_rows
 
 SETTLING_LAWS = ("yielding", *march.MASING)  # laws whose motion is marched on until it is steady
@@ -58,7 +58,7 @@ def march_until_settled(law: str, cases, measured, amplitudes, is_free) -> Settl
     cycles = marched.history.shape[1]
     if amplitudes.shape[1] > 2:
         change = np.ptp(amplitudes[:, -3:], axis=1)
-        is_free = is_free & (change > CHANGES * MIN_TOLERANCE * amplitudes[:, -1])
+        is_free = is_free & (change > MAX_CHANGE_RATIO * MIN_TOLERANCE * amplitudes[:, -1])
     settled = SettledRanges(
         np.full(len(is_free), np.nan), np.full(len(is_free), np.nan), is_free.copy()
     )

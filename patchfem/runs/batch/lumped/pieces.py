@@ -199,7 +199,9 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
     stiffness = np.array([model.rig.first_mode.stiffness for model in models])
     acceleration = np.array([find_max_acceleration(model.rig.drive.signal) for model in models])
     with np.errstate(all="ignore"):
-        values = measures_from_reading(reading, energies, True, True, stiffness, acceleration)
+        values = measures_from_reading(
+            reading, energies, sine=True, whole=True, stiffness=stiffness, size=acceleration
+        )
     work, loss = energies["friction"], energies["friction"]
     if not is_rigid:
         work = np.array([run.end[1].work.sum() for run in finished])
