@@ -10,7 +10,13 @@ from lane_cases import LAWS, SCENE, draw_points, rows
 from patchfem.api import build, get_base_scene, load, run_many
 from patchfem.runs.batch import batches, one_by_one
 from patchfem.runs.batch.case_results import CaseResults
-from patchfem.runs.batch.lumped import lanes, lumped
+from patchfem.runs.batch.lumped import (
+    lane_check,
+    lane_numbers,
+    lane_refinement,
+    lane_runs,
+    lumped,
+)
 from patchfem.scene.sets import format_assignments
 
 # beside others, without an exact batch, stand single runs
@@ -96,14 +102,14 @@ def test_exact_chunks_of_a_study_are_its_whole():
 def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
     """Where the exact engine finds another motion in a case that it checks, all are its, and say so."""
     cases = models("coulomb", 5, 64)
-    real = lanes.collect_runs
+    real = lane_runs.collect_runs
 
     def wrong(models, *given):
         runs, *rest = real(models, *given)
         runs.values["loop_area"][:] *= 1.01
         return runs, *rest
 
-    monkeypatch.setattr(lanes, "collect_runs", wrong)
+    monkeypatch.setattr(lane_runs, "collect_runs", wrong)
     found = batches.solve_models(cases)
     ones = lumped_answers(cases)
     assert all(one["engine"] == "exact" for one in found.numerics.values())
@@ -119,10 +125,10 @@ def test_always_only_the_case_that_is_contradicted_is_exact(monkeypatch):
     """A single wrong case among those that are checked is computed anew, and the others stay as they are."""
     cases = models("coulomb", 7, 96)
     untouched = batches.solve_models(cases)
-    numbers = np.column_stack(lanes.make_cases(cases)[0])
+    numbers = np.column_stack(lane_numbers.make_cases(cases)[0])
     is_fast = np.array([untouched.numerics[case]["engine"] == "lanes" for case in range(96)])
-    checked = lanes.select_checked_cases(numbers, is_fast)[0]
-    real = lanes.collect_runs
+    checked = lane_check.select_checked_cases(numbers, is_fast)[0]
+    real = lane_runs.collect_runs
 
     def wrong(models, *given):
         runs, *rest = real(models, *given)
@@ -130,7 +136,7 @@ def test_always_only_the_case_that_is_contradicted_is_exact(monkeypatch):
         runs.values["loop_area"][is_checked] *= 1.01
         return runs, *rest
 
-    monkeypatch.setattr(lanes, "collect_runs", wrong)
+    monkeypatch.setattr(lane_runs, "collect_runs", wrong)
     found = batches.solve_models(cases)
     assert found.numerics[checked]["engine"] == "exact"
     assert "differed from it in 1, in loop_area of this case" in found.notes[checked][-1]
@@ -202,4 +208,6 @@ def test_always_cases_that_all_run_away_are_not_judged_by_a_loop():
     cases = models("lugre", 5, 3)
     found = CaseResults.blank(3)
     found.measure("equivalent_damping", "1")
-    assert "loop_area" not in found.values and not lanes.has_large_error(cases, found).any()
+    assert (
+        "loop_area" not in found.values and not lane_refinement.has_large_error(cases, found).any()
+    )

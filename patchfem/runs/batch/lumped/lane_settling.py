@@ -15,7 +15,8 @@ from .lane_numbers import count_evaluated_cycles, select_rows
 
 SETTLING_LAWS = ("yielding", *march.MASING)  # laws whose motion is marched on until it is steady
 MIN_TOLERANCE = 1e-4  # smallest tolerance that lanes can meet
-MAX_EXTENSION = 10  # a case marches for at most this times its cycles
+# Factor from the cycles of a case to the most cycles that it marches until it settles.
+MAX_EXTENSION = 10
 # fractions of its cycles after which it is tested whether a case has settled; those that settle
 # soon cost little
 EXTENSIONS = (0.25, 0.25, 0.5, *(MAX_EXTENSION - 1) * (1.0,))
