@@ -62,12 +62,6 @@ def compared(files, tmp_path_factory) -> tuple:
     return cli("compare", *files[:2], "--direction", "y", "-o", out), out
 
 
-@pytest.fixture
-def no_page(monkeypatch):
-    """The page, most of the time of a comparison, is left out."""
-    monkeypatch.setattr("patchfem.export.surfaces.compare.write_page", lambda *of: None)
-
-
 def test_exact_the_answer_in_one_command(files, compared):
     p, (answer, out) = files[2], compared
     assert answer.code == 0 and answer.out.splitlines()[0] == "worn, waves reduced"
@@ -90,16 +84,16 @@ def test_exact_the_answer_in_one_command(files, compared):
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
-def test_exact_json_says_why_there_is_no_depth(files, tmp_path, no_page):
+def test_exact_json_says_why_there_is_no_depth(files, tmp_path):
     other = written(tmp_path / "elsewhere.csv", pair(50001, share=0.3).after)
-    found = json.loads(cli("compare", files[0], other, "--json", "-o", tmp_path / "out").out)
+    found = json.loads(cli("compare", files[0], other, "--json").out)
     for name in NAMES[:4]:
         assert found[name]["value"] is None and "no common part" in found[name]["reason"]
     assert found["amplitude_ratio"]["value"] > 0
 
 
-def test_exact_identical_traces_show_no_change(files, tmp_path, no_page):
-    found = json.loads(cli("compare", files[0], files[0], "--json", "-o", tmp_path / "out").out)
+def test_exact_identical_traces_show_no_change(files):
+    found = json.loads(cli("compare", files[0], files[0], "--json").out)
     assert found["verdict"] == "no change shown" and found["worn_depth_mean"]["value"] is None
     assert found["hidden_wear"]["high"] is None and found["hidden_wear"]["value"] < 1e-9
     assert found["shift"]["value"] == pytest.approx(0.0, abs=1e-12)
@@ -200,27 +194,11 @@ def test_refuses_a_folder_with_files_of_others(tmp_path, verb):
     )
 
 
-def test_exact_a_told_shift_is_a_length(files, tmp_path, no_page):
-    found = json.loads(
-        cli(
-            "compare",
-            *files[:2],
-            "--shift",
-            f"{files[2].shift / UM:.1f} um",
-            "--json",
-            "-o",
-            tmp_path / "out",
-        ).out
-    )
-    assert found["reference"] == "place" and found["shift"]["value"] == pytest.approx(
-        files[2].shift, abs=0.02 * UM
-    )
-    answer = cli(
-        "compare",
-        *files[:2],
-        "--shift",
-        f"{files[2].shift / UM + 300:.1f} um",
-        "-o",
-        tmp_path / "out",
-    )
+def test_exact_a_told_shift_is_a_length(files):
+    shift = files[2].shift
+    answer = cli("compare", *files[:2], "--shift", f"{shift / UM:.1f} um", "--json")
+    found = json.loads(answer.out)
+    assert found["reference"] == "place"
+    assert found["shift"]["value"] == pytest.approx(shift, abs=0.02 * UM)
+    answer = cli("compare", *files[:2], "--shift", f"{shift / UM + 300:.1f} um")
     assert "not available; at the given shift of" in answer.out
