@@ -39,8 +39,6 @@ class Readings:
         Distinct frequencies [Hz] and inputs [m s-2] of rows with a reading, ascending.
     condition : (n,) array
         Number of the condition of each reading.
-    runs : tuple of str
-        A name per row, made of its frequency and whether it is a repeat.
     """
 
     path: Path
@@ -51,7 +49,11 @@ class Readings:
     unstable: np.ndarray
     conditions: np.ndarray
     condition: np.ndarray
-    runs: tuple
+
+    @property
+    def runs(self) -> list:
+        """A name per row, made of its frequency and whether it is a repeat."""
+        return [f"{row.frequency:.6g} Hz" + " repeat" * ("R" in row.flag) for row in self.rows]
 
     @property
     def empty(self) -> list:
@@ -64,7 +66,8 @@ class Readings:
         PatchfemError for a column other than "frequency", "input", "flag" and "run".
         """
         if name == "run":
-            return [self.runs[k] for k in self.row]
+            runs = self.runs
+            return [runs[k] for k in self.row]
         if name not in ("frequency", "input", "flag"):
             raise PatchfemError(
                 f"{self.path}: there is no column {name} by which rows can be held out or left out; "
@@ -176,7 +179,6 @@ def read_readings(path: Path) -> Readings:
     conditions = _distinct_conditions(inputs)
     condition = [int(np.argmin(np.abs(conditions / pair - 1).max(axis=1))) for pair in inputs]
     unstable = [("U" in rows[k].flag) for k in row_numbers]
-    runs = tuple(f"{row.frequency:.6g} Hz" + " repeat" * ("R" in row.flag) for row in rows)
     return Readings(
         Path(path),
         rows,
@@ -186,7 +188,6 @@ def read_readings(path: Path) -> Readings:
         frozen_array(unstable, bool),
         frozen_array(conditions),
         frozen_array(condition, np.int64),
-        runs,
     )
 
 

@@ -192,10 +192,10 @@ class _SweepBase(NamedTuple):
 
 
 @lru_cache(maxsize=2)
-def _get_base(asked: SweepScene) -> _SweepBase:
+def _get_base(sweep_scene: SweepScene) -> _SweepBase:
     """Return the base of the cases of a sweep; that of the last two sweeps is kept."""
     try:
-        return _SweepBase(BaseScene(asked._read(())), {})
+        return _SweepBase(BaseScene(sweep_scene._read(())), {})
     except SceneError:
         return _SweepBase(None, {})
 

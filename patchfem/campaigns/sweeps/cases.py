@@ -151,7 +151,7 @@ class Cases:
 
         return sorted(numbers, key=patch_places)
 
-    def names(self, asked: SweepScene, numbers: Sequence[int] | None = None) -> np.ndarray:
+    def names(self, sweep_scene: SweepScene, numbers: Sequence[int] | None = None) -> np.ndarray:
         """Return names (n,) uint64 of cases: hashes of their keys and values and of what all cases share.
 
         The same values in other units or in another order have the same name, also as part of
@@ -160,14 +160,14 @@ class Cases:
 
         Parameters
         ----------
-        asked : SweepScene
+        sweep_scene : SweepScene
         numbers : sequence of int, optional
             Numbers of the cases; by default all.
         """
-        hasher = _CaseHasher(self, asked)
+        hasher = _CaseHasher(self, sweep_scene)
         every_case = range(len(self))
-        shared = asked.digest()
-        if asked.shares_meshes([axis.key for axis in self.axes]):
+        shared = sweep_scene.digest()
+        if sweep_scene.shares_meshes([axis.key for axis in self.axes]):
             shared = sha256(np.sort(hasher.hash_cases(shared, every_case)).tobytes()).hexdigest()
         return hasher.hash_cases(shared, every_case if numbers is None else numbers)
 
@@ -178,9 +178,9 @@ class _CaseHasher:
     Values of random cases are not kept, because hardly any case has the value of another.
     """
 
-    def __init__(self, cases: Cases, asked: SweepScene):
+    def __init__(self, cases: Cases, sweep_scene: SweepScene):
         self.cases = cases
-        self.asked = asked
+        self.sweep_scene = sweep_scene
         keys = [json.dumps(axis.key) for axis in cases.axes]
         self.keys = keys
         # The order of the keys is the same for all cases.
@@ -203,7 +203,7 @@ class _CaseHasher:
         value = self.cases.axes[axis].values[place]
         if isinstance(value, float) and isfinite(value):
             return f'[{key}, {value!r}, ""]'
-        content = self.asked.content(value) if isinstance(value, str) else ""
+        content = self.sweep_scene.content(value) if isinstance(value, str) else ""
         return f"[{key}, {json.dumps(value)}, {json.dumps(content)}]"
 
 

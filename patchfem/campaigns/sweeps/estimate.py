@@ -41,7 +41,7 @@ TABLE_BYTES = 1600
 COLUMN_BYTES = 400
 
 
-def estimate_sweep(asked: SweepScene, cases: Cases) -> dict:
+def estimate_sweep(sweep_scene: SweepScene, cases: Cases) -> dict:
     """Return the plan of a sweep as a dict that can be written as JSON.
 
     It is the plan of the first valid case, which `case` {key: value as written} names, with seconds
@@ -58,7 +58,7 @@ def estimate_sweep(asked: SweepScene, cases: Cases) -> dict:
     first_error = None
     for number in cases.representative_cases(MAX_PLANNED_CASES):
         try:
-            plans.append(plan(asked.model(cases.sets(number))))
+            plans.append(plan(sweep_scene.model(cases.sets(number))))
             numbers.append(number)
         except PatchfemError as error:
             first_error = first_error or error

@@ -77,13 +77,13 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
     SceneError
         As from `read_cases`, and if a key is both set for all cases and swept.
     """
-    asked = SweepScene(Path(path), read_text(path), tuple(sets), request.of)
-    cases = read_cases(asked, request)
-    swept = {asked.numbered_key(axis.key): axis.key for axis in cases.axes}
+    sweep_scene = SweepScene(Path(path), read_text(path), tuple(sets), request.of)
+    cases = read_cases(sweep_scene, request)
+    swept = {sweep_scene.numbered_key(axis.key): axis.key for axis in cases.axes}
     mistakes = []
     for text in sets:
         key = ".".join(split_key(text.partition("=")[0]))
-        swept_key = swept.get(asked.numbered_key(key))
+        swept_key = swept.get(sweep_scene.numbered_key(key))
         if swept_key:
             mistakes.append(
                 f"--set {text}: the sweep already sets {swept_key} in every case; remove this --set, "
@@ -91,10 +91,10 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
             )
     if mistakes:
         raise SceneError(mistakes)
-    return asked, cases
+    return sweep_scene, cases
 
 
-def read_cases(asked: SweepScene, request: Request) -> Cases:
+def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
     """Return the cases of a request: all combinations of the values that it names.
 
     If it names none, the values are those of the table [sweep].
@@ -123,11 +123,11 @@ def read_cases(asked: SweepScene, request: Request) -> Cases:
     axes, axis_mistakes = read_axes(request.over, sampled=request.count > 0)
     mistakes += [f"--over {mistake.removeprefix('--over ')}" for mistake in axis_mistakes]
     if not request.over and request.file is None:
-        axes, axis_mistakes = asked.axes()
+        axes, axis_mistakes = sweep_scene.axes()
         mistakes += axis_mistakes
         if not axes and not axis_mistakes:
             mistakes.append(
-                f"{asked.path}: no key to sweep is given; add --over table.key=v1,v2,... or a table [sweep]"
+                f"{sweep_scene.path}: no key to sweep is given; add --over table.key=v1,v2,... or a table [sweep]"
             )
     for key in sorted({axis.key for axis in file_axes} & {axis.key for axis in axes}):
         mistakes.append(
@@ -135,17 +135,17 @@ def read_cases(asked: SweepScene, request: Request) -> Cases:
             "this --over"
         )
     every_axis = [*axes, *file_axes]
-    mistakes = mistakes or _find_equal_keys(asked, [axis.key for axis in every_axis])
+    mistakes = mistakes or _find_equal_keys(sweep_scene, [axis.key for axis in every_axis])
     if mistakes:
         listed_axes = [axis for axis in every_axis if isinstance(axis, Axis)]
         first_case = [f"{axis.key}={axis.texts[0]}" for axis in listed_axes]
-        raise SceneError([*asked.mistakes(first_case), *mistakes])
+        raise SceneError([*sweep_scene.mistakes(first_case), *mistakes])
     count = prod(map(len, parts))
     count *= request.count or prod(len(axis.texts) for axis in axes)
     if count > MAX_CASES:
         raise SceneError(
             [
-                f"{asked.path}: the sweep has {count} cases, more than the largest number possible ({MAX_CASES}); "
+                f"{sweep_scene.path}: the sweep has {count} cases, more than the largest number possible ({MAX_CASES}); "
                 "give fewer values for each key, or draw N cases from the ranges with --sobol N"
             ]
         )
@@ -155,8 +155,8 @@ def read_cases(asked: SweepScene, request: Request) -> Cases:
         parts.append(Cases(tuple(axes)))
     cases = combine_cases(parts)
     if cases.rows:
-        cases = replace(cases, words=_repeat_words(request, asked.path.parent))
-    _refuse_all(asked, cases)
+        cases = replace(cases, words=_repeat_words(request, sweep_scene.path.parent))
+    _refuse_all(sweep_scene, cases)
     return cases
 
 
@@ -196,7 +196,7 @@ def _check_measure(measure: str) -> list[str]:
     return [f"--of {measure}: unknown measure; {advice}"]
 
 
-def _find_equal_keys(asked: SweepScene, keys: Sequence[str]) -> list[str]:
+def _find_equal_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[str]:
     """Return a mistake for each key that means the same value as a key before it.
 
     Two keys do so if they name a mode by its name and by its number.
@@ -204,7 +204,7 @@ def _find_equal_keys(asked: SweepScene, keys: Sequence[str]) -> list[str]:
     first_keys: dict = {}
     mistakes = []
     for key in keys:
-        first = first_keys.setdefault(asked.numbered_key(key), key)
+        first = first_keys.setdefault(sweep_scene.numbered_key(key), key)
         if first != key:
             mistakes.append(
                 f"--over {key}: this key is the same as {first}, which is given already; remove one of them"
@@ -212,11 +212,11 @@ def _find_equal_keys(asked: SweepScene, keys: Sequence[str]) -> list[str]:
     return mistakes
 
 
-def _refuse_all(asked: SweepScene, cases: Cases) -> None:
+def _refuse_all(sweep_scene: SweepScene, cases: Cases) -> None:
     """Raise SceneError if none of several cases spread over the sweep is a valid scene."""
     messages: dict = {}
     for number in cases.representative_cases(N_CHECKED):
-        mistakes = asked.mistakes(cases.sets(number))
+        mistakes = sweep_scene.mistakes(cases.sets(number))
         if not mistakes:
             return
         for mistake in mistakes:
@@ -229,21 +229,21 @@ def _refuse_all(asked: SweepScene, cases: Cases) -> None:
     raise SceneError(lines)
 
 
-def contradictions(asked: SweepScene, cases: Cases) -> str:
+def contradictions(sweep_scene: SweepScene, cases: Cases) -> str:
     """Return a warning that cases will fail because a swept key contradicts another key.
 
     It says how to avoid this. It is "" if each of the N_CHECKED cases that are checked is a valid
     scene.
     """
     numbers = cases.representative_cases(N_CHECKED)
-    failing = list(filter(None, (asked.mistakes(cases.sets(number)) for number in numbers)))
+    failing = list(filter(None, (sweep_scene.mistakes(cases.sets(number)) for number in numbers)))
     if not failing:
         return ""
     mistake = failing[0][0]
-    swept = {asked.numbered_key(axis.key) for axis in cases.axes}
+    swept = {sweep_scene.numbered_key(axis.key) for axis in cases.axes}
     key = re.search(r"(?:^|: )([a-z_]+(?:\.[\w-]+)+): ", mistake)
     advice = "give other values in --over"
-    if key and asked.numbered_key(key[1]) not in swept:
+    if key and sweep_scene.numbered_key(key[1]) not in swept:
         advice = f"sweep {key[1]}, too, remove this key from the scene, or {advice}"
     extent = f"{len(failing)} of {len(numbers)} cases"
     if len(numbers) != len(cases):

@@ -42,15 +42,15 @@ class Work:
 
     Attributes
     ----------
-    asked : SweepScene
+    sweep_scene : SweepScene
     cases : Cases
-    tell : callable, optional
-        tell(number, model or error, CaseResults, index in them) returns what is kept of a case
+    extract : callable, optional
+        extract(number, model or error, CaseResults, index in them) returns what is kept of a case
         besides its columns.
     keep : callable, optional
         keep(number, Result) is called after each run.
     write : callable, optional
-        write(numbers, CaseResults, told) returns whether they were written to the folder of the
+        write(numbers, CaseResults, extras) returns whether they were written to the folder of the
         sweep, so that they need not be sent back.
     estimate : bool
         Whether errors are computed for cases that run one by one.
@@ -58,9 +58,9 @@ class Work:
         Meshes that the cases share, chosen from all of them by `choose_meshes`.
     """
 
-    asked: SweepScene
+    sweep_scene: SweepScene
     cases: Cases
-    tell: Callable | None = None
+    extract: Callable | None = None
     keep: Callable | None = None
     write: Callable | None = None
     estimate: bool = True
@@ -80,7 +80,7 @@ def warm_up(work: Work) -> None:
     Errors are ignored, because the run of the case reports them.
     """
     try:
-        model = work.asked.model(work.cases.sets(0))
+        model = work.sweep_scene.model(work.cases.sets(0))
         if batches.choose_batch(model, len(work.cases)) is None:
             plan.plan(model)
     except Exception:
@@ -103,7 +103,7 @@ def compute_chunk(
     Returns
     -------
     tuple
-        CaseResults and a list of what `work.tell` returns for each case; None and [] if
+        CaseResults and a list of what `work.extract` returns for each case; None and [] if
         `work.write` has written them.
     """
     models = _build_similar_models(work, numbers)
@@ -111,11 +111,11 @@ def compute_chunk(
         models = [_build_case_model(work, number) for number in numbers]
     keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
     results = batches.solve_models(models, keep, say, work.estimate, len(work.cases))
-    told = []
-    if work.tell is not None:
+    extras = []
+    if work.extract is not None:
         for case, (number, model) in enumerate(zip(numbers, models)):
-            told.append(work.tell(number, model, results, case))
-    return write_or_return(work, numbers, results, told)
+            extras.append(work.extract(number, model, results, case))
+    return write_or_return(work, numbers, results, extras)
 
 
 def compute_timed(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple:
@@ -139,7 +139,7 @@ def compute_timed(work: Work, numbers: Sequence[int], say: Callable | None = Non
 
 
 def write_or_return(
-    work: Work, numbers: Sequence[int], results: CaseResults, told: list
+    work: Work, numbers: Sequence[int], results: CaseResults, extras: list
 ) -> tuple[CaseResults | None, list]:
     """Write the results of a chunk to the folder of the sweep, or return them.
 
@@ -149,17 +149,17 @@ def write_or_return(
     numbers : sequence of int
         Numbers of the cases.
     results : CaseResults
-    told : list
-        What `work.tell` returned for each case.
+    extras : list
+        What `work.extract` returned for each case.
 
     Returns
     -------
     tuple
-        The results and `told`, or (None, []) if `work.write` has written them.
+        The results and `extras`, or (None, []) if `work.write` has written them.
     """
-    if work.write is not None and work.write(numbers, results, told):
+    if work.write is not None and work.write(numbers, results, extras):
         return None, []
-    return results, told
+    return results, extras
 
 
 def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels | None:
@@ -173,7 +173,7 @@ def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels |
         return None
     try:
         keys = [axis.key for axis in work.cases.axes]
-        models = work.asked.similar_models(keys, values, work.cases.sets, cases)
+        models = work.sweep_scene.similar_models(keys, values, work.cases.sets, cases)
     except PatchfemError:  # the first case has no model
         return None
     if models is None or models.first.patch is None:
@@ -188,7 +188,7 @@ def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels |
 def _build_case_model(work: Work, number: int):
     """Return the model of a case with the shared meshes, or the error of its scene."""
     try:
-        model = work.asked.model(work.cases.sets(number), work.cases.values(number))
+        model = work.sweep_scene.model(work.cases.sets(number), work.cases.values(number))
     except PatchfemError as error:
         return error
     return model if work.meshes is None else work.meshes.with_shared_meshes(model)
@@ -298,7 +298,7 @@ def iterate_chunks(
     Yields
     ------
     tuple
-        (numbers, CaseResults or None, told, seconds) of a chunk; `told` is None for cases that
+        (numbers, CaseResults or None, extras, seconds) of a chunk; `extras` is None for cases that
         died.
     """
     if not len(numbers):

@@ -187,13 +187,14 @@ KILLED = """\
 import os, signal, sys
 from pathlib import Path
 from typing import ClassVar
-from patchfem.campaigns.sweeps.parse_request import Request, asked_of
+from patchfem.campaigns.sweeps.parse_request import Request, read_sweep
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.export.sweeps.run import Place, sweep_into
-def told(done, total, *_):
+from patchfem.export.sweeps.run import SweepTarget, sweep_into
+def kill(done, total, *_):
     if done > 3:
         os.kill(os.getpid(), signal.SIGKILL)
-sweep_into(*asked_of(Path(sys.argv[1]), (), Request(sys.argv[3:])), Place(Path(sys.argv[2])), Pool(2), told=told)
+sweep, cases = read_sweep(Path(sys.argv[1]), (), Request(sys.argv[3:]))
+sweep_into(sweep, cases, SweepTarget(Path(sys.argv[2])), Pool(2), report_progress=kill)
 """
 
 
@@ -206,10 +207,16 @@ def test_exact_progress_begins_with_the_cases_that_are_there(tmp_path):
     progress = []
 
     def sweep(values: str, resume: bool):
-        asked, cases = read_sweep(tmp_path / "rig.toml", (), Request([f"friction.static={values}"]))
-        place = SweepTarget(tmp_path / "out", resume=resume)
+        scene, cases = read_sweep(tmp_path / "rig.toml", (), Request([f"friction.static={values}"]))
+        target = SweepTarget(tmp_path / "out", resume=resume)
         progress.clear()
-        sweep_into(asked, cases, place, LocalExecutor(), told=lambda *now: progress.append(now[:2]))
+        sweep_into(
+            scene,
+            cases,
+            target,
+            LocalExecutor(),
+            report_progress=lambda *state: progress.append(state[:2]),
+        )
 
     sweep("0.1,0.2", False)
     assert progress[0] == (0, 2) and progress[-1] == (2, 2)

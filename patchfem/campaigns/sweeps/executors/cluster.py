@@ -121,9 +121,11 @@ class Cluster:
         from distributed import as_completed
         from distributed.client import ClosedClientError
 
-        path = work.asked.path
+        path = work.sweep_scene.path
         versions = environment_versions(work)
-        shared_work = replace(work, asked=replace(work.asked, path=Path(os.path.abspath(path))))
+        shared_work = replace(
+            work, sweep_scene=replace(work.sweep_scene, path=Path(os.path.abspath(path)))
+        )
         try:
             # Dask repeats this task if all workers that store its result have died.
             shared = self.client.submit(_identity, shared_work, pure=False)
@@ -216,7 +218,7 @@ def environment_versions(work: Work | None = None) -> dict:
         "python": "{}.{}".format(*sys.version_info),
     }
     if work is not None:
-        versions["files"] = work.asked.digest()
+        versions["files"] = work.sweep_scene.digest()
     return versions
 
 
@@ -243,9 +245,9 @@ def _answer(work: Work, chunk: list, origin: tuple) -> tuple | dict:
     worker_versions = environment_versions(work)
     if worker_versions != versions:
         return worker_versions
-    seconds, (results, told) = compute_timed(replace(work, write=None), chunk)
-    folder = f"{work.asked.path.parent}{os.sep}"
+    seconds, (results, extras) = compute_timed(replace(work, write=None), chunk)
+    folder = f"{work.sweep_scene.path.parent}{os.sep}"
     origin_folder = str(path.parent / "_")[:-1]
     for case, text in results.messages.items():
         results.messages[case] = text.replace(folder, origin_folder)
-    return seconds, write_or_return(work, chunk, results, told)
+    return seconds, write_or_return(work, chunk, results, extras)
