@@ -144,24 +144,6 @@ def test_exact_a_curve_in_the_file():
 
 
 @pytest.mark.slow
-def test_exact_the_regimes_over_a_sweep_of_a_coulomb_rig(written):
-    """Stuck while mu N/m stays above a; the page shows the curve and says the regime of the largest motion."""
-    folder, data = written(SLIPPING + SWEEP.format(130, 155, 5))
-    page = (folder / "report.html").read_text()
-    assert "Steady motion at the output" in page and "Floquet multiplier" in page
-    assert f"{data.curve_point.size} points" in page
-    assert data.curve_point.size >= 121 and data.attrs["regime"] == "sliding"
-    names = np.array(data.curve_regime.attrs["flag_meanings"].split())[data.curve_regime.values]
-    assert (
-        names[0] == "sliding"
-        and names[-1] == "2_stops"
-        and 0 < data.attrs["largest_multiplier"] < 1
-    )
-    top = float(data.curve_amplitude.max())
-    assert np.abs(data.relative_displacement).max() == pytest.approx(top, rel=1e-6)
-
-
-@pytest.mark.slow
 def test_exact_a_folded_curve_and_the_motion_at_its_top(written):
     """Of three motions at one frequency the measures are of the largest, which the curve found."""
     folder, data = written(STIFFENED + SWEEP.format(140, 180, 2))
