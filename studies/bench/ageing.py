@@ -25,9 +25,14 @@ from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 HOLDS = tuple(10.0 ** np.linspace(-2, 1, 10))
-LENGTH, RATIO, STATIC, REST, FLOOR, SPEED = 2e-6, 0.5, 0.3, 2e-6, 1e-6, 1e-3
+LENGTH = 2e-6  # [m] length of a bond that has aged without end
+RATIO = 0.5  # kinetic friction / static friction
+STATIC = 0.3  # coefficient of static friction
+REST_GROWTH = 2e-6  # [m/s^2] growth of the bond length at rest
+FLOOR = 1e-6  # [m/s] smallest speed in the growth at rest
+SPEED = 1e-3  # [m/s] speed of the slide before and after the rest
 SCENE = """
 [normal]
 load = "100 N"
@@ -45,7 +50,17 @@ speed = "1 mm/s"
 
 
 def dwell(hold: float, part: float, *more, steps: int = 2000) -> tuple:
-    """(before the rest, at its end, peak after it) over mu_s N for l_k = part eps_0, after a slide that has settled."""
+    """Compute the friction force before a rest, at its end and at its peak after it.
+
+    The force is divided by mu_s N; l_k = part eps_0, and the slide before the rest is steady.
+
+    Parameters
+    ----------
+    hold : float
+        Duration of the rest [s].
+    part : float
+        l_k / eps_0.
+    """
     sets = [
         f"slide.hold={float(hold)!r} s",
         f"slide.distance={(40 + 20 * part) * LENGTH!r} m",
@@ -62,15 +77,29 @@ def dwell(hold: float, part: float, *more, steps: int = 2000) -> tuple:
 
 def aged(hold, part: float):
     """Bond length over eps_0 after a rest, in closed form."""
-    slow = steady_bond_length(SPEED, LENGTH, RATIO, REST, part * LENGTH) / LENGTH
-    return 1 - (1 - slow) * np.exp(-REST * np.asarray(hold) / FLOOR)
+    slow = steady_bond_length(SPEED, LENGTH, RATIO, REST_GROWTH, part * LENGTH) / LENGTH
+    return 1 - (1 - slow) * np.exp(-REST_GROWTH * np.asarray(hold) / FLOOR)
 
 
 def main(
-    holds=HOLDS, parts=(0.5, 5.0, 50.0), path: Path | None = HERE / "ageing.svg", steps: int = 2000
+    holds=HOLDS,
+    parts=(0.5, 5.0, 50.0),
+    path: Path | None = FOLDER / "ageing.svg",
+    steps: int = 2000,
 ) -> list:
-    """One dict per l_k (in eps_0) and rest: closed eps_d/eps_0, force before, at the end of and peak after the rest;
-    then of the law as printed, l_k = 0.1 eps_0, p = 1."""
+    """Print one row per l_k and rest: aged bond length, and force before, at the end of and after the rest.
+
+    Parameters
+    ----------
+    holds : sequence of float
+        Durations of the rests [s].
+    parts : sequence of float
+        l_k / eps_0; the law as printed (p = 1) follows with 0.1.
+    path : Path or None
+        Picture.
+    steps : int
+        Steps of a run.
+    """
     rows = [
         {
             "part": part,
@@ -101,11 +130,11 @@ def main(
             f"force {row['before']:.5f} -> {row['rested']:.5f}, peak {row['peak']:.5f}"
         )
     if path is not None:
-        draw(path, rows, parts)
+        _draw(path, rows, parts)
     return rows
 
 
-def draw(path: Path, rows: list, parts) -> None:
+def _draw(path: Path, rows: list, parts) -> None:
     """Peaks of the stretch reading against the rest, below the closed form of the bond length."""
     time = 10.0 ** np.linspace(-2, 1, 121)
     with drawing(path, (6.4, 3.6)) as (_, axis):

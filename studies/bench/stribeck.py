@@ -23,9 +23,12 @@ from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 SHARES = 10.0 ** np.linspace(-2, 2, 9)  # v/v_c
-LENGTH, RATIO, STATIC, REST = 2e-6, 0.7, 0.6, 10.0
+LENGTH = 2e-6  # [m] length of a bond that has aged without end
+RATIO = 0.7  # kinetic friction / static friction
+STATIC = 0.6  # coefficient of static friction
+REST_GROWTH = 10.0  # [m/s^2] growth of the bond length at rest
 SCENE = """
 [normal]
 load = "100 N"
@@ -58,34 +61,37 @@ def bench(speed: float, slip: float, reading: str, order: float, lengths: int) -
     ]
 
 
-def promised(speed: float, slip: float) -> float:
+def steady_friction(speed: float, slip: float) -> float:
     """2.18 with the bond length of 2.11."""
-    return STATIC * steady_bond_length(speed, LENGTH, RATIO, REST, slip) / LENGTH
+    return STATIC * steady_bond_length(speed, LENGTH, RATIO, REST_GROWTH, slip) / LENGTH
 
 
-def grown(speed: float, slip: float, order: float) -> float:
+def _steady_friction_of_grown_bonds(speed: float, slip: float, order: float) -> float:
     """The same with every bond grown from zero."""
-    ell = 1 / (REST / speed**2 + 1 / slip)
-    return promised(speed, slip) * growth_factor(
-        ell / steady_bond_length(speed, LENGTH, RATIO, REST, slip), order
+    ell = 1 / (REST_GROWTH / speed**2 + 1 / slip)
+    return steady_friction(speed, slip) * growth_factor(
+        ell / steady_bond_length(speed, LENGTH, RATIO, REST_GROWTH, slip), order
     )
 
 
-def main(shares=SHARES, slips=(0.1, 1.0), path: Path | None = HERE / "stribeck.svg") -> list:
+def main(shares=SHARES, slips=(0.1, 1.0), path: Path | None = FOLDER / "stribeck.svg") -> list:
     """One dict per slip growth (in eps_0) and speed (in v_c): promised, stretch, (computed, G) per printed order."""
     rows = []
     for part in slips:
         slip = part * LENGTH
         for share in shares:
-            speed = float(share * np.sqrt(REST * slip))
+            speed = float(share * np.sqrt(REST_GROWTH * slip))
             row = {
                 "slip": part,
                 "share": float(share),
-                "promised": promised(speed, slip),
+                "promised": steady_friction(speed, slip),
                 "stretch": bench(speed, slip, "stretch", 1.0, 32),
             }
             row |= {
-                order: (bench(speed, slip, "report", order, 20), grown(speed, slip, order))
+                order: (
+                    bench(speed, slip, "report", order, 20),
+                    _steady_friction_of_grown_bonds(speed, slip, order),
+                )
                 for order in (0, 1)
             }
             rows.append(row)
@@ -95,21 +101,24 @@ def main(shares=SHARES, slips=(0.1, 1.0), path: Path | None = HERE / "stribeck.s
                 f"(G {row[1][1]:.6f})"
             )
     if path is not None:
-        draw(path, rows, slips)
+        _draw(path, rows, slips)
     return rows
 
 
-def draw(path: Path, rows: list, slips) -> None:
+def _draw(path: Path, rows: list, slips) -> None:
     """One panel per slip growth: lines are closed forms, marks are benches."""
     with drawing(path, (9.6, 3.4), 1, len(slips), sharey=True, squeeze=False) as (_, axes):
         for axis, part in zip(axes[0], slips):
             slip = part * LENGTH
             mine = [row for row in rows if row["slip"] == part]
             fine = 10.0 ** np.linspace(-2, 2, 81)
-            speeds = fine * np.sqrt(REST * slip)
+            speeds = fine * np.sqrt(REST_GROWTH * slip)
             at = [row["share"] for row in mine]
             axis.semilogx(
-                fine, [promised(v, slip) for v in speeds], color=BLUE, label="2.18, Lorentzian"
+                fine,
+                [steady_friction(v, slip) for v in speeds],
+                color=BLUE,
+                label="2.18, Lorentzian",
             )
             axis.semilogx(
                 at, [row["stretch"] for row in mine], "o", color=BLUE, ms=5, label="stretch reading"
@@ -117,7 +126,7 @@ def draw(path: Path, rows: list, slips) -> None:
             for order, colour in ((1, ORANGE), (0, GREY)):
                 axis.semilogx(
                     fine,
-                    [grown(v, slip, order) for v in speeds],
+                    [_steady_friction_of_grown_bonds(v, slip, order) for v in speeds],
                     color=colour,
                     label=f"2.18 G, p = {order}",
                 )

@@ -13,7 +13,8 @@ from dask_jobqueue import SLURMCluster
 
 import patchfem as pf
 
-JOB = {"cores": 1, "processes": 1, "memory": "2GB", "walltime": "04:00:00"}  # of a worker
+# one job runs one worker
+JOB = {"cores": 1, "processes": 1, "memory": "2GB", "walltime": "04:00:00"}
 
 
 def main(scene: str, out: str, jobs: str, *over: str, **more):

@@ -16,9 +16,18 @@ from patchfem.export.drawing.pictures import STYLE
 def drawing(
     path: Path, size: tuple, rows: int = 1, columns: int = 1, saving: dict | None = None, **how
 ):
-    """(figure, its axes) of `rows` by `columns`; written to `path` when the block ends.
+    """Draw a figure with `rows` by `columns` axes, and write it to `path` when the block ends.
 
-    size: width and height in inches; how: arguments of `Figure.subplots`; saving: arguments of `savefig`.
+    Parameters
+    ----------
+    path : Path
+    size : tuple of float
+        Width and height in inches.
+    rows, columns : int
+    saving : dict, optional
+        Arguments of `savefig`.
+    **how
+        Arguments of `Figure.subplots`.
     """
     with rc_context(STYLE):
         figure = Figure(figsize=size)

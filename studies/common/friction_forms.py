@@ -33,8 +33,10 @@ def weight_along(relative_path, order=1.0):
 
 
 def weight_across(relative_distance):
-    """Weight of a bond perpendicular to the path (eq. 2.15, Fig. 14): e^(-y^2/2)/sqrt(2 pi), y = eta/rho; unit area
-    over y, so 2.16 divides by rho."""
+    """Return the weight of a bond perpendicular to the path (eq. 2.15, Fig. 14).
+
+    It is e^(-y^2/2)/sqrt(2 pi) with y = eta/rho and has unit area over y, so that 2.16 divides by rho.
+    """
     return np.exp(-(np.asarray(relative_distance, float) ** 2) / 2) / np.sqrt(2 * np.pi)
 
 
@@ -71,10 +73,22 @@ def growth_factor(share, order=1.0) -> float:
 
 
 def steady_bond_length(speed, length, ratio, rest_growth, slip_growth):
-    """Bond length [m] in steady sliding (eq. 2.11): (eps_0 + eps_k w)/(1 + w), w = v^2/(a_s l_k).
+    """Return the bond length [m] in steady sliding (eq. 2.11).
 
-    speed [m/s] of either sign, ratio = eps_k/eps_0, rest_growth a_s [m s-2], slip_growth l_k [m]; ValueError unless
-    the last four are positive.
+    It is (eps_0 + eps_k w)/(1 + w) with w = v^2/(a_s l_k). ValueError unless the last four are positive.
+
+    Parameters
+    ----------
+    speed : float
+        Of either sign [m/s].
+    length : float
+        eps_0 [m].
+    ratio : float
+        eps_k / eps_0.
+    rest_growth : float
+        a_s [m/s^2].
+    slip_growth : float
+        l_k [m].
     """
     require_positive(length=length, ratio=ratio, rest_growth=rest_growth, slip_growth=slip_growth)
     slow = 1 / np.hypot(1.0, np.asarray(speed, float) / np.sqrt(rest_growth * slip_growth))
@@ -82,10 +96,23 @@ def steady_bond_length(speed, length, ratio, rest_growth, slip_growth):
 
 
 def virgin_force(slide, length, order=1.0, initial=1.0, limit=1.0):
-    """Friction after a first slide >= 0 [m] of one direction (eq. 2.17 at constant bond length), either reading.
+    """Return the friction after a first slide in one direction (eq. 2.17, constant bond length).
 
     limit*(P(p + 1, x) + m_0 phi_p(x)), x = slide/length, P the lower incomplete gamma function, phi_p = x^p e^-x/p!.
     Stretch p = 1, m_0 = 1 and report p = 0, m_0 = 0 are both 1 - e^-x. ValueError for p <= -1 or a slide < 0.
+
+    Parameters
+    ----------
+    slide : float
+        >= 0 [m].
+    length : float
+        Bond length [m].
+    order : float
+        p > -1.
+    initial : float
+        Fraction m_0 of bonds at the start.
+    limit : float
+        mu_s N [N].
     """
     require_positive(length=length)
     x = np.asarray(slide, float) / length
@@ -102,11 +129,22 @@ def virgin_force(slide, length, order=1.0, initial=1.0, limit=1.0):
 
 
 def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
-    """Friction after a long slide and a way back [m] (constant bond length), positive in the first direction.
+    """Return the friction after a long slide and a slide back; it is positive in the first direction.
 
     x = back/length; report: limit*(2 Q(p + 1, 2x) - 1), so 2 e^-2x - 1 for p = 0; stretch: 2 e^-x - 1 for p = 1, else
     e^-2x - P(p + 1, x) - x^(p+1) e^-x M(1, p + 2, -x)/(p + 1)!, M Kummer's function.
     ValueError for a way back < 0, another reading, or an order <= -1 (report) or < 0 (stretch).
+
+    Parameters
+    ----------
+    back : float
+        Slide back >= 0 [m].
+    length : float
+        Bond length [m].
+    order : float
+    reading : {"stretch", "report"}
+    limit : float
+        mu_s N [N].
     """
     require_positive(length=length)
     _reading(reading)
@@ -126,13 +164,21 @@ def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
 
 
 def stretch_loop(amplitude, length, limit=1.0, breakaway=0.0):
-    """Steady loop of the stretch reading, p = 1, constant bond length: (area [J], force at the end of a stroke [N]).
+    """Return area [J] and end force [N] of the steady loop of the stretch reading (p = 1).
 
-    amplitude, length [m]; limit = mu_s N [N]; breakaway: share b of the length that stretches without damage. With x =
-    amplitude/length > b, E = exp(-2 (x - b)) and z = (1 - (1 - 2 b) E)/(1 + E) the force is limit z and the area 4
-    limit length (x - b + b^2 - b z - (1 + z - 2 b)(1 - E)/2). b = 0: 4 limit (amplitude - length tanh x), Dahl's loop.
-    Up to x = b the loop is a line: no area, force limit x of a slide from rest. ValueError unless amplitude and length
-    are positive and 0 <= breakaway <= 1.
+    The bond length is constant. With x = amplitude/length > b, E = exp(-2 (x - b)) and z = (1 - (1 - 2 b) E)/(1 + E) the
+    force is limit z and the area 4 limit length (x - b + b^2 - b z - (1 + z - 2 b)(1 - E)/2). b = 0 gives Dahl's loop,
+    4 limit (amplitude - length tanh x). Up to x = b the loop is a line without area, with the force limit x of a slide
+    from rest. ValueError unless amplitude and length are positive and 0 <= breakaway <= 1.
+
+    Parameters
+    ----------
+    amplitude, length : float
+        [m]
+    limit : float
+        mu_s N [N].
+    breakaway : float
+        Fraction b of the length that stretches without damage.
     """
     require_positive(amplitude=amplitude, length=length)
     if not 0 <= breakaway <= 1:
@@ -146,11 +192,17 @@ def stretch_loop(amplitude, length, limit=1.0, breakaway=0.0):
 
 
 def dither_drift(low, high, breakaway=0.0):
-    """Drift of a dithered force in the stretch reading: slide per cycle in bond lengths that it leaves behind.
+    """Return the slide per cycle, in bond lengths, that a dithered force leaves in the stretch reading.
 
-    p = 1, constant bond length and load. The force runs between low and high, shares of mu_s N, -1 < low < high < 1.
-    The drift is 0 where high - low <= 2 breakaway. Up: the elastic range, then ln((1 - low - 2 b)/(1 - high)); down:
-    the range, then ln((1 + high - 2 b)/(1 + low)).
+    p = 1, constant bond length and load. The drift is 0 where high - low <= 2 b. Up: the elastic range, then
+    ln((1 - low - 2 b)/(1 - high)); down: the range, then ln((1 + high - 2 b)/(1 + low)).
+
+    Parameters
+    ----------
+    low, high : float
+        Ends of the force / mu_s N, -1 < low < high < 1.
+    breakaway : float
+        Fraction b of the length that stretches without damage.
     """
     if high - low <= 2 * breakaway * (1 + 1e-12):
         return 0.0
@@ -161,10 +213,17 @@ def dither_drift(low, high, breakaway=0.0):
 
 
 def report_loop(amplitude, length, limit=1.0):
-    """Steady loop of the printed law, p = 0, constant bond length: (area, force at the end of a stroke).
+    """Return area and end force of the steady loop of the printed law (p = 0, constant bond length).
 
     They are 4 limit (A coth(2A/eps) - eps/2) and limit: as printed the law reaches its full force at ANY amplitude.
     ValueError unless amplitude and length are positive.
+
+    Parameters
+    ----------
+    amplitude, length : float
+        [m]
+    limit : float
+        mu_s N [N].
     """
     require_positive(amplitude=amplitude, length=length)
     amplitude = np.asarray(amplitude, float)
@@ -174,10 +233,17 @@ def report_loop(amplitude, length, limit=1.0):
 
 
 def jenkins_loop(amplitude, length, limit=1.0):
-    """Steady loop of the elastic-plastic law 3.12 with its reversal: (area, force at the end of a stroke).
+    """Return area and end force of the steady loop of the elastic-plastic law 3.12 with its reversal.
 
     They are 4 limit (A - eps) and limit. Below the yield slide (amplitude <= length) the loop is a line: (0, limit
     A/eps). ValueError unless amplitude and length are positive.
+
+    Parameters
+    ----------
+    amplitude, length : float
+        [m]
+    limit : float
+        mu_s N [N].
     """
     require_positive(amplitude=amplitude, length=length)
     amplitude = np.asarray(amplitude, float)

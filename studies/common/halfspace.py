@@ -40,9 +40,20 @@ def wave_numbers(points: int, length: float) -> np.ndarray:
 
 
 def residuals(compliance_k, gap, pressure, closing: float, mean: float) -> MappingProxyType:
-    """Relative residuals of an answer by its definition: load, tension, penetration, complementarity.
+    """Return the relative residuals of a solution: load, tension, penetration and complementarity.
 
     Depths are measured in what the pressure itself moves, not in the height of the gap.
+
+    Parameters
+    ----------
+    compliance_k : (n//2 + 1,) array
+        [m/Pa]
+    gap, pressure : (n,) array
+        [m], [Pa]
+    closing : float
+        [m]
+    mean : float
+        Pressure of the load [Pa].
     """
     sunk = np.fft.irfft(np.asarray(compliance_k) * np.fft.rfft(pressure), gap.size)
     opening = gap - closing + sunk
@@ -56,7 +67,7 @@ def residuals(compliance_k, gap, pressure, closing: float, mean: float) -> Mappi
     return MappingProxyType({key: float(value) for key, value in out.items()})
 
 
-def _checked(compliance_k, gap, length: float, load: float) -> tuple:
+def _check_arguments(compliance_k, gap, length: float, load: float) -> tuple:
     gap = np.asarray(gap, float)
     compliance_k = np.asarray(compliance_k, float)
     if gap.ndim != 1 or gap.size < 4 or not np.isfinite(gap).all():
@@ -97,7 +108,7 @@ def press_periodic(
     at worst, each two pairs of transforms. PatchfemError for arguments without a meaning, NotConverged when a residual
     exceeds 1e-9 after `limit` iterations (50 sqrt(n) + 1000 unless given).
     """
-    compliance_k, gap, mean = _checked(compliance_k, gap, length, load)
+    compliance_k, gap, mean = _check_arguments(compliance_k, gap, length, load)
     limit = int(50 * np.sqrt(gap.size) + 1000) if limit is None else limit
     waves = compliance_k.copy()
     waves[0] = 0.0  # a uniform motion changes no gap difference; it is added to the closing below

@@ -73,8 +73,8 @@ class Peer:
         self.child.wait()
 
 
-def timed(work, repeats: int = 1) -> tuple:
-    """(answer, median CPU seconds) of work()."""
+def measure_seconds(work, repeats: int = 1) -> tuple:
+    """Return the answer of work() and the median of its CPU seconds."""
     seconds = []
     for _ in range(repeats):
         start = process_time()
@@ -83,11 +83,20 @@ def timed(work, repeats: int = 1) -> tuple:
     return answer, float(np.median(seconds))
 
 
-def seconds_at(error: float, errors, seconds) -> tuple:
-    """(seconds, sign) at which a curve of falling errors reaches `error`, log-log between its points.
+def interpolate_seconds(error: float, errors, seconds) -> tuple:
+    """Interpolate the seconds at which a curve of falling errors reaches `error`, log-log.
 
-    sign is "" inside the curve, "<" where its coarsest point is already better (the seconds of that point are more than
-    needed) and ">" where its finest is worse.
+    Parameters
+    ----------
+    error : float
+    errors, seconds : sequence of float
+        Points of the curve.
+
+    Returns
+    -------
+    tuple
+        Seconds and a sign: "" inside the curve, "<" if its coarsest point is already better (fewer seconds suffice),
+        ">" if its finest point is worse.
     """
     order = np.argsort(errors)
     e = np.asarray(errors, float)[order]
@@ -97,7 +106,15 @@ def seconds_at(error: float, errors, seconds) -> tuple:
 
 
 def ratio_text(theirs: float, ours: float, sign: str) -> str:
-    """Their seconds over ours; a bound where ours is one."""
+    """Write the ratio of two times; a bound where one of them is a bound.
+
+    Parameters
+    ----------
+    theirs, ours : float
+        [s]
+    sign : {"", "<", ">"}
+        From `interpolate_seconds`.
+    """
     return {"<": "> ", ">": "< ", "": ""}[sign] + f"{theirs / ours:.2g}"
 
 

@@ -8,7 +8,13 @@ from patchfem.dynamics.events.histories import evaluate_motion
 
 
 def basis(omega, zeta, slide, base) -> ModalBasis:
-    """Modes of unit mass with one interface."""
+    """Return modes of unit mass with one interface.
+
+    Parameters
+    ----------
+    omega, zeta, slide, base : sequence of float
+        Of each mode; omega in rad/s.
+    """
     omega = frozen_array(omega)
     slide = frozen_array(slide)
     return ModalBasis(
@@ -27,7 +33,7 @@ HALF = np.sqrt(0.5)
 SDOF = basis([1.0], [0.003], [1.0], [1.0])
 SDOF_DRIVE = SineDrive(1.0, 1.0)
 SDOF_LIMIT = 0.8  # friction [N]
-PLAIN = basis([1.0], [0.0], [1.0], [1.0])  # the same without damping
+UNDAMPED_MASS = basis([1.0], [0.0], [1.0], [1.0])  # the same without damping
 # two free masses and a spring, m = k = 1, the force sin 1.14 t on the first, friction under the second; the coordinates
 # are those of the motion together and of the relative motion
 TWO = basis([0.0, np.sqrt(2.0)], [0.0, 0.0], [HALF, -HALF], [-HALF, -HALF])
@@ -35,8 +41,20 @@ TWO_DRIVE = SineDrive(1.0, 1.14, False)
 TWO_LIMIT = 3.0  # friction [N]
 
 
-def sampled(modes, drive, limit, cycles: float, times, start=None):
-    """Response at `times` (k,) of `cycles` by the event engine of any modes."""
+def sample_motion(modes, drive, limit, cycles: float, times, start=None):
+    """Integrate modes by the event engine and return the response at given times.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive : drive
+    limit : float
+        Friction limit [N].
+    cycles : float
+    times : (k,) array
+        [s]
+    start : InitialState, optional
+    """
     return evaluate_motion(
         modes, drive, [make_coulomb_elements(limit, limit)], cycles, times, start
     )
@@ -48,4 +66,4 @@ def exact(name: str, times):
         "sdof": (SDOF, SDOF_DRIVE, SDOF_LIMIT),
         "two": (TWO, TWO_DRIVE, TWO_LIMIT),
     }[name]
-    return sampled(modes, drive, limit, float(np.ceil(times[-1])) / drive.period, times)
+    return sample_motion(modes, drive, limit, float(np.ceil(times[-1])) / drive.period, times)

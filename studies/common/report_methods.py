@@ -29,7 +29,7 @@ from patchfem.dynamics.integrated import find_accelerations
 
 KERNELS = Path(__file__).with_name("report_methods_kernels.py")
 CRITERIA = ("displacement", "velocity", "force")
-MAX_ITERATIONS = 200  # of a step of Duhamel's integral
+MAX_ITERATIONS = 200  # iterations of one step of Duhamel's integral
 
 
 class Law(NamedTuple):
@@ -52,7 +52,17 @@ def coulomb(limit: float, stick_speed: float = 0.0) -> Law:
 
 
 def elastic_plastic(limit: float, yield_displacement: float, *, as_printed: bool = False) -> Law:
-    """Return the elastic-plastic law, or equation 3.12, whose force stays at the limit once it is reached."""
+    """Return the elastic-plastic law, or equation 3.12, whose force stays at the limit once it is reached.
+
+    Parameters
+    ----------
+    limit : float
+        [N]
+    yield_displacement : float
+        [m]
+    as_printed : bool
+        Equation 3.12.
+    """
     kernels = load_kernels()
     kind = kernels.ELASTIC_PLASTIC_AS_PRINTED if as_printed else kernels.ELASTIC_PLASTIC
     return Law(kind, limit, yield_displacement)
@@ -100,7 +110,9 @@ class Problem(NamedTuple):
         return Motion(time, self.drive, *self.history, residual, n_failed)
 
 
-def set_up(modes: ModalBasis, drive, law: Law, steps: tuple, start: InitialState | None) -> Problem:
+def _set_up(
+    modes: ModalBasis, drive, law: Law, steps: tuple, start: InitialState | None
+) -> Problem:
     """Return the problem of a motion from its start; steps: duration [s], steps per period of the drive."""
     duration, steps_per_cycle = steps
     step = drive.period / steps_per_cycle
@@ -143,7 +155,17 @@ def duhamel_maps(modes: ModalBasis, step: float) -> np.ndarray:
 def accepted_force_error(
     modes: ModalBasis, step: float, criterion: str, tolerance: float, relaxation: float
 ) -> float:
-    """Return the error of the friction force [N] that a step of Duhamel's integral may have when it is accepted."""
+    """Return the error of the force [N] with which a step of Duhamel's integral is accepted.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    step : float
+        [s]
+    criterion : {"displacement", "velocity", "force"}
+    tolerance : float
+    relaxation : float
+    """
     if criterion == "force":
         return tolerance
     gain = modes.slide**2 @ duhamel_maps(modes, step)[:, CRITERIA.index(criterion), 3]
@@ -181,7 +203,7 @@ def solve_duhamel(
     -------
     Motion
     """
-    problem = set_up(modes, drive, law, steps, start)
+    problem = _set_up(modes, drive, law, steps, start)
     residual = np.zeros(problem.drive.size)
     stop = (CRITERIA.index(criterion), float(tolerance), float(relaxation), MAX_ITERATIONS)
     n_failed = load_kernels().duhamel_loop(
@@ -207,7 +229,7 @@ def solve_newmark(
     start: InitialState | None = None,
 ) -> Motion:
     """Integrate by Newmark's average acceleration; `law` is Coulomb's law, `needs_force` is explained above."""
-    problem = set_up(modes, drive, law, steps, start)
+    problem = _set_up(modes, drive, law, steps, start)
     h = problem.step
     stiffness = h * h / 4 * np.diag(modes.omega**2)
     inverse = np.linalg.inv(np.eye(modes.omega.size) + h / 2 * modes.damping_matrix + stiffness)
@@ -232,9 +254,22 @@ def solve_euler(
     steps: tuple,
     start: InitialState | None = None,
 ) -> Motion:
-    """Integrate friction limit tanh(v/transition_speed) by explicit Euler steps."""
+    """Integrate friction limit tanh(v/transition_speed) by explicit Euler steps.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive : drive
+    limit : float
+        [N]
+    transition_speed : float
+        [m/s]
+    steps : tuple
+        Duration [s] and number of steps.
+    start : InitialState, optional
+    """
     law = Law(load_kernels().RATE, limit, transition_speed)
-    problem = set_up(modes, drive, law, steps, start)
+    problem = _set_up(modes, drive, law, steps, start)
     load_kernels().euler_loop(
         problem.rig, problem.step, problem.drive, tuple(law), problem.history, problem.workspace
     )

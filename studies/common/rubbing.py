@@ -8,7 +8,7 @@ from patchfem.core import PatchfemError, frozen_array
 from patchfem.formatting import format_length
 
 BITE = 1e-3  # default mean depth taken in one place of one pass, as a share of the combined root mean square height
-CLOSE = 1e-9  # by which the mean overlap may miss its target before it is scaled to it
+MEAN_TOL = 1e-9  # the mean overlap is scaled to its target if it misses it by less
 # of the largest height; less is too near the round-off of heights to be taken off at once
 FINEST = 1e-9
 
@@ -114,7 +114,7 @@ class _Pair:
         _shifted_sum(self.up, self.low, place, self.sum)
         # the approach sinks as evenly as the pieces wear
         last, sunk = self.approach.get(place, (None, 0.0))
-        found = overlap_of(self.sum, depth, None if last is None else last - sunk, out)
+        found = _find_approach(self.sum, depth, None if last is None else last - sunk, out)
         self.approach[place] = found, 0.0 if last is None else last - found
 
     def take(self, off_lower, off_upper) -> None:
@@ -122,7 +122,9 @@ class _Pair:
         self.up -= self.shares[1] * off_upper
 
 
-def overlap_of(heights: np.ndarray, depth: float, start: float | None, out: np.ndarray) -> float:
+def _find_approach(
+    heights: np.ndarray, depth: float, start: float | None, out: np.ndarray
+) -> float:
     """Approach D [m] at which the mean of max(heights - D, 0) is `depth` > 0; these overlaps go into `out`.
 
     heights (m, n) [m]: of both pieces together; start: a guess of D. Newton's method on a convex, falling, piecewise
@@ -134,7 +136,7 @@ def overlap_of(heights: np.ndarray, depth: float, start: float | None, out: np.n
     while True:
         touching = near[near > approach]
         over = (touching - approach).sum() - wanted
-        if abs(over) <= CLOSE * wanted:
+        if abs(over) <= MEAN_TOL * wanted:
             break
         if over > 0:  # D lies above: no other point touches there
             near = touching

@@ -7,17 +7,20 @@ from patchfem.elasticity.elasticity import Piece
 from patchfem.elasticity.substructure import assemble_stiffness
 
 
-def stiffness_of(piece):
-    """Stiffness per unit width [N/m per m] of the free unknowns of a piece, two per node (along x, inward): column by
-    column and row by row of a `Piece`, in the order of elimination of a `Substructure`."""
+def free_stiffness(piece):
+    """Assemble the stiffness per unit width [N/m per m] of the free unknowns of a piece.
+
+    Two unknowns per node (along x, inward) stand column by column and row by row for a `Piece`, and in the order of
+    elimination for a `Substructure`.
+    """
     return (
-        matrix_of(piece.stencil)
+        make_matrix(piece.stencil)
         if isinstance(piece, Piece)
         else assemble_stiffness(piece.mesh, piece.layers, piece.order)
     )
 
 
-def stencil_of(matrix: csr_matrix, columns: int) -> np.ndarray:
+def make_stencil(matrix: csr_matrix, columns: int) -> np.ndarray:
     """Stencil of an assembled stiffness whose unknowns run column by column, row by row, two per node.
 
     ValueError where it couples nodes that are not neighbours.
@@ -33,7 +36,7 @@ def stencil_of(matrix: csr_matrix, columns: int) -> np.ndarray:
     return out
 
 
-def matrix_of(stencil) -> csr_matrix:
+def make_matrix(stencil) -> csr_matrix:
     """The stencil as a sparse matrix, unknowns column by column, row by row, two per node (along x, inward)."""
     columns, rows = stencil.shape[:2]
     c, r, dc, dr = np.ogrid[:columns, :rows, -1:2, -1:2]

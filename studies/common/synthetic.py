@@ -10,28 +10,43 @@ from patchfem.core import PatchfemError, frozen_array
 from patchfem.formatting import format_length
 from patchfem.surface.profile import Profile
 
-# [m] report, 4.D: 80 micron scale; a stylus of 12.5 um traces no shorter waves
-DOMINANT, SHORTEST = (
-    80e-6,
-    8e-6,
-)
+DOMINANT = 80e-6  # [m] the 80 micron scale of the report, 4.D
+SHORTEST = 8e-6  # [m] a stylus of 12.5 um traces no shorter waves
 SIGMA = 6.3e-6  # [m] of the larger swings of 13 to 18 um in 4.D; Fig. 30 prints a range of 30.6 um, Rt is 31 um then
 SWINGS = {"peak-to-valley": 2.5, "zero-to-peak": 1.25, "rms": 1.0}  # amplitude / sigma
 
 
 def sine(x: np.ndarray, amplitude: float, wavelength: float, phase: float = 0.0) -> Profile:
-    """A sine trace, amplitude sin(2 pi x/wavelength + phase) [m], at rising x (n,) [m].
+    """Return the trace amplitude sin(2 pi x/wavelength + phase) at rising x (n,) [m].
 
-    amplitude, wavelength [m], phase [rad]. PatchfemError as in `waves`.
+    PatchfemError as in `waves`.
+
+    Parameters
+    ----------
+    x : (n,) array
+        [m]
+    amplitude, wavelength : float
+        [m]
+    phase : float
+        [rad]
     """
     return waves(x, [amplitude], [wavelength], [phase])
 
 
 def waves(x: np.ndarray, amplitudes, wavelengths, phases=None) -> Profile:
-    """Trace of k sines in sum, at rising x (n,) [m].
+    """Return the sum of k sines as a trace at rising x (n,) [m].
 
-    amplitudes, wavelengths: (k,) [m]; phases: (k,) [rad], 0 where left out. PatchfemError for lists of unlike lengths,
-    numbers that are not finite, wavelengths not above zero, and places that do not rise.
+    PatchfemError for lists of unlike lengths, numbers that are not finite, wavelengths not above zero, and places that
+    do not rise.
+
+    Parameters
+    ----------
+    x : (n,) array
+        [m]
+    amplitudes, wavelengths : (k,) array
+        [m]
+    phases : (k,) array, optional
+        [rad]; 0 by default.
     """
     x = _places(x)
     a = _finite("amplitudes", amplitudes)
@@ -50,10 +65,16 @@ def waves(x: np.ndarray, amplitudes, wavelengths, phases=None) -> Profile:
 
 
 def peaks(x: np.ndarray, at, heights, widths) -> Profile:
-    """Trace of k Gaussian peaks in sum, heights exp(-(x - at)^2/(2 widths^2)), at rising x (n,) [m].
+    """Return the sum of k Gaussian peaks, heights exp(-(x - at)^2/(2 widths^2)), as a trace.
 
-    at, heights, widths: (k,) [m]; a height below zero is material that sticks out into the gap. PatchfemError as in
-    `waves`.
+    PatchfemError as in `waves`.
+
+    Parameters
+    ----------
+    x : (n,) array
+        Rising [m].
+    at, heights, widths : (k,) array
+        [m]; a height below zero is material that sticks out into the gap.
     """
     x = _places(x)
     at, heights, widths = (
@@ -150,13 +171,13 @@ def report_trace(length: float, count: int, seed: int, sigma: float = SIGMA) -> 
     cut from `report_area`, scatter as measured ones do). Same seed, same bytes. PatchfemError unless a wave of 8 um
     holds two steps and the length one of 80 um.
     """
-    _resolved("report_trace", length, length, length / max(count, 1), sigma)
+    _check_resolution("report_trace", length, length, length / max(count, 1), sigma)
     q = 2 * np.pi / length * np.arange(count // 2 + 1)
     across = 2 * np.pi / SHORTEST * (np.arange(1000) + 0.5) / 1000
     power = np.array([report_density(np.hypot(one, across)).sum() for one in q])
     power[0] = 0.0
     phase = np.random.default_rng(seed).uniform(0.0, 2 * np.pi, q.size)
-    z = _scaled(np.fft.irfft(np.sqrt(power) * np.exp(1j * phase), count), sigma)
+    z = _scale(np.fft.irfft(np.sqrt(power) * np.exp(1j * phase), count), sigma)
     x = np.linspace(-length / 2, length / 2, count + 1)
     return Profile(
         frozen_array(x), frozen_array(np.append(z, z[0])), f"report's surface, trace (seed {seed})"
@@ -172,18 +193,18 @@ def report_area(shape: tuple, step: float, seed: int, sigma: float = SIGMA) -> t
     and both periods one of 80 um.
     """
     m, n = shape
-    _resolved("report_area", m * step, n * step, step, sigma)
+    _check_resolution("report_area", m * step, n * step, step, sigma)
     qy = 2 * np.pi * np.fft.fftfreq(m, step)
     qx = 2 * np.pi * np.fft.rfftfreq(n, step)
     noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((m, n)))
     wave = noise / np.abs(noise)  # the phases of white noise: random, and those of a real surface
-    z = _scaled(
+    z = _scale(
         np.fft.irfft2(wave * np.sqrt(report_density(np.hypot(qy[:, None], qx))), (m, n)), sigma
     )
     return frozen_array(step * np.arange(n)), frozen_array(step * np.arange(m)), frozen_array(z)
 
 
-def _resolved(name: str, one: float, other: float, step: float, sigma: float) -> None:
+def _check_resolution(name: str, one: float, other: float, step: float, sigma: float) -> None:
     if not (np.isfinite([one, other, step, sigma]).all() and step > 0 and sigma >= 0):
         raise PatchfemError(
             f"{name}: a size and a step above zero and a sigma of zero or more are wanted"
@@ -195,7 +216,7 @@ def _resolved(name: str, one: float, other: float, step: float, sigma: float) ->
         )
 
 
-def _scaled(z, sigma: float) -> np.ndarray:
+def _scale(z, sigma: float) -> np.ndarray:
     """Heights of mean zero with this root mean square; twice, for the round-off of the first time."""
     for _ in range(2):
         z = z - z.mean()

@@ -23,9 +23,18 @@ def decay_half_cycles(start, friction) -> int:
 
 
 def decay_rest(start, friction, omega) -> tuple:
-    """Time [s] and place [m] at which a Coulomb oscillator released at `start` comes to rest (eq. 3.11).
+    """Return time [s] and place [m] at which a released Coulomb oscillator comes to rest (eq. 3.11).
 
-    Arguments and refusals as in `decay`.
+    ValueError as in `decay`.
+
+    Parameters
+    ----------
+    start : float
+        x_0 [m].
+    friction : float
+        F/k [m].
+    omega : float
+        [rad/s]
     """
     require_positive(omega=omega)
     count = decay_half_cycles(start, friction)
@@ -34,10 +43,20 @@ def decay_rest(start, friction, omega) -> tuple:
 
 
 def decay(time, start, friction, omega):
-    """Displacement [m] of an undamped Coulomb oscillator released at rest (eq. 3.11 with N_0 rounded up).
+    """Return the displacement [m] of an undamped Coulomb oscillator released at rest (eq. 3.11).
 
-    time (k,) [s] >= 0, start x_0 [m], friction F/k [m], omega [rad/s]. ValueError for a negative time, and unless
-    friction and omega are positive.
+    N_0 is rounded up. ValueError for a negative time, and unless friction and omega are positive.
+
+    Parameters
+    ----------
+    time : (k,) array
+        >= 0 [s].
+    start : float
+        x_0 [m].
+    friction : float
+        F/k [m].
+    omega : float
+        [rad/s]
     """
     time = np.asarray(time, float)
     if np.any(time < 0):
@@ -55,15 +74,23 @@ def bounded_input(friction):
 
 
 def sliding_amplitude(r, friction, damping=0.0) -> float:
-    """Amplitude over a/omega_n^2 of steady motion that slides without a stop (Den Hartog 1931; damping added).
+    """Return the amplitude over a/omega_n^2 of steady motion that slides without a stop (Den Hartog 1931).
 
-    r = drive/natural frequency > 0, friction f/a >= 0, damping ratio 0 <= xi < 1. Without damping it is
-    sqrt(V^2 - (U f/a)^2), V = 1/(1 - r^2), U = sin(pi/r)/(r (1 + cos(pi/r))).
+    Without damping it is sqrt(V^2 - (U f/a)^2), V = 1/(1 - r^2), U = sin(pi/r)/(r (1 + cos(pi/r))).
     ValueError where no such motion exists (the block stops on the way: below the knee), and without damping at r = 1.
 
-    Between two turns the motion is f + e^(-xi T)(A cos w T + B sin w T) + particular, T = omega_n t; it is
-    antisymmetric over half a drive period, which gives A and B; the rest follows from the particular
-    amplitude 1/|1 - r^2 + 2 i xi r|.
+    Between two reversals the motion is f + e^(-xi T)(A cos w T + B sin w T) + particular, T = omega_n t. It is
+    antisymmetric over half a drive period, which gives A and B; the amplitude of the particular solution is
+    1/|1 - r^2 + 2 i xi r|.
+
+    Parameters
+    ----------
+    r : float
+        Drive / natural frequency > 0.
+    friction : float
+        f/a >= 0.
+    damping : float
+        Damping ratio xi, 0 <= xi < 1.
     """
     require_positive(r=r)
     if friction < 0 or not 0 <= damping < 1:
@@ -153,13 +180,22 @@ def two_stop_amplitude(friction) -> float:
 
 
 def shaken_rms(omega: float, zeta: float, level: float, band: tuple) -> tuple:
-    """Root mean squares of an oscillator on a shaken base: (relative displacement [m], absolute acceleration [m s-2]).
+    """Return the rms of relative displacement [m] and acceleration [m/s^2] of a shaken oscillator.
 
-    omega [rad/s]; zeta < 1: damping ratio; level [m2 s-3]: one-sided spectral density of the base acceleration between
-    the two frequencies of band [Hz], 0 and infinity for white noise. With u = f/f_0 both are integrals of
-    1/((1 - u^2)^2 + (2 zeta u)^2), that of the acceleration with 1 + (2 zeta u)^2 above it, whose antiderivatives are
-    logarithms of the poles u = +-(1 - zeta^2)^(1/2) +- i zeta. Source: Crandall and Mark, Random Vibration in
-    Mechanical Systems, ch. 2.
+    With u = f/f_0 both are integrals of 1/((1 - u^2)^2 + (2 zeta u)^2), that of the acceleration with 1 + (2 zeta u)^2
+    above it, whose antiderivatives are logarithms of the poles u = +-(1 - zeta^2)^(1/2) +- i zeta. Source: Crandall and
+    Mark, Random Vibration in Mechanical Systems, ch. 2.
+
+    Parameters
+    ----------
+    omega : float
+        [rad/s]
+    zeta : float
+        Damping ratio < 1.
+    level : float
+        One-sided spectral density of the base acceleration [m^2/s^3].
+    band : tuple of float
+        Lower and upper frequency [Hz]; 0 and infinity for white noise.
     """
     pole = np.sqrt(1 - zeta * zeta) + 1j * zeta
     poles = np.array([pole, -pole, np.conj(pole), -np.conj(pole)])

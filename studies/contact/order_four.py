@@ -46,7 +46,9 @@ from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.linalg import splu
 
-LENGTH, HEIGHT, COATING = 12.7e-3, 6.35e-3, 152.4e-6  # m; depth of the pieces LENGTH
+LENGTH = 12.7e-3  # [m] length and depth of the pieces
+HEIGHT = 6.35e-3  # [m]
+COATING = 152.4e-6  # [m] thickness of the coating
 LOAD = 26 * 4.4482216152605 / LENGTH  # N/m: 26 lbf over 12.7 mm
 LAYERS = ((250e9, 0.24), (121e9, 0.32))  # Pa, 1: WC-Co as sprayed on Ti-8Al-1Mo-1V
 
@@ -60,7 +62,7 @@ class Case(NamedTuple):
 
 
 LEVELS = (1e-3, 1e-4, 1e-5)
-MOST_CELLS = 130_000  # of a bilinear grid, and of the last of three
+MOST_CELLS = 130_000  # cells of a bilinear grid, and of the finest of three nested grids
 CASES = {  # truths: elements of order 5 and 4 regraded to the edges, which agree to 5e-6 (peak) and 2e-6 (the others)
     "1e-5 rad": Case(
         lambda x: 1e-5 * x, (-LENGTH / 2, 5.5332036e-3), (6.2530743e-8, 1.9217449e6, 1.437188893e11)
@@ -131,7 +133,17 @@ def matrices_1d(order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def cell_stiffness(order: int, ratio: np.ndarray, young: float, poisson: float) -> np.ndarray:
-    """Stiffness (cells, 2 m, 2 m) in plane strain of cells of the given ratio height/length; u_x first, then u_y."""
+    """Return the stiffness (cells, 2 m, 2 m) in plane strain of cells; u_x first, then u_y.
+
+    Parameters
+    ----------
+    order : int
+    ratio : (cells,) array
+        Height / length.
+    young : float
+        [Pa]
+    poisson : float
+    """
     mass, stiff, mixed = matrices_1d(order)
     m = (order + 1) ** 2
     shear = young / (2 * (1 + poisson))
@@ -152,7 +164,7 @@ def cell_stiffness(order: int, ratio: np.ndarray, young: float, poisson: float) 
     return cells
 
 
-def without_interior(cells: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
+def condense_interior(cells: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
     """Cells condensed to the nodes of their edges, and the numbers (of (order + 1)^2) of these nodes."""
     row, column = np.divmod(np.arange((order + 1) ** 2), order + 1)
     inside = (row % order != 0) & (column % order != 0)
@@ -165,7 +177,7 @@ def without_interior(cells: np.ndarray, order: int) -> tuple[np.ndarray, np.ndar
     return out, np.flatnonzero(~inside)
 
 
-def dissection(
+def _dissection(
     x0: int, x1: int, y0: int, y1: int, order: int, into: list[tuple[int, int, int, int]]
 ) -> None:
     """Nested dissection of the nodes strictly inside a box of cells: boxes of nodes, separators after their halves."""
@@ -173,24 +185,30 @@ def dissection(
         return
     if x1 - x0 >= y1 - y0:
         middle = (x0 + x1) // 2
-        dissection(x0, middle, y0, y1, order, into)
-        dissection(middle, x1, y0, y1, order, into)
+        _dissection(x0, middle, y0, y1, order, into)
+        _dissection(middle, x1, y0, y1, order, into)
         into.append((middle * order, middle * order + 1, y0 * order + 1, y1 * order))
     else:
         middle = (y0 + y1) // 2
-        dissection(x0, x1, y0, middle, order, into)
-        dissection(x0, x1, middle, y1, order, into)
+        _dissection(x0, x1, y0, middle, order, into)
+        _dissection(x0, x1, middle, y1, order, into)
         into.append((x0 * order + 1, x1 * order, middle * order, middle * order + 1))
 
 
 def numbering(nx: int, ny: int, order: int) -> tuple[np.ndarray, int]:
-    """Place of every node (ny order + 1, nx order + 1) in the elimination, -1 where held or condensed; their count.
+    """Return the place of every node in the elimination, -1 where held or condensed, and their count.
 
     Nested dissection inside, then the free sides, the face y = 0 (row 0) last; the far row is held.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Cells along and across.
+    order : int
     """
     place = np.full((ny * order + 1, nx * order + 1), -1)
     boxes: list[tuple[int, int, int, int]] = []
-    dissection(0, nx, 0, ny, order, boxes)
+    _dissection(0, nx, 0, ny, order, boxes)
     boxes += [
         (0, 1, 1, ny * order),
         (nx * order, nx * order + 1, 1, ny * order),
@@ -207,7 +225,14 @@ def numbering(nx: int, ny: int, order: int) -> tuple[np.ndarray, int]:
 def face_compliance(
     xs: np.ndarray, ys: np.ndarray, order: int
 ) -> tuple[np.ndarray, int, float, float]:
-    """Normal compliance (n, n) [m2/N] of a piece on its face; unknowns; CPU s of the factors and of condensing."""
+    """Return the normal compliance (n, n) [m2/N] of a face, the unknowns, and CPU s of both steps.
+
+    Parameters
+    ----------
+    xs, ys : array
+        Break points [m].
+    order : int
+    """
     nx = len(xs) - 1
     ny = len(ys) - 1
     place, count = numbering(nx, ny, order)
@@ -219,7 +244,7 @@ def face_compliance(
         layer = np.flatnonzero((0.5 * (ys[1:] + ys[:-1]) > COATING) == bool(material))
         iy, ix = (grid.ravel() for grid in np.meshgrid(layer, np.arange(nx), indexing="ij"))
         ratio = (ys[iy + 1] - ys[iy]) / (xs[ix + 1] - xs[ix])
-        cells, local = without_interior(cell_stiffness(order, ratio, young, poisson), order)
+        cells, local = condense_interior(cell_stiffness(order, ratio, young, poisson), order)
         node = place[
             iy[:, None] * order + local // (order + 1), ix[:, None] * order + local % (order + 1)
         ]
@@ -251,7 +276,7 @@ def face_compliance(
     return compliance, 2 * count, factored - started, time.process_time() - factored
 
 
-def spaced(points: list[tuple[float, float, float]], grading: Grading) -> np.ndarray:
+def make_breaks(points: list[tuple[float, float, float]], grading: Grading) -> np.ndarray:
     """Break points [m] through singular points (place, R, multiplier of the first cell), ascending in place."""
     places = np.array([point[0] for point in points])
     parts = []
@@ -283,10 +308,10 @@ def grids(case: Case, grading: Grading) -> tuple[np.ndarray, np.ndarray]:
     x += [(place, radius, 1.0) for place in (left, right) if abs(place) < LENGTH / 2]
     x += [(LENGTH / 2, COATING, corner)]
     y = [(0.0, radius, 1.0), (COATING, COATING, corner), (HEIGHT, HEIGHT, corner)]
-    return spaced(x, grading), spaced(y, grading)
+    return make_breaks(x, grading), make_breaks(y, grading)
 
 
-def halved(breaks: np.ndarray) -> np.ndarray:
+def halve_cells(breaks: np.ndarray) -> np.ndarray:
     """Every cell cut in the middle: the nested finer grid."""
     out = np.empty(2 * len(breaks) - 1)
     out[::2] = breaks
@@ -344,8 +369,18 @@ def peak(xs: np.ndarray, order: int, pressure: np.ndarray) -> float:
     return max(pressure.max(), (cells[full] @ fine.T).max(initial=0.0))
 
 
-def solved(case: Case, xs: np.ndarray, ys: np.ndarray, order: int) -> Run:
-    """Approach, peak and normal stiffness of the pair of like pieces (one is condensed, the other its mirror)."""
+def solve_pair(case: Case, xs: np.ndarray, ys: np.ndarray, order: int) -> Run:
+    """Solve the pair of like pieces for approach, peak and normal stiffness.
+
+    One piece is condensed, the other is its mirror image.
+
+    Parameters
+    ----------
+    case : Case
+    xs, ys : array
+        Break points [m].
+    order : int
+    """
     clock = time.process_time()
     compliance, unknowns, factor, condense = face_compliance(xs, ys, order)
     x, weight = face_nodes(xs, order)
@@ -364,7 +399,7 @@ def errors(case: Case, values: np.ndarray) -> np.ndarray:
     return abs(values - truth) / scale
 
 
-def extrapolated(runs: list[Run]) -> Run:
+def extrapolate(runs: list[Run]) -> Run:
     """Aitken's limit of three nested runs, of second order where they do not converge evenly; costs added."""
     first = runs[1].values - runs[0].values
     second = runs[2].values - runs[1].values
@@ -379,9 +414,9 @@ def extrapolated(runs: list[Run]) -> Run:
     return Run(values, runs[2].unknowns, runs[2].face, *sums)
 
 
-def best_of(case: Case, xs: np.ndarray, ys: np.ndarray, order: int, times: int = 2) -> Run:
+def _fastest_run(case: Case, xs: np.ndarray, ys: np.ndarray, order: int, times: int = 2) -> Run:
     """The quicker of equal runs: the processor is shared."""
-    return min((solved(case, xs, ys, order) for _ in range(times)), key=lambda run: run.seconds)
+    return min((solve_pair(case, xs, ys, order) for _ in range(times)), key=lambda run: run.seconds)
 
 
 GRADINGS = {
@@ -404,10 +439,14 @@ def ladder(case: Case, method: str) -> list[tuple[float, Run]]:
         ] > MOST_CELLS:
             continue
         if method == "extrapolated":
-            nested = [(xs, ys), (halved(xs), halved(ys)), (halved(halved(xs)), halved(halved(ys)))]
-            run = extrapolated([best_of(case, x, y, 1) for x, y in nested])
+            nested = [
+                (xs, ys),
+                (halve_cells(xs), halve_cells(ys)),
+                (halve_cells(halve_cells(xs)), halve_cells(halve_cells(ys))),
+            ]
+            run = extrapolate([_fastest_run(case, x, y, 1) for x, y in nested])
         else:
-            run = best_of(case, xs, ys, *((4, 2) if method == "order 4" else (1, 1)))
+            run = _fastest_run(case, xs, ys, *((4, 2) if method == "order 4" else (1, 1)))
         out.append((float(errors(case, run.values).max()), run))
     return out
 

@@ -33,7 +33,8 @@ SCENE = (
     '[normal]\nload = "10 kN"\n[friction]\n{}[slide]\nkind = "sine"\namplitude = "25.6 mm"\nfrequency = "1 Hz"\n'
     "cycles = 2\n"
 )
-STATIC, BOND = "friction.static=0.1..1.5", "friction.bond_length=0.1 mm..30 mm"
+STATIC = "friction.static=0.1..1.5"
+BOND = "friction.bond_length=0.1 mm..30 mm"
 STIFFNESS = "friction.stiffness=1e5 N/m..1e8 N/m"
 LAWS = {
     "coulomb": ('law = "coulomb"\nstatic = 0.4\n', (STATIC,)),
@@ -97,7 +98,7 @@ def plateau(slide) -> np.ndarray:
 
 
 def repeat(loop) -> tuple:
-    """(rows of a cycle, rms [N] by which one cycle differs from the next, as the scatter of one)."""
+    """Return the rows of a cycle, and the rms [N] by which two successive cycles differ, as the scatter of one."""
     half = loop.displacement.size // 2
     misses = [
         np.mean((loop.displacement[k:] - loop.displacement[:-k]) ** 2)

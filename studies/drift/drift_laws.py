@@ -16,7 +16,9 @@ from patchfem.friction.bonds.recursion import FirstOrderBonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.protocol import Step
 
-LENGTH, PERIOD, CREEP = ladder.LENGTH, 1 / ladder.HERTZ, 1e-3
+LENGTH = ladder.LENGTH  # [m] bond length
+PERIOD = 1 / ladder.HERTZ  # [s] of a cycle
+CREEP = 1e-3  # [m/s] reference speed of the law tanh
 SHARES = (0.0, 0.1, 0.3, 0.5)  # breakaway
 CASES = {
     "force .5+-.1": ((0.6, 0.4), (1.0, 1.0)),
@@ -78,15 +80,17 @@ def engines(growth: bool, orders=(0.0, 0.5, 1.0, 2.0), shares=SHARES) -> dict:
     return out
 
 
-def small() -> dict:
+def laws_without_bonds() -> dict:
     """Laws without bonds that answer a force."""
     return {"elastic-plastic": ElasticPlastic(1.0, LENGTH), "Iwan, 10 elements": Iwan(10, LENGTH)}
 
 
-def closed(case: str) -> list:
-    """Rows of the laws whose answer needs no march: Coulomb holds below its limit; tanh creeps at v_0 atanh(F/(mu N))
-    along straight ramps of force and load; Bouc-Wen (n = 2, gamma = beta, constant load) goes up by the integral of
-    1/(1 - z^2) and comes back on a line."""
+def closed_form_rows(case: str) -> list:
+    """List the rows of the laws whose drift is known without a march.
+
+    Coulomb holds below its limit. The law tanh creeps at v_0 atanh(F/(mu N)) along straight ramps of force and load.
+    Bouc-Wen (n = 2, gamma = beta, constant load) rises by the integral of 1/(1 - z^2) and returns on a line.
+    """
     (high, low), (first, second) = CASES[case]
     held = max(high / first, low / second) < 1
     rows = [Row("Coulomb", case, *(0.0 if held else None,) * 2)]

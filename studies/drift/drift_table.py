@@ -21,7 +21,17 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from drift_laws import CASES, LENGTH, PERIOD, SHARES, Row, closed, engines, ladder, small
+from drift_laws import (
+    CASES,
+    LENGTH,
+    PERIOD,
+    SHARES,
+    Row,
+    closed_form_rows,
+    engines,
+    ladder,
+    laws_without_bonds,
+)
 from force_control import OutOfReach, slides
 
 CYCLES = 12
@@ -57,8 +67,8 @@ def virgin_gap(share: float) -> float:
 def main(laws=None, cases=tuple(CASES), growing: bool = True) -> dict:
     """{(law, case): Row}, printed as a markdown table; laws: {name: law object}, all of them by default."""
     if laws is None:
-        laws = small() | engines(False) | (engines(True) if growing else {})
-    out = {(found.law, case): found for case in cases for found in closed(case)}
+        laws = laws_without_bonds() | engines(False) | (engines(True) if growing else {})
+    out = {(found.law, case): found for case in cases for found in closed_form_rows(case)}
     for name, engine in laws.items():
         out |= {(name, case): row(name, engine, case) for case in cases}
     print(

@@ -10,10 +10,28 @@ class OutOfReach(ArithmeticError):
     """No slide of up to 50 bond lengths brings the law to the force."""
 
 
-def held_at(engine, state, target: float, sigma, dt: float = 1.0, length: float = 1.0) -> tuple:
-    """(slide [m], state) that brings the traction to `target` [Pa] in one straight step under sigma (1,) [Pa].
+def slide_to_traction(
+    engine, state, target: float, sigma, dt: float = 1.0, length: float = 1.0
+) -> tuple:
+    """Find the slide [m] that brings the traction to a target in one straight step, and the state after it.
 
-    dt [s] is the time of the step, length [m] the scale of the search. OutOfReach where the law does not get there.
+    Parameters
+    ----------
+    engine : law
+    state : state of the law
+    target : float
+        Traction [Pa].
+    sigma : (1,) array
+        Pressure [Pa].
+    dt : float
+        Time of the step [s].
+    length : float
+        Scale of the search [m].
+
+    Raises
+    ------
+    OutOfReach
+        If the law does not reach the target.
     """
 
     def after(dq):
@@ -49,11 +67,22 @@ def slides(
     period: float = 2.0,
     length: float = 1.0,
 ):
-    """Slide (cycles,) [m] at the end of every cycle of a dither that runs from one pair of force and load to the next,
-    forces[k] [Pa] under loads[k] [Pa], k = 0, 1, ... in turn, from rest under 1 Pa.
+    """Return the slide (cycles,) [m] at the end of every cycle of a dither of force and load.
 
-    Force and load change together in `pieces` straight pieces of each change: half the load (`press`), the force, the
-    other half. period [s] of a cycle.
+    Force and load change together in each piece: half the load (`press`), the force, the other half.
+
+    Parameters
+    ----------
+    engine : law
+    forces, loads : sequence of float
+        forces[k] [Pa] under loads[k] [Pa] in turn, from rest under 1 Pa.
+    cycles : int
+    pieces : int
+        Straight pieces of each change.
+    period : float
+        Of a cycle [s].
+    length : float
+        Scale of the search [m].
     """
     state = engine.start(np.ones(1))
     load = 1.0
@@ -68,11 +97,11 @@ def slides(
                 before, middle, after = marks[2 * k : 2 * k + 3]
                 if load != next_load:
                     state = engine.press(state, before, middle).state
-                dq, state = held_at(engine, state, float(target), middle, dt, length)
+                dq, state = slide_to_traction(engine, state, float(target), middle, dt, length)
                 slide += dq
                 if load != next_load:
                     state = engine.press(state, middle, after).state
-                    dq, state = held_at(engine, state, float(target), after, 0.0, length)
+                    dq, state = slide_to_traction(engine, state, float(target), after, 0.0, length)
                     slide += dq
             load = next_load
             force = next_force
@@ -81,6 +110,14 @@ def slides(
 
 
 def drift(engine, forces, loads, cycles: int = 12, **more) -> float:
-    """Slide [m] over the last of the cycles; arguments of `slides`."""
+    """Return the slide [m] over the last cycle of a dither.
+
+    Parameters
+    ----------
+    engine : law
+    forces, loads : sequence of float
+        As in `slides`.
+    cycles : int
+    """
     ends = slides(engine, forces, loads, cycles, **more)
     return float(ends[-1] - ends[-2])

@@ -19,9 +19,9 @@ from friction_forms import dither_drift, stretch_loop
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.friction.bonds.recursion import FirstOrderBonds
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 COLOURS = (BLUE, "#4f9bd9", "#e0975f", ORANGE)
-MARCHED = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
+MARCHED_SHARES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
 
 
 def growing(share: float, swing: float) -> float:
@@ -36,7 +36,7 @@ def growing(share: float, swing: float) -> float:
         return np.nan
 
 
-def main(path: Path = HERE / "drift.svg", marched=MARCHED) -> Path:
+def main(path: Path = FOLDER / "drift.svg", marched=MARCHED_SHARES) -> Path:
     """Draw both panels; the file written."""
     swing = np.linspace(0, 0.4, 401)
     amplitude = 10.0 ** np.linspace(-1, 1.5, 200)

@@ -34,10 +34,10 @@ from ladder_cycles import (
     coulomb,
     elastic_plastic,
     error,
-    followed,
     iwan,
+    last_cycle,
     points,
-    printed,
+    printed_law_cycle,
     rate,
 )
 
@@ -56,9 +56,9 @@ class Row(NamedTuple):
 
 def constant(amplitude: float, print_steps: int) -> list:
     """Rows without growth: every law against Dahl's, which is the stretch, LuGre and the constant length in one."""
-    dahl = followed(points(bonds()), amplitude)
+    dahl = last_cycle(points(bonds()), amplitude)
     sharp = elastic_plastic(amplitude)
-    report = printed(amplitude, 1.0, print_steps)
+    report = printed_law_cycle(amplitude, 1.0, print_steps)
     rows = [
         ("report p = 1", report, None),
         ("stretch = LuGre = Dahl", dahl, report),
@@ -74,15 +74,15 @@ def constant(amplitude: float, print_steps: int) -> list:
 
 def growing(amplitude: float, print_steps: int) -> list:
     """Rows with growth: constant lengths are once eps_0 with mu_s and once eps_k with mu_k (the same stiffness)."""
-    stretch, lugre = (followed(points(law), amplitude) for law in (bonds(**GROWTH), at_once()))
-    kinetic = followed(points(bonds(RATIO)), amplitude)
-    report = printed(amplitude, 1.0, print_steps, **GROWTH)
+    stretch, lugre = (last_cycle(points(law), amplitude) for law in (bonds(**GROWTH), at_once()))
+    kinetic = last_cycle(points(bonds(RATIO)), amplitude)
+    report = printed_law_cycle(amplitude, 1.0, print_steps, **GROWTH)
     sharp = elastic_plastic(amplitude, RATIO)
     rows = [
         ("report p = 1", report, None),
         ("stretch", stretch, report),
         ("LuGre", lugre, stretch),
-        ("constant eps_0, mu_s", followed(points(bonds()), amplitude), lugre),
+        ("constant eps_0, mu_s", last_cycle(points(bonds()), amplitude), lugre),
         ("constant eps_k, mu_k", kinetic, lugre),
         ("elastic-plastic, mu_k", sharp, kinetic),
         ("Coulomb, mu_k", coulomb(sharp, RATIO), sharp),
@@ -96,8 +96,8 @@ def slow_path(amplitude: float, times: float = 20.0) -> list:
         "slip_growth": times * GROWTH["slip_growth"],
         "rest_growth": GROWTH["rest_growth"] / times,
     }
-    stretch = followed(points(bonds(**slow)), amplitude)
-    lugre = followed(points(at_once()), amplitude)
+    stretch = last_cycle(points(bonds(**slow)), amplitude)
+    lugre = last_cycle(points(at_once()), amplitude)
     return _rows("on, l_k = eps_0", amplitude, [("LuGre", lugre, stretch)], stretch)
 
 

@@ -24,7 +24,9 @@ from patchfem.friction.bonds.quadrature import cutoff_age
 
 loop_kernels = load_instances()
 
-HERTZ, LENGTH, RATIO = 143.0, 2e-6, 0.7
+HERTZ = 143.0  # [Hz] frequency of the loops
+LENGTH = 2e-6  # [m] bond length
+RATIO = 0.7  # kinetic friction / static friction
 GROWTH = {"ratio": RATIO, "rest_growth": 10.0, "slip_growth": 0.05 * LENGTH, "rest_speed": 1e-4}
 AMPLITUDES = (0.1, 0.3, 1.0, 3.0, 12.5, 50.0)  # bond lengths
 STEPS = 4800  # per cycle
@@ -47,15 +49,15 @@ class Cycle(NamedTuple):
         return Cycle(dq, (self.force * self.dq).reshape(-1, every).sum(axis=1) / dq)
 
 
-def harmonic(amplitude: float, steps: int = STEPS, path: float = 20.0) -> np.ndarray:
+def _harmonic(amplitude: float, steps: int = STEPS, path: float = 20.0) -> np.ndarray:
     """Slide (k,) [bond lengths] of whole cycles, the last of them after at least `path` bond lengths."""
     cycles = 1 + int(np.ceil(path / (4 * amplitude)))
     return amplitude * np.sin(2 * np.pi * np.arange(cycles * steps + 1) / steps)
 
 
-def followed(model, amplitude: float, steps: int = STEPS) -> Cycle:
+def last_cycle(model, amplitude: float, steps: int = STEPS) -> Cycle:
     """Last of the cycles of a model of the loops whose lengths are in metres and whose limit is in mu_s N."""
-    path = LENGTH * harmonic(amplitude, steps)
+    path = LENGTH * _harmonic(amplitude, steps)
     contact = model.build()
     forces = np.zeros((path.size, 3))
     energies = np.zeros((path.size, 2))
@@ -84,12 +86,25 @@ def at_once() -> Bonds:
     return bonds(**fast)
 
 
-def printed(amplitude: float, order: float, steps: int, **growth) -> Cycle:
-    """The law as printed, every bond of its own length, by the compiled list merged to 0.01 bond lengths (1e-4 of
-    the limit); the means of the steps are asked for in the last cycle only."""
+def printed_law_cycle(amplitude: float, order: float, steps: int, **growth) -> Cycle:
+    """Compute the last cycle of the law as printed, in which every bond has its own length.
+
+    The compiled list is merged to 0.01 bond lengths, an error of 1e-4 of the limit. Means of steps are computed in the
+    last cycle only.
+
+    Parameters
+    ----------
+    amplitude : float
+        In bond lengths.
+    order : float
+    steps : int
+        Steps per cycle.
+    **growth
+        Growth of the bond length.
+    """
     law = bonds(order=order, reading="report", **growth)
     c = bond_list_model(law, 1.0, cutoff_age(order, 1e-5), 0.01).build()
-    path = LENGTH * harmonic(amplitude, steps)
+    path = LENGTH * _harmonic(amplitude, steps)
     dt = 1 / (HERTZ * steps)
     force = []
     for i, dq in enumerate(np.diff(path)):
@@ -101,7 +116,7 @@ def printed(amplitude: float, order: float, steps: int, **growth) -> Cycle:
 
 
 def error(found: Cycle, wanted: Cycle) -> tuple:
-    """(area error over 4 A, rms of the force difference over the steps of a cycle) of `found`."""
+    """Return the area error of a cycle over 4 A, and the rms of its force difference over the steps."""
     if found.dq.size != wanted.dq.size:
         few = min(found.dq.size, wanted.dq.size)
         found, wanted = (cycle.over(cycle.dq.size // few) for cycle in (found, wanted))
@@ -117,21 +132,21 @@ def coulomb(like: Cycle, limit: float = 1.0) -> Cycle:
 
 def elastic_plastic(amplitude: float, share: float = 1.0) -> Cycle:
     """One Jenkins element of stiffness mu_s N/eps_0 and the limit share mu_s N."""
-    return followed(jenkins_model([1 / LENGTH], [share * LENGTH]), amplitude)
+    return last_cycle(jenkins_model([1 / LENGTH], [share * LENGTH]), amplitude)
 
 
 def iwan(amplitude: float, count: int, scale: float = 1.0) -> Cycle:
     stiffness, limit = today.iwan_elements(count, scale)
-    return followed(jenkins_model(stiffness / LENGTH, limit * LENGTH), amplitude)
+    return last_cycle(jenkins_model(stiffness / LENGTH, limit * LENGTH), amplitude)
 
 
 def bouc_wen(amplitude: float, power: float) -> Cycle:
     """gamma = beta = 1/2; the mean of a step is that of its ends."""
     steps = 200 if amplitude <= 1 else STEPS
     path = (
-        harmonic(amplitude, steps)[-2 * steps - 1 :]
+        _harmonic(amplitude, steps)[-2 * steps - 1 :]
         if amplitude > 1
-        else harmonic(amplitude, steps)
+        else _harmonic(amplitude, steps)
     )
     z = today.bouc_wen(path, power)[-steps - 1 :]
     return Cycle(np.diff(path)[-steps:], (z[1:] + z[:-1]) / 2)

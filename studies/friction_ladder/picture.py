@@ -16,9 +16,9 @@ from drawing import drawing
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 AMPLITUDES = 10.0 ** np.linspace(-1, 1.75, 12)
-OFF = {
+CURVES_WITHOUT_GROWTH = {
     "report p = 1": ("report", BLUE, "-"),
     "elastic-plastic": ("elastic-plastic", "#4f9bd9", "-"),
     "Coulomb": ("Coulomb", ORANGE, "-"),
@@ -37,7 +37,7 @@ ON = {
 }
 
 
-def main(path: Path = HERE / "ladder.svg", amplitudes=AMPLITUDES) -> Path:
+def main(path: Path = FOLDER / "ladder.svg", amplitudes=AMPLITUDES) -> Path:
     """Draw the panels and return the file that was written."""
     rows = {
         (row.growth, row.rung, row.amplitude): row
@@ -47,7 +47,7 @@ def main(path: Path = HERE / "ladder.svg", amplitudes=AMPLITUDES) -> Path:
     }
     with drawing(path, (6.4, 4.2), 1, 2, {"bbox_inches": "tight"}, sharey=True) as (_, panels):
         for axis, growth, curves, title in (
-            (panels[0], "off", OFF, "constant bond length"),
+            (panels[0], "off", CURVES_WITHOUT_GROWTH, "constant bond length"),
             (panels[1], "on", ON, "growing bond length"),
         ):
             for rung, (text, colour, line) in curves.items():

@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 
 
 def iwan_elements(count: int, scale: float = 1.0) -> tuple:
-    """(stiffness, yield slide), (count,) each, of parallel Jenkins elements with the virgin curve 1 - exp(-x/scale).
+    """Return stiffness and yield slide, (count,) each, of Jenkins elements with the virgin curve 1 - exp(-x/scale).
 
     Minus its second derivative is the stiffness per yield slide s of a population, exp(-s) ds. An element takes over
     stiffness and force of its share of s: a chain of tangents, with limit and first stiffness exact. The shares are
@@ -29,8 +29,17 @@ def iwan_loop(amplitude, scale: float = 1.0):
 
 
 def bouc_wen(path, power: float, beta: float = 0.5) -> np.ndarray:
-    """z at the knots of path (k, ...) of dz/dq = 1 - |z|^n (beta sgn(v z) + 1 - beta), n = power; exact for n = 1,
-    elsewhere by Runge-Kutta steps of order 4 and at most 0.05."""
+    """Integrate z of the Bouc-Wen law at the knots of a path (k, ...).
+
+    dz/dq = 1 - |z|^n (beta sgn(v z) + 1 - beta) with n = power. It is exact for n = 1; other powers take Runge-Kutta
+    steps of order 4 that are at most 0.05 long.
+
+    Parameters
+    ----------
+    path : (k, ...) array
+    power : float
+    beta : float
+    """
     z = np.zeros_like(path)
     step = _exact if power == 1 else _runge_kutta
     for i, dq in enumerate(np.diff(path, axis=0)):
@@ -69,8 +78,10 @@ def _runge_kutta(z, dq, power, beta):
 
 
 def best_rate(share, wanted) -> float:
-    """v_0 over the greatest speed whose tanh(share/v_0) is nearest to `wanted` (k,) in rms; share (k,): speeds over
-    the greatest speed."""
+    """Fit v_0, over the greatest speed, so that tanh(share/v_0) is nearest to `wanted` (k,) in rms.
+
+    `share` (k,) are the speeds over the greatest speed.
+    """
 
     def miss(log_speed):
         return np.sqrt(np.mean((np.tanh(share / np.exp(log_speed)) - wanted) ** 2))

@@ -10,7 +10,15 @@ from engine_problems import ALL, KIND, POINT, POINTS, Problem
 
 
 def cvode(peer, one: Problem, tolerance: float, method: str = "Adams") -> tuple:
-    """(slide, CPU seconds) of SUNDIALS' CVODE with its root finder."""
+    """Integrate a problem by SUNDIALS' CVODE with its root finder; return the slide and CPU seconds.
+
+    Parameters
+    ----------
+    peer : Peer
+    one : Problem
+    tolerance : float
+    method : str
+    """
     found = peer.ask(
         problem=KIND[one.name],
         numbers=one.numbers,
@@ -49,7 +57,16 @@ MATRICES = {
 
 
 def siconos(peer, one: Problem, steps: int, theta: float = 0.5) -> tuple:
-    """(slide, CPU seconds) of Siconos' Moreau-Jean steps with a relay."""
+    """Integrate a problem by Siconos' Moreau-Jean steps with a relay; return the slide and CPU seconds.
+
+    Parameters
+    ----------
+    peer : Peer
+    one : Problem
+    steps : int
+        Steps per cycle.
+    theta : float
+    """
     found = peer.ask(
         **MATRICES[one.name],
         limit=one.limit,

@@ -21,7 +21,7 @@ from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 from patchfem.structure.drives import make_release
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 POINTS = 20  # per cycle at which slides are compared
 TRUTH = 204800  # steps per cycle of the march that stands for the truth of the patch
 # as `switched` names them
@@ -31,7 +31,8 @@ KIND = {
     "two": "two",
     "patch": "patch",
 }
-POINT, ALL = ("decay", "block", "two"), ("decay", "block", "two", "patch")
+POINT = ("decay", "block", "two")  # problems with point contacts
+ALL = ("decay", "block", "two", "patch")  # all problems
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -73,7 +74,7 @@ def problem(name: str) -> Problem:
         half = np.pi
         made = Problem(
             name,
-            problems.PLAIN,
+            problems.UNDAMPED_MASS,
             make_release(2 * half),
             1.0,
             16,
@@ -107,7 +108,9 @@ def problem(name: str) -> Problem:
         )
         return replace(made, truth=exact(made, 0))
     model = build(
-        scene.load(HERE / "patch.toml", ["contact.element_size=0.2 mm", "accuracy.tolerance=1e-3"])
+        scene.load(
+            FOLDER / "patch.toml", ["contact.element_size=0.2 mm", "accuracy.tolerance=1e-3"]
+        )
     )
     modes = model.rig.modes
     drive = model.rig.drive.signal
@@ -145,7 +148,9 @@ def problem(name: str) -> Problem:
 
 def exact(one: Problem, _) -> np.ndarray:
     """The event engine of any modes, plain Python."""
-    return problems.sampled(one.modes, one.drive, one.limit, one.cycles, one.times, one.start).slide
+    return problems.sample_motion(
+        one.modes, one.drive, one.limit, one.cycles, one.times, one.start
+    ).slide
 
 
 def march(one: Problem, steps: int) -> np.ndarray:

@@ -16,12 +16,12 @@ from report_methods import Motion, coulomb, solve_duhamel, solve_euler, solve_ne
 from switched import PROBLEMS, follow
 
 
-def sampled_slide(motion: Motion, one: Problem, steps: int) -> np.ndarray:
+def _sampled_slide(motion: Motion, one: Problem, steps: int) -> np.ndarray:
     """Return the slide of a motion at the problem's times."""
     return (motion.z[-one.last * steps - 1 :] @ one.modes.slide)[:: steps // POINTS][1:]
 
 
-def duhamel_motion(one: Problem, steps: int, stick_speed: float, **how) -> np.ndarray:
+def _duhamel_motion(one: Problem, steps: int, stick_speed: float, **how) -> np.ndarray:
     """Return the slide by Duhamel's integral (3.10)."""
     motion = solve_duhamel(
         one.modes,
@@ -31,17 +31,17 @@ def duhamel_motion(one: Problem, steps: int, stick_speed: float, **how) -> np.nd
         start=one.start,
         **how,
     )
-    return sampled_slide(motion, one, steps)
+    return _sampled_slide(motion, one, steps)
 
 
 def duhamel_report(one: Problem, steps: int) -> np.ndarray:
-    """(3.10) as the report ran it: sgn(v), the velocity unchanged to 1e-4."""
-    return duhamel_motion(one, steps, 0.0, criterion="velocity", tolerance=1e-4, relaxation=0.1)
+    """Integrate by (3.10) as the report did: law sgn(v), velocity unchanged to 1e-4."""
+    return _duhamel_motion(one, steps, 0.0, criterion="velocity", tolerance=1e-4, relaxation=0.1)
 
 
 def duhamel_cured(one: Problem, steps: int) -> np.ndarray:
-    """(3.10) with a static branch that narrows with the step, the force to 1e-9 of its limit."""
-    return duhamel_motion(one, steps, 0.1 * one.drive.period / steps, tolerance=1e-9 * one.limit)
+    """Integrate by (3.10) with a static branch that narrows with the step, the force to 1e-9 of its limit."""
+    return _duhamel_motion(one, steps, 0.1 * one.drive.period / steps, tolerance=1e-9 * one.limit)
 
 
 def newmark_motion(
@@ -67,7 +67,7 @@ def newmark_motion(
         needs_force=needs_force,
         start=one.start,
     )
-    return sampled_slide(motion, one, steps)
+    return _sampled_slide(motion, one, steps)
 
 
 def newmark_report(one: Problem, steps: int) -> np.ndarray:
@@ -91,7 +91,7 @@ def euler_tanh(one: Problem, steps: int) -> np.ndarray:
         (one.cycles * one.drive.period, steps),
         one.start,
     )
-    return sampled_slide(motion, one, steps)
+    return _sampled_slide(motion, one, steps)
 
 
 def advancer(tolerance: float, size: float):
@@ -124,8 +124,16 @@ def advancer(tolerance: float, size: float):
     return advance
 
 
-def counted(one: Problem, tolerance: float, longest: float) -> tuple:
-    """(slide, events) of scipy's DOP853 from event to event, no step longer than so many cycles."""
+def slide_and_events(one: Problem, tolerance: float, longest: float) -> tuple:
+    """Integrate by scipy's DOP853 from event to event; return the slide and the number of events.
+
+    Parameters
+    ----------
+    one : Problem
+    tolerance : float
+    longest : float
+        Longest step in cycles.
+    """
     return follow(
         PROBLEMS[KIND[one.name]](**one.numbers), advancer(tolerance, one.size), one.times, longest
     )
@@ -133,7 +141,7 @@ def counted(one: Problem, tolerance: float, longest: float) -> tuple:
 
 def dop853(one: Problem, tolerance: float) -> np.ndarray:
     """scipy's DOP853 from event to event."""
-    return counted(one, tolerance, one.longest)[0]
+    return slide_and_events(one, tolerance, one.longest)[0]
 
 
 COARSE = (100, 200, 400, 800, 1600, 3200, 6400)

@@ -30,19 +30,19 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
-from failure_cases import CASES, SLIDES, STEPS, refined, solve
+from failure_cases import CASES, SLIDES, STEPS, peak_errors, solve
 from problems import TWO, exact
-from told import told
+from study_text import read_answer
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = (
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = (
     "in part: the failures and their cure are reproduced. The curves are not reproduced, because the report "
     "gives neither its step nor its tolerance"
 )
-DRAWN = {
+DRAWN_CASES = {
     "Fig 17, 18: displacement 1e-2": "displacement",
     "Fig 19, 20: velocity 1e-4": "velocity",
     "static branch, force 1e-6": "force, static branch",
@@ -50,11 +50,11 @@ DRAWN = {
 }
 
 
-def picture(rows: list, curves: dict, path: Path = HERE / "failure.svg") -> Path:
+def _picture(rows: list, curves: dict, path: Path = FOLDER / "failure.svg") -> Path:
     """x2 and force of four ways beside the exact ones, and the error of Newmark against the step."""
     truth = exact("two", np.linspace(0, 20, 2001))
     with drawing(path, (9.6, 6.6), 3, 4) as (figure, axes):
-        for column, (name, title) in enumerate(DRAWN.items()):
+        for column, (name, title) in enumerate(DRAWN_CASES.items()):
             found = next(r for r in rows if r.name == name).run
             upper = axes[0, column]
             lower = axes[1, column]
@@ -100,7 +100,7 @@ def picture(rows: list, curves: dict, path: Path = HERE / "failure.svg") -> Path
 
 
 def main(draw: bool = True) -> tuple:
-    """(rows, {(stick speed, by force): errors}), printed."""
+    """Print the rows of all methods and the errors of Newmark's method, and return both."""
     rows = [solve(*case) for case in CASES]
     print("Fig 16, mass 2 may move from t = 8.0797 on, |F| <= 3")
     for r in rows:
@@ -110,7 +110,7 @@ def main(draw: bool = True) -> tuple:
             f"converged {r.failed:5.1%}  x2(20) off by {r.error:+8.3f}"
         )
     curves = {
-        (speed, by_force): refined(speed, by_force)
+        (speed, by_force): peak_errors(speed, by_force)
         for speed in (1e-3, 1e-4)
         for by_force in (False, True)
     }
@@ -121,7 +121,7 @@ def main(draw: bool = True) -> tuple:
             + "  ".join(f"{error:+.1e}" for error in errors)
         )
     if draw:
-        picture(rows, curves)
+        _picture(rows, curves)
     print(ANSWER)
     return rows, curves
 

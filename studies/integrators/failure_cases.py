@@ -15,24 +15,25 @@ from patchfem.core import DriveSegment
 from patchfem.structure.drives import PiecewiseDrive
 
 SLIDES = 8.079711463905416  # exact instant at which mass 2 moves first
-END, MOVED = 40.0, 0.05
+END = 40.0  # end of a run in the unit of time of the report
+MOVED_DISTANCE = 0.05  # displacement from which the mass counts as moved
 
 
-PLAIN = coulomb(TWO_LIMIT)
+COULOMB_LAW = coulomb(TWO_LIMIT)
 BRANCH = coulomb(TWO_LIMIT, 0.01)
 ELASTIC = elastic_plastic(TWO_LIMIT, 0.01)
-PRINTED = elastic_plastic(TWO_LIMIT, 0.03, as_printed=True)
+PRINTED_LAW = elastic_plastic(TWO_LIMIT, 0.03, as_printed=True)
 CASES = (  # name, law, step, what must not change, by how much, relaxation
-    ("Fig 17, 18: displacement 1e-2", PLAIN, 0.05, "displacement", 1e-2, 0.1),
-    ("displacement 1e-3", PLAIN, 0.05, "displacement", 1e-3, 0.5),
-    ("displacement 1e-6", PLAIN, 0.05, "displacement", 1e-6, 0.1),
-    ("Fig 19, 20: velocity 1e-4", PLAIN, 0.05, "velocity", 1e-4, 0.1),
-    ("velocity 1e-6", PLAIN, 0.02, "velocity", 1e-6, 0.5),
-    ("force 1e-3", PLAIN, 0.02, "force", 1e-3, 0.5),
+    ("Fig 17, 18: displacement 1e-2", COULOMB_LAW, 0.05, "displacement", 1e-2, 0.1),
+    ("displacement 1e-3", COULOMB_LAW, 0.05, "displacement", 1e-3, 0.5),
+    ("displacement 1e-6", COULOMB_LAW, 0.05, "displacement", 1e-6, 0.1),
+    ("Fig 19, 20: velocity 1e-4", COULOMB_LAW, 0.05, "velocity", 1e-4, 0.1),
+    ("velocity 1e-6", COULOMB_LAW, 0.02, "velocity", 1e-6, 0.5),
+    ("force 1e-3", COULOMB_LAW, 0.02, "force", 1e-3, 0.5),
     ("static branch, force 1e-6", BRANCH, 0.02, "force", 1e-6, 0.5),
     ("Fig 21, 22: elastic 0.01, velocity 1e-6", ELASTIC, 0.01, "velocity", 1e-6, 0.5),
     ("elastic 0.01, force 1e-6", ELASTIC, 0.01, "force", 1e-6, 0.5),
-    ("3.12 as printed, eps 0.03", PRINTED, 0.01, "velocity", 1e-6, 0.5),
+    ("3.12 as printed, eps 0.03", PRINTED_LAW, 0.01, "velocity", 1e-6, 0.5),
 )
 STEPS = (50, 100, 200, 500, 1000, 2000, 5000, 10000)
 CYCLES = 200
@@ -71,7 +72,7 @@ def solve(name, law: Law, step, criterion, tolerance, relax) -> Row:
     x = found.z @ TWO.slide
     force = found.force
     t = found.time
-    first = int(np.argmax(np.abs(x) > MOVED))
+    first = int(np.argmax(np.abs(x) > MOVED_DISTANCE))
     early = np.abs(x[t < SLIDES]).max()
     miss = np.abs(found.residual[1:])
     return Row(
@@ -88,7 +89,7 @@ def solve(name, law: Law, step, criterion, tolerance, relax) -> Row:
     )
 
 
-def refined(speed: float, by_force: bool, steps=STEPS) -> list:
+def peak_errors(speed: float, by_force: bool, steps=STEPS) -> list:
     """Relative errors of the peak of the stick-slip block by Newmark with a stick speed, one per steps per cycle."""
     times = np.linspace(CYCLES - 1, CYCLES, 2001) * SDOF_DRIVE.period
     peak = np.abs(exact("sdof", times).slide).max()

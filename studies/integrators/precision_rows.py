@@ -12,23 +12,46 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from engine_peers import PEERS
 from engine_problems import ALL, problem
 from engines import OURS
-from peer import Peer, ratio_text, seconds_at
+from peer import Peer, interpolate_seconds, ratio_text
 
 from patchfem.core import Missing, PatchfemError
 
 EQUAL = (1e-2, 1e-3, 1e-4, 1e-6)  # errors at which times are compared
-FLOOR = 1e-13  # an error of zero is drawn and compared here
+FLOOR = 1e-13  # smaller errors are drawn and compared as this error
 
 
-def once(work, one, knob) -> tuple:
-    """(slide, CPU seconds) of an engine of ours."""
+def run_once(work, one, knob) -> tuple:
+    """Run an engine of this package once; return the slide and CPU seconds.
+
+    Parameters
+    ----------
+    work : callable
+    one : Problem
+    knob : int or float
+        Steps per cycle or tolerance.
+    """
     start = process_time()
     slide = work(one, knob)
     return slide, process_time() - start
 
 
 def measure(names=ALL, ours=OURS, peers=PEERS, repeats: int = 3) -> tuple:
-    """(rows, versions, absent): the least CPU seconds of `repeats` turns of everybody, the error of each."""
+    """Measure the least CPU seconds of several turns of each engine, and its error.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Problems.
+    ours, peers : dict
+        Engines of this package and other programs.
+    repeats : int
+        Number of turns.
+
+    Returns
+    -------
+    tuple
+        Rows, versions of the peers, and absent peers with the reason.
+    """
     children = {}
     versions = {"scipy": version("scipy")}
     absent = {}
@@ -67,7 +90,7 @@ def measure(names=ALL, ours=OURS, peers=PEERS, repeats: int = 3) -> tuple:
 def _turn(found: dict, where: str, name: str, knob, work, child) -> None:
     one = problem(where)
     try:
-        slide, seconds = once(work, one, knob) if child is None else work(child, one, knob)
+        slide, seconds = run_once(work, one, knob) if child is None else work(child, one, knob)
     except (PatchfemError, RuntimeError) as error:
         found[where, name, knob] = {
             "problem": where,
@@ -87,7 +110,16 @@ def _turn(found: dict, where: str, name: str, knob, work, child) -> None:
 
 
 def curve(rows: list, where: str, name: str) -> tuple:
-    """(errors, seconds) of an engine on a problem, in the order of its knob."""
+    """Return the errors and seconds of an engine on a problem, in the order of its knob.
+
+    Parameters
+    ----------
+    rows : list of dict
+    where : str
+        Problem.
+    name : str
+        Engine.
+    """
     mine = [
         r for r in rows if r["problem"] == where and r["engine"] == name and r["error"] is not None
     ]
@@ -115,11 +147,13 @@ def ratios(rows: list, where: str, reference: str) -> dict:
             continue
         out[name] = {}
         for error in EQUAL:
-            mine, sign = seconds_at(error, *base) if len(base[0]) > 1 else (float(base[1][0]), "")
+            mine, sign = (
+                interpolate_seconds(error, *base) if len(base[0]) > 1 else (float(base[1][0]), "")
+            )
             if error < errors.min() or (len(base[0]) > 1 and error < base[0].min()):
                 out[name][error] = "-"
                 continue
-            theirs, other = seconds_at(error, errors, seconds)
+            theirs, other = interpolate_seconds(error, errors, seconds)
             out[name][error] = ("< " if other == "<" else "") + ratio_text(
                 theirs, mine, sign if other != "<" else ""
             )

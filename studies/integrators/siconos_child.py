@@ -15,7 +15,7 @@ OFFSET = -1e3
 
 
 def march(kernel, ask: dict):
-    """(slide at every step, CPU seconds of the steps)."""
+    """March in steps; return the slide at every step and the CPU seconds of the steps."""
     matrix = {name: np.array(ask[name], float) for name in ("mass", "damper", "stiffness")}
     n = len(matrix["mass"])
     h = ask["step"]

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from switched import PROBLEMS, follow
 
 
-def advancer(cvode, tolerance: float, atol: float, method: str):
+def _advancer(cvode, tolerance: float, atol: float, method: str):
     """`advance` of `switched` by CVODE with its root finder."""
 
     def advance(rhs, event, t, y, end, longest, wanted):
@@ -63,7 +63,7 @@ def answer(cvode, ask: dict) -> dict:
         start = process_time()
         slide, events = follow(
             problem,
-            advancer(cvode, ask["tolerance"], ask["tolerance"] * ask["scale"], ask["method"]),
+            _advancer(cvode, ask["tolerance"], ask["tolerance"] * ask["scale"], ask["method"]),
             times,
             ask["longest"],
         )

@@ -23,7 +23,7 @@ class Block:
         self.place = place
 
     def start(self):
-        """(phase, state)."""
+        """Return the phase and the state at the start."""
         return (0 if abs(self.place) <= self.limit else -1 if self.place > 0 else 1), np.array(
             [self.place, 0.0]
         )
@@ -49,7 +49,16 @@ class Block:
         return lambda t, y: phase * y[1]
 
     def switch(self, phase, t, y):
-        """(phase, state) after the event."""
+        """Return the phase and the state after an event.
+
+        Parameters
+        ----------
+        phase : int
+        t : float
+            Time of the event.
+        y : array
+            State at the event.
+        """
         need = -self.size * sin(t) - y[0]
         if phase != 0:
             y = np.array([y[0], 0.0])
@@ -71,7 +80,7 @@ class TwoMasses:
         self.period = 2 * pi / omega
 
     def start(self):
-        """(phase, state x1, x2, v1, v2)."""
+        """Return the phase and the state at the start."""
         return 0, np.zeros(4)
 
     def rhs(self, phase):
@@ -96,7 +105,16 @@ class TwoMasses:
         return lambda t, y: phase * y[3]
 
     def switch(self, phase, t, y):
-        """(phase, state) after the event."""
+        """Return the phase and the state after an event.
+
+        Parameters
+        ----------
+        phase : int
+        t : float
+            Time of the event.
+        y : array
+            State at the event.
+        """
         need = y[0] - y[1]
         if phase != 0:
             y = np.array([y[0], y[1], y[2], 0.0])
@@ -113,8 +131,23 @@ PROBLEMS = {"block": Block, "two": TwoMasses, "patch": Patch}
 
 
 def follow(problem, advance, times, share: float):
-    """(slide at `times` (k,) ascending, number of events) from the start to the last of them, no step longer than
-    `share` of the drive period. RuntimeError where events pile up."""
+    """Follow a problem from event to event; return the slide at given times and the number of events.
+
+    Parameters
+    ----------
+    problem : problem with events
+    advance : callable
+        Integrator of a stretch.
+    times : (k,) array
+        Ascending [s].
+    share : float
+        Longest step / drive period.
+
+    Raises
+    ------
+    RuntimeError
+        If events follow each other without progress.
+    """
     phase, y = problem.start()
     t = 0.0
     end = float(times[-1])

@@ -24,7 +24,7 @@ class Patch:
         self.at = 0.0
 
     def start(self):
-        """(phase, state z..., v...); the base moves against +x first."""
+        """Return the phase and the state (z, v) at the start; the base moves against +x first."""
         return (1 if self.row @ self.base * self.drive < 0 else -1), np.zeros(2 * self.row.size)
 
     def stretches(self, q):
@@ -57,7 +57,16 @@ class Patch:
         return lambda t, y: phase * (self.row @ y[n:])
 
     def switch(self, phase, t, y):
-        """(phase, state) after a reversal."""
+        """Return the phase and the state after a reversal.
+
+        Parameters
+        ----------
+        phase : int
+        t : float
+            Time of the reversal.
+        y : array
+            State at the reversal.
+        """
         q = float(self.row @ y[: self.row.size])
         self.stretch = self.stretches(q)
         self.at = q

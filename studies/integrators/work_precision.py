@@ -43,15 +43,15 @@ from precision_rows import EQUAL, FLOOR, curve, measure, ratios
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
-HERE = Path(__file__).parent
-TABLE = HERE / "work_precision.json"
+FOLDER = Path(__file__).parent
+TABLE = FOLDER / "work_precision.json"
 TITLES = {
     "decay": "free decay",
     "block": "stick-slip at resonance",
     "two": "two masses of Fig 16",
     "patch": "patch of 41 elements",
 }
-SHOWN = ("block", "two", "patch")
+SHOWN_PROBLEMS = ("block", "two", "patch")
 STYLES = {
     "exact": ("*", BLUE),
     "exact, one mode": ("*", "#8b1a1a"),
@@ -67,12 +67,12 @@ STYLES = {
 }
 
 
-def picture(table: dict, path: Path = HERE / "work_precision.svg") -> Path:
+def picture(table: dict, path: Path = FOLDER / "work_precision.svg") -> Path:
     """Error against CPU time, one panel per problem."""
     rows = table["rows"]
-    with drawing(path, (9.6, 4.6), 1, len(SHOWN), sharey=True) as (figure, axes):
+    with drawing(path, (9.6, 4.6), 1, len(SHOWN_PROBLEMS), sharey=True) as (figure, axes):
         names = list(dict.fromkeys(r["engine"] for r in rows))
-        for axis, where in zip(axes, SHOWN):
+        for axis, where in zip(axes, SHOWN_PROBLEMS):
             for name in names:
                 errors, seconds = curve(rows, where, name)
                 mark, colour = STYLES.get(name, ("o", "#9467bd"))

@@ -21,16 +21,28 @@ from patchfem.closed_forms import contact as exact
 from patchfem.contact.asperity_laws import HertzAsperities
 from patchfem.contact.unilateral import solve_forces
 
-CARBIDE, TITANIUM, COATING = (250e9, 0.24), (121e9, 0.32), 152.4e-6  # rig.toml
+CARBIDE = (250e9, 0.24)  # Young's modulus [Pa] and Poisson's ratio in rig.toml
+TITANIUM = (121e9, 0.32)  # Young's modulus [Pa] and Poisson's ratio in rig.toml
+COATING = 152.4e-6  # [m] thickness in rig.toml
 MEAN = 26 * 4.4482216152605 / 12.7e-3**2  # 0.717 MPa, the mean pressure of the rig
-WAVE, HEIGHT = 80e-6, 15.5e-6  # report, 4.D: 80 micron scale, amplitude 13 to 18 micron
+WAVE = 80e-6  # [m] the 80 micron scale of the report, 4.D
+HEIGHT = 15.5e-6  # [m] mean of the 13 to 18 micron of the report, 4.D
 RADIUS = WAVE**2 / (4 * np.pi**2 * HEIGHT)  # 10.5 um, of a crest
 LATTICE = -3.9002649  # sum of 1/r over a square lattice less its mean
 
 
 def depths(count: int, scatter: float, shape: str, seed: int = 0) -> np.ndarray:
-    """(count,) depths [m] of peaks below the highest, in random order: the quantiles of a `uniform` height between 0
-    and `scatter`, or of a `gaussian` one of that deviation."""
+    """Draw the depths (count,) [m] of peaks below the highest one, in random order.
+
+    Parameters
+    ----------
+    count : int
+    scatter : float
+        Range of uniform heights, or standard deviation of Gaussian ones [m].
+    shape : {"uniform", "gaussian"}
+        Distribution, of which the quantiles are taken.
+    seed : int
+    """
     share = (np.random.default_rng(seed).permutation(count) + 0.5) / count
     depth = scatter * (share if shape == "uniform" else norm.ppf(share))
     return depth - depth.min()
@@ -46,7 +58,17 @@ def closing_of_waves(k, coat: tuple = CARBIDE) -> np.ndarray:
 
 @cache
 def between_ridges(count: int, coat: tuple = CARBIDE, shells: int = 200) -> np.ndarray:
-    """(count,) closing at each ridge per force on the first [m2/N], less what equal forces on all of them close."""
+    """Return the closing (count,) at each ridge per force on the first [m2/N], without the mean of equal forces.
+
+    Parameters
+    ----------
+    count : int
+        Number of ridges.
+    coat : tuple
+        Young's modulus [Pa] and Poisson's ratio of the coating.
+    shells : int
+        Periods that are summed.
+    """
     step = 2 * np.pi / WAVE
     around = step * np.arange(-shells, shells + 1)
     waves = closing_of_waves(np.abs(step * np.fft.fftfreq(count)[:, None] + around), coat)
@@ -55,7 +77,19 @@ def between_ridges(count: int, coat: tuple = CARBIDE, shells: int = 200) -> np.n
 
 @cache
 def between_peaks(side: int, coat: tuple = CARBIDE, shells: int = 40) -> np.ndarray:
-    """(side, side) closing at each peak of a square lattice per force on the first [m/N], without its own Hertz one."""
+    """Return the closing (side, side) at each peak of a square lattice per force on the first [m/N].
+
+    The Hertzian closing of the first peak itself is left out.
+
+    Parameters
+    ----------
+    side : int
+        Peaks along a side.
+    coat : tuple
+        Young's modulus [Pa] and Poisson's ratio of the coating.
+    shells : int
+        Periods that are summed.
+    """
     step = 2 * np.pi / WAVE
     modulus = exact.combined_modulus(*coat)
     qx, qy = np.meshgrid(*[step * np.fft.fftfreq(side)] * 2, indexing="ij")
@@ -70,19 +104,31 @@ def between_peaks(side: int, coat: tuple = CARBIDE, shells: int = 40) -> np.ndar
 
 
 def own_ridge(force, modulus: float) -> tuple:
-    """(closing [m], its slope) of one of equal ridges under force [N/m] (Westergaard's solution)."""
+    """Return the closing [m] of one of equal ridges under a force [N/m], and its slope (Westergaard)."""
     full = exact.westergaard_full_pressure(WAVE, HEIGHT, modulus) * WAVE
     return HEIGHT * force / full * (1 - np.log(force / full)), -HEIGHT / full * np.log(force / full)
 
 
 def own_peak(force, modulus: float) -> tuple:
-    """(closing [m], its slope) of a round peak under force [N] (Hertz)."""
+    """Return the closing [m] of a round peak under a force [N], and its slope (Hertz)."""
     closing = (9 * force**2 / (16 * RADIUS * modulus**2)) ** (1 / 3)
     return closing, 2 / 3 * closing / force
 
 
 def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE, mean: float = MEAN) -> tuple:
-    """(k_n [Pa/m] = dp/d(closing), forces (count,)) of peaks at `depth` (count,) under the pressure `mean` [Pa]."""
+    """Solve peaks that carry one force each; return k_n = dp/d(closing) [Pa/m] and the forces (count,).
+
+    Parameters
+    ----------
+    depth : (count,) array
+        Of the peaks below the highest [m].
+    round_peaks : bool
+        Round peaks instead of ridges.
+    coat : tuple
+        Young's modulus [Pa] and Poisson's ratio of the coating.
+    mean : float
+        Pressure [Pa].
+    """
     count = depth.size
     modulus = exact.combined_modulus(*coat)
     number = np.arange(count)
@@ -140,8 +186,8 @@ def separate(scatter: float, shape: str, coat: tuple = CARBIDE) -> float:
         law = HertzAsperities(RADIUS, density, scatter, modulus)
         return float(law.stiffness(law.separation(np.array([MEAN])))[0])
 
-    def carried(power: float, depth: float) -> float:
+    def carried_pressure(power: float, depth: float) -> float:
         return rate * (depth**power - max(depth - scatter, 0.0) ** power) / scatter
 
-    depth = brentq(lambda d: carried(2.5, d) / 2.5 - MEAN, 0, 1e-4, xtol=1e-18)
-    return carried(1.5, depth)
+    depth = brentq(lambda d: carried_pressure(2.5, d) / 2.5 - MEAN, 0, 1e-4, xtol=1e-18)
+    return carried_pressure(1.5, depth)

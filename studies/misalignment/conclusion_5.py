@@ -54,13 +54,24 @@ ROCKING = 0.884 * (40e-3 * 2 * np.pi * 73) ** 2
 
 @cache
 def rigid(portion: float, skin: str, halvings: int = 2, *more: str) -> tuple:
-    """(tilt [rad], moment [N m]) under which a rigid fixture leaves `portion` of the patch rubbed; more: as in
-    `tilted.case`."""
+    """Find the tilt [rad] and moment [N m] at which a rigid fixture leaves a portion of the patch rubbed.
+
+    Parameters
+    ----------
+    portion : float
+    skin : str
+    halvings : int
+        Refinements of the mesh.
+    **more
+        As in `tilted.case`.
+    """
 
     def press(log_tilt: float):
         return press_patch(tilted.case(10**log_tilt, skin, *more), tilted.pair(halvings))
 
-    tilt = brentq(lambda log_tilt: tilted.rubbed(press(log_tilt)) - portion, -6, -1.3, xtol=1e-5)
+    tilt = brentq(
+        lambda log_tilt: tilted.rubbed_portion(press(log_tilt)) - portion, -6, -1.3, xtol=1e-5
+    )
     return 10**tilt, -press(tilt).pressure.moment
 
 
@@ -73,8 +84,23 @@ def neutral(portion: float, skin: str, spring: float | None, halvings: int = 2) 
 def springs_for(
     tolerance: float, skin: str, most: float = 0.9, least: float = 0.05, halvings: int = 2
 ) -> tuple | None:
-    """(least, largest) stiffness [N m/rad] of a holder with which a misalignment of `tolerance` [rad] rubs a portion
-    between `most` and `least`; the largest may be infinite; None: no holder does."""
+    """Find the smallest and largest stiffness [N m/rad] of a holder that keeps the rubbed portion in a range.
+
+    Parameters
+    ----------
+    tolerance : float
+        Misalignment [rad].
+    skin : str
+    most, least : float
+        Ends of the range of the rubbed portion.
+    halvings : int
+        Refinements of the mesh.
+
+    Returns
+    -------
+    tuple or None
+        The largest stiffness may be infinite; None if no holder does.
+    """
     (first, gives), (last, holds) = rigid(most, skin, halvings), rigid(least, skin, halvings)
     if tolerance <= first:
         return None

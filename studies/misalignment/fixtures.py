@@ -57,7 +57,7 @@ COLUMNS = {
 }
 
 
-def held(angle: float, spring: float | None, skin: str = "bare"):
+def held_pieces(angle: float, spring: float | None, skin: str = "bare"):
     """Pieces in a holder at the neutral angle [rad] with its spring [N m/rad], None: rigid."""
     more = () if spring is None else (f"holder.rotational_stiffness={spring!r} N m/rad",)
     return tilted.case(float(angle), skin, *more)
@@ -70,7 +70,7 @@ def free(offset: float, skin: str = "bare"):
 
 def case(angle: float, spring: float | None) -> dict:
     """Values of the measures at one neutral angle [rad] of the holder and one stiffness [N m/rad] of it."""
-    return values(press_patch(held(angle, spring), tilted.pair(1)))
+    return values(press_patch(held_pieces(angle, spring), tilted.pair(1)))
 
 
 def tilt_for(fraction: float, spring: float | None, steps: int = 30) -> float:
@@ -96,7 +96,9 @@ def line(found: dict) -> str:
     return "  ".join(out)
 
 
-def table(title: str, named: str, cases: dict, measured: Callable = tilted.measured) -> dict:
+def table(
+    title: str, named: str, cases: dict, measured: Callable = tilted.compute_measures
+) -> dict:
     """{key: measures} of {key: pieces}, printed as they come."""
     print(title)
     out: dict[float, dict[str, Measure]] = {}
@@ -112,7 +114,7 @@ def main(tilts=tilted.TILTS, springs=SPRINGS, offsets=OFFSETS) -> dict:
         spring: table(
             "rigid fixture" if spring is None else f"holder {spring:.0e} N m/rad",
             "tilt rad",
-            {tilt: held(tilt, spring) for tilt in tilts},
+            {tilt: held_pieces(tilt, spring) for tilt in tilts},
         )
         for spring in springs
     }

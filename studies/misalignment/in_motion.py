@@ -33,24 +33,28 @@ from scipy.constants import lbf as LBF
 import patchfem as pf
 from patchfem.core import G_N as G
 
-HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parent / "common"))
-RIG = HERE.parent / "rig" / "rig.toml"
+FOLDER = Path(__file__).parent
+sys.path.insert(0, str(FOLDER.parent / "common"))
+RIG = FOLDER.parent / "rig" / "rig.toml"
 TILTS = tuple(10.0 ** np.linspace(-6, -2, 9))  # rad
-LOADS, LEVELS = (13.0, 26.0, 52.0), (3.0, 5.0, 10.0)  # lbf, g
+LOADS = (13.0, 26.0, 52.0)  # [lbf]
+LEVELS = (3.0, 5.0, 10.0)  # [g] of the base acceleration
 # of 4 g per 26 lbf: levels between which the onset is looked for
-AROUND = (
+RELATIVE_LEVELS = (
     0.75,
     0.875,
     1.0,
     1.125,
 )
-MASS, AXIAL = 0.884, 143.0  # kg, Hz
+MASS = 0.884  # [kg] moving mass of the rig
+AXIAL = 143.0  # [Hz] axial mode of the rig
 
 
 def scene(drive: str = "", **more):
-    """The shipped rig with elastic-plastic bonds, whose motion is exact; drive: another table, more: keys as `--set`
-    has them."""
+    """Write the shipped rig with elastic-plastic bonds, whose motion is exact.
+
+    `drive` is another table of the drive; `more` are keys as for `--set`.
+    """
     text = RIG.read_text("utf-8").replace('law = "nonlocal"', 'law = "elastic-plastic"')
     gone = ("reading", "kinetic", "steps_per_cycle", "[measured]", "file = ")
     text = "\n".join(line for line in text.splitlines() if not line.startswith(gone))
@@ -59,7 +63,7 @@ def scene(drive: str = "", **more):
     return pf.load(text, **more)
 
 
-def swept(tilts=TILTS, loads=LOADS, levels=LEVELS, **more):
+def sweep_measures(tilts=TILTS, loads=LOADS, levels=LEVELS, **more):
     """Dataset of the measures over tilt [rad], load [lbf] and level [g]; in SI."""
     return pf.sweep(
         scene(**more),
@@ -71,14 +75,14 @@ def swept(tilts=TILTS, loads=LOADS, levels=LEVELS, **more):
     )
 
 
-def allowed(load: float, level: float, tilts=TILTS) -> str:
+def allowed_tilt(load: float, level: float, tilts=TILTS) -> str:
     """How much tilt may be allowed under a load [lbf] at a level [g], as `patchfem sweep` says it."""
-    return swept(tilts, (load,), (level,)).attrs["answer"]
+    return sweep_measures(tilts, (load,), (level,)).attrs["answer"]
 
 
 def onsets(load: float, tilts=TILTS):
-    """(levels (t,) [g] at which distortion begins under a load [lbf], their errors)."""
-    levels = ", ".join(f'"{4 * share * load / 26} g"' for share in AROUND)
+    """Return the levels (t,) [g] at which distortion begins under a load [lbf], and their errors."""
+    levels = ", ".join(f'"{4 * share * load / 26} g"' for share in RELATIVE_LEVELS)
     drive = f'[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\nlevels = [{levels}]\ncycles = 100\n'
     found = pf.sweep(
         scene(drive), {"contact.tilt.angle": list(tilts), "contact.load": [load * LBF]}
@@ -86,9 +90,9 @@ def onsets(load: float, tilts=TILTS):
     return tuple(found[name].values.ravel() / G for name in ("onset_level", "onset_level_error"))
 
 
-def yaws(tilts=TILTS, load: float = 26.0, level: float = 5.0) -> np.ndarray:
+def _yaws(tilts=TILTS, load: float = 26.0, level: float = 5.0) -> np.ndarray:
     """Amplitudes (t,) [m] of the yaw mode in the last cycles."""
-    found = swept(
+    found = sweep_measures(
         tilts,
         (load,),
         (level,),
@@ -103,8 +107,10 @@ def resonance(stiffness):
 
 
 def maps(found) -> dict:
-    """Maps (tilt, load and level) by title: the rubbed share, and the others over their value at the least tilt; nan
-    where the patch sticks and no loop is there."""
+    """Return maps over tilt, load and level by title: the rubbed portion, and other measures over their first value.
+
+    A measure is NaN where the patch sticks, so that there is no loop.
+    """
 
     def flat(name):
         return found[name].values.reshape(len(found["contact_tilt_angle"]), -1)
@@ -123,7 +129,7 @@ def maps(found) -> dict:
     return out
 
 
-def picture(found, path: Path = HERE / "in_motion.svg") -> Path:
+def picture(found, path: Path = FOLDER / "in_motion.svg") -> Path:
     """Draw the maps; the file written."""
     from drawing import drawing
 
@@ -153,7 +159,7 @@ def picture(found, path: Path = HERE / "in_motion.svg") -> Path:
 
 def main(tilts=TILTS, loads=LOADS, levels=LEVELS):
     """Print a table per load and level; the Dataset."""
-    found = swept(tilts, loads, levels)
+    found = sweep_measures(tilts, loads, levels)
     for load in found["contact_load"].values:
         for level in found["drive_acceleration"].values:
             one = found.sel(contact_load=load, drive_acceleration=level)
@@ -182,5 +188,5 @@ if __name__ == "__main__":
             + " g"
         )
     for g in LEVELS:
-        print(f"26 lbf, {g:g} g: {allowed(26.0, g, asked)}")
-    print("yaw " + ", ".join(f"{1e6 * yaw:.2f}" for yaw in yaws(asked)) + " um")
+        print(f"26 lbf, {g:g} g: {allowed_tilt(26.0, g, asked)}")
+    print("yaw " + ", ".join(f"{1e6 * yaw:.2f}" for yaw in _yaws(asked)) + " um")

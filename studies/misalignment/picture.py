@@ -17,7 +17,7 @@ from drawing import drawing
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.runs.patch.press import press_patch
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 TILTS = 10.0 ** np.linspace(-6, -2, 61)
 FIXTURES = {None: "rigid", 1e4: "10 kN m/rad", 1e3: "1 kN m/rad", 1e2: "100 N m/rad"}
 SKINS = {
@@ -33,13 +33,15 @@ def portions(spring, skin: str, tilts=TILTS, halvings: int = 1) -> np.ndarray:
     """Rubbed portion at each misalignment [rad] of a holder."""
     return np.array(
         [
-            tilted.rubbed(press_patch(fixtures.held(tilt, spring, skin), tilted.pair(halvings)))
+            tilted.rubbed_portion(
+                press_patch(fixtures.held_pieces(tilt, spring, skin), tilted.pair(halvings))
+            )
             for tilt in tilts
         ]
     )
 
 
-def main(path: Path = HERE / "misalignment.svg", tilts=TILTS) -> Path:
+def main(path: Path = FOLDER / "misalignment.svg", tilts=TILTS) -> Path:
     """Draw both panels; the file written."""
     with drawing(path, (9.6, 3.6), 1, 2, sharey=True) as (_, (left, right)):
         for axis, title, curves in (

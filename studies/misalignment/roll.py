@@ -28,20 +28,17 @@ from patchfem.runs.patch.values import values
 
 FRICTION = 0.3  # rig.toml
 COUNTS = (8, 16)
-# rig.toml: the yaw mode as fitted to Table 1, friction SLIDE * GYRATION off the axis
-SLIDE, GYRATION = (
-    0.095,
-    40e-3,
-)
+SLIDE = 0.095  # slide of the yaw mode as fitted to Table 1
+GYRATION = 40e-3  # [m] friction acts SLIDE * GYRATION off the axis
 
 
-def rolled(roll: float, count: int, skin: str):
+def rolled_pieces(roll: float, count: int, skin: str):
     return tilted.case(0.0, skin, f"strips.count={count}", f"strips.roll={float(roll)!r} rad")
 
 
 def case(roll: float, count: int, skin: str = "bare") -> dict:
     """name -> Measure of pieces in strips under a roll [rad], with `yaw` [N m], the moment of sliding friction."""
-    three = [press_patch(rolled(roll, count, skin), tilted.pair(k)) for k in (1, 0)]
+    three = [press_patch(rolled_pieces(roll, count, skin), tilted.pair(k)) for k in (1, 0)]
     return measures(*three) | {"yaw": abs(three[0].strips.yaw_moment(FRICTION))}
 
 
@@ -49,7 +46,7 @@ def roll_for(centre: float, skin: str, count: int = 16) -> float:
     """Roll [rad] that moves the pressure sideways by `centre` [m]."""
 
     def short(log_roll: float) -> float:
-        found = values(press_patch(rolled(10**log_roll, count, skin), tilted.pair(0)))
+        found = values(press_patch(rolled_pieces(10**log_roll, count, skin), tilted.pair(0)))
         return abs(found["pressure_centre_lateral"]) - centre
 
     return 10 ** brentq(short, -7, -1.5, xtol=1e-6)

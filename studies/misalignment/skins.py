@@ -36,12 +36,12 @@ def main(tilts=tilted.TILTS, skins=tuple(tilted.SKINS), offsets=OFFSETS) -> dict
         out[skin, "rigid"] = fixtures.table(
             f"{skin}, rigid fixture",
             "tilt rad",
-            {tilt: fixtures.held(tilt, None, skin) for tilt in tilts},
+            {tilt: fixtures.held_pieces(tilt, None, skin) for tilt in tilts},
         )
         out[skin, "held"] = fixtures.table(
             f"{skin}, holder {SPRING:.0e} N m/rad",
             "tilt rad",
-            {tilt: fixtures.held(tilt, SPRING, skin) for tilt in tilts},
+            {tilt: fixtures.held_pieces(tilt, SPRING, skin) for tilt in tilts},
         )
         out[skin, "free"] = fixtures.table(
             f"{skin}, free to rotate",

@@ -23,7 +23,7 @@ RIG = Path(__file__).parents[1] / "rig" / "rig.toml"
 # [contact] alone: the patch at rest
 TEXT = RIG.read_text(encoding="utf-8").partition("[friction]")[0]
 TILTS = tuple(10.0 ** np.arange(-6, -1.5, 0.5))
-RUBBED = 0.1  # share of the mean pressure from which a place counts as rubbed
+RUBBED_FRACTION = 0.1  # share of the mean pressure from which a place counts as rubbed
 # peaks: those of `rough_skin`, 80 um apart, scattered by 0.2 um
 SKINS = {
     "bare": (),
@@ -40,8 +40,10 @@ SKINS = {
 
 
 def case(angle: float | None = None, skin: str = "bare", *more: str) -> PatchModel:
-    """The pieces with a skin of SKINS; angle [rad], None: free to rotate; more: further key=value of contact,
-    None for a free angle."""
+    """Build the pieces with a skin of SKINS at an angle [rad]; None leaves the rotation free.
+
+    `more` are further key=value of contact.
+    """
     sets = [f"asperities.{text}" for text in SKINS[skin]] + list(more)
     if angle is not None:
         sets.append(f"tilt.angle={angle!r} rad")
@@ -71,13 +73,13 @@ def patches(asked: PatchModel) -> tuple:
     return tuple(press_patch(asked, pair(k)) for k in (2, 1, 0))
 
 
-def measured(asked: PatchModel) -> dict:
+def compute_measures(asked: PatchModel) -> dict:
     """name -> Measure (value and error) of a model of `case`, with `rubbed`, the portion beyond RUBBED, as a value."""
     three = patches(asked)
-    return measures(*three) | {"rubbed": rubbed(three[0])}
+    return measures(*three) | {"rubbed": rubbed_portion(three[0])}
 
 
-def rubbed(patch: Patch, share: float = RUBBED) -> float:
+def rubbed_portion(patch: Patch, share: float = RUBBED_FRACTION) -> float:
     """Portion of the length that bears at least `share` of the mean pressure, its edges found between the nodes."""
     x = patch.x
     sigma = (

@@ -23,7 +23,7 @@ import patchfem as pf
 
 MESH = Path(__file__).parents[2] / "meshes" / "test-piece.msh"
 TILTS = ("0.01 mrad", "0.1 mrad", "1 mrad")
-COMPARED = ("approach", "pressure_peak", "contact_fraction", "normal_stiffness")
+COMPARED_MEASURES = ("approach", "pressure_peak", "contact_fraction", "normal_stiffness")
 SCENE = """\
 [contact]
 length = "12.7 mm"
@@ -39,7 +39,7 @@ angle = "{tilt}"
 """
 
 
-def pressed(tilt: str, mesh: str = "") -> pf.Result:
+def press_pieces(tilt: str, mesh: str = "") -> pf.Result:
     """The pieces of the rig under a tilt, on the mesh of a file where one is named."""
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "scene.toml"
@@ -47,7 +47,7 @@ def pressed(tilt: str, mesh: str = "") -> pf.Result:
         return pf.run(scene, **({"contact.mesh": mesh} if mesh else {}))
 
 
-def between(one: pf.Result, other: pf.Result) -> float:
+def pressure_difference(one: pf.Result, other: pf.Result) -> float:
     """Half the integral of the absolute difference of two pressures over the integral of the first, 1."""
     first, second = ((run.patch.x, run.patch.pressure.sigma_n) for run in (one, other))
     x = np.union1d(first[0], second[0])
@@ -58,16 +58,16 @@ def between(one: pf.Result, other: pf.Result) -> float:
 def rows():
     """Per tilt: tilt, (departure of the file, error stated for it) of each measure and `between`, in per cent."""
     for tilt in TILTS:
-        made = pressed(tilt)
-        read = pressed(tilt, str(MESH))
+        made = press_pieces(tilt)
+        read = press_pieces(tilt, str(MESH))
         pairs = [
             (
                 100 * (read.measures[name].value / made.measures[name].value - 1),
                 100 * abs(read.measures[name].error / made.measures[name].value),
             )
-            for name in COMPARED
+            for name in COMPARED_MEASURES
         ]
-        yield tilt, pairs, 100 * between(made, read)
+        yield tilt, pairs, 100 * pressure_difference(made, read)
 
 
 if __name__ == "__main__":

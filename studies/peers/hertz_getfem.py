@@ -28,8 +28,19 @@ from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from hertz_pair import FORMS, HALF, LOAD, MATERIAL, RADIUS, STEPS, Row, errors_of, grid_of, ours
-from peer import Peer, ratio_text, run, seconds_at
+from hertz_pair import (
+    FORMS,
+    HALF,
+    LOAD,
+    MATERIAL,
+    RADIUS,
+    STEPS,
+    Row,
+    compute_errors,
+    make_grid,
+    ours,
+)
+from peer import Peer, interpolate_seconds, ratio_text, run
 
 FINENESS = (8, 16, 32)  # cells per half width
 PEERS = ("nodal", "gauss")
@@ -37,7 +48,7 @@ PEERS = ("nodal", "gauss")
 
 def theirs(peer: Peer, cells: int, form: str, quadrature: str) -> Row:
     """GetFEM on the same mesh and gap; units mm, N, MPa, its start the overlap of 1.4 a."""
-    grid = grid_of(cells)
+    grid = make_grid(cells)
     newton = LOAD * 1e-3
     steps = [
         {"N": factor * newton, "crown": 1e-3 / RADIUS, "tilt": angle} for factor, angle in STEPS
@@ -61,7 +72,7 @@ def theirs(peer: Peer, cells: int, form: str, quadrature: str) -> Row:
         found["dofs"],
         found["build"] + found["solve"],
         float(np.mean(found["warm"])),
-        errors_of(grid.x, p[0]),
+        compute_errors(grid.x, p[0]),
         p,
     )
 
@@ -85,7 +96,7 @@ def agreement(one: Row, other: Row) -> float:
     return float(np.abs(one.pressure - other.pressure).max() / one.pressure.max())
 
 
-def _line_of(row: Row) -> str:
+def _format_row(row: Row) -> str:
     return (
         f"{row.program:13} a/{row.cells:<3} {row.dofs:6d} dofs  cold {row.cold:6.3f} s  "
         f"further {1e3 * row.warm:8.2f} ms  p(0) {row.errors[0]:+.1e}  half width {row.errors[1]:+.1e}  "
@@ -99,7 +110,9 @@ def ratios(rows: list) -> list:
     out = []
     for row in (r for r in rows if r.program != "patchfem"):
         same = next(r for r in mine if r.cells == row.cells)
-        at, sign = seconds_at(row.errors[2], [r.errors[2] for r in mine], [r.cold for r in mine])
+        at, sign = interpolate_seconds(
+            row.errors[2], [r.errors[2] for r in mine], [r.cold for r in mine]
+        )
         out.append(
             (row, row.cold / same.cold, ratio_text(row.cold, at, sign), row.warm / same.warm)
         )
@@ -131,7 +144,7 @@ def main(fineness=FINENESS, repeats: int = 3, forms=tuple(FORMS), peers=PEERS) -
             rows = out[form] = [_median(found) for found in tries.values()]
             print(f"{form}: {FORMS[form]} of the two pieces assembled")
             for row in rows:
-                print("  " + _line_of(row))
+                print("  " + _format_row(row))
             for row, cold, equal, warm in ratios(rows):
                 print(
                     f"  {row.program:13} a/{row.cells:<3} over patchfem: cold {cold:.1f} at the same mesh, {equal} "

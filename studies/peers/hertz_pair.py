@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from peer import timed
+from peer import measure_seconds
 
 from patchfem.closed_forms import contact as exact
 from patchfem.contact.gaps import crown, tilt
@@ -22,11 +22,10 @@ MATERIAL = (121e9, 0.32)
 MODULUS = exact.combined_modulus(*MATERIAL)
 RADIUS = np.pi * MODULUS * HALF**2 / (4 * LOAD)
 PEAK = exact.hertz_peak(LOAD, RADIUS, MODULUS)
-# 200 half widths to the nearest far face: the half planes of Hertz to 1e-5
-LENGTH, HEIGHT = (
-    40e-3,
-    20e-3,
+LENGTH = (
+    40e-3  # [m] with 200 half widths to the nearest far face the half planes of Hertz hold to 1e-5
 )
+HEIGHT = 20e-3  # [m]
 GROWTH = 1.15
 # (load factor, tilt [rad]): the first cold, then warm
 STEPS = (
@@ -63,15 +62,17 @@ def _line(fine: float, even: float, total: float) -> np.ndarray:
     )
 
 
-def grid_of(cells: int) -> TensorGrid:
-    """Piece with HALF/cells along 1.25 a and down to a; even rows to the depth a cost little and cure the floor of
-    5e-4 in p(0) that rows growing from the face on leave."""
+def make_grid(cells: int) -> TensorGrid:
+    """Make a grid with cells of HALF/cells along 1.25 a and down to a.
+
+    Even rows down to a cost little; rows that grow from the face on have an error of 5e-4 in p(0).
+    """
     fine = HALF / cells
     right = _line(fine, 1.25 * HALF, LENGTH / 2)
     return TensorGrid(np.concatenate([-right[:0:-1], right]), _line(fine, HALF, HEIGHT), 0)
 
 
-def errors_of(x, p) -> tuple:
+def compute_errors(x, p) -> tuple:
     """Relative errors (p(0), half width, mean square inside 0.9 a over p0) of nodal pressures (m,) [Pa]."""
     near = np.abs(x) < 0.8 * HALF
     inside = np.abs(x) < 0.9 * HALF
@@ -84,7 +85,7 @@ def errors_of(x, p) -> tuple:
     )
 
 
-def condensed(grid: TensorGrid, bodies: int) -> Compliance:
+def condense_pair(grid: TensorGrid, bodies: int) -> Compliance:
     """The pair from its meshes on: one piece doubled, or both pieces assembled and condensed."""
     layers = Layers(MATERIAL, MATERIAL, "strain")
     parts = [interface_compliance(make_piece(grid.x, grid.depth, 0, layers)) for _ in range(bodies)]
@@ -99,16 +100,16 @@ def condensed(grid: TensorGrid, bodies: int) -> Compliance:
 
 def ours(cells: int, form: str) -> Row:
     """patchfem on one mesh, nothing kept from before."""
-    grid = grid_of(cells)
+    grid = make_grid(cells)
     shape = crown(grid.x, RADIUS)
-    pair, making = timed(lambda: condensed(grid, FORMS[form]))
-    state, solving = timed(lambda: press(pair, shape, LOAD))
+    pair, making = measure_seconds(lambda: condense_pair(grid, FORMS[form]))
+    state, solving = measure_seconds(lambda: press(pair, shape, LOAD))
     found = [state]
     warm = []
     for factor, angle in STEPS[1:]:
         gap = shape + tilt(grid.x, angle)
         start = found[-1].sigma_n > 0
-        state, seconds = timed(
+        state, seconds = measure_seconds(
             lambda gap=gap, factor=factor, start=start: press(
                 pair, gap, factor * LOAD, rotation=0.0, start=start
             ),
@@ -125,6 +126,6 @@ def ours(cells: int, form: str) -> Row:
         dofs,
         making + solving,
         float(np.mean(warm)),
-        errors_of(grid.x, p[0]),
+        compute_errors(grid.x, p[0]),
         p,
     )

@@ -24,17 +24,20 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import figure_5
 import figure_27
 from figures_2_3 import STICK_SPEED, exact_cycle, newmark_run
-from told import told
+from study_text import read_answer
 
 import patchfem as pf
 from patchfem.response.measures import compute_harmonic
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ""
-G, MIL, ONSET = 9.80665, 25.4e-6, 4.14
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = ""
+G = 9.80665  # [m/s^2]
+MIL = 25.4e-6  # [m]
+ONSET = 4.14  # [g] at which the block begins to slip
 ONSETS = {135: (3.8, 4.2), 143: (3.9, 4.0), 150: (4.0,), 155: (4.2,)}  # Table 1, both series [g]
-HOLDS, PART = "holds", "in part"
+HOLDS = "holds"  # verdict of a conclusion that holds
+PART = "in part"  # verdict of a conclusion that holds in part
 
 
 class Conclusion(NamedTuple):
@@ -48,9 +51,9 @@ class Conclusion(NamedTuple):
 
 @lru_cache
 def block(level: float, frequency: float = 143.0, **sets) -> tuple:
-    """(Result, {measure: value}) of the steady block at a level [g]."""
+    """Compute the steady block at a level [g]; return the result and its measures by name."""
     found = pf.run(
-        HERE / "block.toml",
+        FOLDER / "block.toml",
         **sets,
         **{"drive.acceleration": level * G, "drive.frequency": frequency},
     )
@@ -58,7 +61,7 @@ def block(level: float, frequency: float = 143.0, **sets) -> tuple:
 
 
 def phases(level: float) -> tuple:
-    """(release, stop) of the block as phases of the input displacement [deg], from 0 to 180."""
+    """Return release and stop of the block as phases of the input displacement, 0 to 180 degrees."""
     value = block(level)[1]
     release = np.degrees(value["slip_start_phase"])
     return release, release + 180 * (1 - value["stick_fraction"])
@@ -149,7 +152,7 @@ def fourth() -> Conclusion:
 
 
 def fifth() -> Conclusion:
-    text = (HERE.parent / "rig" / "rig.toml").read_text("utf-8")
+    text = (FOLDER.parent / "rig" / "rig.toml").read_text("utf-8")
     found = pf.run(
         text[: text.index("[contact.shear]")], **{"contact.tilt.angle": "29 urad"}
     ).measures
@@ -250,7 +253,7 @@ def table(found: list) -> str:
     )
 
 
-def main(path: Path | None = HERE / "conclusions.md") -> list:
+def main(path: Path | None = FOLDER / "conclusions.md") -> list:
     """[Conclusion], printed and written as a table."""
     found = [one() for one in ALL]
     for one in found:

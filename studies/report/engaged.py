@@ -34,16 +34,17 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 from figure_27 import scene
-from modal_test import RATE, G, fitted, h1, tested
-from told import told
+from modal_test import RATE, G, fit_mode, h1, run_random_test
+from study_text import read_answer
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ""
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = ""
 ARM = 0.04  # radius of gyration of the block [m], assumed
-HELD, SLIDING = 1.0, 5.0  # level [g rms]: below slip, as peaks stay below 4 g, and well above it
+STUCK_LEVEL = 1.0  # [g rms] below slip, because peaks stay below 4 g
+SLIDING_LEVEL = 5.0  # [g rms] far above the onset of slip
 POINT = '[normal]\nload = "26 lbf"\n'
 PATCH = (
     '[contact]\nlength = "12.7 mm"\nwidth = "{} mm"\nheight = "6.35 mm"\nload = "26 lbf"\n'
@@ -69,12 +70,9 @@ CASES = {  # mode -> how the pieces touch -> (contact, motion of the contact alo
         "a patch of 12.7 mm": (PATCH.format(12.7), 0.1, True),
     },
 }
-# K: stiffness of the flexures
-SHARE, SPRING, DAMPER = (
-    0.75,
-    "a spring of 0.75 K",
-    "a damper as in Fig. 27",
-)
+SHARE = 0.75  # stiffness of the engaged spring / stiffness K of the flexures
+SPRING = "a spring of 0.75 K"
+DAMPER = "a damper as in Fig. 27"
 # [g rms]
 CRITICAL = {
     "rigid block": 4.2,
@@ -132,9 +130,9 @@ tolerance = 1e-2
 """
 
 
-def turned(mode: str, touch: str, level: float, seconds: float = 8.0, seed: int = 1) -> Turned:
+def random_turn(mode: str, touch: str, level: float, seconds: float = 8.0, seed: int = 1) -> Turned:
     """H1 of the turn of a mode in a random test of so many seconds, windows of one."""
-    done = tested(rig(mode, touch), seconds, level, seed)
+    done = run_random_test(rig(mode, touch), seconds, level, seed)
     how = {"fs": RATE, "nperseg": int(RATE)}
     f, power = signal.welch(done.base, **how)
     moved = (
@@ -149,8 +147,18 @@ def turned(mode: str, touch: str, level: float, seconds: float = 8.0, seed: int 
     )
 
 
-def damped(model: str, level: float, seconds: float = 20.0, seed: int = 1) -> tuple:
-    """(frequency [Hz], damping ratio) of one mode fitted to H1 from 60 to 260 Hz, and the estimate."""
+def fit_damping(model: str, level: float, seconds: float = 20.0, seed: int = 1) -> tuple:
+    """Fit one mode to H1 from 60 to 260 Hz; return its frequency [Hz], damping ratio and the estimate.
+
+    Parameters
+    ----------
+    model : str
+    level : float
+        [g rms]
+    seconds : float
+        Duration of the test.
+    seed : int
+    """
     text = scene({SPRING: "rigid block", DAMPER: "second path"}.get(model, model))
     if model == SPRING:  # found by trying: it gives 148 Hz where it is critical
         stiffness = SHARE * 0.8546 * (2 * np.pi * 143) ** 2
@@ -165,21 +173,21 @@ def damped(model: str, level: float, seconds: float = 20.0, seed: int = 1) -> tu
         text = text.replace("3.48925e6 N/m", f"{spring!r} N/m").replace(
             "1374.2 N s/m", f"{damper!r} N s/m"
         )
-    seen = h1(tested(text, seconds, level, seed), 1.0).between(60, 260)
-    return *fitted(seen)[:2], seen
+    seen = h1(run_random_test(text, seconds, level, seed), 1.0).between(60, 260)
+    return *fit_mode(seen)[:2], seen
 
 
-def picture(turns: list, tests: dict, path: Path) -> Path:
+def _picture(turns: list, tests: dict, path: Path) -> Path:
     """Yaw and rocking while the block slides, over the base, and the coherence where a mode is critically damped."""
     colours = (GREY, "black", ORANGE, BLUE)
     with drawing(path, (10.4, 4.2), 1, 3) as (_, axes):
         for axis, mode in zip(axes, CASES):
             for one, colour in zip(
-                (one for one in turns if (one.mode, one.level) == (mode, SLIDING)), colours
+                (one for one in turns if (one.mode, one.level) == (mode, SLIDING_LEVEL)), colours
             ):
                 axis.semilogy(one.f, one.moved, color=colour, lw=1.2, label=one.touch)
             axis.set(
-                title=f"{mode}, {SLIDING:g} g rms",
+                title=f"{mode}, {SLIDING_LEVEL:g} g rms",
                 xlabel="frequency [Hz]",
                 xlim=(20, 200),
                 ylim=(1e-3, 3e4),
@@ -201,27 +209,26 @@ def picture(turns: list, tests: dict, path: Path) -> Path:
     return path
 
 
-def main(path: Path | None = HERE / "engaged.svg") -> tuple:
-    """([Turned], {model: (frequency, damping, estimate)}), printed and drawn."""
-    turns = [
-        turned(mode, touch, level)
-        for mode, touches in CASES.items()
-        for touch in touches
-        for level in (HELD, SLIDING)
-    ]
+def main(path: Path | None = FOLDER / "engaged.svg") -> tuple:
+    """Print and draw the turns of all modes and the fitted dampings, and return both."""
+    turns = []
+    for mode, touches in CASES.items():
+        for touch in touches:
+            turns.append(random_turn(mode, touch, STUCK_LEVEL))
+            turns.append(random_turn(mode, touch, SLIDING_LEVEL))
     for one in turns:
         free = next(each.peak for each in turns if each.mode == one.mode)
         print(
             f"{one.mode:8} {one.touch:24} {one.level:g} g rms: {one.peak:.3g} um/g, {one.peak / free:.3g} of free"
         )
-    tests = {model: damped(model, level) for model, level in CRITICAL.items()}
+    tests = {model: fit_damping(model, level) for model, level in CRITICAL.items()}
     for model, (f, damping, seen) in tests.items():
         print(
             f"{model:24} {CRITICAL[model]:g} g rms: {f:.0f} Hz, damping {damping:.2f}, coherence "
             f"{seen.coherence.mean():.3f} in the mean"
         )
     if path is not None:
-        picture(turns, tests, path)
+        _picture(turns, tests, path)
     print(ANSWER)
     return turns, tests
 

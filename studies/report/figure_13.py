@@ -20,13 +20,13 @@ from scipy.special import gammaincinv
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 from friction_forms import weight_along
-from told import told
+from study_text import read_answer
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = (
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = (
     "in part: the equation and the shape of the curves are reproduced. The axes and the values of p in the "
     "print could not be read"
 )
@@ -34,7 +34,7 @@ ORDERS = (-0.5, 0.0, 1.0, 2.0)
 COLOURS = (GREY, ORANGE, BLUE, "#4f9bd9")
 
 
-def main(path: Path | None = HERE / "figure_13.svg") -> list:
+def main(path: Path | None = FOLDER / "figure_13.svg") -> list:
     """One dict per p: at 0, where it is largest, how large, and the R/eps behind which a tenth of the area lies."""
     x = np.linspace(0, 8, 1601)
     rows = []

@@ -20,20 +20,20 @@ from scipy.integrate import quad
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 from friction_forms import weight_across
-from told import told
+from study_text import read_answer
 
 from patchfem.export.drawing.pictures import BLUE
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = (
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = (
     "in part: the equation and the shape of the curve are reproduced. The axes in the print could not "
     "be read"
 )
 
 
-def main(path: Path | None = HERE / "figure_14.svg") -> list:
-    """(eta/rho, W, share of the area within) at 0, 1 and 2, and at infinity."""
+def main(path: Path | None = FOLDER / "figure_14.svg") -> list:
+    """Return (eta/rho, W, fraction of the area within) at 0, 1 and 2, and at infinity."""
     rows = [
         (y, float(weight_across(y)), quad(weight_across, -y, y)[0]) for y in (0.0, 1.0, 2.0, np.inf)
     ]

@@ -24,9 +24,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
-from problems import PLAIN
+from problems import UNDAMPED_MASS
 from report_methods import coulomb, solve_duhamel
-from told import told
+from study_text import read_answer
 from vibration_forms import decay
 
 import patchfem as pf
@@ -34,9 +34,9 @@ from patchfem.core import DriveSegment, InitialState
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.structure.drives import PiecewiseDrive
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = (
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = (
     "in part: equation 3.11 holds with N0 rounded up. The equation as printed predicts rest too early for a "
     "block with w0 = 1"
 )
@@ -60,7 +60,7 @@ class Row(NamedTuple):
 def solve(omega: float, ratio: float) -> Row:
     """The row of a block of unit mass released at x0 = 1."""
     found = pf.run(
-        HERE / "figure_15.toml",
+        FOLDER / "figure_15.toml",
         **{
             "structure.mode.block.frequency": omega / (2 * np.pi),
             "friction.static": omega**2 / ratio,
@@ -81,11 +81,11 @@ def solve(omega: float, ratio: float) -> Row:
     )
 
 
-def stepped(step: float = 0.05) -> tuple:
-    """(time, x, share of steps that do not converge) of the first reading by the report's steps."""
+def run_report_steps(step: float = 0.05) -> tuple:
+    """Run the first reading by the report's steps; return time, x and the fraction of failed steps."""
     drive = PiecewiseDrive((DriveSegment(0.0, 0.0, 0.0, 1.0),), 1000 * step, False)
     found = solve_duhamel(
-        PLAIN,
+        UNDAMPED_MASS,
         drive,
         coulomb(0.125),
         (END, 1000),
@@ -97,7 +97,7 @@ def stepped(step: float = 0.05) -> tuple:
     return found.time, found.z[:, 0], found.n_failed / found.time.size
 
 
-def picture(rows: list, steps: tuple, path: Path) -> Path:
+def _picture(rows: list, steps: tuple, path: Path) -> Path:
     """Displacement over time as in Fig. 15 for three readings of 11, and what the report's steps do after rest."""
     time = np.linspace(0, END, 1801)
     with drawing(path, (9.6, 5.6), 2, 1, height_ratios=(2, 1)) as (_, (upper, lower)):
@@ -129,10 +129,10 @@ def picture(rows: list, steps: tuple, path: Path) -> Path:
     return path
 
 
-def main(path: Path | None = HERE / "figure_15.svg") -> tuple:
-    """([Row], what `stepped` gives), printed and drawn."""
+def main(path: Path | None = FOLDER / "figure_15.svg") -> tuple:
+    """Print and draw the rows and the run by the report's steps, and return both."""
     rows = [solve(*each) for each in READINGS]
-    steps = stepped()
+    steps = run_report_steps()
     for r in rows:
         print(
             f"w0 {r.omega:.4f}, k x0/F {r.ratio:g}: N0 unrounded {r.printed:.3f} (there x is {r.moving:+.4f} x0), at "
@@ -145,7 +145,7 @@ def main(path: Path | None = HERE / "figure_15.svg") -> tuple:
         f"{np.ptp(steps[1][after]) / 2:.4f} x0 after it, {100 * steps[2]:.0f} % do not converge"
     )
     if path is not None:
-        picture(rows, steps, path)
+        _picture(rows, steps, path)
     print(ANSWER)
     return rows, steps
 

@@ -24,24 +24,21 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
-from modal_test import Estimate, fitted, h1, tested
-from told import told
+from modal_test import Estimate, fit_mode, h1, run_random_test
+from study_text import read_answer
 
 import patchfem as pf
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.structure.response import compute_receptance
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = "yes"
-# of the random test [s], [s], [g]
-SCENE, SECONDS, WINDOW, RMS = (
-    HERE / "free.toml",
-    80.0,
-    16.0,
-    0.1,
-)
-NEAR = (140.0, 146.0)  # of the axial mode, where a mode is fitted [Hz]
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = "yes"
+SCENE = FOLDER / "free.toml"
+SECONDS = 80.0  # [s] duration of the random test
+WINDOW = 16.0  # [s] window of the estimate
+RMS = 0.1  # [g] of the random base acceleration
+FIT_BAND = (140.0, 146.0)  # [Hz] the axial mode is fitted here
 
 
 class Free(NamedTuple):
@@ -76,10 +73,10 @@ def curve() -> Free:
 def random_test(seconds: float = SECONDS, window: float = WINDOW) -> Estimate:
     """H1 of a random test, from 60 to 210 Hz."""
     text = SCENE.read_text("utf-8").replace('method = "harmonic"', 'method = "exact"')
-    return h1(tested(text, seconds, RMS), window).between(60, 210)
+    return h1(run_random_test(text, seconds, RMS), window).between(60, 210)
 
 
-def picture(free: Free, seen: Estimate, path: Path) -> Path:
+def _picture(free: Free, seen: Estimate, path: Path) -> Path:
     """Magnitude above phase, and the peak by itself."""
     with drawing(path, (9.6, 5.4), 2, 2, height_ratios=(2, 1), width_ratios=(1.9, 1)) as (
         figure,
@@ -127,11 +124,11 @@ def picture(free: Free, seen: Estimate, path: Path) -> Path:
     return path
 
 
-def main(path: Path | None = HERE / "figure_26.svg") -> tuple:
-    """(Free, Estimate, (frequency [Hz], damping, what is left) fitted to H1), printed and drawn."""
+def main(path: Path | None = FOLDER / "figure_26.svg") -> tuple:
+    """Print and draw the steady curve, the random test and the fitted mode, and return all three."""
     free = curve()
     seen = random_test()
-    found = fitted(seen.between(*NEAR))
+    found = fit_mode(seen.between(*FIT_BAND))
     at = int(np.argmax(np.abs(seen.h)))
     print(
         f"steady curve: {free.f.size} points, peak {free.peak[1]:.1f} at {free.peak[0]:.2f} Hz, rocking "
@@ -142,7 +139,7 @@ def main(path: Path | None = HERE / "figure_26.svg") -> tuple:
         f"{found[1]:.5f}, coherence {seen.coherence[at]:.3f}"
     )
     if path is not None:
-        picture(free, seen, path)
+        _picture(free, seen, path)
     print(ANSWER)
     return free, seen, found
 

@@ -28,19 +28,20 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
-from modal_test import Estimate, G, fitted, h1, tested
-from told import told
+from modal_test import Estimate, G, fit_mode, h1, run_random_test
+from study_text import read_answer
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = (
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = (
     "in part: a mode is critically damped, but not at 148 Hz (in the model with grooves the damping ratio "
     "at 148 Hz is 1.3). "
     "With a single contact point yaw is not suppressed"
 )
-MIL, ONSET = 25.4e-6, 4.14  # of block.toml [g]
+MIL = 25.4e-6  # [m]
+ONSET = 4.14  # [g] at which the block of block.toml begins to slip
 POINT = (
     '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
 )
@@ -73,29 +74,29 @@ def scene(model: str) -> str:
     """Text of a rig with one point of contact."""
     if model == "rigid block":
         return (
-            (HERE / "block.toml")
+            (FOLDER / "block.toml")
             .read_text("utf-8")
             .replace('method = "harmonic"', 'method = "exact"')
         )
     if model == "grooves":  # what lifts would leave them
-        lines = (HERE / "grooved.toml").read_text("utf-8").splitlines()
+        lines = (FOLDER / "grooved.toml").read_text("utf-8").splitlines()
         return "\n".join(line for line in lines if not line.startswith(("lifted_mass", "travel")))
-    text = (HERE.parent / "table_1" / "second_path.toml").read_text("utf-8")
+    text = (FOLDER.parent / "table_1" / "second_path.toml").read_text("utf-8")
     text = POINT + text[text.index("static =") : text.index("[measured]")]
     return text.replace('method = "harmonic"', 'method = "march"')
 
 
 def row(model: str, level: float, seconds: float = 20.0, seed: int = 1) -> Row:
     """H1 of so many seconds by windows of one."""
-    done = tested(scene(model), seconds, level, seed)
+    done = run_random_test(scene(model), seconds, level, seed)
     seen = h1(done, 1.0).between(60, 260)
-    found = fitted(seen) if done.displacement.std() > 0.1 * MIL else (np.nan, np.nan)
+    found = fit_mode(seen) if done.displacement.std() > 0.1 * MIL else (np.nan, np.nan)
     return Row(
         model, level, found[0], found[1], done.displacement.std() / MIL, done.velocity.std(), seen
     )
 
 
-def linearised(speed: float) -> float:
+def linearised_damping(speed: float) -> float:
     """Damping ratio of the rigid block by statistical linearisation at a speed [m/s rms]."""
     return 0.003 + np.sqrt(2 / np.pi) * ONSET * G / (2 * 2 * np.pi * 143 * speed)
 
@@ -140,12 +141,12 @@ def picture(rows: list, path: Path) -> Path:
     return path
 
 
-def main(path: Path | None = HERE / "figure_27.svg", cases=CASES, seconds: float = 20.0) -> list:
+def main(path: Path | None = FOLDER / "figure_27.svg", cases=CASES, seconds: float = 20.0) -> list:
     """[Row], printed and drawn."""
     rows = [row(*case, seconds) for case in cases]
     for r in rows:
         more = (
-            f", linearised {linearised(r.speed):.3f}"
+            f", linearised {linearised_damping(r.speed):.3f}"
             if r.model == "rigid block" and r.damping > 0
             else ""
         )

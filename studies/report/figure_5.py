@@ -26,7 +26,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 from report_methods import solve_euler
-from told import told
+from study_text import read_answer
 
 import patchfem as pf
 from patchfem.dynamics.cycles import find_hermite_extremes
@@ -34,9 +34,9 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.model.model import build
 from patchfem.scene.scene import load as load_scene
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = "yes"
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = "yes"
 # of Euler [1/w0]; friction itself shakes above 2 m v0/F0 = 0.2
 STEPS = (
     0.01,
@@ -47,7 +47,7 @@ STEPS = (
     0.15,
     0.2,
 )
-FREQUENCY = 0.1  # of the frame over that of the block
+FREQUENCY = 0.1  # frequency of the frame / natural frequency of the block
 
 
 class Motion(NamedTuple):
@@ -69,7 +69,7 @@ def motion(step: float | None = None) -> Motion:
     period = 2 * np.pi / FREQUENCY
     if step is not None:
         return _by_euler(round(period / step), period)
-    found = pf.run(HERE / "figure_5.toml")
+    found = pf.run(FOLDER / "figure_5.toml")
     kept = found.to_xarray()
     kept = kept.isel(time=kept.time.values >= 7 * period - 1e-6)
     block = -kept.output_displacement.values
@@ -85,7 +85,7 @@ def motion(step: float | None = None) -> Motion:
 
 def _by_euler(steps: int, period: float) -> Motion:
     """The last cycle by Euler's method with this number of steps per cycle."""
-    rig = build(load_scene(HERE / "figure_5.toml")).rig
+    rig = build(load_scene(FOLDER / "figure_5.toml")).rig
     numbers = rig.friction.interfaces[0].numbers
     motion = solve_euler(
         rig.modes,
@@ -123,14 +123,14 @@ def swings(one: Motion) -> np.ndarray:
     return np.abs(one.block[at[one.friction[at] > 0.0999]] - 0.1)
 
 
-def held(one: Motion) -> float:
+def carried_time_fraction(one: Motion) -> float:
     """Share of the time in which friction carries the block along: relative speed below v0, |F| < F0 tanh 1."""
     return float(
         np.trapezoid(1.0 * (np.abs(one.friction) < 0.1 * np.tanh(1.0)), one.time) / one.time[-1]
     )
 
 
-def picture(exact: Motion, euler: dict, path: Path) -> Path:
+def _picture(exact: Motion, euler: dict, path: Path) -> Path:
     """Block, frame and friction over a cycle, and the largest displacement over Euler's step."""
     with drawing(path, (9.6, 6.4), 2, 2, height_ratios=(1.35, 1), width_ratios=(1.5, 1)) as (
         figure,
@@ -164,18 +164,18 @@ def picture(exact: Motion, euler: dict, path: Path) -> Path:
     return path
 
 
-def main(steps=STEPS, path: Path | None = HERE / "figure_5.svg") -> tuple:
-    """(exact Motion, {step: Motion by Euler}), printed and drawn."""
+def main(steps=STEPS, path: Path | None = FOLDER / "figure_5.svg") -> tuple:
+    """Print and draw the exact motion and those by Euler's method, and return both."""
     exact = motion()
     euler = {h: motion(h) for h in steps}
     for name, one in [("exact", exact), *[(f"Euler, h = {h:g}", one) for h, one in euler.items()]]:
         swung = swings(one)
         print(
             f"{name:14} largest {one.peak:.4f} a0, turns a cycle {turns(one).size:3}, swing over the one before "
-            f"{swung[2] / swung[1]:.3f}, carried along {held(one):.3f}"
+            f"{swung[2] / swung[1]:.3f}, carried along {carried_time_fraction(one):.3f}"
         )
     if path is not None:
-        picture(exact, euler, path)
+        _picture(exact, euler, path)
     print(ANSWER)
     return exact, euler
 

@@ -30,7 +30,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
-from told import told
+from study_text import read_answer
 
 import patchfem as pf
 from patchfem.campaigns.fits.loop import fit_loop
@@ -38,23 +38,20 @@ from patchfem.campaigns.fits.loop_path import LoopOptions
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.scene.scene import loads
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = (
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = (
     "in part: the ringing is reproduced in an example with assumed numbers. The report gives neither the "
     "scales of the figure nor data of the assembly"
 )
-# m, Hz, 1, kg, kg: as figure_8.toml has them
-STROKE, OWN, DAMPING, MASS, HEAVY = (
-    50e-6,
-    500.0,
-    0.01,
-    1.0,
-    1e6,
-)
-FREQUENCIES = (2.0, 5.0, 10.0, 20.0, 40.0)  # of the slider [Hz]
+STROKE = 50e-6  # [m] amplitude of the slider in figure_8.toml
+NATURAL_FREQUENCY = 500.0  # [Hz] natural frequency of the piece in figure_8.toml
+DAMPING = 0.01  # damping ratio in figure_8.toml
+MASS = 1.0  # [kg] of the piece in figure_8.toml
+HEAVY = 1e6  # [kg] of the slider in figure_8.toml
+FREQUENCIES = (2.0, 5.0, 10.0, 20.0, 40.0)  # [Hz] frequencies of the slider
 LIMIT = 0.3 * 26 * 4.4482216152605  # N
-STIFFNESS = MASS * (2 * np.pi * OWN) ** 2
+STIFFNESS = MASS * (2 * np.pi * NATURAL_FREQUENCY) ** 2
 BENCH = """[normal]
 load = "26 lbf"
 [friction]
@@ -91,7 +88,7 @@ def loop(frequency: float = 10.0, static: float = 0.3) -> Loop:
     """figure_8.toml with its slider at a frequency [Hz]; kinetic friction stays 0.3."""
     omega = 2 * np.pi * frequency
     found = pf.run(
-        HERE / "figure_8.toml",
+        FOLDER / "figure_8.toml",
         **{
             "structure.interface[1].static": static,
             "structure.interface[1].kinetic": 0.3,
@@ -128,8 +125,10 @@ def loop(frequency: float = 10.0, static: float = 0.3) -> Loop:
 
 
 def ring(frequency: float) -> float:
-    """Peak of the load cell over the friction limit in closed form: the piece breaks away at the slider's speed and
-    swings about the friction at its own frequency; damping takes its share of a quarter swing.
+    """Return the peak of the load cell over the friction limit in closed form.
+
+    The piece breaks away at the speed of the slider and swings about the friction at its natural frequency, damped over
+    a quarter of a swing.
     """
     # of the stroke, until the spring has gone from one limit to the other
     left = 2 * LIMIT / STIFFNESS / STROKE
@@ -139,8 +138,10 @@ def ring(frequency: float) -> float:
 
 
 def read_as_rigid(one: Loop) -> tuple:
-    """(friction coefficient, bond length [m]) of an elastic-plastic bench fitted to slider and load cell, as if nothing
-    but the contact gave way."""
+    """Fit an elastic-plastic bench to slider and load cell as if the fixture were rigid.
+
+    Returns friction coefficient and bond length [m].
+    """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cell.csv"
         # a cycle and a quarter, for it must come back
@@ -189,7 +190,7 @@ def picture(loops: list, path: Path) -> Path:
     return path
 
 
-def main(path: Path | None = HERE / "figure_8.svg", frequencies=FREQUENCIES) -> list:
+def main(path: Path | None = FOLDER / "figure_8.svg", frequencies=FREQUENCIES) -> list:
     """[Loop], printed and drawn."""
     loops = [loop(each) for each in frequencies]
     for one in loops:

@@ -22,17 +22,18 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
-from told import told
+from study_text import read_answer
 
 import patchfem as pf
 from patchfem.export.drawing.pictures import BLUE, ORANGE
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = "yes"
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = "yes"
 FIGURES = {10: 0.1, 11: 1.0, 12: 5.0}  # drive over natural frequency
-BESIDE = (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.7, 0.9, 1.1, 1.5, 2.0, 3.0)
-DAMPING, SETTLED = 0.04, 1e-5  # c; what is left of the start
+OTHER_RATIOS = (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.7, 0.9, 1.1, 1.5, 2.0, 3.0)
+DAMPING = 0.04  # coefficient c of the damper
+TRANSIENT_TOL = 1e-5  # fraction of the start that may remain
 
 
 class Row(NamedTuple):
@@ -50,13 +51,13 @@ class Row(NamedTuple):
     friction: float
 
 
-def turned(x) -> float:
+def turns_per_cycle(x) -> float:
     """Turns per cycle of a motion x (k,) over two cycles, first and last sample alike."""
     rising = np.sign(np.diff(x[:-1], append=x[:1]))
     return float((rising != np.roll(rising, 1)).sum() / 2)
 
 
-def distorted(x) -> float:
+def distortion_ratio(x) -> float:
     """Share, of root mean squares, that is not the first harmonic of a motion x (k,) even over two cycles."""
     power = np.abs(np.fft.rfft(x[:-1]))[1:] ** 2
     return float(np.sqrt(1 - power[1] / power.sum()))
@@ -64,9 +65,9 @@ def distorted(x) -> float:
 
 def solve(ratio: float) -> Row:
     """Run until the start has decayed and read the last two cycles."""
-    cycles = max(8, int(np.ceil(ratio * np.log(1 / SETTLED) / (np.pi * DAMPING))))
+    cycles = max(8, int(np.ceil(ratio * np.log(1 / TRANSIENT_TOL) / (np.pi * DAMPING))))
     found = pf.run(
-        HERE / "figures_10_12.toml",
+        FOLDER / "figures_10_12.toml",
         **{"drive.frequency": ratio / (2 * np.pi), "drive.cycles": cycles},
     )
     kept = found.to_xarray()
@@ -94,8 +95,8 @@ def solve(ratio: float) -> Row:
         x1,
         x2,
         tuple(float(np.ptp(x) / 2) for x in both),
-        tuple(turned(x) for x in both),
-        tuple(distorted(x) for x in both),
+        tuple(turns_per_cycle(x) for x in both),
+        tuple(distortion_ratio(x) for x in both),
         float(rubbed / (rubbed + damped)),
     )
 
@@ -132,7 +133,7 @@ def picture(rows: list, path: Path) -> Path:
     return path
 
 
-def main(beside=BESIDE, path: Path | None = HERE / "figures_10_12.svg") -> list:
+def main(beside=OTHER_RATIOS, path: Path | None = FOLDER / "figures_10_12.svg") -> list:
     """[Row] of Figs 10, 11 and 12, then of the frequencies beside them, printed and drawn."""
     rows = [solve(ratio) for ratio in (*FIGURES.values(), *beside)]
     for r in rows:

@@ -25,25 +25,26 @@ from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
-from told import told
+from study_text import read_answer
 
 import patchfem as pf
 from patchfem.core import Response
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = (
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = (
     "in part: both records of 8 g at 143 Hz are reproduced, with friction coefficients that differ by 2 %. "
     "The unstable motion at 135 Hz from 6 g on is not reproduced"
 )
-G, MIL = 9.80665, 25.4e-6
-MORE = {"friction.static": "0.408"}  # 2 % more friction
+G = 9.80665  # [m/s^2]
+MIL = 25.4e-6  # [m]
+MORE_FRICTION = {"friction.static": "0.408"}  # 2 % more friction
 CASES = (
     ("Fig. 28: 135 Hz, 5 g", 135, 5.0, {}),
     ("Fig. 28 (text): 135 Hz, 6 g", 135, 6.0, {}),
     ("Fig. 29: 143 Hz, 5 g", 143, 5.0, {}),
-    ("143 Hz, 8 g, 2 % more friction", 143, 8.0, MORE),
+    ("143 Hz, 8 g, 2 % more friction", 143, 8.0, MORE_FRICTION),
     ("143 Hz, 8 g", 143, 8.0, {}),
 )
 
@@ -62,13 +63,13 @@ class Run(NamedTuple):
     seen: Response
 
 
-def moved(title: str, frequency: float, level: float, sets: dict) -> Run:
+def run_block(title: str, frequency: float, level: float, sets: dict) -> Run:
     """200 cycles of grooved.toml at a frequency [Hz] and a level [g], or until it runs away.
 
     Gone is a block beyond 2 mil, or thrown out of its grooves on the way there.
     """
     found = pf.run(
-        HERE / "grooved.toml",
+        FOLDER / "grooved.toml",
         **sets,
         **{"drive.frequency": frequency, "drive.acceleration": level * G},
     )
@@ -88,7 +89,7 @@ def moved(title: str, frequency: float, level: float, sets: dict) -> Run:
 
 def let_go(place: float, level: float) -> bool:
     """Whether the block stays at 143 Hz and a level [g], let go at rest at a place [um] off its valley."""
-    text = (HERE / "grooved.toml").read_text("utf-8")
+    text = (FOLDER / "grooved.toml").read_text("utf-8")
     start = f'[structure.start]\ndisplacement = ["{place} um", "0 m"]\nvelocity = ["0 m/s", "0 m/s"]\n\n[drive]'
     found = pf.run(text.replace("[drive]", start), **{"drive.acceleration": level * G})
     return found.outcome in ("steady", "transient")
@@ -96,7 +97,7 @@ def let_go(place: float, level: float) -> bool:
 
 def last_level(frequency: float, levels) -> float:
     """The level [g] at which the block leaves when it is raised through `levels` every 50 cycles."""
-    text = (HERE / "grooved.toml").read_text("utf-8")
+    text = (FOLDER / "grooved.toml").read_text("utf-8")
     listed = ", ".join(f'"{level:g} g"' for level in levels)
     text = text.replace("cycles = 200", "cycles = 50").replace(
         'acceleration = "8 g"', f"levels = [{listed}]"
@@ -134,9 +135,9 @@ def picture(runs: list, path: Path) -> Path:
     return path
 
 
-def main(path: Path | None = HERE / "figures_28_29.svg", cases=CASES) -> list:
+def main(path: Path | None = FOLDER / "figures_28_29.svg", cases=CASES) -> list:
     """[Run], printed and drawn."""
-    runs = [moved(*case) for case in cases]
+    runs = [run_block(*case) for case in cases]
     for run in runs:
         print(
             f"{run.title:32} {'stays' if run.stays else 'leaves':6} {run.cycles:5.1f} cycles, "

@@ -27,19 +27,22 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
-from problems import SDOF, SDOF_DRIVE, sampled
+from problems import SDOF, SDOF_DRIVE, sample_motion
 from report_methods import coulomb, solve_newmark
-from told import told
+from study_text import read_answer
 
 import patchfem as pf
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = "in part: q is 0.15 only if slip begins at 4.14 g, and the large motion begins at 5.3 g instead of 8 g"
-G, MIL, LIMIT = 9.80665, 25.4e-6, 0.30 * 26 * 4.4482216152605  # LIMIT [N]: friction of block.toml
-ONSETS, LEVELS = (4.00, 4.14), (4.0, 5.0, 6.0, 7.0, 8.0)  # g
-STICK_SPEED = 0.2075  # of the largest speed of the input
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = "in part: q is 0.15 only if slip begins at 4.14 g, and the large motion begins at 5.3 g instead of 8 g"
+G = 9.80665  # [m/s^2]
+MIL = 25.4e-6  # [m]
+LIMIT = 0.30 * 26 * 4.4482216152605  # [N] friction limit of block.toml
+ONSETS = (4.00, 4.14)  # [g] at which slip begins
+LEVELS = (4.0, 5.0, 6.0, 7.0, 8.0)  # [g] of the base acceleration
+STICK_SPEED = 0.2075  # stick speed / largest speed of the input
 CURVE = 401  # points of a drawn cycle, and steps per cycle of Newmark less one
 
 
@@ -70,7 +73,7 @@ class Cycle(NamedTuple):
 def steady(onset: float, level: float) -> Row:
     """The row of block.toml with this onset and level [g]."""
     sets = {"structure.moving_mass": LIMIT / (onset * G), "drive.acceleration": level * G}
-    found = pf.run(HERE / "block.toml", **sets)
+    found = pf.run(FOLDER / "block.toml", **sets)
     amplitude = found.measures["relative_displacement_amplitude"].value
     return Row(
         onset,
@@ -86,7 +89,7 @@ def steady(onset: float, level: float) -> Row:
 def exact_cycle(onset: float, level: float = 5.0, after: int = 40) -> Cycle:
     """A cycle of the exact motion `after` cycles from rest."""
     times = 2 * np.pi * (after + 0.5 + np.linspace(0, 1, CURVE))
-    r = sampled(SDOF, SDOF_DRIVE, onset / level, after + 2.0, times)
+    r = sample_motion(SDOF, SDOF_DRIVE, onset / level, after + 2.0, times)
     return Cycle(
         r.output, r.output_rate, r.force, r.acceleration - r.base_acceleration, r.acceleration
     )
@@ -116,7 +119,7 @@ def newmark_run(
 
 def growth(onset: float, level: float, cycles: int = 200) -> np.ndarray:
     """Largest displacement (cycles,) [mil] in every cycle from rest."""
-    q = sampled(
+    q = sample_motion(
         SDOF,
         SDOF_DRIVE,
         onset / level,
@@ -189,8 +192,8 @@ def _growth(axes) -> None:
     )
 
 
-def main(path: Path | None = HERE / "figures_2_3.svg") -> tuple:
-    """([Row], {name: q and largest absolute acceleration by Newmark}), printed and drawn."""
+def main(path: Path | None = FOLDER / "figures_2_3.svg") -> tuple:
+    """Print and draw the rows and the runs by Newmark's method, and return both."""
     rows = [steady(onset, level) for onset in ONSETS for level in LEVELS]
     for r in rows:
         print(

@@ -38,7 +38,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "wear"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import bands
 from drawing import drawing
-from told import told
+from study_text import read_answer
 
 from patchfem.core import frozen_array
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
@@ -50,24 +50,22 @@ from patchfem.surface.profile import Profile, level
 from patchfem.surface.roughness.report import make_report
 from patchfem.surface.roughness.spectrum import BAND, band_amplitude, estimate_spectrum
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = (
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = (
     "in part: synthetic surfaces were compared with the four heights that are printed above the curves. The "
     "curves themselves could not be read, and four traces cannot prove everything that the report says"
 )
 # heads of Figs 30 and 31 [m]: first and second scan
-PRINTED = (
+PRINTED_HEIGHTS = (
     (30.5626e-6, 21.5831e-6),
     (17.8602e-6, 14.8619e-6),
 )
-# steps of 3.2 um; sets of four traces; lines between before and after
-STROKES, SETS, APART = (
-    (2, 4),
-    20,
-    160,
-)
-UM, BITE = 1e-6, 0.03e-6
+STROKES = (2, 4)  # strokes in steps of 3.2 um
+SETS = 20  # number of sets of four traces
+LINES_BETWEEN = 160  # number of lines between the traces before and after
+UM = 1e-6  # [m]
+BITE = 0.03e-6  # [m] worn off by one pass
 
 
 class Set(NamedTuple):
@@ -79,8 +77,8 @@ class Set(NamedTuple):
     across: tuple
 
 
-def worn(stroke: int) -> tuple:
-    """(before, after) heights [m] of the lower surface at a stroke of so many steps, and the Row of its whole areas."""
+def rub_surface(stroke: int) -> tuple:
+    """Return the heights [m] of the lower surface before and after rubbing, and the row of its whole areas."""
     rows, (new, after) = bands.wear((stroke,), 1, BITE)
     return new, after[stroke], rows[-1]
 
@@ -92,7 +90,7 @@ def trace(heights, name: str) -> Profile:
 
 def cut(before, after, line: int) -> Set:
     """The set at a line of the raster, the traces after APART lines beside those before."""
-    other = (line + APART) % bands.POINTS
+    other = (line + LINES_BETWEEN) % bands.POINTS
     pairs = (
         (trace(before[line], "before, x"), trace(after[other], "after, x")),
         (trace(before[:, line], "before, y"), trace(after[:, other], "after, y")),
@@ -102,7 +100,7 @@ def cut(before, after, line: int) -> Set:
 
 
 def counts(sets: list) -> tuple:
-    """How many sets are called reduced along x, along y, lower along x than along y after, and before."""
+    """Count the sets that are reduced along x, along y, and lower along x than along y after and before."""
     ratios = [
         (*[part.ratios.amplitude for part in one.parts], one.across[1], one.across[0])
         for one in sets
@@ -112,7 +110,7 @@ def counts(sets: list) -> tuple:
     )
 
 
-def held(sets: list, row) -> int:
+def count_held(sets: list, row) -> int:
     """In how many comparisons of the sets the interval holds the ratio of the whole areas."""
     return sum(
         one.parts[way].ratios.amplitude.low < row.after[way] < one.parts[way].ratios.amplitude.high
@@ -201,13 +199,13 @@ def write(one: Set, folder: Path) -> list:
 
 
 def main(
-    strokes=STROKES, count: int = SETS, path: Path | None = HERE / "figures_30_31.svg"
+    strokes=STROKES, count: int = SETS, path: Path | None = FOLDER / "figures_30_31.svg"
 ) -> dict:
     """{stroke: ([Set], Row of the whole areas)}, printed and drawn."""
     lines = [k * bands.POINTS // count for k in range(count)]
     found = {}
     for stroke in strokes:
-        before, after, row = worn(stroke)
+        before, after, row = rub_surface(stroke)
         sets = found.setdefault(stroke, ([cut(before, after, line) for line in lines], row))[0]
         x, y, less, earlier = counts(sets)
         low, high = (
@@ -217,10 +215,10 @@ def main(
             f"stroke {row.stroke / UM:.1f} um: waves of the areas {row.after[0]:.2f} along x and {row.after[1]:.2f} "
             f"along y; wave heights of traces {low[0]:.1f} to {low[1]:.1f} um before, {high[0]:.1f} to {high[1]:.1f} "
             f"um after; of {count} sets reduced along x {x}, along y {y}, lower along x than along y after {less}, "
-            f"before {earlier}; the interval holds the ratio of the areas in {held(sets, row)} of {2 * count}; "
+            f"before {earlier}; the interval holds the ratio of the areas in {count_held(sets, row)} of {2 * count}; "
             f"with a worn depth {sum(bool(part.basis) for one in sets for part in one.parts)}"
         )
-        for way, (first, last) in zip((0, 1), zip(*PRINTED)):
+        for way, (first, last) in zip((0, 1), zip(*PRINTED_HEIGHTS)):
             high = totals(sets, way)
             print(
                 f"  along {'xy'[way]}: Pt {spread(high[0] / UM, 1)} um before, {spread(high[1] / UM, 1)} um after, "

@@ -11,8 +11,8 @@ Run: python studies/report/items.py
 from pathlib import Path
 from typing import NamedTuple
 
-HERE = Path(__file__).parent
-SHOWN = {"nothing": "nothing to compute"}
+FOLDER = Path(__file__).parent
+VERDICT_TEXTS = {"nothing": "nothing to compute"}
 VERDICTS = {
     "works": "work",
     "in part": "work in part",
@@ -33,21 +33,18 @@ class Item(NamedTuple):
     verdict: str
 
 
-RIG, PRINTED, GROOVED = (
-    "studies/rig/rig.toml",
-    "studies/rig/report.toml",
-    "studies/report/grooved.toml",
-)
-BLOCK, FRAME, LOOP = (
-    "studies/report/block.toml",
-    "studies/report/figure_5.toml",
-    "studies/bench/loop.toml",
-)
+RIG = "studies/rig/rig.toml"
+PRINTED_LAW_SCENE = "studies/rig/report.toml"
+GROOVED_SCENE = "studies/report/grooved.toml"
+BLOCK = "studies/report/block.toml"
+FRAME = "studies/report/figure_5.toml"
+LOOP = "studies/bench/loop.toml"
 TWO = "studies/report/figures_10_12.toml"
-FIGURES, MODAL, HISTORIES = (
-    f"tests/studies/test_report_{name}.py" for name in ("figures", "modal", "histories")
-)
-CONCLUDED, RIG_DID = "tests/studies/test_report_conclusions.py", "tests/studies/test_report_rig.py"
+FIGURES = "tests/studies/test_report_figures.py"
+MODAL = "tests/studies/test_report_modal.py"
+HISTORIES = "tests/studies/test_report_histories.py"
+CONCLUSION_TESTS = "tests/studies/test_report_conclusions.py"
+RIG_TESTS = "tests/studies/test_report_rig.py"
 
 
 def _figure(name: str) -> str:
@@ -56,7 +53,12 @@ def _figure(name: str) -> str:
 
 def _conclusion(number: int, said: str) -> Item:
     return Item(
-        f"5, conclusion {number}", said, BLOCK, "studies/report/conclusions.py", CONCLUDED, "works"
+        f"5, conclusion {number}",
+        said,
+        BLOCK,
+        "studies/report/conclusions.py",
+        CONCLUSION_TESTS,
+        "works",
     )
 
 
@@ -138,7 +140,7 @@ ITEMS = (
         "measured friction loops with ringing",
         "studies/report/figure_8.toml",
         _figure("_8"),
-        RIG_DID,
+        RIG_TESTS,
         "works",
     ),
     Item("2.B, Figs 6, 7", "photographs of an older set-up", "", "", "", "nothing"),
@@ -177,7 +179,7 @@ ITEMS = (
     Item(
         "2.C, eqs 2.16, 2.17",
         "the nonlocal law as printed",
-        PRINTED,
+        PRINTED_LAW_SCENE,
         "studies/rig/readings.py",
         "tests/friction/bonds/test_list_truths.py",
         "in part: the program refuses to combine this law with grooves",
@@ -346,7 +348,7 @@ ITEMS = (
     Item(
         "4.B, Fig. 27",
         "with a load of 26 lbf: nearly critically damped in the vicinity of 148 Hz",
-        GROOVED,
+        GROOVED_SCENE,
         _figure("_27"),
         MODAL,
         "in part: the critically damped mode lies at 101 Hz, at 128 to 135 Hz or at 295 Hz, "
@@ -357,7 +359,7 @@ ITEMS = (
         "rocking and yaw are suppressed when the pieces rub",
         RIG,
         "studies/report/engaged.py",
-        RIG_DID,
+        RIG_TESTS,
         "works",
     ),
     Item(
@@ -373,7 +375,7 @@ ITEMS = (
         "exploratory sweeps from 130 to 160 Hz below 5 g",
         RIG,
         "studies/report/sweeps.py",
-        RIG_DID,
+        RIG_TESTS,
         "works",
     ),
     Item(
@@ -389,7 +391,7 @@ ITEMS = (
         "the level is raised in steps at a fixed frequency, up to 10 g or divergence",
         RIG,
         "studies/report/steps.py",
-        RIG_DID,
+        RIG_TESTS,
         "works",
     ),
     Item(
@@ -405,16 +407,21 @@ ITEMS = (
         "records of input, absolute acceleration and gauge signal",
         RIG,
         "studies/report/steps.py",
-        RIG_DID,
+        RIG_TESTS,
         "works",
     ),
     Item(
-        "4.D, Fig. 28", "time histories at 135 Hz", GROOVED, _figure("s_28_29"), HISTORIES, "works"
+        "4.D, Fig. 28",
+        "time histories at 135 Hz",
+        GROOVED_SCENE,
+        _figure("s_28_29"),
+        HISTORIES,
+        "works",
     ),
     Item(
         "4.D, Fig. 29",
         "time histories at 143 Hz, stable and unstable at 8 g",
-        GROOVED,
+        GROOVED_SCENE,
         _figure("s_28_29"),
         HISTORIES,
         "works",
@@ -489,9 +496,9 @@ ITEMS = (
     Item(
         "Table 1, 4.D",
         "levels of runaway: from 6 g on at 135 Hz, 8 g at 143 Hz",
-        GROOVED,
+        GROOVED_SCENE,
         "studies/report/runaways.py",
-        RIG_DID,
+        RIG_TESTS,
         "in part: with friction far off the axis the computed rig also has its "
         "lowest level of runaway at 135 Hz, but its displacement is 8 to 11 times the measured one; no model fitted "
         "to Table 1 has its lowest level of runaway at 135 Hz",
@@ -597,7 +604,7 @@ ITEMS = (
         "stiffening of the flexures at large motion",
         "studies/table_1/rigid.toml",
         "studies/report/conclusions.py",
-        CONCLUDED,
+        CONCLUSION_TESTS,
         "works",
     ),
     Item(
@@ -625,7 +632,7 @@ def table(items=ITEMS) -> str:
     ]
     rows = [
         f"| {number} | {one.place} | {one.said} | {link(one.scene)} | {link(one.study)} | {link(one.test)} | "
-        f"{SHOWN.get(one.verdict, one.verdict)} |"
+        f"{VERDICT_TEXTS.get(one.verdict, one.verdict)} |"
         for number, one in enumerate(items, 1)
     ]
     return "\n".join(
@@ -645,7 +652,7 @@ def table(items=ITEMS) -> str:
     )
 
 
-def main(path: Path | None = HERE / "items.md") -> tuple:
+def main(path: Path | None = FOLDER / "items.md") -> tuple:
     """The items, written as a page."""
     if path is not None:
         path.write_text(table(), "utf-8")

@@ -17,8 +17,10 @@ from patchfem.runs.rig.interface import make_contact
 from patchfem.runs.rig.numerics import choose
 from patchfem.structure.drives import RecordedDrive
 
-G, RATE, STEPS = 9.80665, 4000.0, 32  # rows per second; rows that count as a cycle
-BAND = (20.0, 400.0)  # of the random base [Hz]
+G = 9.80665  # [m/s^2]
+RATE = 4000.0  # [1/s] rows of the record per second
+STEPS = 32  # rows that count as a cycle
+BAND = (20.0, 400.0)  # [Hz] band of the random base acceleration
 
 
 class Test(NamedTuple):
@@ -44,7 +46,7 @@ class Estimate(NamedTuple):
         return Estimate(self.f[inside], self.h[inside], self.coherence[inside])
 
 
-def random_base(seconds: float, rms: float, seed: int = 1) -> RecordedDrive:
+def _random_base(seconds: float, rms: float, seed: int = 1) -> RecordedDrive:
     """A normal random record, even over BAND; rms in g."""
     count = int(seconds * RATE)
     f = np.fft.rfftfreq(count, 1 / RATE)
@@ -58,9 +60,19 @@ def random_base(seconds: float, rms: float, seed: int = 1) -> RecordedDrive:
     return RecordedDrive(np.arange(count) / RATE, value, STEPS / RATE)
 
 
-def marched(scene, drive=None, steps: int = STEPS, seconds: float | None = None):
-    """Every sample (`Window` of the march) of the rig of a scene, path or text, from rest; drive: that of the scene
-    unless given; steps: in what counts as its cycle; seconds: of the run, those of the drive unless given."""
+def march_samples(scene, drive=None, steps: int = STEPS, seconds: float | None = None):
+    """March the rig of a scene from rest and return every sample.
+
+    Parameters
+    ----------
+    scene : Path or str
+    drive : optional
+        By default that of the scene.
+    steps : int
+        Steps of what counts as its cycle.
+    seconds : float, optional
+        Duration; by default that of the drive.
+    """
     model = pf.build(scene)
     drive = drive or model.rig.drive.signal
     modes = model.rig.modes
@@ -74,9 +86,9 @@ def marched(scene, drive=None, steps: int = STEPS, seconds: float | None = None)
     return march(modes, drive, contact, cycles, steps, cycles).window
 
 
-def tested(scene, seconds: float, rms: float, seed: int = 1) -> Test:
+def run_random_test(scene, seconds: float, rms: float, seed: int = 1) -> Test:
     """The rig of a scene under `random_base` from rest."""
-    seen = marched(scene, random_base(seconds, rms, seed), seconds=seconds - STEPS / RATE)
+    seen = march_samples(scene, _random_base(seconds, rms, seed), seconds=seconds - STEPS / RATE)
     return Test(seen.base_acceleration, seen.acceleration, seen.output, seen.output_rate)
 
 
@@ -94,18 +106,18 @@ def h1(test: Test, seconds: float) -> Estimate:
         return Estimate(f, h, signal.coherence(test.base, test.block, **how)[1])
 
 
-def transmitted(f, frequency: float, damping: float):
+def mode_transmissibility(f, frequency: float, damping: float):
     """Absolute over base acceleration of one mode, (f_0^2 + 2 i zeta f_0 f)/(f_0^2 - f^2 + 2 i zeta f_0 f)."""
     damper = 2j * damping * frequency * np.asarray(f)
     return (frequency**2 + damper) / (frequency**2 - np.asarray(f) ** 2 + damper)
 
 
-def fitted(seen: Estimate) -> tuple:
-    """(frequency [Hz], damping, rms of the logarithm that is left) of one mode with this `transmitted`."""
+def fit_mode(seen: Estimate) -> tuple:
+    """Fit one mode to an estimate; return frequency [Hz], damping ratio and rms of the logarithmic misfit."""
 
-    def missed(p):
-        left = np.log(transmitted(seen.f, *p) / seen.h)
+    def misfit(p):
+        left = np.log(mode_transmissibility(seen.f, *p) / seen.h)
         return np.concatenate([left.real, left.imag])
 
-    found = least_squares(missed, [145.0, 0.3])
+    found = least_squares(misfit, [145.0, 0.3])
     return float(found.x[0]), float(found.x[1]), float(np.sqrt(2 * np.mean(found.fun**2)))

@@ -33,17 +33,18 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from told import told
+from study_text import read_answer
 
 from patchfem.export import histories, netcdf
 from patchfem.inputs.measured import MeasuredRow, read_table
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ""
-SCENE, TABLE = HERE / "repeats.toml", HERE.parent / "rig" / "table1.csv"
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = ""
+SCENE = FOLDER / "repeats.toml"  # scene of the rig with wear
+TABLE = FOLDER.parent / "rig" / "table1.csv"  # readings of Table 1
 # report, Table 1 [g]: of its columns in the order of the print
 ONSETS = (
     3.8,
@@ -53,7 +54,8 @@ ONSETS = (
     4.2,
     4.0,
 )
-FITTED, STATIC = 3.951, 0.40  # onset [g] of the scene and its friction, one for one
+FITTED_ONSET = 3.951  # [g] onset of slip of the scene
+STATIC = 0.40  # coefficient of friction of the scene; the onset is proportional to it
 MINUTES = 10  # assumed: at each level; the report gives no time
 COEFFICIENT = 1e-14  # m2/N, assumed: sprayed carbide on itself
 STEADY = {
@@ -80,7 +82,7 @@ class Reading(NamedTuple):
 
 
 def columns() -> list:
-    """(column, row) of Table 1 in the order of the print, rows without a reading included."""
+    """List (column, row) of Table 1 in the order of the print, with rows without a reading."""
     out = []
     column = -1
     last = None
@@ -178,8 +180,10 @@ def rms(values) -> float:
 
 
 def main(coefficients=(COEFFICIENT,)) -> dict:
-    """name -> readings of a series, for wear of each coefficient [m2/N] and for the first with friction that follows
-    the onset of slip; the repeats printed."""
+    """Print the repeats; return the readings of a series for each wear coefficient [m2/N] by name.
+
+    One more series lets the friction follow the onset of slip.
+    """
     out = {}
     with tempfile.TemporaryDirectory() as folder:
         for coefficient in coefficients:
@@ -189,7 +193,9 @@ def main(coefficients=(COEFFICIENT,)) -> dict:
         place = Path(folder) / "onset"
         place.mkdir()
         first = next(iter(out.values()))
-        out["onset"] = series(place, coefficients[0], as_onsets(first), STATIC * ONSETS[0] / FITTED)
+        out["onset"] = series(
+            place, coefficients[0], as_onsets(first), STATIC * ONSETS[0] / FITTED_ONSET
+        )
     for name, readings in out.items():
         read, model = pairs(readings).T
         of_all = " %, ".join(

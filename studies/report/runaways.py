@@ -32,26 +32,30 @@ from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
-from told import told
+from study_text import read_answer
 
 import patchfem as pf
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ""
-G, MIL = 9.80665, 25.4e-6
-FREQUENCIES, LEVELS = (135.0, 143.0, 150.0, 155.0), [4 + 0.25 * k for k in range(33)]  # [Hz], [g]
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = ""
+G = 9.80665  # [m/s^2]
+MIL = 25.4e-6  # [m]
+FREQUENCIES = (135.0, 143.0, 150.0, 155.0)  # [Hz]
+LEVELS = [4 + 0.25 * k for k in range(33)]  # [g] of the base acceleration
 AWAY = 2 * MIL  # slip, half peak to peak, beyond which a block has left
-GROOVED = (HERE / "grooved.toml").read_text("utf-8")
-LIFT, YAW, KINETIC = "normal.grooves.lifted_mass", "structure.mode.yaw.slide", "friction.kinetic"
+GROOVED_SCENE = (FOLDER / "grooved.toml").read_text("utf-8")
+LIFT = "normal.grooves.lifted_mass"
+YAW = "structure.mode.yaw.slide"
+KINETIC = "friction.kinetic"
 STILL = {YAW: 0.0}
 
 
 def block(friction: str, more: str = "") -> str:
     """Text of a block without grooves and without yaw."""
-    head = GROOVED.split("[normal.grooves]")[0]
-    tail = GROOVED[GROOVED.index("[structure]") :]
+    head = GROOVED_SCENE.split("[normal.grooves]")[0]
+    tail = GROOVED_SCENE[GROOVED_SCENE.index("[structure]") :]
     yaw = tail.index('[[structure.mode]]\nname = "yaw"')
     return f"{head}[friction]\n{friction}\n{tail[:yaw]}{more}{tail[tail.index('[drive]') :]}"
 
@@ -63,7 +67,7 @@ BONDS = (
     'law = "coulomb"',
     'law = "nonlocal"\nbond_length = "0.3 um"\nrest_growth = "1000 m/s^2"\nslip_growth = "0.2 um"',
 )
-LOOSE = "\n".join(one for one in GROOVED.splitlines() if not one.startswith("lifted_mass"))
+LOOSE = "\n".join(one for one in GROOVED_SCENE.splitlines() if not one.startswith("lifted_mass"))
 TWO = """[structure]
 masses = ["1.123 kg"]
 [[structure.spring]]
@@ -83,18 +87,18 @@ law = "elastic-plastic"
 static = 0.2
 load = "26 lbf"
 bond_length = "4.5 um"
-""" + GROOVED[GROOVED.index("[drive]") :]
+""" + GROOVED_SCENE[GROOVED_SCENE.index("[drive]") :]
 PATHS = {  # name -> (text, --set)
     "friction alone": (block(RIGID), {}),
     "friction alone, held to 8 g": (block(RIGID.replace("0.4", "0.583")), {}),
     "interlocking spring": (block(RIGID, SPRING + 'wavelength = "80 um"\n'), {}),
     "softening spring": (block(RIGID, SPRING + SOFT), {}),
     "second interface that slips": (TWO, {}),
-    "grooves": (GROOVED, STILL),
+    "grooves": (GROOVED_SCENE, STILL),
     "grooves, nothing lifted": (LOOSE, STILL),
-    "grooves worn to 10 um": (GROOVED, STILL | {"normal.grooves.amplitude": "5 um"}),
-    "grooves, kinetic friction 10 % lower": (GROOVED, STILL | {KINETIC: 0.36}),
-    "grooves, damping -0.02": (GROOVED, STILL | {"structure.mode.axial.damping": -0.02}),
+    "grooves worn to 10 um": (GROOVED_SCENE, STILL | {"normal.grooves.amplitude": "5 um"}),
+    "grooves, kinetic friction 10 % lower": (GROOVED_SCENE, STILL | {KINETIC: 0.36}),
+    "grooves, damping -0.02": (GROOVED_SCENE, STILL | {"structure.mode.axial.damping": -0.02}),
     "grooves, bonds that grow": (LOOSE.replace(*BONDS), STILL),
     "grooves, weight swings by 30 %": (
         LOOSE.replace(
@@ -102,12 +106,15 @@ PATHS = {  # name -> (text, --set)
         ),
         STILL,
     ),
-    "grooves, yaw 0.09": (GROOVED, {}),
-    "grooves, yaw 0.25": (GROOVED, {YAW: 0.25}),
-    "grooves, yaw 0.30": (GROOVED, {YAW: 0.30}),
-    "grooves, yaw 0.30 at 150 Hz": (GROOVED, {YAW: 0.30, "structure.mode.yaw.frequency": "150 Hz"}),
+    "grooves, yaw 0.09": (GROOVED_SCENE, {}),
+    "grooves, yaw 0.25": (GROOVED_SCENE, {YAW: 0.25}),
+    "grooves, yaw 0.30": (GROOVED_SCENE, {YAW: 0.30}),
+    "grooves, yaw 0.30 at 150 Hz": (
+        GROOVED_SCENE,
+        {YAW: 0.30, "structure.mode.yaw.frequency": "150 Hz"},
+    ),
 }
-SHOWN = ("friction alone, held to 8 g", "softening spring", "grooves", "grooves, yaw 0.30")
+SHOWN_PATHS = ("friction alone, held to 8 g", "softening spring", "grooves", "grooves, yaw 0.30")
 
 
 class Row(NamedTuple):
@@ -120,7 +127,17 @@ class Row(NamedTuple):
 
 
 def motion(name: str, frequency: float, level: float, **more) -> tuple:
-    """(whether the block has left, slip [mil], motion at the output [mil]) after 150 cycles from rest."""
+    """Return whether the block left within 150 cycles, its slip [mil] and its motion at the output [mil].
+
+    Parameters
+    ----------
+    name : str
+        Load path.
+    frequency : float
+        [Hz]
+    level : float
+        [g]
+    """
     text, sets = PATHS[name]
     load = {"normal.frequency": frequency} if "swings" in name else {}
     how = {"structure.travel": "6 mil", "drive.cycles": 150, "accuracy.tolerance": 1e-2} | more
@@ -156,7 +173,7 @@ def row(name: str) -> Row:
     return Row(name, tuple(out), before)
 
 
-def main(path: Path | None = HERE / "runaways.svg", names=tuple(PATHS)) -> list:
+def main(path: Path | None = FOLDER / "runaways.svg", names=tuple(PATHS)) -> list:
     """[Row], printed and drawn."""
     rows = [row(name) for name in names]
     for one in rows:
@@ -178,7 +195,7 @@ def main(path: Path | None = HERE / "runaways.svg", names=tuple(PATHS)) -> list:
 def picture(rows: list, path: Path) -> Path:
     """Level of the runaway over the frequency."""
     with drawing(path, (7.2, 4.4)) as (_, axis):
-        for name, colour in zip(SHOWN, (GREY, "black", BLUE, ORANGE)):
+        for name, colour in zip(SHOWN_PATHS, (GREY, "black", BLUE, ORANGE)):
             one = next(row for row in rows if row.name == name)
             axis.plot(FREQUENCIES, one.levels, "o-", color=colour, label=name)
         axis.plot([135, 143], [6, 8], "x", color="black", ms=9, mew=2, label="rig, unstable")

@@ -29,8 +29,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 from figure_27 import POINT
-from modal_test import marched
-from told import told
+from modal_test import march_samples
+from study_text import read_answer
 
 from patchfem.campaigns.rows.condition_models import FitRequest
 from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
@@ -39,16 +39,15 @@ from patchfem.inputs.measured import read_table
 from patchfem.scene.ranges import read_ranges
 from patchfem.scene.scene import loads
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ""
-G, MIL = 9.80665, 25.4e-6
-SCENE, TABLE = HERE.parent / "table_1" / "second_path.toml", HERE.parent / "rig" / "table1.csv"
-# report, Table 1 [g]; cycles of each, assumed
-LEVELS, EACH = (
-    {135.0: (4, 5, 6, 7), 143.0: (4, 5, 6, 7, 8)},
-    200,
-)
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = ""
+G = 9.80665  # [m/s^2]
+MIL = 25.4e-6  # [m]
+SCENE = FOLDER.parent / "table_1" / "second_path.toml"
+TABLE = FOLDER.parent / "rig" / "table1.csv"
+LEVELS = {135.0: (4, 5, 6, 7), 143.0: (4, 5, 6, 7, 8)}  # [g] of Table 1 at each frequency [Hz]
+CYCLES_PER_LEVEL = 200  # cycles of each level, which the report does not give
 FREE = (
     "friction.static=0.2..0.8",
     "structure.bonded.stiffness=0 N/m..1e7 N/m",
@@ -60,12 +59,9 @@ READING = (
     "measured.reading=fundamental",
     "measured.acceleration_gain=1.4142135623730951",
 )
-# the recipe: fitted to 143 Hz, 135 Hz is predicted
-HOLD, STARTS, SEED = (
-    "frequency=135 Hz,150 Hz,155 Hz",
-    8,
-    3,
-)
+HOLD = "frequency=135 Hz,150 Hz,155 Hz"  # predicted conditions; the model is fitted to 143 Hz
+STARTS = 8  # random starts of a fit
+SEED = 3  # seed of the random starts
 
 
 class Step(NamedTuple):
@@ -86,7 +82,7 @@ def text() -> str:
     return POINT + whole[whole.index("static =") :]
 
 
-def raised(frequency: float):
+def raise_levels(frequency: float):
     """Every sample of the series of levels at a frequency [Hz], the state carried over."""
     scene = text()
     scene = (
@@ -96,10 +92,12 @@ kind = "base"
 waveform = "levels"
 frequency = "{frequency} Hz"
 levels = [{", ".join(f'"{level} g"' for level in LEVELS[frequency])}]
-cycles = {EACH}
+cycles = {CYCLES_PER_LEVEL}
 """
     )
-    return marched(scene, steps=200, seconds=EACH * len(LEVELS[frequency]) / frequency)
+    return march_samples(
+        scene, steps=200, seconds=CYCLES_PER_LEVEL * len(LEVELS[frequency]) / frequency
+    )
 
 
 def steps(frequency: float, seen) -> list:
@@ -111,8 +109,8 @@ def steps(frequency: float, seen) -> list:
     }
     out = []
     for k, level in enumerate(LEVELS[frequency]):
-        last = (seen.time * frequency > EACH * (k + 1) - 10) & (
-            seen.time * frequency <= EACH * (k + 1)
+        last = (seen.time * frequency > CYCLES_PER_LEVEL * (k + 1) - 10) & (
+            seen.time * frequency <= CYCLES_PER_LEVEL * (k + 1)
         )
         row = next(row for value, row in rows.items() if abs(value - level) < 1e-6)
         read = tuple(
@@ -132,7 +130,7 @@ def steps(frequency: float, seen) -> list:
     return out
 
 
-def fitted(gauge: bool):
+def fit_gauge(gauge: bool):
     """Spring and yaw fitted to 143 Hz, with or without a free factor of the gauge: `FittedRows`."""
     scene = loads(text(), SCENE, READING)
     wanted, wrong = read_ranges((*FREE, *((GAUGE,) if gauge else ())))
@@ -143,14 +141,16 @@ def fitted(gauge: bool):
     )
 
 
-def picture(series: dict, found: dict, path: Path) -> Path:
+def _picture(series: dict, found: dict, path: Path) -> Path:
     """Input, acceleration and gauge as the recorder drew them: a column per frequency, and three cycles at 143 Hz."""
     with drawing(path, (10.4, 6.0), 3, 3, sharey="row", width_ratios=(4, 5, 4)) as (_, axes):
         for column, (frequency, seen) in zip(axes.T, series.items()):
-            _enveloped(column, frequency, seen)
+            _draw_envelope(column, frequency, seen)
             for one in found[frequency]:
                 at = (
-                    (np.array([one.level, one.level + 1]) - LEVELS[frequency][0]) * EACH / frequency
+                    (np.array([one.level, one.level + 1]) - LEVELS[frequency][0])
+                    * CYCLES_PER_LEVEL
+                    / frequency
                 )
                 for axis, value in zip(column[1:], one.read):
                     if value is not None:
@@ -161,11 +161,15 @@ def picture(series: dict, found: dict, path: Path) -> Path:
             column[2].set_xlabel("time [s]")
         seen = series[143.0]
         column = axes[:, 2]
-        last = (seen.time * 143 >= 2 * EACH - 3) & (seen.time * 143 <= 2 * EACH)
+        last = (seen.time * 143 >= 2 * CYCLES_PER_LEVEL - 3) & (
+            seen.time * 143 <= 2 * CYCLES_PER_LEVEL
+        )
         for axis, value in zip(
             column, (seen.base_acceleration / G, seen.acceleration / G, seen.output / MIL)
         ):
-            axis.plot(seen.time[last] * 143 - 2 * EACH + 3, value[last], color=BLUE, lw=1.2)
+            axis.plot(
+                seen.time[last] * 143 - 2 * CYCLES_PER_LEVEL + 3, value[last], color=BLUE, lw=1.2
+            )
         column[0].set_title("143 Hz, 5 g, the last cycles")
         column[2].set_xlabel("cycles")
         axes[1, 0].legend(
@@ -180,7 +184,7 @@ def picture(series: dict, found: dict, path: Path) -> Path:
     return path
 
 
-def _enveloped(column, frequency: float, seen) -> None:
+def _draw_envelope(column, frequency: float, seen) -> None:
     """The band between the largest and the smallest value of every two cycles."""
     count = int(seen.time[-1] * frequency + 1e-6) // 2
     for axis, value in zip(
@@ -193,9 +197,9 @@ def _enveloped(column, frequency: float, seen) -> None:
         axis.axhline(0, color=GREY, lw=0.5)
 
 
-def main(path: Path | None = HERE / "steps.svg", fits: bool = True) -> tuple:
-    """({frequency: [Step]}, {whether the gauge is free: FittedRows}), printed and drawn."""
-    series = {frequency: raised(frequency) for frequency in LEVELS}
+def main(path: Path | None = FOLDER / "steps.svg", fits: bool = True) -> tuple:
+    """Print and draw the steps at each frequency and the fits with and without a gauge factor, and return both."""
+    series = {frequency: raise_levels(frequency) for frequency in LEVELS}
     found = {frequency: steps(frequency, seen) for frequency, seen in series.items()}
     for one in (one for row in found.values() for one in row):
         read = "nothing" if one.read[0] is None else f"{one.read[0]:.1f} g, {one.read[1]:.2f} V"
@@ -203,7 +207,7 @@ def main(path: Path | None = HERE / "steps.svg", fits: bool = True) -> tuple:
             f"{one.frequency:g} Hz, {one.level} g: {one.acceleration:.2f} g, gauge {one.gauge:.3f} V; read {read}"
             + " unstable" * one.unstable
         )
-    fit = {gauge: fitted(gauge) for gauge in ((False, True) if fits else ())}
+    fit = {gauge: fit_gauge(gauge) for gauge in ((False, True) if fits else ())}
     for one in fit.values():
         names = [free.key.rpartition(".")[2] for free in one.models.ranges]
         values = ", ".join(
@@ -215,16 +219,16 @@ def main(path: Path | None = HERE / "steps.svg", fits: bool = True) -> tuple:
         best = int((one.search.rms < 1.01 * np.nanmin(one.search.rms)).sum())
         scored = one.score(one.logs, one.left_out_logs)
         print(
-            f"{values}; fitted {shown(scored['fitted'])}, predicted {shown(scored['held_out'])}; {best} of {STARTS} "
-            "starts end there"
+            f"{values}; fitted {format_score(scored['fitted'])}, predicted {format_score(scored['held_out'])}; "
+            f"{best} of {STARTS} starts end there"
         )
     if path is not None:
-        picture(series, found, path)
+        _picture(series, found, path)
     print(ANSWER)
     return found, fit
 
 
-def shown(score: dict) -> str:
+def format_score(score: dict) -> str:
     """all / acceleration / displacement."""
     return " / ".join(f"{score[name]:.3f}" for name in ("all", "acceleration", "displacement"))
 

@@ -25,18 +25,24 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
-from modal_test import marched
-from told import told
+from modal_test import march_samples
+from study_text import read_answer
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
-HERE = Path(__file__).parent
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ""
-G, MIL, DISTORTED = 9.80665, 25.4e-6, 0.03
-LOW, HIGH, RATE = 130.0, 160.0, 15.0  # of the sweep [Hz], [Hz], [Hz/s]
+FOLDER = Path(__file__).parent
+ANSWER = read_answer(__doc__)
+VERDICT = ""
+G = 9.80665  # [m/s^2]
+MIL = 25.4e-6  # [m]
+DISTORTION_LIMIT = (
+    0.03  # third harmonic / first harmonic from which the acceleration counts as distorted
+)
+START_FREQUENCY = 130.0  # [Hz] at which the sweep begins
+END_FREQUENCY = 160.0  # [Hz] at which the sweep ends
+RATE = 15.0  # [Hz/s] of the sweep
 LEVELS = (3.0, 3.8, 4.0, 4.1, 4.2, 4.3, 4.4, 4.5, 4.75)  # report, 4.C: below 5 g
-SHOWN = (3.0, 4.2, 4.4, 4.75)
+SHOWN_LEVELS = (3.0, 4.2, 4.4, 4.75)
 MODELS = {
     "rigid block": "block.toml",
     "grooves": "grooved.toml",
@@ -58,7 +64,7 @@ class Swept(NamedTuple):
 
 def scene(model: str) -> str:
     """Text of a rig whose base is swept."""
-    text = (HERE / MODELS[model]).read_text("utf-8")
+    text = (FOLDER / MODELS[model]).read_text("utf-8")
     text = "\n".join(
         line
         for line in text[: text.index("[drive]")].splitlines()
@@ -68,8 +74,8 @@ def scene(model: str) -> str:
 [drive]
 kind = "base"
 waveform = "sweep"
-from = "{LOW} Hz"
-to = "{HIGH} Hz"
+from = "{START_FREQUENCY} Hz"
+to = "{END_FREQUENCY} Hz"
 rate = "{RATE} Hz/s"
 acceleration = "4 g"
 [accuracy]
@@ -77,10 +83,10 @@ method = "march"
 """
 
 
-def swept(model: str, level: float) -> Swept:
+def sweep_level(model: str, level: float) -> Swept:
     """The sweep at a level [g], cut into stretches of ten cycles."""
-    seen = marched(scene(model).replace('"4 g"', f'"{level} g"'), steps=200)
-    turns = LOW * seen.time + RATE * seen.time**2 / 2
+    seen = march_samples(scene(model).replace('"4 g"', f'"{level} g"'), steps=200)
+    turns = START_FREQUENCY * seen.time + RATE * seen.time**2 / 2
     even = np.arange(0, turns[-1], 1 / 64)
     felt, out = (np.interp(even, turns, one) for one in (seen.acceleration, seen.output))
     felt, out = (one[: one.size // 640 * 640].reshape(-1, 640) for one in (felt, out))
@@ -89,7 +95,7 @@ def swept(model: str, level: float) -> Swept:
     return Swept(
         model,
         level,
-        np.sqrt(LOW**2 + 2 * RATE * middle),
+        np.sqrt(START_FREQUENCY**2 + 2 * RATE * middle),
         np.abs(felt).max(1) / G,
         np.ptp(out, axis=1) / 2 / MIL,
         lines[:, 30] / lines[:, 10],
@@ -97,9 +103,11 @@ def swept(model: str, level: float) -> Swept:
 
 
 def critical(sweeps: list) -> np.ndarray:
-    """Level [g] (k,) at which the waveform becomes distorted, at the frequencies of the sweeps of one model, which rise
-    in level: between two of them by the logarithm of the distortion."""
-    logs = np.log(np.maximum([sweep.distortion for sweep in sweeps], 1e-6) / DISTORTED)
+    """Return the levels [g] (k,) at which the waveform becomes distorted, at the frequencies of the sweeps.
+
+    The sweeps of one model rise in level; between two of them the logarithm of the distortion is interpolated.
+    """
+    logs = np.log(np.maximum([sweep.distortion for sweep in sweeps], 1e-6) / DISTORTION_LIMIT)
     first = np.argmax(logs > 0, axis=0)
     k = np.arange(logs.shape[1])
     low = logs[first - 1, k]
@@ -110,11 +118,13 @@ def critical(sweeps: list) -> np.ndarray:
 
 def picture(sweeps: list, path: Path) -> Path:
     """Acceleration over input above the distortion, a column per model."""
-    colours = dict(zip(SHOWN, ("black", GREY, BLUE, ORANGE)))
+    colours = dict(zip(SHOWN_LEVELS, ("black", GREY, BLUE, ORANGE)))
     with drawing(path, (10.4, 5.6), 2, 3, sharex=True, sharey="row") as (_, axes):
         for column, model in enumerate(MODELS):
             size, wave = axes[:, column]
-            for one in (each for each in sweeps if each.model == model and each.level in SHOWN):
+            for one in sweeps:
+                if one.model != model or one.level not in SHOWN_LEVELS:
+                    continue
                 size.plot(
                     one.frequency,
                     one.acceleration / one.level,
@@ -128,9 +138,11 @@ def picture(sweeps: list, path: Path) -> Path:
                     color=colours[one.level],
                     lw=1.2,
                 )
-            wave.axhline(DISTORTED, color=GREY, lw=0.8, ls="--")
+            wave.axhline(DISTORTION_LIMIT, color=GREY, lw=0.8, ls="--")
             size.set(title=model, ylim=(0.7, 1.7))
-            wave.set(xlabel="frequency [Hz]", xlim=(LOW, HIGH), ylim=(1e-4, 0.5))
+            wave.set(
+                xlabel="frequency [Hz]", xlim=(START_FREQUENCY, END_FREQUENCY), ylim=(1e-4, 0.5)
+            )
         axes[0, 0].set_ylabel("peak acceleration / input")
         axes[1, 0].set_ylabel("third / first harmonic")
         axes[0, 0].legend(loc="upper left", ncols=2, fontsize=9)
@@ -138,9 +150,9 @@ def picture(sweeps: list, path: Path) -> Path:
     return path
 
 
-def main(path: Path | None = HERE / "sweeps.svg", models=tuple(MODELS)) -> list:
+def main(path: Path | None = FOLDER / "sweeps.svg", models=tuple(MODELS)) -> list:
     """[Swept], printed and drawn."""
-    sweeps = [swept(model, level) for model in models for level in LEVELS]
+    sweeps = [sweep_level(model, level) for model in models for level in LEVELS]
     for model in models:
         mine = [sweep for sweep in sweeps if sweep.model == model]
         level = critical(mine)

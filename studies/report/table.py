@@ -2,8 +2,8 @@
 
 The answers are in studies/report/README.md. This script writes that page from the docstrings of the studies.
 
-A study that has QUESTION, ANSWER and REPRODUCED is asked for them, without running it; of the others question and
-answer stand in the gallery of studies/README.md. Seconds are CPU seconds of `python STUDY`, start and compiled code
+A study with a VERDICT states question and answer in its docstring, which is read without running it; those of the
+others are in the gallery of studies/README.md. Seconds are CPU seconds of `python STUDY`, start and compiled code
 loaded included, as `--measure` saw them one after the other and keeps them in seconds.json.
 
 Run: python studies/report/table.py [--measure [STUDY ...]]
@@ -19,12 +19,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from told import told
+from study_text import read_answer, read_question
 
-HERE = Path(__file__).parent
-STUDIES, KEPT = HERE.parent, HERE / "seconds.json"
-QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ""
+FOLDER = Path(__file__).parent
+STUDIES = FOLDER.parent
+SECONDS_FILE = FOLDER / "seconds.json"
+ANSWER = read_answer(__doc__)
+VERDICT = ""
+# links from the gallery to a later section of its page
+LINK_BELOW = re.compile(r",? see \[below\]\([^)]*\)|See \[below\]\([^)]*\)\.")
 LONGEST = 300  # CPU seconds after which a measurement ends
 LONG = 20  # CPU seconds beyond which a study is marked as long
 
@@ -60,31 +63,30 @@ def studies() -> list:
         seen.add(named[1])
         cells = [cell.strip() for cell in line.strip("|").split("|")]
         tree = ast.parse((STUDIES / named[1]).read_text("utf-8"))
-        reproduced = constant(tree, "REPRODUCED")
-        said = cells[1:3] if reproduced is None else told(ast.get_docstring(tree))
+        reproduced = constant(tree, "VERDICT")
+        question, answer = cells[1:3]
+        if reproduced is not None:
+            text = ast.get_docstring(tree)
+            question = read_question(text)
+            answer = read_answer(text)
         found.append(
             Study(
-                named[1],
-                *(
-                    re.sub(r",? see \[below\]\([^)]*\)|See \[below\]\([^)]*\)\.", "", text)
-                    for text in said
-                ),
-                reproduced or "",
+                named[1], LINK_BELOW.sub("", question), LINK_BELOW.sub("", answer), reproduced or ""
             )
         )
     return found
 
 
-def measured(path: str) -> float | None:
+def measure_study(path: str) -> float | None:
     """CPU seconds of one study in a process of its own; None where it did not run to its end."""
 
-    def bounded():
+    def limit_seconds():
         resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST))
 
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
         [sys.executable, str(STUDIES / path)],
-        preexec_fn=bounded,
+        preexec_fn=limit_seconds,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
@@ -103,7 +105,7 @@ def measured(path: str) -> float | None:
 def table(found: list, seconds: dict) -> str:
     """The page in Markdown."""
     rows = [
-        f"| [{one.path}](../{one.path}) | {one.question} | {one.answer} | {shown(seconds.get(one.path))} | "
+        f"| [{one.path}](../{one.path}) | {one.question} | {one.answer} | {format_seconds(seconds.get(one.path))} | "
         f"{one.reproduced} |"
         for one in found
     ]
@@ -135,23 +137,25 @@ def table(found: list, seconds: dict) -> str:
     )
 
 
-def shown(seconds: float | None) -> str:
+def format_seconds(seconds: float | None) -> str:
     """CPU seconds as a cell, those of a study that takes long marked."""
     if seconds is None:
         return "-"
     return f"{seconds:.1f}" if seconds < 10 else f"{seconds:.0f}" + ", long" * (seconds > LONG)
 
 
-def main(measure: list | None = None, path: Path | None = HERE / "README.md") -> list:
+def main(measure: list | None = None, path: Path | None = FOLDER / "README.md") -> list:
     """[Study], written as a page; measure: paths to be measured, [] for all, None for none."""
     found = studies()
-    seconds = json.loads(KEPT.read_text("utf-8")) if KEPT.exists() else {}
+    seconds = json.loads(SECONDS_FILE.read_text("utf-8")) if SECONDS_FILE.exists() else {}
     if measure is not None:
         for one in found:
             if one.path != "report/table.py" and (not measure or one.path in measure):
-                seconds[one.path] = measured(one.path)
-                print(f"{one.path}: {shown(seconds[one.path])} s", flush=True)
-                KEPT.write_text(json.dumps(dict(sorted(seconds.items())), indent=1) + "\n", "utf-8")
+                seconds[one.path] = measure_study(one.path)
+                print(f"{one.path}: {format_seconds(seconds[one.path])} s", flush=True)
+                SECONDS_FILE.write_text(
+                    json.dumps(dict(sorted(seconds.items())), indent=1) + "\n", "utf-8"
+                )
     if path is not None:
         path.write_text(table(found, seconds), "utf-8")
     return found

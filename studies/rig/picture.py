@@ -17,18 +17,18 @@ from patchfem.inputs.measured import read_table
 from patchfem.runs import run as runner
 from patchfem.scene import scene
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 
 
-def main(path: Path = HERE / "rig.svg") -> Path:
+def main(path: Path = FOLDER / "rig.svg") -> Path:
     """Run rig.toml, draw pressure, shear, loop and the measured accelerations at 143 Hz; the file written."""
-    found = runner.run(runner.plan(scene.load(HERE / "rig.toml")), estimate=False)
+    found = runner.run(runner.plan(scene.load(FOLDER / "rig.toml")), estimate=False)
     x = found.patch.x * 1e3
     fields = found.fields
     window = found.window
     rows = [
         r
-        for r in read_table(HERE / "table1.csv")
+        for r in read_table(FOLDER / "table1.csv")
         if abs(r.frequency - 143) < 0.5 and r.acceleration
     ]
     with drawing(path, (9.6, 2.7), 1, 4) as (_, (a, b, c, d)):

@@ -23,7 +23,7 @@ from patchfem.export.drawing.pictures import BLUE, ORANGE
 from patchfem.runs import run as runner
 from patchfem.scene import scene
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 NAMES = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
@@ -35,13 +35,13 @@ NAMES = (
 SHEAR = "[contact.shear]"
 
 
-def solve(reading: str, elastic: bool, cycles: float):
+def _solve(reading: str, elastic: bool, cycles: float):
     """The Result of the rig at 143 Hz and 5 g; elastic: the pieces give way in shear."""
-    text = (HERE / "rig.toml").read_text("utf-8")
+    text = (FOLDER / "rig.toml").read_text("utf-8")
     if not elastic:
         text = "".join(line for line in text.splitlines(True) if not line.startswith(SHEAR))
     sets = [f"friction.reading={reading}", f"drive.cycles={cycles}"]
-    return runner.run(runner.plan(scene.loads(text, str(HERE / "rig.toml"), sets)))
+    return runner.run(runner.plan(scene.loads(text, str(FOLDER / "rig.toml"), sets)))
 
 
 def picture(found: dict, path: Path) -> Path:
@@ -64,14 +64,14 @@ def picture(found: dict, path: Path) -> Path:
     return path
 
 
-def main(cycles: float = 200, path: Path | None = HERE / "readings.svg") -> dict:
-    """(reading, elastic) -> {measure: (value, error)} after so many cycles from rest."""
+def main(cycles: float = 200, path: Path | None = FOLDER / "readings.svg") -> dict:
+    """Return measures with their errors by (reading, elastic) after so many cycles from rest."""
     found = {}
     out = {}
     for elastic in (False, True):
         for reading in ("stretch", "report"):
             begin = process_time()
-            done = solve(reading, elastic, cycles)
+            done = _solve(reading, elastic, cycles)
             found[reading, elastic] = done.window, process_time() - begin
             out[reading, elastic] = {
                 name: (done.measures[name].value, done.measures[name].error) for name in NAMES

@@ -22,19 +22,22 @@ from patchfem.runs import run as runner
 from patchfem.scene import scene
 from patchfem.slip.shear_modes import jenkins_set
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 TILTS = (0.0, 1e-5, 1e-4, 1e-3)
 
 
 def main(tilts=TILTS, cycles: float = 200) -> list:
-    """One dict per tilt [rad]: contact fraction, K_t, slip thresholds (first, median, last) [m], and of the rig scene
-    the amplitude [m] and loop area [J]; pairs are (value, error)."""
+    """Return one dict per tilt [rad]: contact fraction, K_t, slip thresholds, amplitude [m] and loop area [J].
+
+    The thresholds [m] are the first, the median and the last; pairs are (value, error).
+    """
     rows = []
     for angle in tilts:
         found = runner.run(
             runner.plan(
                 scene.load(
-                    HERE / "rig.toml", [f"contact.tilt.angle={angle} rad", f"drive.cycles={cycles}"]
+                    FOLDER / "rig.toml",
+                    [f"contact.tilt.angle={angle} rad", f"drive.cycles={cycles}"],
                 )
             )
         )
@@ -72,11 +75,11 @@ def main(tilts=TILTS, cycles: float = 200) -> list:
     return rows
 
 
-def allowed(tilts="1e-6 rad..1e-3 rad:7") -> str:
+def allowed_tilt(tilts="1e-6 rad..1e-3 rad:7") -> str:
     """How much tilt may be allowed, as `patchfem sweep` says it."""
-    return pf.sweep(HERE / "rig.toml", {"contact.tilt.angle": tilts}).attrs["answer"]
+    return pf.sweep(FOLDER / "rig.toml", {"contact.tilt.angle": tilts}).attrs["answer"]
 
 
 if __name__ == "__main__":
     main()
-    print(allowed())
+    print(allowed_tilt())

@@ -14,8 +14,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from urllib.parse import unquote
 
-HERE = Path(__file__).parent
-PAGES = (HERE / "start.md", *sorted((HERE / "tasks").glob("*.md")))
+FOLDER = Path(__file__).parent
+PAGES = (FOLDER / "start.md", *sorted((FOLDER / "tasks").glob("*.md")))
 
 
 class _Page(HTMLParser):
@@ -57,7 +57,7 @@ def mute(folder: Path) -> list:
 
 
 def links(folder: Path) -> tuple:
-    """(how many links inside a built site were tried, those that lead nowhere as "page: link")."""
+    """Return the number of links inside a built site, and those without a target as "page: link"."""
     tried = 0
     dead = []
     for path in _pages(folder):
@@ -79,7 +79,7 @@ def commands(page: Path) -> list:
 
 
 def faults(page: Path) -> list:
-    """What the commands of a page answer where one fails; they run one after the other in an empty folder."""
+    """Run the commands of a page one after the other in an empty folder and list those that fail."""
     place = os.environ | {
         "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
     }

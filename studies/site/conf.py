@@ -7,9 +7,9 @@ import os
 import sys
 from pathlib import Path
 
-HERE = Path(__file__).parent
-ROOT = HERE.parents[1]
-sys.path[:0] = [str(ROOT), str(HERE), str(ROOT / "tests/support")]
+FOLDER = Path(__file__).parent
+ROOT = FOLDER.parents[1]
+sys.path[:0] = [str(ROOT), str(FOLDER), str(ROOT / "tests/support")]
 # of the notebooks too
 os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
 
@@ -18,11 +18,9 @@ from docutils import nodes  # noqa: E402
 
 import patchfem  # noqa: E402
 
-project, author, copyright = (
-    "patchfem",
-    "The patchfem founders",
-    "The patchfem founders, MIT licence",
-)
+project = "patchfem"
+author = "The patchfem founders"
+copyright = "The patchfem founders, MIT licence"
 version = release = patchfem.__version__
 extensions = [
     "myst_nb",
@@ -61,7 +59,7 @@ html_title = "patchfem"
 html_show_sourcelink = False
 html_copy_source = False
 html_static_path = []
-html_search_scorer = str(HERE / "scorer.js")
+html_search_scorer = str(FOLDER / "scorer.js")
 html_theme_options = {
     "show_prev_next": False,
     "secondary_sidebar_items": ["page-toc"],
@@ -77,12 +75,12 @@ suppress_warnings = ["myst.header"]  # a page of the repository may begin below 
 
 def setup(app) -> None:
     """Write the pages that are made from the program, before any page is read; at the end a first one for a browser."""
-    app.connect("builder-inited", lambda app: made.write(HERE / "made"))
-    app.connect("doctree-read", _heard)
+    app.connect("builder-inited", lambda app: made.write(FOLDER / "made"))
+    app.connect("doctree-read", _name_pictures)
     app.connect("build-finished", _front)
 
 
-def _heard(app, doctree) -> None:
+def _name_pictures(app, doctree) -> None:
     """Pictures that a cell of code draws are told by the heading above them; else their file is read out."""
     for image in doctree.findall(nodes.image):
         above = image

@@ -30,7 +30,7 @@ amplitude = "2 um"
 frequency = "1 Hz"
 cycles = 2
 """
-RUBBED = PATCH + '[contact.crown]\nradius = "10 m"\n[contact.shear]\n' + LAW + SLIDE
+RUBBED_PATCH = PATCH + '[contact.crown]\nradius = "10 m"\n[contact.shear]\n' + LAW + SLIDE
 POINT = '[normal]\nload = "115 N"\n' + LAW + SLIDE + "[accuracy]\ntolerance = 1e-2\n"
 BONDS = POINT.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')
 RIG = (
@@ -93,7 +93,7 @@ ENVIRON = {
 }
 GROOVES = 'wavelength = "80 um"\namplitude = "2 um"\n'
 BOND = 'bond_length = "1 um"\n'
-GROWN = (
+GROWING_BONDS = (
     f'[friction]\nlaw = "nonlocal"\nstatic = 0.3\nkinetic = 0.2\n{BOND}rest_growth = "1e-3 m/s^2"\nslip_growth = '
     '"1 um"\n'
 )
@@ -164,7 +164,7 @@ EXAMPLES = {
     "friction.reading=stretch": law("nonlocal", BOND + 'reading = "stretch"\n'),
     "friction.reading=report": law("nonlocal", BOND + 'reading = "report"\n'),
     "friction.temperature": (
-        POINT.replace(LAW, GROWN),
+        POINT.replace(LAW, GROWING_BONDS),
         '[friction.temperature]\nsurface = "600 K"\nreference = "293 K"'
         '\nslip_activation = "1000 K"\n',
     ),
@@ -178,7 +178,7 @@ EXAMPLES = {
         '[slide]\nkind = "triangle"\namplitude = "3 um"\nspeed = "2 um/s"\ncycles = 2\n',
     ),
     "slide.kind=dwell": (
-        POINT.replace(LAW, GROWN),
+        POINT.replace(LAW, GROWING_BONDS),
         '[slide]\nkind = "dwell"\nspeed = "10 um/s"\ndistance = "8 um"\n'
         'hold = "1 s"\ndistance_after = "8 um"\n',
     ),
@@ -262,7 +262,8 @@ def _matrix(entries) -> str:
     )
 
 
-_X, _T = np.linspace(0, 12.7, 301), np.linspace(0, 0.05, 201)
+_X = np.linspace(0, 12.7, 301)
+_T = np.linspace(0, 0.05, 201)
 FILES = {
     "trace.csv": _table(
         "x [mm],z [um]", _X, 0.05 * np.sin(2 * np.pi * _X / 3) + 0.02 * np.sin(2 * np.pi * _X / 0.7)

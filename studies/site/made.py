@@ -30,7 +30,7 @@ from patchfem.runs.results.patch_rows import ROWS as STATIC
 from patchfem.scene.keys.types import attributes_by_key, find_meaning
 
 ROOT = Path(__file__).parents[2]
-SHOWN = [name for name in EFFECTS if not name.startswith("structure.interface.")]
+SHOWN_EFFECTS = [name for name in EFFECTS if not name.startswith("structure.interface.")]
 GROUPS = {
     "The patch": "contact",
     "One point": "normal",
@@ -69,7 +69,7 @@ def write(folder: Path) -> None:
         "code": code(),
         "effects/index": effects_index(),
     }
-    pages |= {f"effects/{slug(name)}": effect(name, folder / "effects") for name in SHOWN}
+    pages |= {f"effects/{slug(name)}": effect(name, folder / "effects") for name in SHOWN_EFFECTS}
     for name, text in pages.items():
         (folder / f"{name}.md").write_text(text, "utf-8")
     for path in (*folder.rglob("*.toml"), *folder.rglob("*.csv")):
@@ -83,7 +83,7 @@ def slug(effect: str) -> str:
     return re.sub(r"[.=]", "-", effect)
 
 
-def fenced(kind: str, text: str) -> str:
+def fence(kind: str, text: str) -> str:
     """A block of Markdown."""
     return f"{FENCE}{kind}\n{text.strip()}\n{FENCE}"
 
@@ -100,7 +100,7 @@ def effects_index() -> str:
         "effect.",
     ]
     for title, table in GROUPS.items():
-        of = [name for name in SHOWN if re.split(r"[.=]", name)[0] == table]
+        of = [name for name in SHOWN_EFFECTS if re.split(r"[.=]", name)[0] == table]
         parts += [
             f"## {title}",
             keys_page.grid(
@@ -108,27 +108,27 @@ def effects_index() -> str:
                 [(f"[`{name}`]({slug(name)}.md)", about(name)) for name in of],
             ),
         ]
-    listed = "\n".join(slug(name) for name in SHOWN)
-    return "\n\n".join([*parts, fenced("{toctree}", f":hidden:\n\n{listed}")]) + "\n"
+    listed = "\n".join(slug(name) for name in SHOWN_EFFECTS)
+    return "\n\n".join([*parts, fence("{toctree}", f":hidden:\n\n{listed}")]) + "\n"
 
 
-def table_of(effect: str) -> tuple:
-    """(table, key, value) that turn an effect on: ("friction", "law", "coulomb"), ("contact.tilt", "", "")."""
+def effect_table(effect: str) -> tuple:
+    """Return table, key and value that turn an effect on, such as ("friction", "law", "coulomb")."""
     selector, _, value = effect.partition("=")
     table, _, key = selector.rpartition(".") if value else (selector, "", "")
     return table, key, value
 
 
 def about(effect: str) -> str:
-    """What an effect is, in the words of the guide or of the records of the keys."""
-    table, key, value = table_of(effect)
+    """Describe an effect in the words of the guide or of the records of the keys."""
+    table, key, value = effect_table(effect)
     if effect == "sweep":
         return "Keys and their values: the scene is run for each combination."
     if not value:
         return " ".join((TABLES[table].__doc__ or "").split())
     for row in re.findall(r"^\| (.+?) \| (.+) \|$", guide(), re.M):
         if row[0] in (f"`{value}`", f'`{key} = "{value}"`'):
-            return linked(row[1][:1].upper() + row[1][1:].rstrip(".") + ".")
+            return remove_links(row[1][:1].upper() + row[1][1:].rstrip(".") + ".")
     return f"One value of `{key}`: {find_meaning(TABLES[table], key)}."
 
 
@@ -143,23 +143,23 @@ def guide() -> str:
     return guide_file().read_text("utf-8")
 
 
-def linked(text: str) -> str:
+def remove_links(text: str) -> str:
     """A sentence of the guide without its links, which lead elsewhere from here."""
     return re.sub(r"\[([^\]]+)\]\([^)]+\)", r"\1", text)
 
 
 def effect(name: str, folder: Path) -> str:
     """The page of an effect; its picture is drawn into the folder."""
-    table, key, value = table_of(name)
+    table, key, value = effect_table(name)
     heading = f'`{key} = "{value}"` in `[{table}]`' if value else f"`[{table}]`"
     parts = [
         f"# {heading}",
         about(name),
         "## Equation",
-        fenced("text", EFFECTS[name].equations),
+        fence("text", EFFECTS[name].equations),
         "Numbers in brackets are those of the [corrected equations](../../theory.md).",
         "## Scene",
-        fenced("toml", examples.scene(name)),
+        fence("toml", examples.scene(name)),
         *read_files(name),
         "## Answer",
         *answer(name, folder),
@@ -175,14 +175,14 @@ def effect(name: str, folder: Path) -> str:
 def read_files(name: str) -> list:
     """The first lines of the files that a scene reads."""
     return [
-        f"The first lines of `{file}`:\n\n" + fenced("text", "\n".join(text.splitlines()[:4]))
+        f"The first lines of `{file}`:\n\n" + fence("text", "\n".join(text.splitlines()[:4]))
         for file, text in examples.FILES.items()
         if f'"{file}"' in examples.scene(name)
     ]
 
 
 def answer(name: str, folder: Path) -> list:
-    """What the scene answers, with and without the effect, and its picture."""
+    """Run a scene with and without the effect; return the table of both and its picture."""
     scene = folder / f"{slug(name)}.toml"
     scene.write_text(examples.scene(name), "utf-8")
     picture = folder / f"{slug(name)}.svg"
@@ -215,7 +215,7 @@ def changes(name: str, result, folder: Path) -> str:
     """The measures that the effect changes by more than their errors; the first ones where it has no run without it."""
     start, more = examples.EXAMPLES[name]
     plain = None
-    if more and not table_of(name)[2] and name != "contact.approach":
+    if more and not effect_table(name)[2] and name != "contact.approach":
         bare = folder / "without.toml"
         bare.write_text(start, "utf-8")
         with contextlib.suppress(pf.PatchfemError):
@@ -256,7 +256,7 @@ def differs(one, other) -> bool:
 
 def key_rows(name: str) -> list:
     """The keys of the effect: of a table all of them, of a value those that it needs and may have."""
-    table, key, value = table_of(name)
+    table, key, value = effect_table(name)
     if name == "sweep":
         return [
             "The keys of this table are dotted keys of the scene in quotes. A value is a list, or a range with its "
@@ -276,8 +276,8 @@ def key_rows(name: str) -> list:
 
 
 def limits(name: str) -> list:
-    """What the effect does not go with: of a law what was tried, of others every effect beside it, tried now."""
-    value = table_of(name)[2]
+    """List what an effect does not go with, by trying every other effect beside it."""
+    value = effect_table(name)[2]
     said = {}
     if value in LAWS:
         law = tried.laws()[value]
@@ -285,8 +285,8 @@ def limits(name: str) -> list:
             for sentence in tried.refused(law, one):
                 said.setdefault(sentence, []).append(one.words)
     elif name != "sweep":
-        for other in SHOWN:
-            for sentence in beside(name, other):
+        for other in SHOWN_EFFECTS:
+            for sentence in refusing_sentences(name, other):
                 said.setdefault(sentence, []).append(f"`{other}`")
     rows = [(", ".join(dict.fromkeys(words)), sentence) for sentence, words in said.items()]
     more = "[Limits](../../../../patchfem/scene/LIMITS.md) has the bounds of all numbers and what the models neglect."
@@ -300,7 +300,7 @@ def limits(name: str) -> list:
     ]
 
 
-def beside(name: str, other: str) -> list:
+def refusing_sentences(name: str, other: str) -> list:
     """Sentences with which the scene of an effect refuses another one for not being built yet."""
     start, more = examples.EXAMPLES[name]
     blocks = examples.blocks(start) | examples.blocks(more)
@@ -355,7 +355,7 @@ def glossary() -> str:
     )
     return (
         f"# Glossary\n\nTerms as this program uses them, and every measure of a run.\n\n"
-        f"{fenced('{glossary}', body)}\n"
+        f"{fence('{glossary}', body)}\n"
     )
 
 
@@ -366,11 +366,11 @@ def commands() -> str:
     parts = [
         "# Commands",
         "`patchfem` without arguments prints:",
-        fenced("text", run_patchfem()),
+        fence("text", run_patchfem()),
         "The sections below are the texts that `patchfem VERB --help` prints.",
     ]
     for verb in VERBS:
-        parts += [f"## patchfem {verb}", fenced("text", run_patchfem(verb, "--help"))]
+        parts += [f"## patchfem {verb}", fence("text", run_patchfem(verb, "--help"))]
     return "\n\n".join(parts) + "\n"
 
 
@@ -397,11 +397,11 @@ def python() -> str:
     for name in pf.__all__:
         one = pf.api.plot if name == "plot" else getattr(pf.api, name)
         if inspect.isclass(one):
-            parts.append(fenced("{eval-rst}", f".. autoclass:: patchfem.api.{name}\n   :members:"))
+            parts.append(fence("{eval-rst}", f".. autoclass:: patchfem.api.{name}\n   :members:"))
         elif callable(one):
-            parts.append(fenced("{eval-rst}", f".. autofunction:: patchfem.api.{name}"))
+            parts.append(fence("{eval-rst}", f".. autofunction:: patchfem.api.{name}"))
     parts.append(
-        fenced(
+        fence(
             "{eval-rst}",
             ".. autoclass:: patchfem.api.SweepPlots\n   :members:\n\n.. autoclass:: "
             "patchfem.api.Plots\n   :members:",
@@ -424,5 +424,5 @@ def code() -> str:
         file = ROOT / "patchfem" / name / "__init__.py"
         file = file if file.exists() else file.parent.with_suffix(".py")
         text = ast.get_docstring(ast.parse(file.read_text("utf-8")))
-        parts += [f"## {name}", words[:1].upper() + words[1:] + ".", fenced("text", text)]
+        parts += [f"## {name}", words[:1].upper() + words[1:] + ".", fence("text", text)]
     return "\n\n".join(parts) + "\n"

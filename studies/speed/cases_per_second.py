@@ -32,7 +32,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "integrators"))
 from engine_peers import PEERS
 from engines import advancer
 from numba import njit
-from peer import Peer, run, timed
+from peer import Peer, measure_seconds, run
 from rig_texts import TEXTS
 from switched import PROBLEMS, follow
 
@@ -45,7 +45,9 @@ from patchfem.runs.batch import batches
 from patchfem.scene.axes import make_axis
 from patchfem.scene.scene import loads
 
-CYCLES, POINTS, LANES = 200, 200, 64
+CYCLES = 200  # cycles of a run
+POINTS = 200  # samples of a cycle of the loop in NumPy
+LANES = 64  # cases that are integrated together
 AMPLITUDE = "relative_displacement_amplitude"
 SCENE = f"""[normal]
 load = "1 N"
@@ -69,7 +71,7 @@ tolerance = 1e-3
 """
 
 
-def drawn(count: int, seed: int = 1) -> np.ndarray:
+def draw_blocks(count: int, seed: int = 1) -> np.ndarray:
     """Friction over the push and damping ratio (count, 2) of random blocks."""
     r = np.random.default_rng(seed)
     return np.stack([r.uniform(0.1, 0.9, count), 10 ** r.uniform(np.log10(0.003), -1, count)], 1)
@@ -77,8 +79,20 @@ def drawn(count: int, seed: int = 1) -> np.ndarray:
 
 @njit(fastmath=True, error_model="numpy")
 def loop(limit, turn, part, steps, cycles, out):
-    """The loop of thirty lines: amplitude out (n,) of n blocks, LANES side by side; limit (n,); turn (4, n): what a
-    step without push makes of place and speed; part (n,): cosine part of the motion without friction; n in LANES."""
+    """Integrate n blocks by a loop of thirty lines, LANES side by side.
+
+    Parameters
+    ----------
+    limit : (n,) array
+        Friction limit.
+    turn : (4, n) array
+        Map of place and speed over a step without a push.
+    part : (n,) array
+        Cosine part of the motion without friction.
+    steps, cycles : int
+    out : (n,) array
+        Amplitudes.
+    """
     # one array, so that a compiler knows all distances
     h = 2 * np.pi / steps
     n = LANES
@@ -196,7 +210,14 @@ def by_dop853(case, tolerance: float) -> float:
 
 
 def by_cvode(child: Peer, cases: np.ndarray, tolerance: float) -> tuple:
-    """(amplitudes (n,), CPU seconds) of SUNDIALS' CVODE with its root finder."""
+    """Integrate cases by SUNDIALS' CVODE with its root finder; return amplitudes (n,) and CPU seconds.
+
+    Parameters
+    ----------
+    child : Peer
+    cases : (n, 2) array
+    tolerance : float
+    """
     found = [
         child.ask(
             problem="block",
@@ -308,7 +329,7 @@ FAMILIES = {
 }
 
 
-def of_family(name: str, count: int, seed: int):
+def _answer_family(name: str, count: int, seed: int):
     """Answers of random cases of a family, from the values of their keys on."""
     text, _, keys = FAMILIES[name]
     r = np.random.default_rng(seed)
@@ -324,18 +345,29 @@ def of_family(name: str, count: int, seed: int):
 
 
 def families(seed: int = 1, names=tuple(FAMILIES), goes: int = 3, share: float = 1.0) -> list[dict]:
-    """Cases per CPU second of every family: the median of some goes, each of other cases, after a small one that
-    compiles and imports what it needs; the share of the cases whose amplitude (peak pressure) has a bar within the
-    tolerance of the scene."""
+    """Measure cases per CPU second of every family, as the median of several sweeps of other cases.
+
+    A small sweep before them compiles and imports. The fraction of cases is given whose amplitude (or peak pressure) has
+    an error within the tolerance of the scene.
+
+    Parameters
+    ----------
+    seed : int
+    names : sequence of str
+    goes : int
+        Number of sweeps.
+    share : float
+        Number of cases / default number.
+    """
     rows = []
     for name in names:
         count = max(8, int(FAMILIES[name][1] * share))
-        of_family(name, min(count, 64), seed + 1000)
+        _answer_family(name, min(count, 64), seed + 1000)
         took = []
         good = []
         tolerance = loads(FAMILIES[name][0], RIG).accuracy.tolerance
         for go in range(goes):
-            found, seconds = timed(partial(of_family, name, count, seed + go))
+            found, seconds = measure_seconds(partial(_answer_family, name, count, seed + go))
             measure = AMPLITUDE if AMPLITUDE in found.values else "pressure_peak"
             error = found.errors[measure]
             value = found.values[measure]
@@ -362,24 +394,24 @@ def main(
     count: int = 2000, few: int = 3, steps=(100, 200, 400, 800), tolerances=(1e-3, 1e-5, 1e-8)
 ) -> list[dict]:
     """Measure all ways and print them; the rows."""
-    cases = drawn(count)
+    cases = draw_blocks(count)
     warm = cases[:LANES]
     for way in (by_patchfem, by_exact, lambda some: by_loop(some, 20)):
         way(warm)
-    found, seconds = timed(lambda: by_exact(cases))
+    found, seconds = measure_seconds(lambda: by_exact(cases))
     exact = found.values[AMPLITUDE].copy()
     rows = [row("exact engine, in a batch", "", seconds, exact, exact)]
-    found, seconds = timed(lambda: by_patchfem(cases))
+    found, seconds = measure_seconds(lambda: by_patchfem(cases))
     rows.append(row("lanes, with bars", "1e-3", seconds, found.values[AMPLITUDE], exact))
     miss = np.abs(found.values[AMPLITUDE] - exact) > found.errors[AMPLITUDE] + 1e-12 * exact
     rows[-1]["outside"] = int(miss.sum())
     print(f"  outside their bars: {miss.sum()} of {count}")
     for one in steps:
-        amplitudes, seconds = timed(lambda one=one: by_loop(cases, one))
+        amplitudes, seconds = measure_seconds(lambda one=one: by_loop(cases, one))
         rows.append(row("loop of thirty lines", str(one), seconds, amplitudes, exact))
     some = cases[:few]
     for tolerance in tolerances:
-        amplitudes, seconds = timed(
+        amplitudes, seconds = measure_seconds(
             lambda tolerance=tolerance: [by_dop853(case, tolerance) for case in some]
         )
         rows.append(row("DOP853 with events", f"{tolerance:g}", seconds, amplitudes, exact[:few]))

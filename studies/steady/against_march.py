@@ -28,11 +28,13 @@ from rig_texts import TEXTS
 from patchfem.runs import run as runner
 from patchfem.scene import scene
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 NAMES = tuple(TEXTS)
 FREQUENCIES = np.linspace(115.5, 174.0, 40)  # Hz, 1.5 apart, 144 among them
 MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area")
-STEPS, CYCLES, LONG = 1600, 600, 2000
+STEPS = 1600  # steps per cycle of the march
+CYCLES = 600  # cycles of the march
+LONG = 2000  # cycles of the exact run
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -87,7 +89,7 @@ def compute(names=NAMES, frequencies=FREQUENCIES, **how) -> dict:
 
 
 def main(
-    names=NAMES, frequencies=FREQUENCIES, path: Path | None = HERE / "against_march.svg", **how
+    names=NAMES, frequencies=FREQUENCIES, path: Path | None = FOLDER / "against_march.svg", **how
 ) -> dict:
     """{contact: [Row]}, printed and drawn."""
     table = compute(names, frequencies, **how)

@@ -31,7 +31,7 @@ from patchfem.runs.rig.interface import contact_model
 from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 # and the size [m] that amplitudes are counted in
 CASES = {
     "elastic-plastic": (TEXTS["elastic-plastic"], 1e-6),
@@ -53,14 +53,26 @@ class Row:
     many: tuple
 
     def miss(self, which: str) -> tuple:
-        """Largest relative distances of frequency and damping from the bench's; of the damping over what the contact
-        adds where that is most."""
+        """Return the largest relative differences of frequency and damping from those of the bench.
+
+        Damping is compared relative to what the contact adds, where that is larger.
+        """
         pairs = zip(getattr(self, which), self.bench)
         return tuple(float(np.abs(found / truth - 1).max()) for found, truth in pairs)
 
 
 def loop(text: str, amplitude: float, steps: int) -> tuple:
-    """(equivalent stiffness [N/m], area [J]) of a steady sine cycle of the scene's interface on a bench."""
+    """Return equivalent stiffness [N/m] and loop area [J] of a steady sine cycle of the interface on a bench.
+
+    Parameters
+    ----------
+    text : str
+        Scene.
+    amplitude : float
+        [m]
+    steps : int
+        Steps per cycle.
+    """
     head = text[: text.index("[structure]")]
     bench = (
         f'{head}[slide]\nkind = "sine"\namplitude = "{amplitude!r} m"\nfrequency = "143 Hz"\ncycles = 8\n'
@@ -93,7 +105,7 @@ def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
     )
 
 
-def main(names=tuple(CASES), path: Path | None = HERE / "backbone.svg", **how) -> list:
+def main(names=tuple(CASES), path: Path | None = FOLDER / "backbone.svg", **how) -> list:
     """[Row], printed and drawn."""
     rows = [case(name, **how) for name in names]
     for r in rows:

@@ -17,14 +17,14 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import steady_pictures
-from fold_sweeps import HIGH, LOW, at_rest, curve, sweep
+from fold_sweeps import HIGH_END, LOW_END, at_rest, curve, sweep
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 RATES = (0.4, 0.1, 0.025)  # Hz/s
 
 
-def main(rates=RATES, path: Path | None = HERE / "fold.svg", **how) -> tuple:
-    """(Curve, [Sweep]), printed and drawn."""
+def main(rates=RATES, path: Path | None = FOLDER / "fold.svg", **how) -> tuple:
+    """Print and draw the curve and the sweeps, and return both."""
     steady = curve()
     print(
         f"folds at {steady.folds[0]:.4f} Hz (upper branch ends) and {steady.folds[1]:.4f} Hz (lower branch ends); "
@@ -42,7 +42,7 @@ def main(rates=RATES, path: Path | None = HERE / "fold.svg", **how) -> tuple:
         if len(mine) > 1:
             print(f"  {'up  ' if up else 'down'} at no rate {at_rest(mine):.4f} Hz")
     if path is not None:
-        steady_pictures.fold(steady, sweeps, path, (LOW, HIGH))
+        steady_pictures.fold(steady, sweeps, path, (LOW_END, HIGH_END))
     return steady, sweeps
 
 

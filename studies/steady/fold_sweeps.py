@@ -8,10 +8,11 @@ import numpy as np
 from patchfem.runs import run as runner
 from patchfem.scene import scene
 
-HERE = Path(__file__).parent
-LOW, HIGH = 145.0, 149.0  # Hz, ends of the sweeps
+FOLDER = Path(__file__).parent
+LOW_END = 145.0  # [Hz] lower end of the sweeps
+HIGH_END = 149.0  # [Hz] upper end of the sweeps
 # Hz, of slow ones: just outside the folds, where one motion is left to settle on
-NEAR = (
+SLOW_STARTS = (
     146.2,
     148.0,
 )
@@ -31,7 +32,7 @@ class Curve:
     folds: tuple
 
     def branch(self, upper: bool) -> tuple:
-        """(frequency, amplitude) of the stable upper or lower branch, frequencies rising."""
+        """Return frequencies, rising, and amplitudes of the stable upper or lower branch."""
         turns = np.flatnonzero(np.diff(self.frequency) < 0)
         cut = slice(0, turns[0] + 1) if upper else slice(turns[-1] + 1, None)
         return self.frequency[cut], self.amplitude[cut]
@@ -55,7 +56,7 @@ def curve(low: float = 138.0, high: float = 152.0, tolerance: float = 1e-4) -> C
     """The scene by its own method."""
     sets = [f"drive.from={low} Hz", f"drive.to={high} Hz", f"accuracy.tolerance={tolerance}"]
     found = runner.run(
-        runner.plan(scene.load(HERE / "stiffened.toml", sets)), estimate=False
+        runner.plan(scene.load(FOLDER / "stiffened.toml", sets)), estimate=False
     ).extra["curve"]
     return Curve(
         found["frequency"],
@@ -67,10 +68,17 @@ def curve(low: float = 138.0, high: float = 152.0, tolerance: float = 1e-4) -> C
 
 
 def sweep(
-    steady: Curve, up: bool, rate: float, steps: int = STEPS, low: float = LOW, high: float = HIGH
+    steady: Curve,
+    up: bool,
+    rate: float,
+    steps: int = STEPS,
+    low: float = LOW_END,
+    high: float = HIGH_END,
 ) -> Sweep:
     """March up or down from rest at the first frequency; the state is carried through."""
-    low, high = (max(low, NEAR[0]), min(high, NEAR[1])) if rate < SLOW else (low, high)
+    low, high = (
+        (max(low, SLOW_STARTS[0]), min(high, SLOW_STARTS[1])) if rate < SLOW else (low, high)
+    )
     first, last = (low, high) if up else (high, low)
     sets = [
         f"drive.from={first} Hz",
@@ -81,7 +89,7 @@ def sweep(
         f"accuracy.steps_per_cycle={steps}",
     ]
     seen = runner.run(
-        runner.plan(scene.load(HERE / "stiffened.toml", sets)), estimate=False
+        runner.plan(scene.load(FOLDER / "stiffened.toml", sets)), estimate=False
     ).response
     turn = np.abs(seen.output) > 0
     turn[1:-1] &= (np.abs(seen.output[1:-1]) >= np.abs(seen.output[:-2])) & (
@@ -113,7 +121,9 @@ def sweep(
 
 
 def at_rest(sweeps: list) -> float:
-    """Where the two slowest sweeps one way would jump at no rate at all [Hz]: the delay past a fold goes as the rate to
-    the power 2/3 (Haberman 1979)."""
+    """Extrapolate the two slowest sweeps to the frequency [Hz] of a jump at zero rate.
+
+    The delay past a fold is proportional to the rate to the power 2/3 (Haberman 1979).
+    """
     fast, slow = sorted(sweeps, key=lambda s: -s.rate)[-2:]
     return slow.jump - (fast.jump - slow.jump) / ((fast.rate / slow.rate) ** (2 / 3) - 1)

@@ -14,13 +14,11 @@ from patchfem.campaigns.rows.condition_models import ConditionModels, FitRequest
 from patchfem.core import frozen_array
 from patchfem.model.model import build
 
-MASS, AXIAL = 1.19396625, 143.0  # kg, Hz: block and axial mode of every scene here
-# m2/N, m2, at each level: assumed as in studies/report/repeats.py
-COEFFICIENT, AREA, MINUTES = (
-    1e-14,
-    0.0127**2,
-    10,
-)
+MASS = 1.19396625  # [kg] block of every scene here
+AXIAL = 143.0  # [Hz] axial mode of every scene here
+COEFFICIENT = 1e-14  # [m^2/N] of wear, assumed as in studies/report/repeats.py
+AREA = 0.0127**2  # [m^2] of the patch
+MINUTES = 10  # duration of each level, assumed as in studies/report/repeats.py
 DEPTH = 1e-6  # m worn, at which the factor of `Worn` is read
 BOND = 0.243e-6  # m by which the point gives way before it slides
 

@@ -9,7 +9,18 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from derived import Worn, by_row
-from rungs import CONTAINS, HELD, HERE, ROOT2, RUNGS, SCREEN, SEED, STUCK, TABLE, UNDER
+from rungs import (
+    CONTAINED_READINGS,
+    CONTAINS,
+    FOLDER,
+    PREDICTED_ROWS,
+    ROOT2,
+    RUNGS,
+    SCREEN,
+    SEED,
+    STUCK_READING,
+    TABLE,
+)
 
 from patchfem.campaigns.rows.cells import read_readings, scores
 from patchfem.campaigns.rows.computed import ModelReadings
@@ -20,15 +31,17 @@ from patchfem.identify.least_squares import NEAR_BOUND_FRACTION, run_descents
 from patchfem.identify.space import CubeResidual, make_space
 
 MIL = 25.4e-6
-SCORES = HERE / "scores.json"
-# times the least training score: of the ends of one valley, and of valleys told beside it
-ALIKE, TIED = (
-    1.01,
-    1.05,
+SCORES = FOLDER / "scores.json"
+SAME_VALLEY_FACTOR = (
+    1.01  # ends of one valley have at most this multiple of the smallest training score
+)
+TIED_FACTOR = (
+    1.05  # times the smallest training score: valleys that the record names beside the best
 )
 # rms difference of the training logarithms of two ends from which they are two valleys
-APART = 0.01
-DRAWS, PERCENT = 4000, (5, 95)  # of the bootstrap over rows
+VALLEY_DISTANCE = 0.01
+DRAWS = 4000  # number of bootstrap draws of rows
+PERCENT = (5, 95)  # percentiles of the bootstrap intervals
 # of what a smaller rung does not have
 NEUTRAL = {
     "worn.factor": 1.0,
@@ -42,13 +55,15 @@ def training(cells, protocol: str) -> np.ndarray:
     """Which readings (n,) a protocol fits: "143", "all" or "without FREQUENCY"."""
     if protocol == "all":
         return np.ones(cells.row.size, bool)
-    held = HELD if protocol == "143" else f"frequency={protocol.split()[1]} Hz"
+    held = PREDICTED_ROWS if protocol == "143" else f"frequency={protocol.split()[1]} Hz"
     return ~cells.select(held)
 
 
 def stuck_gain(cells, seen) -> float:
-    """What an accelerometer shows of a block that does not slide, from the readings `seen` (n,) bool: the mean of
-    acceleration over input at the lowest level of the frequency where that is least."""
+    """Return the reading of an accelerometer over the input for a block that sticks, from the readings `seen`.
+
+    It is the mean at the lowest level of the frequency where it is smallest.
+    """
     here = seen & cells.felt
     frequency, level = cells.conditions[cells.condition[here]].T
     ratio = cells.measured[here] / level
@@ -67,14 +82,27 @@ def cells_for(rung: str):
 
 
 def computed_for(rung: str, reading: str, cells, seen, placebo: str = "") -> ModelReadings:
-    """What computes the conditions of a rung under a reading, the gain of stuck readings taken from those `seen`."""
-    more = [f"measured.acceleration_gain={stuck_gain(cells, seen)!r}"] if reading == STUCK else []
+    """Return the function that computes the conditions of a rung under a reading.
+
+    Parameters
+    ----------
+    rung, reading : str
+    cells : Cells
+    seen : (n,) array of bool
+        Readings from which the gain of a stuck block is taken.
+    placebo : str
+    """
+    sets = []
+    if reading == STUCK_READING:
+        sets.append(f"measured.acceleration_gain={stuck_gain(cells, seen)!r}")
+    if placebo:
+        sets.append(placebo)
     one = RUNGS[rung]
-    question = one.question(reading, *more, *([placebo] if placebo else []))
+    question = one.question(reading, *sets)
     return (Worn if one.worn else ModelReadings)(question.condition_models(cells.conditions))
 
 
-def fitted(
+def fit_rung(
     rung: str, reading: str, protocol: str, placebo: str = "", starts: int = 0, most: int = 0
 ) -> dict:
     """Fit a rung under a reading to the readings of a protocol, as a record of numbers that JSON keeps.
@@ -90,9 +118,12 @@ def fitted(
     cells = cells_for(rung)
     seen = training(cells, protocol)
     computed = computed_for(rung, reading, cells, seen, placebo)
-    begins = [] if placebo else contained(rung, reading, protocol, computed.models.ranges, known())
+    begins = []
+    if not placebo:
+        wanted = computed.models.ranges
+        begins = _contained_starts(rung, reading, protocol, wanted, read_records())
     first = starts or (one.starts if protocol in ("143", "without 143") else (one.starts + 1) // 2)
-    values, ends, valleys = best_of(
+    values, ends, valleys = search_starts(
         cells, computed, seen, first, most or starts or one.most, begins
     )
     computed.forget()
@@ -104,29 +135,29 @@ def fitted(
         "protocol": protocol,
         "placebo": placebo,
         "keys": [free.key for free in computed.models.ranges],
-        "values": rounded(values, 6),
+        "values": round_digits(values, 6),
         "at_bound": bounds(computed.models.ranges, values),
         "gain": gain(computed, reading, values),
-        "fitted": rounded(scores(cells, logs, seen)),
-        "others": rounded(scores(cells, logs, ~seen)),
-        "bootstrap": bootstrap(cells, logs, seen),
-        "logs": rounded(logs),
-        "cells": rounded(answer / np.array([[G_N], [MIL]])),
+        "fitted": round_digits(scores(cells, logs, seen)),
+        "others": round_digits(scores(cells, logs, ~seen)),
+        "bootstrap": _bootstrap(cells, logs, seen),
+        "logs": round_digits(logs),
+        "cells": round_digits(answer / np.array([[G_N], [MIL]])),
         "valleys": valleys,
-        "starts": rounded(ends),
+        "starts": round_digits(ends),
         "motions": computed.n_motions,
         "seconds": round(time.process_time() - begin, 1),
     }
 
 
-def contained(rung: str, reading: str, protocol: str, wanted, rows: dict) -> list:
+def _contained_starts(rung: str, reading: str, protocol: str, wanted, rows: dict) -> list:
     """Return values (n,) to start from, taken from the records `rows` of `known`.
 
     These are the records of the rungs and readings that are this one with some numbers fixed, fitted to the same rows,
     and of this one fitted to 143 Hz if that is a part of these rows.
     """
     places = [(other, reading, protocol) for other in CONTAINS.get(rung, ())]
-    places += [(rung, other, protocol) for other in UNDER.get(reading, ())]
+    places += [(rung, other, protocol) for other in CONTAINED_READINGS.get(reading, ())]
     places += [(rung, reading, "143")] * (protocol not in ("143", "without 143"))
     out = []
     for other, under, fitted_to in places:
@@ -147,26 +178,39 @@ def contained(rung: str, reading: str, protocol: str, wanted, rows: dict) -> lis
     return out
 
 
-def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
-    """(values (n,), training rms at the end of every start, valleys) of starts from `begins` (b, n), twice as many
-    random ones again and again, and the best with each number that may be 0 at 0, until two end in the best valley or
-    `most` random ones are reached.
+def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
+    """Descend from many starts until two end in the best valley; return values, training rms and valleys.
 
-    valleys: {"starts", "best": how many of them ended in the best valley, "tied": of every other valley within TIED of
-    the best training score its training score and the scores of the readings that were not fitted}.
+    The starts are `begins`, random ones, twice as many each time, and the best end with each number that may be 0 at 0.
+
+    Parameters
+    ----------
+    cells : Cells
+    computed : ModelReadings
+    seen : (n,) array of bool
+        Training readings.
+    starts, most : int
+        First and largest number of random starts.
+    begins : (b, n) array
+
+    Returns
+    -------
+    tuple
+        Values (n,), training rms at the end of every start, and a dict: starts, number of ends in the best valley, and
+        the valleys tied with it.
     """
     wanted = computed.models.ranges
     residual = make_residual(cells, computed, seen, "bound")
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
     quick = CubeResidual(residual, box, is_quick=True)
-    drawn = np.random.default_rng(SEED)
+    rng = np.random.default_rng(SEED)
     random = 0
     ends = run_descents(quick, [box.unit(one) for one in begins], before_descent=computed.forget)
     while True:
-        points = drawn.random((starts - random, SCREEN, len(wanted)))
+        points = rng.random((starts - random, SCREEN, len(wanted)))
         ends += run_descents(
             quick,
-            [screened(quick, some, computed.forget) for some in points],
+            [_screen_points(quick, some, computed.forget) for some in points],
             before_descent=computed.forget,
         )
         top = min(ends, key=lambda one: one.cost).u
@@ -181,7 +225,7 @@ def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
             [min(ends, key=lambda one: one.cost).u],
             before_descent=computed.forget,
         )[0]
-        best, others = valleys_of(
+        best, others = group_valleys(
             cells, computed, seen, last, [(box.values(one.u), one.rms) for one in ends]
         )
         random = starts
@@ -191,7 +235,7 @@ def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
         starts *= 2
 
 
-def screened(quick, points, forget) -> np.ndarray:
+def _screen_points(quick, points, forget) -> np.ndarray:
     """The point (n,) of some of the unit cube with the least sum of squares, each computed from rest."""
     costs = []
     for u in points:
@@ -201,9 +245,19 @@ def screened(quick, points, forget) -> np.ndarray:
     return points[int(np.argmin(costs))]
 
 
-def valleys_of(cells, computed, seen, last, ends) -> tuple:
-    """(number of ends in the best valley, the other valleys near it) of (values, rms) at the ends of the starts; last:
-    the Descent to the bottom of the best."""
+def group_valleys(cells, computed, seen, last, ends) -> tuple:
+    """Return the number of ends in the best valley, and the other valleys near it.
+
+    Parameters
+    ----------
+    cells : Cells
+    computed : ModelReadings
+    seen : (n,) array of bool
+    last : Descent
+        Descent to the bottom of the best valley.
+    ends : list
+        (values, rms) at the ends of the starts.
+    """
     wanted = computed.models.ranges
     residual = make_residual(cells, computed, seen, "bound")
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
@@ -214,17 +268,19 @@ def valleys_of(cells, computed, seen, last, ends) -> tuple:
 
     least = at(box.values(last.u))
     count = 0
-    known = []
+    valleys = []
     for values, score in sorted(ends, key=lambda one: (not one[1] < np.inf, one[1])):
-        if not score <= TIED * last.rms:
+        if not score <= TIED_FACTOR * last.rms:
             continue
         here = at(values)
-        if score <= ALIKE * last.rms and rms(here - least) < APART:
+        if score <= SAME_VALLEY_FACTOR * last.rms and rms(here - least) < VALLEY_DISTANCE:
             count += 1
-        elif rms(here - least) >= APART and all(rms(here - other) >= APART for other, _ in known):
+        elif rms(here - least) >= VALLEY_DISTANCE and all(
+            rms(here - other) >= VALLEY_DISTANCE for other, _ in valleys
+        ):
             logs = cells.logs(*computed(values, range(len(cells.conditions))))
-            known.append((here, [score, *(scores(cells, logs, ~seen) or {}).values()]))
-    return count, rounded([row for _, row in known])
+            valleys.append((here, [score, *(scores(cells, logs, ~seen) or {}).values()]))
+    return count, round_digits([row for _, row in valleys])
 
 
 def rms(values) -> float:
@@ -243,14 +299,20 @@ def bounds(wanted, values) -> list:
 
 
 def gain(computed, reading: str, values) -> float | None:
-    """The factor of the accelerometer that came from training readings, by a fit or as that of a stuck block; None
-    where it is none of them."""
+    """Return the factor of the accelerometer from training readings; None if there is none.
+
+    Parameters
+    ----------
+    computed : ModelReadings
+    reading : str
+    values : (n,) array
+    """
     if computed.free_gains[0] is not None:
-        return rounded(float(values[computed.free_gains[0]]), 6)
-    return rounded(computed.gains[0], 6) if reading == STUCK else None
+        return round_digits(float(values[computed.free_gains[0]]), 6)
+    return round_digits(computed.gains[0], 6) if reading == STUCK_READING else None
 
 
-def bootstrap(cells, logs, seen) -> dict:
+def _bootstrap(cells, logs, seen) -> dict:
     """5 and 95 % of the scores of the others (n,) bool when rows are drawn with replacement, the fit kept:
     {"fitted", "others": {kind: [low, high]}, "better": {null: {kind: share of draws in which the model scores the
     others better}}}; None where there is nothing to draw."""
@@ -261,7 +323,7 @@ def bootstrap(cells, logs, seen) -> dict:
     }
 
 
-def drawn(cells, among) -> np.ndarray:
+def draw_rows(cells, among) -> np.ndarray:
     """How often (DRAWS, n) each reading counts when the rows with readings among `among` (n,) bool are drawn anew."""
     rows = np.unique(cells.row[among])
     draws = np.random.default_rng(0).integers(0, rows.size, (DRAWS, rows.size))
@@ -270,7 +332,7 @@ def drawn(cells, among) -> np.ndarray:
     return often[:, cells.row] * among
 
 
-def resampled(cells, logs, often, kind: str) -> np.ndarray:
+def _resample_scores(cells, logs, often, kind: str) -> np.ndarray:
     """Scores (DRAWS,) of a kind of reading in drawn rows; NaN where none was drawn."""
     weight = often * {"all": 1, "acceleration": cells.felt, "displacement": ~cells.felt}[kind]
     square = np.where(weight.sum(axis=0) > 0, np.square(np.asarray(logs, float)), 0.0)
@@ -285,39 +347,43 @@ def intervals(cells, logs, among) -> dict | None:
     """{kind: [low, high]} of the scores among readings (n,) bool, as `bootstrap` has them."""
     if not among.any():
         return None
-    often = drawn(cells, among)
-    return {
-        kind: rounded(list(np.nanpercentile(found, PERCENT))) if np.isfinite(found).any() else None
-        for kind, found in ((kind, resampled(cells, logs, often, kind)) for kind in KIND)
-    }
+    often = draw_rows(cells, among)
+    out = dict.fromkeys(KIND)
+    for kind in KIND:
+        found = _resample_scores(cells, logs, often, kind)
+        if np.isfinite(found).any():
+            out[kind] = round_digits(list(np.nanpercentile(found, PERCENT)))
+    return out
 
 
 def better(cells, logs, null, among) -> dict | None:
     """{kind: share of draws in which logs (n,) score better than those of a null}, None where that predicts nothing."""
     if not among.any():
         return None
-    often = drawn(cells, among)
+    often = draw_rows(cells, among)
     out = {}
     for kind in KIND:
-        one, other = (resampled(cells, each, often, kind) for each in (logs, null))
+        one, other = (_resample_scores(cells, each, often, kind) for each in (logs, null))
         there = np.isfinite(one) & np.isfinite(other)
-        out[kind] = rounded(float(np.mean(one[there] < other[there])), 3) if there.any() else None
+        out[kind] = (
+            round_digits(float(np.mean(one[there] < other[there])), 3) if there.any() else None
+        )
     return out
 
 
-def rounded(given, digits: int = 4):
+def round_digits(given, digits: int = 4):
     """The numbers of a tree to so many significant digits; what is not finite is None."""
     if given is None or isinstance(given, str):
         return given
     if isinstance(given, dict):
-        return {name: rounded(one, digits) for name, one in given.items()}
+        return {name: round_digits(one, digits) for name, one in given.items()}
     if isinstance(given, (list, tuple, np.ndarray)):
-        return [rounded(one, digits) for one in given]
+        return [round_digits(one, digits) for one in given]
     return float(f"{given:.{digits}g}") if np.isfinite(given) else None
 
 
-def known() -> dict:
-    """What was computed: (rung, reading, protocol, placebo) -> record."""
+def read_records() -> dict:
+    """Read all records: (rung, reading, protocol, placebo) -> record."""
     rows = json.loads(SCORES.read_text("utf-8")) if SCORES.exists() else []
     return {(row["rung"], row["reading"], row["protocol"], row["placebo"]): row for row in rows}
 

@@ -22,20 +22,22 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from fitting import fitted, keep, known
+from fitting import fit_rung, keep, read_records
 from rungs import variants
 from table import tables
 
 
 def main(minutes: float = 0.0) -> dict:
-    """Fit what is not yet known, in the order of the recipe, for so many minutes; print the tables and return all that
-    is known: (rung, reading, protocol, placebo) -> record."""
-    rows = known()
+    """Fit what is missing for so many minutes, print the tables and return all records.
+
+    The fits follow the order of the recipe; the records are those of `read_records`.
+    """
+    rows = read_records()
     until = time.monotonic() + 60 * minutes
     for variant in variants():
         if variant in rows or time.monotonic() >= until:
             continue
-        rows[variant] = fitted(*variant)
+        rows[variant] = fit_rung(*variant)
         keep(rows)
         print(
             f"{' / '.join(part for part in variant if part)}: {rows[variant]['seconds']} s",

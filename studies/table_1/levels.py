@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from rungs import HERE, ROOT2, RUNGS, STUCK
+from rungs import FOLDER, ROOT2, RUNGS, STUCK_READING
 
 from patchfem.campaigns.rows.computed import ModelReadings
 from patchfem.core import G_N
@@ -31,20 +31,23 @@ from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
 FREQUENCIES = (135.0, 143.0, 150.0, 155.0)
-DISTORTED, AWAY = 0.03, 2 * 25.4e-6  # 1, m
+DISTORTION_LIMIT = (
+    0.03  # third harmonic / first harmonic from which the acceleration counts as distorted
+)
+RUNAWAY_AMPLITUDE = 2 * 25.4e-6  # [m] amplitude that counts as a runaway
 ONSETS = [round(2 + 0.05 * k, 2) for k in range(101)]  # g
 RUNAWAYS = [4 + 0.25 * k for k in range(33)]  # g
-SHOWN = (
+SHOWN_MODELS = (
     ("rigid Coulomb", "peak"),
-    ("second path, patch", STUCK),
+    ("second path, patch", STUCK_READING),
     ("spring and yaw", ROOT2),
-    ("path of Fig. 27", STUCK),
+    ("path of Fig. 27", STUCK_READING),
     ("grooves", ROOT2),
     ("grooves, lift and yaw", "fundamental x gain"),
 )
 
 
-def measured(scene, frequency: float, level: float, name: str) -> float | None:
+def _compute_measure(scene, frequency: float, level: float, name: str) -> float | None:
     """A measure of the scene at a frequency [Hz] and a level [g]; None where it has none."""
     sets = [*scene.sets, f"drive.frequency={frequency} Hz", f"drive.acceleration={level} g"]
     found = run(plan(loads(scene.text, scene.path, sets))).measures.get(name)
@@ -58,7 +61,7 @@ def runaway(question, values, frequency: float) -> float | None:
     )
     for k, level in enumerate(RUNAWAYS):
         computed.forget()
-        if computed(values, [k])[1][k] > AWAY:
+        if computed(values, [k])[1][k] > RUNAWAY_AMPLITUDE:
             return level
     return None
 
@@ -74,10 +77,11 @@ def row(rung: str, reading: str, values, frequency: float) -> dict:
         ONSETS,
         True,
         key=lambda level: (
-            (measured(scene, frequency, level, "acceleration_distortion") or 0.0) > DISTORTED
+            (_compute_measure(scene, frequency, level, "acceleration_distortion") or 0.0)
+            > DISTORTION_LIMIT
         ),
     )
-    phase = measured(scene, frequency, 5.0, "slip_start_phase")
+    phase = _compute_measure(scene, frequency, 5.0, "slip_start_phase")
     return {
         "rung": rung,
         "frequency": frequency,
@@ -87,11 +91,11 @@ def row(rung: str, reading: str, values, frequency: float) -> dict:
     }
 
 
-def main(shown=SHOWN, frequencies=FREQUENCIES) -> list:
+def main(shown=SHOWN_MODELS, frequencies=FREQUENCIES) -> list:
     """Print and return a `row` per rung and frequency."""
     known = {
         (load["rung"], load["reading"]): load
-        for load in json.loads((HERE / "scores.json").read_text("utf-8"))
+        for load in json.loads((FOLDER / "scores.json").read_text("utf-8"))
         if load["protocol"] == "143" and not load["placebo"]
     }
     out = []

@@ -12,18 +12,18 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
-from fitting import known
-from rungs import HERE, ROOT2, STUCK, TABLE
+from fitting import read_records
+from rungs import FOLDER, ROOT2, STUCK_READING, TABLE
 
 from patchfem.campaigns.rows.cells import read_readings
 from patchfem.core import G_N
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 MIL = 25.4e-6
-SHOWN = {  # (rung, reading) -> name, colour, line
+SHOWN_MODELS = {  # (rung, reading) -> name, colour, line
     ("rigid Coulomb", "peak"): ("rigid Coulomb", GREY, ":"),
     ("spring and yaw", ROOT2): ("spring and yaw, √2 × fundamental", BLUE, "-"),
-    ("path of Fig. 27", STUCK): ("path of Fig. 27, 1.24 × peak", ORANGE, "-"),
+    ("path of Fig. 27", STUCK_READING): ("path of Fig. 27, 1.24 × peak", ORANGE, "-"),
     ("grooves, lift and yaw", "fundamental x gain"): (
         "grooves with lift and yaw, gain × fundamental",
         "#2f7d4f",
@@ -33,9 +33,9 @@ SHOWN = {  # (rung, reading) -> name, colour, line
 FREQUENCIES = (135.0, 143.0, 150.0, 155.0)
 
 
-def main(path: Path = HERE / "ladder.svg") -> Path:
+def main(path: Path = FOLDER / "ladder.svg") -> Path:
     """Draw accelerations at four frequencies and displacements at the two where a gauge worked; the file written."""
-    rows = known()
+    rows = read_records()
     cells = read_readings(TABLE)
     with drawing(path, (9.6, 5.4), 2, 4, sharex=True) as (figure, axes):
         for panel, frequency in zip(axes[0], FREQUENCIES):
@@ -65,7 +65,7 @@ def main(path: Path = HERE / "ladder.svg") -> Path:
 def _panel(panel, rows: dict, cells, frequency: float, what: int, unit: float) -> None:
     at = cells.conditions[:, 0] == frequency
     level = cells.conditions[at, 1] / G_N
-    for key, (name, colour, line) in SHOWN.items():
+    for key, (name, colour, line) in SHOWN_MODELS.items():
         row = rows.get((*key, "143", ""))
         if row is not None:
             values = np.array([np.nan if one is None else one for one in row["cells"][what]])

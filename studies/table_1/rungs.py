@@ -31,19 +31,22 @@ from patchfem.campaigns.rows.condition_models import FitRequest
 from patchfem.scene.ranges import read_ranges
 from patchfem.scene.scene import Scene, load, loads
 
-HERE = Path(__file__).parent
-TABLE = HERE.parent / "rig" / "table1.csv"
-HELD = "frequency=135 Hz,150 Hz,155 Hz"
-STARTS, MOST, SCREEN, SEED = 8, 16, 8, 0
+FOLDER = Path(__file__).parent
+TABLE = FOLDER.parent / "rig" / "table1.csv"
+PREDICTED_ROWS = "frequency=135 Hz,150 Hz,155 Hz"
+STARTS = 8  # random starts of a fit
+MAX_STARTS = 16  # largest number of random starts
+SCREEN = 8  # random points per start, of which the best begins a descent
+SEED = 0  # seed of the random starts
 POINT = (
     '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
 )
 GAIN = "measured.acceleration_gain=0.5..3"
-STUCK = "peak x stuck"
+STUCK_READING = "peak x stuck"
 READINGS = {  # name -> (--set strings, free keys of the reading)
     "peak": ((), ()),
     "peak x gain": ((), (GAIN,)),
-    STUCK: (
+    STUCK_READING: (
         ("measured.acceleration_gain=1.2375",),
         (),
     ),  # that of 143 Hz; each fit puts its own in its place
@@ -57,29 +60,32 @@ ROOT2 = "fundamental x sqrt2"
 # in this order of the campaign
 READING = (
     "peak",
-    STUCK,
+    STUCK_READING,
     ROOT2,
     "peak x gain",
     "fundamental x gain",
 )
-FRICTION, YAW = "friction.static=0.1..1.5", "structure.mode.yaw.slide=0..0.5"
-SPRING, DAMPER = (
-    "structure.bonded.stiffness=0 N/m..2e7 N/m",
-    "structure.bonded.damping=0 N s/m..10000 N s/m",
-)
-SEEN = "structure.mode.yaw.accelerometer=-1..1"
-LOAD, AMPLITUDE = "normal.load=15 lbf..50 lbf", ("normal.grooves.amplitude", "2 um..14 um")
-NO_SPRING, NO_DAMPER = "structure.bonded.stiffness=0 N/m", "structure.bonded.damping=0 N s/m"
-MASS, OMEGA, OWN = 1.19396625, 2 * pi * 143, 0.003  # kg, 1/s, 1: block, axial mode, its own damping
+FRICTION = "friction.static=0.1..1.5"
+YAW = "structure.mode.yaw.slide=0..0.5"
+SPRING = "structure.bonded.stiffness=0 N/m..2e7 N/m"
+DAMPER = "structure.bonded.damping=0 N s/m..10000 N s/m"
+YAW_SEEN = "structure.mode.yaw.accelerometer=-1..1"
+LOAD = "normal.load=15 lbf..50 lbf"
+AMPLITUDE = ("normal.grooves.amplitude", "2 um..14 um")
+NO_SPRING = "structure.bonded.stiffness=0 N/m"
+NO_DAMPER = "structure.bonded.damping=0 N s/m"
+MASS = 1.19396625  # [kg] block
+OMEGA = 2 * pi * 143  # [rad/s] axial mode
+AXIAL_DAMPING = 0.003  # damping ratio of the axial mode
 # 148 Hz, ratio 1
 FIG_27 = (
     f"structure.bonded.stiffness={MASS * OMEGA**2 * ((148 / 143) ** 2 - 1)!r} N/m",
-    f"structure.bonded.damping={2 * MASS * (2 * pi * 148 - OWN * OMEGA)!r} N s/m",
+    f"structure.bonded.damping={2 * MASS * (2 * pi * 148 - AXIAL_DAMPING * OMEGA)!r} N s/m",
 )
 PENDULUM = f"structure.bonded.stiffness=0 N/m..{26 * 4.4482216152605 / 0.02!r} N/m"  # load over 20 mm or more of cable
-EACH = ("all", "without 135", "without 143", "without 150", "without 155")
+PROTOCOLS = ("all", "without 135", "without 143", "without 150", "without 155")
 FOUR = ("peak", "peak x gain", "fundamental x gain", ROOT2)
-FIVE = ("peak", "peak x gain", STUCK, "fundamental x gain", ROOT2)
+FIVE = ("peak", "peak x gain", STUCK_READING, "fundamental x gain", ROOT2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,14 +102,14 @@ class Rung:
     readings: tuple = FOUR
     each: tuple = ()
     starts: int = STARTS
-    most: int = MOST
+    most: int = MAX_STARTS
     numbers: tuple = ()
     derive: Callable | None = None
     worn: bool = False
 
     def text(self, reading: str, *more: str) -> Scene:
         """The scene under a reading, with more --set strings."""
-        path = HERE / self.scene
+        path = FOLDER / self.scene
         text = path.read_text("utf-8")
         if self.point:
             text = POINT + text[text.index("static =") :]
@@ -113,27 +119,23 @@ class Rung:
         return loads(text, path, sets) if self.point else load(path, sets)
 
     def question(self, reading: str, *more: str) -> FitRequest:
-        """What `campaigns.rows` is asked: the scene and the ranges of its free keys and of its reading.
+        """Build the request to `campaigns.rows`: the scene, and the ranges of its free keys and of its reading.
 
         Grooves of another wavelength are searched between the amplitudes that bend alike, as far as they do not lock.
         """
         scene = self.text(reading, *more)
-        wanted = read_ranges((*self.free, *READINGS[reading][1]))[0]
+        wanted = list(read_ranges((*self.free, *READINGS[reading][1]))[0])
         grooves = scene.normal.grooves if scene.normal is not None else None
         if grooves is not None:
             bends = (grooves.wavelength / 80e-6) ** 2
             most = 0.9 * grooves.wavelength / (2 * pi * scene.friction.static)
-            wanted = [
-                replace(one, low=bends * one.low, high=min(bends * one.high, most))
-                if one.key == AMPLITUDE[0]
-                else one
-                for one in wanted
-            ]
-        return (
-            Derived(scene, [*wanted, *self.numbers], TABLE, self.derive)
-            if self.numbers
-            else FitRequest(scene, wanted, TABLE)
-        )
+            for place, one in enumerate(wanted):
+                if one.key == AMPLITUDE[0]:
+                    high = min(bends * one.high, most)
+                    wanted[place] = replace(one, low=bends * one.low, high=high)
+        if self.numbers:
+            return Derived(scene, [*wanted, *self.numbers], TABLE, self.derive)
+        return FitRequest(scene, wanted, TABLE)
 
 
 SECOND = (FRICTION, SPRING, DAMPER, YAW)
@@ -145,7 +147,7 @@ RUNGS = {
         (FRICTION, PENDULUM, YAW),
         (NO_DAMPER,),
         True,
-        readings=(STUCK, ROOT2),
+        readings=(STUCK_READING, ROOT2),
         each=(ROOT2,),
     ),
     "spring and yaw": Rung(
@@ -154,7 +156,7 @@ RUNGS = {
         (NO_DAMPER,),
         True,
         readings=FIVE,
-        each=(ROOT2, STUCK),
+        each=(ROOT2, STUCK_READING),
     ),
     "rods, spring and yaw": Rung(
         "rods.toml",
@@ -176,31 +178,42 @@ RUNGS = {
         numbers=(Number("worn.factor", 0.3, 3.0),),
         worn=True,
     ),
-    "second path": Rung("second_path.toml", SECOND, point=True, readings=FIVE, each=(STUCK, ROOT2)),
+    "second path": Rung(
+        "second_path.toml", SECOND, point=True, readings=FIVE, each=(STUCK_READING, ROOT2)
+    ),
     "second path, patch": Rung(
-        "second_path.toml", SECOND, readings=(STUCK, ROOT2), starts=4, most=16
+        "second_path.toml", SECOND, readings=(STUCK_READING, ROOT2), starts=4, most=16
     ),
     "yaw in the accelerometer": Rung(
-        "second_path.toml", (*SECOND, SEEN), point=True, readings=FIVE, each=(STUCK, "peak x gain")
+        "second_path.toml",
+        (*SECOND, YAW_SEEN),
+        point=True,
+        readings=FIVE,
+        each=(STUCK_READING, "peak x gain"),
     ),
     "damper, yaw seen": Rung(
         "second_path.toml",
-        (FRICTION, DAMPER, YAW, SEEN),
+        (FRICTION, DAMPER, YAW, YAW_SEEN),
         (NO_SPRING,),
         True,
-        readings=(STUCK, "peak x gain", ROOT2),
-        each=(STUCK,),
+        readings=(STUCK_READING, "peak x gain", ROOT2),
+        each=(STUCK_READING,),
     ),
     "path of Fig. 27, yaw not seen": Rung(
-        "second_path.toml", (FRICTION, YAW), FIG_27, True, readings=(STUCK, ROOT2), each=(ROOT2,)
+        "second_path.toml",
+        (FRICTION, YAW),
+        FIG_27,
+        True,
+        readings=(STUCK_READING, ROOT2),
+        each=(ROOT2,),
     ),
     "path of Fig. 27": Rung(
         "second_path.toml",
-        (FRICTION, YAW, SEEN),
+        (FRICTION, YAW, YAW_SEEN),
         FIG_27,
         True,
-        readings=(STUCK, "peak x gain", ROOT2),
-        each=(STUCK, "peak x gain", ROOT2),
+        readings=(STUCK_READING, "peak x gain", ROOT2),
+        each=(STUCK_READING, "peak x gain", ROOT2),
     ),
     "grooves": Rung("grooves.toml", (LOAD, "=".join(AMPLITUDE)), starts=4, most=8, each=(ROOT2,)),
     "grooves, lift and yaw": Rung(
@@ -227,12 +240,12 @@ CONTAINS = {  # rung -> those that it is with some of its numbers kept
     ),
 }
 # reading -> those that it is at one gain
-UNDER = {
-    "peak x gain": ("peak", STUCK),
+CONTAINED_READINGS = {
+    "peak x gain": ("peak", STUCK_READING),
     "fundamental x gain": (ROOT2,),
 }
 PLACEBOS = {  # (rung, reading, protocol) -> what is put in the place of what the report says
-    ("yaw in the accelerometer", STUCK, "all"): tuple(
+    ("yaw in the accelerometer", STUCK_READING, "all"): tuple(
         f"structure.mode.yaw.frequency={one} Hz" for one in (73, 110, 122, 138)
     ),
     ("spring and yaw", ROOT2, "143"): tuple(
@@ -245,35 +258,37 @@ PLACEBOS = {  # (rung, reading, protocol) -> what is put in the place of what th
 
 
 def variants() -> list:
-    """Every (rung, reading, protocol, placebo) of the recipe: protocol "143" or one of EACH; placebo a --set string or
-    ""."""
+    """List every (rung, reading, protocol, placebo) of the recipe.
+
+    The protocol is "143" or one of PROTOCOLS; the placebo is a --set string or "".
+    """
     found = [(rung, reading, "143", "") for rung, one in RUNGS.items() for reading in one.readings]
     found += [(*key, placebo) for key, texts in PLACEBOS.items() for placebo in texts]
     found += [
         (rung, reading, protocol, "")
         for rung, one in RUNGS.items()
         for reading in one.each
-        for protocol in EACH
+        for protocol in PROTOCOLS
     ]
-    return sorted(found, key=_place)
+    return sorted(found, key=_rank)
 
 
 # left out in this order
 FOLDS = (
     ("spring and yaw", ROOT2),
-    ("path of Fig. 27", STUCK),
-    ("spring and yaw", STUCK),
+    ("path of Fig. 27", STUCK_READING),
+    ("spring and yaw", STUCK_READING),
     ("path of Fig. 27, yaw not seen", ROOT2),
     ("path of Fig. 27", ROOT2),
     ("path of Fig. 27", "peak x gain"),
-    ("damper, yaw seen", STUCK),
-    ("second path", STUCK),
+    ("damper, yaw seen", STUCK_READING),
+    ("second path", STUCK_READING),
     ("second path", ROOT2),
-    ("yaw in the accelerometer", STUCK),
+    ("yaw in the accelerometer", STUCK_READING),
     ("yaw in the accelerometer", "peak x gain"),
 )
 # what others contain goes first
-SMALL = (
+FIRST_RUNGS = (
     "patch",
     "weight on its cable",
     "spring and yaw",
@@ -293,13 +308,16 @@ SLOW = (
 )
 
 
-def _place(variant: tuple) -> tuple:
-    """When a variant is worked through by a campaign that may be stopped: 143 Hz of what is quick, the first two of
-    FOLDS, 143 Hz of what is slow, the other FOLDS, free gains, the other folds, all rows, placebos, what is slow."""
+def _rank(variant: tuple) -> tuple:
+    """Return the place of a variant in a campaign that may be stopped.
+
+    First come quick fits to 143 Hz and the first two of FOLDS, then slow fits to 143 Hz, other FOLDS, free gains, other
+    folds, all rows and placebos.
+    """
     rung, reading, protocol, placebo = variant
     slow = SLOW.index(rung) + 1 if rung in SLOW else 0
     first = FOLDS.index((rung, reading)) if (rung, reading) in FOLDS else len(FOLDS)
-    size = SMALL.index(rung) if rung in SMALL else 0, READING.index(reading)
+    size = FIRST_RUNGS.index(rung) if rung in FIRST_RUNGS else 0, READING.index(reading)
     if protocol == "143" and not placebo:
         return 1.5 if slow else 2.5 if reading.endswith("gain") else 0, slow, *size
     if slow and not placebo:

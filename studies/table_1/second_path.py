@@ -23,9 +23,9 @@ from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.scene.ranges import read_ranges
 from patchfem.scene.scene import load, loads
 
-HERE = Path(__file__).parent
-TABLE = HERE.parent / "rig" / "table1.csv"
-HELD = "frequency=135 Hz,150 Hz,155 Hz"
+FOLDER = Path(__file__).parent
+TABLE = FOLDER.parent / "rig" / "table1.csv"
+PREDICTED_ROWS = "frequency=135 Hz,150 Hz,155 Hz"
 FREE = (
     "friction.static=0.2..0.8",
     "structure.bonded.stiffness=1e6 N/m..1e7 N/m",
@@ -39,7 +39,7 @@ POINT = (
 
 def question(point: bool = False) -> FitRequest:
     """The scene with the patch, or with one elastic-plastic point in its place, and its free numbers."""
-    path = HERE / "second_path.toml"
+    path = FOLDER / "second_path.toml"
     text = path.read_text("utf-8")
     if point:
         text = POINT + text[text.index("static =") :]
@@ -50,7 +50,7 @@ def as_it_stands(point: bool = False) -> dict:
     """Scores of the scene's own numbers and the seconds of its 27 readings, the second time that they are asked."""
     cells = read_readings(TABLE)
     asked = question(point)
-    held = cells.select(HELD)
+    held = cells.select(PREDICTED_ROWS)
     computed = ModelReadings(asked.condition_models(cells.conditions))
     own = asked.scene
     values = [
@@ -72,9 +72,11 @@ def as_it_stands(point: bool = False) -> dict:
     }
 
 
-def fitted(point: bool = False, starts: int = 8):
+def fit_path(point: bool = False, starts: int = 8):
     """The numbers fitted to 143 Hz from random starts, as FittedRows."""
-    return fit_rows(question(point), RowsOptions(hold=(HELD,), search=SearchSettings(starts)))
+    return fit_rows(
+        question(point), RowsOptions(hold=(PREDICTED_ROWS,), search=SearchSettings(starts))
+    )
 
 
 def main(starts: int = 8) -> dict:
@@ -83,7 +85,7 @@ def main(starts: int = 8) -> dict:
     print(f"{'':<8}{'':<12}{'acceleration':>14}{'displacement':>14}{'all':>8}")
     for name in ("patch", "point"):
         begin = time.process_time()
-        found = fitted(name == "point", starts)
+        found = fit_path(name == "point", starts)
         seconds = time.process_time() - begin
         each = {
             "model": found.score(found.logs, found.left_out_logs),

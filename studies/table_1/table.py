@@ -12,9 +12,9 @@ from textwrap import fill
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from fitting import KIND, better, intervals, known, training
+from fitting import KIND, better, intervals, read_records, training
 from fitting import NULLS as RIVALS
-from rungs import EACH, HERE, ROOT2, RUNGS, STUCK, TABLE, variants
+from rungs import FOLDER, PROTOCOLS, ROOT2, RUNGS, STUCK_READING, TABLE, variants
 
 from patchfem.campaigns.rows.cells import read_readings, scores
 from patchfem.campaigns.rows.null_models import NULL_MODELS, fit_null_model
@@ -51,13 +51,21 @@ TITLES = {
     "damper, yaw seen": "damper, yaw in the accelerometer",
     "path of Fig. 27, yaw not seen": "path of Fig. 27, yaw not in the accelerometer",
 }
-BEFORE = (  # (rung, reading), its scores in the ladder before this one: at 143 Hz, 135 to 155 Hz, left out; its starts
+# (rung, reading), its scores in the earlier ladder at 143 Hz, at 135 to 155 Hz and left out, its starts
+EARLIER_LADDER = (
     ("spring and yaw", ROOT2, ".074 / .082 / .051", ".166 / .138 / .255", ".179 / .132 / .287", 8),
-    ("second path", STUCK, ".063 / .065 / .058", ".186 / .156 / .284", ".298 / .140 / .569", 8),
+    (
+        "second path",
+        STUCK_READING,
+        ".063 / .065 / .058",
+        ".186 / .156 / .284",
+        ".298 / .140 / .569",
+        8,
+    ),
     ("second path", ROOT2, ".084 / .097 / .041", ".172 / .125 / .303", ".246 / .129 / .456", 8),
     (
         "yaw in the accelerometer",
-        STUCK,
+        STUCK_READING,
         ".062 / .063 / .060",
         ".179 / .144 / .287",
         ".146 / .097 / .249",
@@ -90,33 +98,33 @@ BEFORE = (  # (rung, reading), its scores in the ladder before this one: at 143 
     ),
 )
 MARK = "<!-- {} -->"
-SAID = {
+NAMED_FITS = {
     "rigid": ("rigid Coulomb", "peak"),
     "patch": ("patch", "fundamental x gain"),
     "weight": ("weight on its cable", ROOT2),
     "spring": ("spring and yaw", ROOT2),
-    "path": ("path of Fig. 27", STUCK),
+    "path": ("path of Fig. 27", STUCK_READING),
     "root": ("path of Fig. 27", ROOT2),
     "lift": ("grooves, lift and yaw", "fundamental x gain"),
-    "damped": ("second path", STUCK),
-    "seen": ("yaw in the accelerometer", STUCK),
+    "damped": ("second path", STUCK_READING),
+    "seen": ("yaw in the accelerometer", STUCK_READING),
 }
 
 
-def three(found: dict | None) -> str:
+def three(values: dict | None) -> str:
     """ "all / acceleration / displacement" of scores; a dash where one is missing."""
-    if found is None:
+    if values is None:
         return "-"
-    return " / ".join("-" if found[name] is None else short(found[name]) for name in KIND)
+    return " / ".join("-" if values[name] is None else short(values[name]) for name in KIND)
 
 
 def short(score: float) -> str:
     return f"{score:.3f}".lstrip("0")
 
 
-def folds_of(rows: dict, rung: str, reading: str) -> list | None:
+def _read_folds(rows: dict, rung: str, reading: str) -> list | None:
     """The records of the four folds; None where one is missing."""
-    folds = [rows.get((rung, reading, protocol, "")) for protocol in EACH[1:]]
+    folds = [rows.get((rung, reading, protocol, "")) for protocol in PROTOCOLS[1:]]
     return None if None in folds else folds
 
 
@@ -132,7 +140,7 @@ def left_logs(folds) -> np.ndarray:
 
 def left_out(rows: dict, rung: str, reading: str) -> dict | None:
     """Scores of every reading by the fit that did not see its frequency; None where a fold is missing."""
-    folds = folds_of(rows, rung, reading)
+    folds = _read_folds(rows, rung, reading)
     if folds is None:
         return None
     logs = left_logs(folds)
@@ -143,7 +151,7 @@ def null_left(name: str) -> np.ndarray:
     """`left_logs` of a model without mechanics."""
     cells = read_readings(TABLE)
     out = np.full(cells.row.size, np.nan)
-    for protocol in EACH[1:]:
+    for protocol in PROTOCOLS[1:]:
         fold = training(cells, protocol)
         out[~fold] = fit_null_model(cells, name, fold)[0][~fold]
     return out
@@ -163,16 +171,16 @@ def numbers(row: dict) -> str:
             f"{SHORT[name]} = {shown:.3g} {UNITS[name]}".strip()
             + (f" ({end} end of its range)" if end else "")
         )
-    given = f"; not fitted: gain = {row['gain']:.4g}" if row["reading"] == STUCK else ""
+    given = f"; not fitted: gain = {row['gain']:.4g}" if row["reading"] == STUCK_READING else ""
     return ", ".join(parts) + given
 
 
-def titled(rung: str) -> str:
+def rung_title(rung: str) -> str:
     """The name of a model as it is printed."""
     return TITLES.get(rung, rung)
 
 
-def found(row: dict) -> str:
+def starts_text(row: dict) -> str:
     """In how many of its starts a record found its valley; † once only, ‡ taken over from the ladder before."""
     text = f"{row['valleys']['best']} of {row['valleys']['starts']}"
     return text + " †" * (row["valleys"]["best"] < 2) + " ‡" * row.get("before", False)
@@ -204,7 +212,15 @@ def nulls() -> list:
 
 def tables(rows: dict) -> list:
     """Lines of markdown of what was computed: (rung, reading, protocol, placebo) -> record."""
-    return [*_rungs(rows), "", *_left(rows), "", *_before(rows), "", *_placebos(rows)]
+    return [
+        *_rungs(rows),
+        "",
+        *_left_out_lines(rows),
+        "",
+        *_comparison_lines(rows),
+        "",
+        *_placebos(rows),
+    ]
 
 
 def _rungs(rows: dict) -> list:
@@ -229,35 +245,35 @@ def _rungs(rows: dict) -> list:
         for reading in one.readings:
             row = rows.get((rung, reading, "143", ""))
             if row is None:
-                out.append(f"| {titled(rung)} | {reading} | not run | | | | | | |")
+                out.append(f"| {rung_title(rung)} | {reading} | not run | | | | | | |")
                 continue
             every = rows.get((rung, reading, "all", ""))
             out.append(
-                f"| {titled(rung)} | {reading} | {len(row['values'])}: {numbers(row)} | {found(row)} | "
-                f"{three(row['fitted'])} | {three(row['others'])} | {_marked(rows, rung, reading)} | "
+                f"| {rung_title(rung)} | {reading} | {len(row['values'])}: {numbers(row)} | {starts_text(row)} | "
+                f"{three(row['fitted'])} | {three(row['others'])} | {_mark_scores(rows, rung, reading)} | "
                 f"{three(every and every['fitted'])} | {row['seconds']:.0f} |"
             )
     return out
 
 
-def _marked(rows: dict, rung: str, reading: str) -> str:
+def _mark_scores(rows: dict, rung: str, reading: str) -> str:
     """The left-out scores, with † where the best valley of a fold was found once only."""
-    folds = folds_of(rows, rung, reading)
+    folds = _read_folds(rows, rung, reading)
     once = folds and any(fold["valleys"]["best"] < 2 for fold in folds)
     return three(left_out(rows, rung, reading)) + (" †" if once else "")
 
 
-def shared(rows: dict) -> list:
-    """(rung, reading) of which all folds are there, and their logarithms."""
+def fully_folded(rows: dict) -> list:
+    """List the (rung, reading) that have all folds, with their logarithms."""
     here = [
-        (rung, reading, folds_of(rows, rung, reading))
+        (rung, reading, _read_folds(rows, rung, reading))
         for rung, one in RUNGS.items()
         for reading in one.each
     ]
     return [(rung, reading, folds, left_logs(folds)) for rung, reading, folds in here if folds]
 
 
-def _left(rows: dict) -> list:
+def _left_out_lines(rows: dict) -> list:
     """Each frequency left out: scores with their bootstrap, and how often the rows drawn anew prefer the model."""
     cells = read_readings(TABLE)
     every = np.ones(cells.row.size, bool)
@@ -272,7 +288,7 @@ def _left(rows: dict) -> list:
     told = {"constant": "constant x input", "strong": "power law in input and frequency"}
     listed = [
         (f"without mechanics: {told[name]}", "", None, logs) for name, logs in null.items()
-    ] + shared(rows)
+    ] + fully_folded(rows)
     for rung, reading, folds, logs in listed:
         own = scores(cells, logs, every)
         drawn = intervals(cells, logs, every)
@@ -289,7 +305,7 @@ def _left(rows: dict) -> list:
         of_strong = f"{beats['strong']['acceleration']:.2f}" if folds else ""
         twice = f"{sum(fold['valleys']['best'] > 1 for fold in folds)} of 4" if folds else ""
         out.append(
-            f"| {titled(rung)} | {reading} | {' | '.join(cellular)} | {of_constant} | {of_strong} | {twice} | "
+            f"| {rung_title(rung)} | {reading} | {' | '.join(cellular)} | {of_constant} | {of_strong} | {twice} | "
             f"{_ends(folds) if folds else ''} |"
         )
     return out
@@ -310,20 +326,20 @@ def _ends(folds) -> str:
     return "; ".join(parts) or "none"
 
 
-def _before(rows: dict) -> list:
+def _comparison_lines(rows: dict) -> list:
     """The ladder before and after, for what stood in both."""
     out = [
         "| model | accelerometer shows | version | score at 143 Hz | score at 135, 150, 155 Hz | score with each "
         "frequency left out | starts |",
         "|---|---|---|---|---|---|---|",
     ]
-    for rung, reading, *before, starts in BEFORE:
+    for rung, reading, *before, starts in EARLIER_LADDER:
         row = rows.get((rung, reading, "143", ""))
         if row is None:
             continue
         out += [
-            f"| {titled(rung)} | {reading} | before | {' | '.join(before)} | {starts} |",
-            f"| | | after | {three(row['fitted'])} | {three(row['others'])} | {_marked(rows, rung, reading)} | "
+            f"| {rung_title(rung)} | {reading} | before | {' | '.join(before)} | {starts} |",
+            f"| | | after | {three(row['fitted'])} | {three(row['others'])} | {_mark_scores(rows, rung, reading)} | "
             f"{row['valleys']['starts']} |",
         ]
     return out
@@ -344,17 +360,18 @@ def _placebos(rows: dict) -> list:
         kind = "frequency of the yaw mode" if kind == "frequency" else kind
         instead = f"{three(real and real['fitted'])}, {three(real and real['others'])}"
         out.append(
-            f"| {titled(rung)}: {kind} = {value} | {instead} | {three(row['fitted'])} | "
+            f"| {rung_title(rung)}: {kind} = {value} | {instead} | {three(row['fitted'])} | "
             f"{three(row['others'])} |"
         )
     return out
 
 
 def head(rows: dict) -> list:
-    """What the records say, in sentences; every score as all / accelerations / displacements."""
-    one = {name: rows[rung, reading, "143", ""] for name, (rung, reading) in SAID.items()}
+    """Write the sentences on the records; a score is all / accelerations / displacements."""
+    one = {name: rows[rung, reading, "143", ""] for name, (rung, reading) in NAMED_FITS.items()}
     left = {
-        name: three(left_out(rows, *SAID[name])) for name in ("spring", "path", "damped", "seen")
+        name: three(left_out(rows, *NAMED_FITS[name]))
+        for name in ("spring", "path", "damped", "seen")
     }
     none = {name: (three(held), three(out)) for name, _, _, held, out, _ in nulls()}
     draws = [
@@ -417,16 +434,16 @@ def parts(rows: dict) -> dict:
     return {
         "head": head(rows),
         "rungs": _rungs(rows),
-        "left out": _left(rows),
-        "before": _before(rows),
+        "left out": _left_out_lines(rows),
+        "before": _comparison_lines(rows),
         "placebos": _placebos(rows),
     }
 
 
-def main(path: Path = HERE / "README.md") -> str:
+def main(path: Path = FOLDER / "README.md") -> str:
     """Put every table between its marks in README.md; the text written."""
     text = path.read_text("utf-8")
-    for name, lines in parts(known()).items():
+    for name, lines in parts(read_records()).items():
         before, _, rest = text.partition(MARK.format(name) + "\n")
         text = (
             before

@@ -45,8 +45,11 @@ def answer(name: str, frequency: float, level: float, cycles: float, estimate: b
 
 
 def main(cycles: float = 800, models=("coulomb", "patch")) -> dict:
-    """Print cells and scores; returns {model: {"cells" (2, c) [m s-2] and [m], "all", "acceleration", "displacement"},
-    "null"}."""
+    """Print cells and scores and return them by model.
+
+    Each model has "cells" (2, c) in m/s^2 and m, "all", "acceleration" and "displacement"; "null" is the score without
+    a model.
+    """
     cells = read_readings(RIG / "table1.csv")
     every = np.ones(cells.row.size, bool)
     out = {

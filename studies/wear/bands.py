@@ -30,8 +30,10 @@ from synthetic import report_area
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
-HERE = Path(__file__).parent
-STEP, POINTS, UM = 3.2e-6, 320, 1e-6
+FOLDER = Path(__file__).parent
+STEP = 3.2e-6  # [m] spacing of the surface
+POINTS = 320  # points of the surface in each direction
+UM = 1e-6  # [m]
 # steps; Table 1: 0.08 to 0.55 mil, 2 to 14 um, of relative displacement
 STROKES = (
     0,
@@ -67,7 +69,7 @@ def amplitudes(areas) -> np.ndarray:
     return np.array([[periodic_amplitude(z, STEP, axis)[::8] for z in areas] for axis in (1, 0)])
 
 
-def whole(traces) -> np.ndarray:
+def area_amplitudes(traces) -> np.ndarray:
     """Band amplitude of each area, from those of its traces."""
     return np.sqrt((traces**2).mean(axis=-1))
 
@@ -79,9 +81,13 @@ def pairs(one, other) -> np.ndarray:
 
 def row(stroke: int, worn: float, before, after) -> Row:
     """Row from the amplitudes of all areas (2, k, traces) [m] before and after."""
-    ratios = whole(after[0]) / whole(after[1])
+    ratios = area_amplitudes(after[0]) / area_amplitudes(after[1])
     single = pairs(*after)
-    fallen = [(whole(after[axis]) / whole(before[axis])).mean() for axis in (0, 1)]
+    along_x, along_y = map(area_amplitudes, after)
+    fallen = (
+        (along_x / area_amplitudes(before[0])).mean(),
+        (along_y / area_amplitudes(before[1])).mean(),
+    )
     return Row(
         stroke * STEP,
         worn,
@@ -89,7 +95,7 @@ def row(stroke: int, worn: float, before, after) -> Row:
         ratios.std(ddof=1),
         np.quantile(single, INTERVAL),
         (single < np.quantile(pairs(*before), INTERVAL[0])).mean(),
-        tuple(fallen),
+        fallen,
         tuple(
             np.quantile(pairs(after[axis], np.roll(before[axis], 1, 0)), INTERVAL)
             for axis in (0, 1)
@@ -118,7 +124,7 @@ def wear(strokes, seeds: int, bite: float) -> tuple:
     return rows, (new[0][0], shown)
 
 
-def picture(rows: list, shown: tuple, path: Path) -> Path:
+def _picture(rows: list, shown: tuple, path: Path) -> Path:
     """Left: traces of one surface, new and worn at 6.4 um. Right: band ratio over stroke."""
     new = shown[0]
     worn = shown[1][2]
@@ -174,7 +180,10 @@ def picture(rows: list, shown: tuple, path: Path) -> Path:
 
 
 def main(
-    strokes=STROKES, seeds: int = 6, bite: float = 0.01 * UM, path: Path | None = HERE / "bands.svg"
+    strokes=STROKES,
+    seeds: int = 6,
+    bite: float = 0.01 * UM,
+    path: Path | None = FOLDER / "bands.svg",
 ) -> list:
     """[Row], printed and drawn; first that of new surfaces."""
     rows, shown = wear(strokes, seeds, bite)
@@ -189,7 +198,7 @@ def main(
             f"trace each way {low:.2f}-{high:.2f}, below new ones {100 * r.seen:.0f} %; after/before {falls}"
         )
     if path is not None:
-        picture(rows, shown, path)
+        _picture(rows, shown, path)
     return rows
 
 

@@ -34,13 +34,13 @@ from patchfem.runs.rig import levels, solve
 from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 
-HERE = Path(__file__).parent
-SCENE = HERE.parent / "rig" / "rig.toml"
+FOLDER = Path(__file__).parent
+SCENE = FOLDER.parent / "rig" / "rig.toml"
 RIG = SCENE.read_text()
 CYCLES = 135_723  # 16 minutes at 143 Hz
 COEFFICIENTS = (1e-15, 1e-14, 1e-13)  # m2/N, assumed: sprayed carbide on itself, mild to severe
-PLASTIC = '[friction]\nlaw = "elastic-plastic"\nbond_length = "1 um"\nstatic = 0.30\n'  # its onset is sharp
-SHOWN = (
+PLASTIC = '[friction]\nlaw = "elastic-plastic"\nbond_length = "1 um"\nstatic = 0.30\n'  # this law has a sharp onset of slip
+SHOWN_MEASURES = (
     "contact_fraction",
     "pressure_peak",
     "normal_stiffness",
@@ -81,7 +81,7 @@ def onset(worn, cycles: int, pair=None) -> float:
     return levels.onset(found.levels, found.probe, 3e-3)[0] / G_N
 
 
-def worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> Row:
+def _worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> Row:
     """The shipped rig worn with a coefficient [m2/N]; motion: cycles of each march."""
     text = RIG + f'[wear]\ncoefficient = "{coefficient!r} m^2/N"\ncycles = {cycles}\n'
     found = runner.run(
@@ -89,7 +89,7 @@ def worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> Ro
     )
     depth = found.fields["worn_depth"][-1]
     fields = found.fields["normal_stress"]
-    values = {name: found.measures[name].value for name in SHOWN}
+    values = {name: found.measures[name].value for name in SHOWN_MEASURES}
     return Row(
         coefficient,
         values,
@@ -135,11 +135,11 @@ def main(
     cycles=CYCLES,
     motion=200,
     tolerance="1e-2",
-    path=HERE / "rig_story.svg",
+    path=FOLDER / "rig_story.svg",
 ) -> list:
     """Rows of the rig, new and worn with each coefficient; printed as a table, drawn where a path is given."""
-    rows = [worn_rig(each, cycles, motion, tolerance) for each in coefficients]
-    new = {name: rows[0].history[name][0] for name in SHOWN}
+    rows = [_worn_rig(each, cycles, motion, tolerance) for each in coefficients]
+    new = {name: rows[0].history[name][0] for name in SHOWN_MEASURES}
     pair = runner.run(
         scene.loads(RIG, SCENE, [f"drive.cycles={motion}"]), estimate=False
     ).patch.pair
@@ -155,7 +155,7 @@ def main(
         f"{'amp um':>8} {'loop mJ':>8} {'onset g':>8}"
     )
     for r in rows:
-        v = [r.values[name] for name in SHOWN]
+        v = [r.values[name] for name in SHOWN_MEASURES]
         print(
             f"{r.coefficient:8.0e} {r.depth * 1e6:9.3f} {100 * v[0]:9.1f} {v[1] / 1e6:9.2f} {r.error / 1e6:6.2f} "
             f"{v[2] / 1e6:9.0f} {v[3] / 1e6:9.0f} {v[4] * 1e6:8.3f} {v[5] * 1e3:8.4f} {r.onset:8.3f}"

@@ -1,8 +1,6 @@
-"""Factors of a stiffness: every library against the dense inverse and each other; what the dissection promises."""
+"""Factors of a stiffness against the dense inverse, and the properties of the dissection of a mesh."""
 
 from __future__ import annotations
-
-import importlib.util
 
 import numpy as np
 import pytest
@@ -13,28 +11,13 @@ from pieces import COATED, COATING
 from scipy.sparse import block_diag, coo_matrix, csc_matrix, csr_matrix, eye_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay
-from stiffness import stiffness_of
-from study_module import study
+from stiffness import free_stiffness
 
 from patchfem.core import NotConverged
 from patchfem.elasticity import fronts
 from patchfem.elasticity.dissect import MAX_LEAF_NODES, dissect_nodes
+from patchfem.elasticity.substructure import Substructure
 from patchfem.mesh.tensor import graded_grid
-
-factors = study("common/factors.py")
-make_piece, factorise, BACKENDS = factors.make_piece, factors.factorise, factors.BACKENDS
-NEEDS = {"cholmod": "sksparse", "pardiso": "pypardiso"}
-
-
-def usable(name):
-    """The name as a test parameter, skipped by name where its extra is not installed."""
-    there = name not in NEEDS or importlib.util.find_spec(NEEDS[name]) is not None
-    return pytest.param(
-        name, marks=pytest.mark.skipif(not there, reason=f"{name} is not installed")
-    )
-
-
-each_backend = pytest.mark.parametrize("name", [usable(name) for name in BACKENDS])
 
 
 def scattered(count, seed):
@@ -46,12 +29,11 @@ def scattered(count, seed):
     )
 
 
-@each_backend
 @pytest.mark.parametrize("size, split", [(5e-4, 0.0), (1e-4, 0.5)])
-def test_exact_solutions_and_compliance_are_those_of_the_dense_inverse(name, size, split):
+def test_exact_solutions_and_compliance_are_those_of_the_dense_inverse(size, split):
     mesh = of_grid(graded_grid(2e-3, 1e-3, size, COATING), split, seed=4)
-    piece = make_piece(mesh, COATED, name)
-    full = np.linalg.inv(stiffness_of(piece).toarray())
+    piece = Substructure(mesh, COATED)
+    full = np.linalg.inv(free_stiffness(piece).toarray())
     k = 2 * mesh.interface.size
     assert np.abs(piece.factor.compliance() - full[-k:, -k:]).max() <= 1e-10 * np.abs(full).max()
     load = np.random.default_rng(1).normal(size=(full.shape[0], 3))
@@ -60,8 +42,7 @@ def test_exact_solutions_and_compliance_are_those_of_the_dense_inverse(name, siz
     assert np.array_equal(load, kept)
 
 
-@each_backend
-def test_refuses_a_singular_stiffness(name):
+def test_refuses_a_singular_stiffness():
     matrix = csc_matrix(
         np.diag([2.0, 1, 1, 1, 1, 1])
         - np.diag([1.0, 0, 0, 0, 0], 1)
@@ -69,7 +50,7 @@ def test_refuses_a_singular_stiffness(name):
     )
     matrix[0, 0] = 1.0
     with pytest.raises(NotConverged, match="stiffness of the piece"):
-        factorise(matrix, [0, 2, 3], name).compliance()
+        fronts.factorise(matrix, np.array([0, 2, 3])).compliance()
 
 
 @given(count=st.integers(4, 900), seed=st.integers(0, 99))

@@ -53,8 +53,8 @@ def test_exact_dissection_and_condensed_cells_leave_the_compliance_of_all_unknow
 def test_order_four_reaches_1e_4_with_a_fifth_of_the_unknowns_that_miss_it_bilinearly(orders):
     """The tilt of 1e-4 rad: 5790 unknowns of order 4 are within 1e-4, 30 780 bilinear ones not within 2.5e-4."""
     case = orders.CASES["1e-4 rad"]
-    fine = orders.solved(case, *orders.grids(case, orders.Grading(0.7, 0.8, 1e-3)), 4)
-    rough = orders.solved(case, *orders.grids(case, orders.Grading(0.125, 0.8, 1e-4)), 1)
+    fine = orders.solve_pair(case, *orders.grids(case, orders.Grading(0.7, 0.8, 1e-3)), 4)
+    rough = orders.solve_pair(case, *orders.grids(case, orders.Grading(0.125, 0.8, 1e-4)), 1)
     assert (
         orders.errors(case, fine.values).max()
         < 1e-4

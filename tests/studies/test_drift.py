@@ -27,7 +27,7 @@ def test_exact_drift_of_the_stretch_is_the_closed_form(table):
 
 
 def test_exact_laws_that_close_their_loops_do_not_drift(table):
-    for name, engine in table.small().items():
+    for name, engine in table.laws_without_bonds().items():
         for case in table.CASES:
             steps = 3 if name == "elastic-plastic" else 2
             last = (
@@ -36,7 +36,7 @@ def test_exact_laws_that_close_their_loops_do_not_drift(table):
                 else 0.0
             )
             assert last == pytest.approx(0.0, abs=1e-12), (name, case)
-    assert all(table.closed(case)[0].last == 0 for case in table.CASES)
+    assert all(table.closed_form_rows(case)[0].last == 0 for case in table.CASES)
 
 
 def test_always_a_load_that_changes_at_a_held_force_moves_none_but_order_zero(table):
@@ -53,7 +53,7 @@ def test_always_a_load_that_changes_at_a_held_force_moves_none_but_order_zero(ta
 
 
 def test_exact_creep_and_the_way_of_bouc_wen(table):
-    rows = {row.law: row.last for row in table.closed("force .5+-.1")}
+    rows = {row.law: row.last for row in table.closed_form_rows("force .5+-.1")}
     time = (np.arange(4000) + 0.5) / 4000
     slow = 1e-3 * np.arctanh(0.4 + 0.2 * time).mean() / 143 / 2e-6
     assert (

@@ -26,7 +26,7 @@ def today(ladder):
 
 @pytest.mark.parametrize("amplitude", [0.3, 3.0])
 def test_exact_areas_without_growth(ladder, amplitude):
-    dahl = ladder.followed(ladder.points(ladder.bonds()), amplitude)
+    dahl = ladder.last_cycle(ladder.points(ladder.bonds()), amplitude)
     sharp = ladder.elastic_plastic(amplitude)
     assert dahl.area == pytest.approx(friction_forms.stretch_loop(amplitude, 1.0)[0], rel=2e-6)
     assert sharp.area == pytest.approx(friction_forms.jenkins_loop(amplitude, 1.0)[0], abs=1e-12)
@@ -35,7 +35,7 @@ def test_exact_areas_without_growth(ladder, amplitude):
 
 
 def test_exact_rms_of_coulomb_falls_as_the_fourth_root(ladder):
-    dahl = ladder.followed(ladder.points(ladder.bonds()), 400.0, 48_000)
+    dahl = ladder.last_cycle(ladder.points(ladder.bonds()), 400.0, 48_000)
     assert ladder.error(ladder.coulomb(dahl), dahl)[1] == pytest.approx(
         (4 / np.pi / 400) ** 0.25, rel=0.01
     )
@@ -61,7 +61,7 @@ def test_exact_lugre_is_the_law_that_grows_at_once(ladder):
         ).y[0]
         / length
     )
-    found = ladder.followed(ladder.points(ladder.at_once()), amplitude)
+    found = ladder.last_cycle(ladder.points(ladder.at_once()), amplitude)
     assert found.force == pytest.approx((z[1:] + z[:-1]) / 2, abs=4e-6)
 
 
@@ -97,11 +97,11 @@ def test_exact_iwan_by_masing_is_a_bond_length_short(ladder, today, amplitude):
 def test_always_where_the_growing_rungs_are_enough(ladder, table):
     for amplitude, wanted in ((0.3, (0.0, 0.001, 0.011)), (3.0, (0.0019, 0.22, 0.029))):
         stretch, lugre = (
-            ladder.followed(ladder.points(law), amplitude)
+            ladder.last_cycle(ladder.points(law), amplitude)
             for law in (ladder.bonds(**ladder.GROWTH), ladder.at_once())
         )
         held = [
-            ladder.followed(ladder.points(ladder.bonds(share)), amplitude)
+            ladder.last_cycle(ladder.points(ladder.bonds(share)), amplitude)
             for share in (1.0, ladder.RATIO)
         ]
         found = (ladder.error(lugre, stretch), *(ladder.error(one, lugre) for one in held))
@@ -112,7 +112,7 @@ def test_always_where_the_growing_rungs_are_enough(ladder, table):
 
 def test_always_best_rate(ladder):
     for amplitude, wanted, rms in ((1.0, 3.23, 0.520), (50.0, 0.257, 0.287)):
-        dahl = ladder.followed(ladder.points(ladder.bonds()), amplitude)
+        dahl = ladder.last_cycle(ladder.points(ladder.bonds()), amplitude)
         share = dahl.dq / np.abs(dahl.dq).max()
         assert ladder.today.best_rate(share, dahl.force) == pytest.approx(wanted, rel=0.01)
         assert ladder.error(ladder.rate(dahl), dahl)[1] == pytest.approx(rms, abs=2e-3)

@@ -112,9 +112,9 @@ def test_exact_free_decay_by_the_event_engine(engines, problem):
 def test_exact_without_a_longest_step_dop853_passes_over_releases(engines, problem):
     """No warning, 4 events instead of 240."""
     one = problem("block")
-    slide, events = engines.counted(one, 1e-8, 1e9)
+    slide, events = engines.slide_and_events(one, 1e-8, 1e9)
     assert events == 4 and one.error(slide) > 0.5
-    assert engines.counted(one, 1e-8, 1 / 8)[1] == 240
+    assert engines.slide_and_events(one, 1e-8, 1 / 8)[1] == 240
 
 
 def test_exact_errors_of_the_saved_table(engines, problem, table):
@@ -199,5 +199,5 @@ def test_exact_the_patch_by_two_programs(engines, problem):
     one = problem("patch")
     assert one.error(engines.dop853(one, 1e-10)) < 1e-6
     assert one.error(engines.march(one, 3200)) < 1e-4
-    slide, events = engines.counted(one, 1e-8, 1 / 8)
+    slide, events = engines.slide_and_events(one, 1e-8, 1 / 8)
     assert events < 202 and one.error(slide) > 1e-2

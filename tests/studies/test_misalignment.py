@@ -65,7 +65,7 @@ def test_exact_the_docstring_of_fixtures_holds_what_it_prints(tilted, fixtures, 
         "normal_stiffness",
         "tangential_stiffness",
     )
-    found = tilted.measured(fixtures.held(float(tilt), None))
+    found = tilted.compute_measures(fixtures.held_pieces(float(tilt), None))
     for name, cell in zip(names, re.sub(r" *± *[\d.]+", "", row).split(), strict=True):
         value = found[name].value * fixtures.COLUMNS[name][1]
         last = 10.0 ** -len(cell.partition(".")[2])
@@ -75,7 +75,7 @@ def test_exact_the_docstring_of_fixtures_holds_what_it_prints(tilted, fixtures, 
 def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
     from patchfem.runs.patch.measures import measures
 
-    found = fixtures.held(1e-3, None)
+    found = fixtures.held_pieces(1e-3, None)
     two = measures(press_patch(found, tilted.pair(1)), press_patch(found, tilted.pair(0)))
     # an independent program with elements of order 5
     best = {
@@ -94,7 +94,7 @@ def test_always_meshes_graded_anew_agree_within_the_errors(tilted, angle, skin):
     from patchfem.runs.patch.measures import measures
 
     found = tilted.case(angle, skin)
-    ours = tilted.measured(found)
+    ours = tilted.compute_measures(found)
     other = measures(*solve_all(found, 1e-3), tolerance=1e-3)
     for name in (
         "contact_fraction",
@@ -121,7 +121,7 @@ def test_always_a_free_piece_keeps_less_than_the_kern(tilted, fixtures):
 
 def test_always_the_soft_skin_keeps_its_stiffness(tilted, fixtures):
     even, tipped = (
-        {skin: coarse(tilted, fixtures.held(tilt, None, skin)) for skin in tilted.SKINS}
+        {skin: coarse(tilted, fixtures.held_pieces(tilt, None, skin)) for skin in tilted.SKINS}
         for tilt in (1e-6, 1e-2)
     )
     for skin, left in (("bare", 0.052), ("linear", 0.05), ("peaks", 0.112), ("exponential", 0.824)):
@@ -147,8 +147,8 @@ def test_exact_a_spring_adds_what_it_gives_way(tilted, conclusion, fixtures):
     for skin in tilted.SKINS:
         for spring in (1e4, 300.0):
             angle = conclusion.neutral(0.5, skin, spring, 0)
-            found = press_patch(fixtures.held(angle, spring, skin), tilted.pair(0))
-            assert tilted.rubbed(found) == pytest.approx(0.5, abs=1e-4)
+            found = press_patch(fixtures.held_pieces(angle, spring, skin), tilted.pair(0))
+            assert tilted.rubbed_portion(found) == pytest.approx(0.5, abs=1e-4)
             assert found.pressure.rotation == pytest.approx(
                 conclusion.rigid(0.5, skin, 0)[0], rel=1e-3
             )
@@ -187,7 +187,7 @@ def test_exact_strips_are_a_wedge_on_springs(tilted, roll):
     k = values(press_patch(tilted.case(0.0), pair))["normal_stiffness"] / LENGTH**2
     for angle in (5e-6, 1e-4):
         fraction, centre, _, _ = exact.wedge_on_linear_foundation(angle, LOAD, LENGTH, LENGTH, k)
-        found = values(press_patch(roll.rolled(angle, 128, "bare"), pair))
+        found = values(press_patch(roll.rolled_pieces(angle, 128, "bare"), pair))
         assert found["pressure_centre_lateral"] == pytest.approx(centre, rel=2e-4)
         assert found["contact_fraction"] == pytest.approx(fraction, abs=1 / 128)
 
@@ -283,7 +283,7 @@ def moving():
 @pytest.fixture(scope="module")
 def maps(moving):
     """Aligned, at the tilt that may be left alone, and at one that may not; stuck and slipping."""
-    return moving.swept((1e-6, 3e-5, 1e-4), (26.0,), (3.0, 5.0))
+    return moving.sweep_measures((1e-6, 3e-5, 1e-4), (26.0,), (3.0, 5.0))
 
 
 @pytest.fixture(scope="module")
@@ -307,7 +307,9 @@ def test_always_the_motion_hardly_feels_the_tilt_that_the_study_tolerates(moving
         (3.0, (1e-6, 10**-4.5, 1e-4), "0.053"),
     ):
         assert (
-            re.search(r"[Tt]ilt may reach (\S+) mrad \(", moving.allowed(26.0, level, tilts))[1]
+            re.search(r"[Tt]ilt may reach (\S+) mrad \(", moving.allowed_tilt(26.0, level, tilts))[
+                1
+            ]
             == limit
         )
         assert f"{limit} mrad" in moving.__doc__

@@ -30,10 +30,10 @@ def without(name) -> bool:
 
 def test_exact_errors_of_the_closed_forms_themselves_vanish():
     hertz = study("peers/hertz_pair.py")
-    x = hertz.grid_of(16).x
+    x = hertz.make_grid(16).x
     hertzian = exact.hertz_pressure(x, hertz.LOAD, hertz.RADIUS, hertz.MODULUS)
-    assert np.abs(hertz.errors_of(x, hertzian)).max() <= 1e-12
-    assert hertz.errors_of(x, 1.01 * hertzian)[0] == pytest.approx(0.01)
+    assert np.abs(hertz.compute_errors(x, hertzian)).max() <= 1e-12
+    assert hertz.compute_errors(x, 1.01 * hertzian)[0] == pytest.approx(0.01)
 
 
 def test_exact_mirrored_and_twice_condensed_pairs_are_one(hertz):

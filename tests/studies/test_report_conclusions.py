@@ -33,7 +33,7 @@ def test_exact_the_first_harmonic_lags(ten):
 
 def test_always_what_is_written_is_what_is_computed(ten):
     """The rows of conclusions.md that cost least; the sentence has their numbers."""
-    text = (ten.HERE / "conclusions.md").read_text("utf-8")
+    text = (ten.FOLDER / "conclusions.md").read_text("utf-8")
     for one in (ten.first, ten.fourth, ten.sixth, ten.seventh, ten.ninth):
         found = one()
         assert f"| {found.number} | {found.claim} | {found.verdict} | {found.found} |" in text
@@ -49,7 +49,7 @@ def test_always_what_is_written_is_what_is_computed(ten):
 @pytest.mark.slow
 def test_the_sentence_and_the_file(ten, tmp_path, capsys):
     found = ten.main(tmp_path / "x.md")
-    assert (tmp_path / "x.md").read_text("utf-8") == (ten.HERE / "conclusions.md").read_text(
+    assert (tmp_path / "x.md").read_text("utf-8") == (ten.FOLDER / "conclusions.md").read_text(
         "utf-8"
     )
     assert [one.number for one in found] == list(range(1, 11))
@@ -57,12 +57,12 @@ def test_the_sentence_and_the_file(ten, tmp_path, capsys):
     assert ten.ANSWER.startswith(
         "Six hold fully (1, 3, 5, 7, 8, 10) and four partly. Conclusion 2:"
     )
-    assert ten.REPRODUCED == ""
+    assert ten.VERDICT == ""
 
 
 @pytest.mark.slow
 def test_flexures_as_stiff_as_conclusion_2_says_limit_the_block_at_10_mil(ten):
-    text = (ten.HERE / "block.toml").read_text("utf-8")
+    text = (ten.FOLDER / "block.toml").read_text("utf-8")
     text = text.replace('"coulomb"', '"elastic-plastic"\nbond_length = "0.243 um"')
     push = np.sqrt(8**2 - (4 * 4.14 / np.pi) ** 2) * ten.G * 0.8546
     text += f'[structure.stiffening]\ncubic = "{4 / 3 * push / 254e-6**3} N/m^3"\n'

@@ -50,7 +50,7 @@ def test_figures_2_and_3_where_the_stops_end_and_what_jumps():
     one = study("report/figures_2_3.py")
     assert one.steady(4.14, 5.28).stuck > 0 == one.steady(4.14, 5.31).stuck
     assert_contains(one.ANSWER, "from 5.3 g on")
-    assert_contains(one.REPRODUCED, "in part", "4.14 g", "5.3 g")
+    assert_contains(one.VERDICT, "in part", "4.14 g", "5.3 g")
     exact = one.exact_cycle(4.14)
     stopped = one.newmark_run(one.STICK_SPEED)
     step = 2 * np.pi / (one.CURVE - 1)
@@ -105,10 +105,10 @@ def test_figure_5_ringing_of_the_block():
         f"{euler[0.1].peak:.3f} a0 with a time step of 0.1/w0",
         f"{euler[0.2].peak:.3f} a0 with a time step of 0.2/w0",
     )
-    assert_contains(one.__doc__, f"for {100 * one.held(exact):.0f} % of the time")
+    assert_contains(one.__doc__, f"for {100 * one.carried_time_fraction(exact):.0f} % of the time")
     # nothing is left of 2 %
     assert one.swings(euler[0.04])[2] == pytest.approx(one.swings(euler[0.04])[1], rel=3e-3)
-    assert one.turns(exact).size == 18 and one.REPRODUCED == "yes"
+    assert one.turns(exact).size == 18 and one.VERDICT == "yes"
 
 
 def test_figures_10_to_12_ringing_of_two_masses():
@@ -135,7 +135,7 @@ def test_figures_10_to_12_ringing_of_two_masses():
     )
     assert slow.distortion[1] < 0.05 and resonant.distortion[0] < 0.002
     assert slow.turns[1] == 2 and rows[0.4].turns[0] > 2
-    assert all(rows[ratio].turns == (2, 2) for ratio in (0.5, 1.0, 5.0)) and one.REPRODUCED == "yes"
+    assert all(rows[ratio].turns == (2, 2) for ratio in (0.5, 1.0, 5.0)) and one.VERDICT == "yes"
 
 
 def test_figure_15_rest_of_a_released_block():
@@ -175,7 +175,7 @@ def test_figure_15_rest_of_a_released_block():
         f"swing by {swing:.3f} x0",
         f"{100 * failed:.0f} % of them do not converge",
     )
-    assert one.REPRODUCED.startswith("in part: ")
+    assert one.VERDICT.startswith("in part: ")
 
 
 @pytest.mark.slow
@@ -183,10 +183,10 @@ def test_figures_30_and_31_a_share_of_the_traces(tmp_path):
     one = study("report/figures_30_31.py")
     ((sets, row),) = one.main((2,), 4, None).values()
     assert_contains(one.ANSWER, f"{row.after[0]:.2f} along x and {row.after[1]:.2f} along y")
-    assert one.held(sets, row) >= 7 and not any(
+    assert one.count_held(sets, row) >= 7 and not any(
         part.reference for each in sets for part in each.parts
     )
-    printed = np.divide(*one.PRINTED[::-1])
+    printed = np.divide(*one.PRINTED_HEIGHTS[::-1])
     assert_contains(
         " ".join(one.__doc__.split()), f"is {printed[0]:.2f} and {printed[1]:.2f}, if each figure"
     )
@@ -220,7 +220,7 @@ def test_figures_30_and_31_counts_of_all_sets(tmp_path):
         flat,
         f"the counts are {a}, {b} and {c}",
         f"to {twelve[1].after[0]:.2f} and {twelve[1].after[1]:.2f}, the",
-        f"in {one.held(*six)} and {one.held(*twelve)} of 40 cases",
+        f"in {one.count_held(*six)} and {one.count_held(*twelve)} of 40 cases",
     )
     new, old = (1e6 * one.heights(six[0], when) for when in (0, 1))
     assert_contains(

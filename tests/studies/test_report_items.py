@@ -10,7 +10,7 @@ def items():
 
 
 def test_always_the_page_is_the_list(items):
-    assert (items.HERE / "items.md").read_text("utf-8") == items.table(), (
+    assert (items.FOLDER / "items.md").read_text("utf-8") == items.table(), (
         "run python studies/report/items.py"
     )
 

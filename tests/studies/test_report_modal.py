@@ -14,16 +14,16 @@ def test_exact_a_block_that_friction_holds_transmits_the_base():
 def test_always_h1_of_a_linear_rig_is_its_transmissibility():
     """A damping of .03, so that windows of 1 s resolve the peak: 19 of them scatter by a few percent."""
     modal = study("report/modal_test.py")
-    text = (study("report/figure_26.py").HERE / "block.toml").read_text("utf-8")
+    text = (study("report/figure_26.py").FOLDER / "block.toml").read_text("utf-8")
     text = text[text.index("[structure]") :].replace("0.003", "0.03").replace("harmonic", "exact")
-    seen = modal.h1(modal.tested(text, 10.0, 0.1), 1.0).between(60, 260)
-    frequency, damping, left = modal.fitted(seen)
+    seen = modal.h1(modal.run_random_test(text, 10.0, 0.1), 1.0).between(60, 260)
+    frequency, damping, left = modal.fit_mode(seen)
     assert (
         frequency == pytest.approx(143, rel=2e-3)
         and damping == pytest.approx(0.03, rel=0.05)
         and left < 0.05
     )
-    exact = modal.transmitted(seen.f, 143, 0.03)
+    exact = modal.mode_transmissibility(seen.f, 143, 0.03)
     assert np.median(np.abs(seen.h / exact - 1)) < 0.01
 
 
@@ -31,7 +31,7 @@ def test_always_a_hard_driven_block_is_damped_as_linearisation_says():
     """sqrt(2/pi) mu N/(m sigma_v) is the damper of Coulomb friction under a normal velocity, which this nearly is."""
     figure = study("report/figure_27.py")
     row = figure.row("rigid block", 20.0, 10.0)
-    assert row.damping == pytest.approx(figure.linearised(row.speed), rel=0.1)
+    assert row.damping == pytest.approx(figure.linearised_damping(row.speed), rel=0.1)
     assert row.frequency == pytest.approx(143, rel=5e-3)
 
 
@@ -67,7 +67,7 @@ def test_figure_26_the_random_test(tmp_path, capsys):
         f"ratio of {damping:.5f} (true value 0.003)",
         f"{100 * low:.1f} % too low",
     )
-    assert figure.REPRODUCED == "yes" and "axial 143 Hz" in (tmp_path / "x.svg").read_text()
+    assert figure.VERDICT == "yes" and "axial 143 Hz" in (tmp_path / "x.svg").read_text()
 
 
 @pytest.mark.slow
@@ -111,5 +111,5 @@ def test_figure_27_the_sentence(tmp_path, capsys):
         f"by {4 * 0.47825 / spring:.0f} mil",
         f"{4 * 0.47825 / spring / 0.08:.0f} times what was",
     )
-    assert_contains(figure.REPRODUCED, "in part", "148 Hz", "1.3", "yaw")
+    assert_contains(figure.VERDICT, "in part", "148 Hz", "1.3", "yaw")
     assert "148 Hz" in (tmp_path / "x.svg").read_text() and figure.ANSWER in capsys.readouterr().out

@@ -59,7 +59,7 @@ def test_figure_8_the_sentence(tmp_path, capsys):
 
 def test_exact_a_swept_block_that_friction_holds_moves_with_the_base():
     sweeps = study("report/sweeps.py")
-    one = sweeps.swept("rigid block", 4.0)
+    one = sweeps.sweep_level("rigid block", 4.0)
     assert one.displacement.max() < 1e-9 and one.distortion.max() < 2e-3
     assert one.acceleration == pytest.approx(4.0, rel=2e-3)
     assert one.frequency[0] > 130 and one.frequency[-1] < 160 and np.all(np.diff(one.frequency) > 0)
@@ -96,7 +96,7 @@ def test_sweeps_the_sentence(tmp_path, capsys):
 def test_always_a_level_ends_in_its_steady_motion():
     """The series of levels, marched, against the harmonic balance of each level alone."""
     steps = study("report/steps.py")
-    for one in steps.steps(143.0, steps.raised(143.0))[1:]:
+    for one in steps.steps(143.0, steps.raise_levels(143.0))[1:]:
         found = pf.run(
             steps.text(),
             **{"measured.file": str(steps.TABLE), "drive.acceleration": one.level * steps.G},
@@ -197,7 +197,10 @@ def test_runaways_the_sentence(tmp_path, capsys):
 def test_always_a_held_block_turns_about_one_point_and_not_on_a_patch():
     engaged = study("report/engaged.py")
     for mode, touches in engaged.CASES.items():
-        peak = {touch: engaged.turned(mode, touch, engaged.HELD, 4.0, 5).peak for touch in touches}
+        peak = {
+            touch: engaged.random_turn(mode, touch, engaged.STUCK_LEVEL, 4.0, 5).peak
+            for touch in touches
+        }
         patches = [peak[touch] for touch in touches if "patch" in touch]
         assert patches and max(patches) < 2e-3 * peak["one point on the axis"]
 
@@ -205,7 +208,7 @@ def test_always_a_held_block_turns_about_one_point_and_not_on_a_patch():
 def test_exact_a_point_on_the_axis_leaves_the_other_mode_free():
     """H1 of the yaw mode below a tenth of its frequency's width: share/(omega0^2 - omega^2) of the base."""
     engaged = study("report/engaged.py")
-    one = engaged.turned("yaw", "one point on the axis", engaged.SLIDING, 16.0)
+    one = engaged.random_turn("yaw", "one point on the axis", engaged.SLIDING_LEVEL, 16.0)
     part = (one.f >= 40) & (one.f <= 110)
     w = 2 * np.pi * one.f[part]
     own = 2 * np.pi * 129
@@ -236,8 +239,8 @@ def test_engaged_the_sentence(tmp_path, capsys):
     )
     more = [
         [
-            engaged.turned("yaw", touch, 5.0, seed=seed).peak
-            / engaged.turned("yaw", "one point on the axis", 5.0, seed=seed).peak
+            engaged.random_turn("yaw", touch, 5.0, seed=seed).peak
+            / engaged.random_turn("yaw", "one point on the axis", 5.0, seed=seed).peak
             for seed in (2, 3)
         ]
         for touch in ("a patch of 12.7 mm", "two patches 20 mm apart")
@@ -255,7 +258,7 @@ def test_engaged_the_sentence(tmp_path, capsys):
     springs = [
         tests[engaged.SPRING],
         *(
-            engaged.damped(engaged.SPRING, engaged.CRITICAL[engaged.SPRING], seed=seed)
+            engaged.fit_damping(engaged.SPRING, engaged.CRITICAL[engaged.SPRING], seed=seed)
             for seed in (2, 3, 4)
         ),
     ]

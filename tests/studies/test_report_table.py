@@ -13,15 +13,15 @@ def page():
 
 def test_always_the_page_is_what_the_studies_say(page):
     """Another answer, another study: `python studies/report/table.py` writes the page anew."""
-    seconds = json.loads(page.KEPT.read_text("utf-8"))
-    assert (page.HERE / "README.md").read_text("utf-8") == page.table(page.studies(), seconds), (
+    seconds = json.loads(page.SECONDS_FILE.read_text("utf-8"))
+    assert (page.FOLDER / "README.md").read_text("utf-8") == page.table(page.studies(), seconds), (
         "run python studies/report/table.py"
     )
     assert set(seconds) <= {one.path for one in page.studies()}
 
 
 def test_always_every_study_of_a_figure_has_a_word_on_it(page):
-    """REPRODUCED is "yes", or says what is missing and why."""
+    """VERDICT is "yes", or says what is missing and why."""
     found = {one.path: one for one in page.studies()}
     assert len(found) == len(page.studies()) > 40 and all(
         one.question.endswith(("?", ".")) for one in found.values()
@@ -35,4 +35,8 @@ def test_always_every_study_of_a_figure_has_a_word_on_it(page):
 def test_exact_the_words_of_a_module_without_running_it(page):
     module = study("report/figures_28_29.py")
     one = next(one for one in page.studies() if one.path == "report/figures_28_29.py")
-    assert one[1:] == (module.QUESTION, module.ANSWER, module.REPRODUCED)
+    assert one[1:] == (
+        " ".join(module.__doc__.split("\n\n")[0].split()),
+        module.ANSWER,
+        module.VERDICT,
+    )

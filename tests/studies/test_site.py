@@ -31,8 +31,8 @@ def files(tmp_path_factory):
 
 
 def test_always_every_effect_has_a_scene_that_names_it(files):
-    assert sorted(examples.EXAMPLES) == sorted(made.SHOWN)
-    for name in set(made.SHOWN) - {"sweep"}:
+    assert sorted(examples.EXAMPLES) == sorted(made.SHOWN_EFFECTS)
+    for name in set(made.SHOWN_EFFECTS) - {"sweep"}:
         (files / "scene.toml").write_text(examples.scene(name), "utf-8")
         assert name in pf.plan(files / "scene.toml").effects, name
 
@@ -54,7 +54,7 @@ def test_always_an_effect_is_told_from_its_records(files):
 
 
 def test_always_every_value_has_a_sentence():
-    said = [made.about(name) for name in made.SHOWN]
+    said = [made.about(name) for name in made.SHOWN_EFFECTS]
     assert all(len(text) > 20 and text.endswith(".") for text in said)
 
 
@@ -100,7 +100,7 @@ def made_pages() -> set:
         "python.md",
         "code.md",
         "effects/index.md",
-        *(f"effects/{made.slug(name)}.md" for name in made.SHOWN),
+        *(f"effects/{made.slug(name)}.md" for name in made.SHOWN_EFFECTS),
     }
 
 

@@ -38,7 +38,7 @@ def test_table_1_a_point_at_the_same_numbers_scores_as_the_patch():
 )
 def test_table_1_the_second_path_fitted_at_143_hz(point, wanted, values):
     """From 8 random starts, the optimum that an independent program reaches from five."""
-    found = study("table_1/second_path.py").fitted(point)
+    found = study("table_1/second_path.py").fit_path(point)
     near(found.score(found.logs, found.left_out_logs), wanted)
     assert found.fit.values == pytest.approx(values, rel=2e-3)
 

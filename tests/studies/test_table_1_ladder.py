@@ -73,7 +73,7 @@ def test_exact_the_gain_of_a_fold_comes_from_its_own_readings(fitting):
     assert gains.pop("without 143") == pytest.approx(1.25, rel=1e-12)
     assert list(gains.values()) == pytest.approx([9.9 / 8] * 5, rel=1e-12)
     seen = fitting.training(cells, "without 143")
-    assert fitting.computed_for("second path", fitting.STUCK, cells, seen).gains[
+    assert fitting.computed_for("second path", fitting.STUCK_READING, cells, seen).gains[
         0
     ] == pytest.approx(1.25, rel=1e-12)
 
@@ -129,7 +129,7 @@ def test_exact_friction_that_wear_does_not_change_gives_the_rung_beside_it(fitti
 def test_always_a_fit_sees_nothing_but_its_training_readings(fitting):
     """One random start of the second path at 143 Hz, and its end with each of two numbers at 0: the record is whole,
     and its scores are those of its own logarithms."""
-    found = fitting.fitted("second path", "peak", "143", starts=1)
+    found = fitting.fit_rung("second path", "peak", "143", starts=1)
     assert (
         found["keys"][0] == "friction.static"
         and len(found["values"]) == 4
@@ -147,7 +147,7 @@ def test_always_a_fit_sees_nothing_but_its_training_readings(fitting):
 
 @pytest.fixture(scope="module")
 def records(fitting):
-    return fitting.known()
+    return fitting.read_records()
 
 
 def test_exact_every_score_follows_from_the_cells_that_are_kept(fitting, records):
@@ -193,14 +193,14 @@ def test_always_a_record_tells_its_valleys_gain_bounds_and_bootstrap(fitting, re
         question = fitting.RUNGS[rung].question(reading, *([placebo] if placebo else []))
         assert row["at_bound"] == fitting.bounds(question.ranges, row["values"])
         left = (rung, reading, protocol) in (  # the last descent left all starts
-            ("spring and yaw", fitting.STUCK, "all"),
+            ("spring and yaw", fitting.STUCK_READING, "all"),
             ("rods, spring and yaw", ROOT2, "without 143"),
         )
         assert (
             (not left) <= row["valleys"]["best"] <= row["valleys"]["starts"] == len(row["starts"])
         )
         assert (row["gain"] is None) == (reading in ("peak", ROOT2))
-        if reading == fitting.STUCK:
+        if reading == fitting.STUCK_READING:
             assert row["gain"] == pytest.approx(
                 fitting.stuck_gain(cells, fitting.training(cells, protocol))
             )
@@ -222,7 +222,7 @@ def test_table_1_the_scores_that_the_study_tells(records, fitting):
     """What the words of README.md say of the numbers beside them, and of ladder.py; spring and yaw within 0.002 of what
     another program reached: .074 and .166."""
     table = study("table_1/table.py")
-    one = {name: records[*key, "143", ""] for name, key in table.SAID.items()}
+    one = {name: records[*key, "143", ""] for name, key in table.NAMED_FITS.items()}
     none = {name: (held, left) for name, _, _, held, left, _ in table.nulls()}
     constant = none["constant"]
     strong = none["power_input_frequency"]
@@ -252,15 +252,17 @@ def test_table_1_the_scores_that_the_study_tells(records, fitting):
     assert abs(one["lift"]["others"]["all"] - spring["all"]) < 0.01
     left = [
         table.scores(read_readings(fitting.TABLE), logs, np.ones(35, bool))
-        for *_, logs in table.shared(records)
+        for *_, logs in table.fully_folded(records)
     ]
     assert len(left) >= 14
     every = {
-        key: table.left_out(records, *table.SAID[key])
+        key: table.left_out(records, *table.NAMED_FITS[key])
         for key in ("spring", "path", "damped", "seen")
     }
     assert abs(every["damped"]["all"] - constant[1]["all"]) < 0.005
-    assert records[*table.SAID["damped"], "without 143", ""]["at_bound"][3] == "low"  # its yaw
+    assert (
+        records[*table.NAMED_FITS["damped"], "without 143", ""]["at_bound"][3] == "low"
+    )  # its yaw
     assert all(
         every[key]["displacement"] < 0.9 * constant[1]["displacement"]
         for key in ("spring", "path", "seen")
