@@ -101,24 +101,23 @@ def lengths_by_hand(law, path, times):
     return np.array(knots), np.array(middles)
 
 
-def sum_by_hand(law, path, pressure, dt=1.0, pieces=None):
-    """Traction (m,) at the end of `path` over mu_s: 2.17 as a plain sum over bonds, 12 Gauss points per piece.
+def bonds_of_strokes(law, path, dt, longest):
+    """Yield (number, weights, stretches u, forces) of the bonds of every stroke of `path`, 12 Gauss points per piece.
 
     No bond is lost, kept apart or summed cleverly. stretch: damage with the length of the middle of a step; report:
-    every bond integrates its own length from zero through every later step.
+    every bond integrates its own length from zero through every later step. `longest` is the largest piece of a stroke
+    in bond lengths; the forces are (x/eps)^p exp(-x/eps) with x = |u| or the path R.
     """
     steps = np.diff(path)
     times = np.broadcast_to(dt, len(steps)).astype(float)
     _, middles = lengths_by_hand(law, path, times)
     y, w = GAUSS
-    total = np.zeros_like(pressure(path[0]), float)
     harm_after = np.append(np.cumsum((np.abs(steps) / middles)[::-1])[::-1], 0.0)
     travel_after = np.append(np.cumsum(np.abs(steps)[::-1])[::-1], 0.0)
     for k, dq in enumerate(steps):
         if dq == 0:
             continue
-        count = pieces or max(1, int(np.ceil(abs(dq) / (0.5 * middles[k]))))
-        cuts = set(np.linspace(0, 1, count + 1))
+        cuts = set(np.linspace(0, 1, int(np.ceil(abs(dq) / (longest * middles[k]))) + 1))
         turn = (path[-1] - path[k]) / dq
         if 0 < turn < 1:
             cuts.add(turn)
@@ -129,26 +128,45 @@ def sum_by_hand(law, path, pressure, dt=1.0, pieces=None):
         travel = travel_after[k + 1] + (1 - part) * abs(dq)
         if law.reading == "stretch":
             harm = harm_after[k + 1] + (1 - part) * abs(dq) / middles[k]
-            f = (np.abs(u) / middles[k]) ** law.order * np.exp(-harm)
-        elif not law.has_growth:
-            f = (travel / law.length) ** law.order * np.exp(-travel / law.length)
-        else:
-            own = np.zeros_like(part)
+            yield k, weight, u, (np.abs(u) / middles[k]) ** law.order * np.exp(-harm)
+            continue
+        own = np.full(part.size, law.length)
+        if law.has_growth:
+            own = np.zeros(part.size)
             for j in range(k, len(steps)):
                 span = times[j] * (1 - part if j == k else 1.0)
                 a, b = rates(law, steps[j] / times[j])
                 goal = law.length * (a + law.ratio * b) / (a + b)
                 own = goal + (own - goal) * np.exp(-(a + b) * span)
-            f = (travel / own) ** law.order * np.exp(-travel / own)
-        total += (pressure(path[k]) + pressure(path[k + 1])) / 2 * (weight @ (np.sign(u) * f))
+        yield k, weight, u, (travel / own) ** law.order * np.exp(-travel / own)
+
+
+def sum_by_hand(law, path, pressure, dt=1.0):
+    """Return the traction (m,) at the end of `path` over mu_s: 2.17 as a plain sum over bonds."""
+    total = np.zeros_like(pressure(path[0]), float)
+    for k, weight, u, force in bonds_of_strokes(law, path, dt, 0.5):
+        mean = (pressure(path[k]) + pressure(path[k + 1])) / 2
+        total += mean * (weight @ (np.sign(u) * force))
     cohort = path[-1] - path[0]
     if law.initial and cohort != 0:
-        x = travel_after[0] / law.length
-        size, harm = (
-            (abs(cohort) / law.length, harm_after[0]) if law.reading == "stretch" else (x, x)
-        )
+        steps = np.abs(np.diff(path))
+        x = steps.sum() / law.length
+        size = x
+        harm = x
+        if law.reading == "stretch":
+            size = abs(cohort) / law.length
+            harm = (steps / lengths_by_hand(law, path, np.broadcast_to(dt, steps.size))[1]).sum()
         total += law.initial * pressure(path[0]) * np.sign(cohort) * size**law.order * np.exp(-harm)
     return total / gamma(law.order + 1)
+
+
+def energy_by_hand(law, path, dt=1.0):
+    """Return the energy at the end of `path` [m] per mu_s N: force times stretch at frozen damage, over all bonds."""
+    total = sum(
+        weight @ (force * np.abs(u))
+        for _, weight, u, force in bonds_of_strokes(law, path, dt, 0.25)
+    )
+    return total / gamma(law.order + 1) / (law.order + 1 if law.reading == "stretch" else 1.0)
 
 
 def random_walk(seed, count, size):

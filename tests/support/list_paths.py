@@ -3,8 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from friction_paths import GAUSS, lengths_by_hand, rates
-from scipy.special import gamma
 
 from patchfem.dynamics.interfaces.arrays import BondList
 from patchfem.friction.bonds import list_kernels
@@ -57,40 +55,3 @@ def follow_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
         assert list_kernels.list_step(dq, held, v, v, dt)
         rows.append((mean, status[STATUS.force], ahead, status[STATUS.energy]))
     return Listed(*np.array(rows).T, status)
-
-
-def energy_by_hand(law, path, dt=1.0):
-    """Sum over the bonds of force times stretch at frozen damage [m] per mu_s N at the end of `path`.
-
-    stretch: (|u|/eps)^p exp(-damage) |u|/(p + 1); report: (R/eps)^p exp(-R/eps) |u|, both over Gamma(p + 1) eps_0.
-    """
-    steps = np.diff(path)
-    times = np.broadcast_to(dt, len(steps)).astype(float)
-    _, middles = lengths_by_hand(law, path, times)
-    y, w = GAUSS
-    total = 0.0
-    harm_after = np.append(np.cumsum((np.abs(steps) / middles)[::-1])[::-1], 0.0)
-    travel_after = np.append(np.cumsum(np.abs(steps)[::-1])[::-1], 0.0)
-    for k, dq in enumerate(steps):
-        cuts = {0.0, 1.0, *np.linspace(0, 1, int(np.ceil(abs(dq) / 0.25)) + 1)}
-        turn = (path[-1] - path[k]) / dq
-        cuts = np.array(sorted(cuts | ({turn} if 0 < turn < 1 else set())))
-        part = (cuts[:-1, None] + np.diff(cuts)[:, None] * (1 + y) / 2).ravel()
-        weight = (np.diff(cuts)[:, None] * w / 2).ravel() * abs(dq) / law.length
-        u = np.abs(path[-1] - (path[k] + part * dq))
-        travel = travel_after[k + 1] + (1 - part) * abs(dq)
-        if law.reading == "stretch":
-            harm = harm_after[k + 1] + (1 - part) * abs(dq) / middles[k]
-            f = (u / middles[k]) ** law.order * np.exp(-harm) / (law.order + 1)
-        else:
-            own = np.full(part.size, law.length)
-            if law.has_growth:
-                own = np.zeros(part.size)
-                for j in range(k, len(steps)):
-                    span = times[j] * (1 - part if j == k else 1.0)
-                    a, b = rates(law, steps[j] / times[j])
-                    goal = law.length * (a + law.ratio * b) / (a + b)
-                    own = goal + (own - goal) * np.exp(-(a + b) * span)
-            f = (travel / own) ** law.order * np.exp(-travel / own)
-        total += weight @ (f * u)
-    return total / gamma(law.order + 1)

@@ -4,10 +4,9 @@ Campaign `partial-slip` of `campaigns`. The benches are crowned, tilted or both,
 slide by 0.02 to 2 of the relative displacement at which the whole patch slips, at tolerances of
 1e-2 to 1e-4.
 
-The solver shares nothing with patchfem. Half of a pair is a grid of biquadratic elements, assembled
-as sums of Kronecker products. Pressure and shear are constant on the cells of the interface;
-contact and stick hold for the averages over cells. With the limits g = mu p of the cells, the
-missing shear r = g - t at the slide q solves r >= 0, C r >= C g - q, r (C r - C g + q) = 0, and
+The solver shares nothing with patchfem: pressure and compliances are those of `static_reference`, at
+the nodes of elements of order 4. With the limits g = mu f of the nodes, the missing shear r = g - t at
+the slide q solves r >= 0, C r >= C g - q, r (C r - C g + q) = 0, and
 Masing's rule gives the loop. Each bench is solved on two grids; their difference is the uncertainty
 of the reference.
 """
@@ -16,133 +15,30 @@ from pathlib import Path
 from time import process_time
 
 import numpy as np
+import static_reference as static
 from campaigns import measure_rows
 from scipy.interpolate import PchipInterpolator
-from scipy.sparse import bmat, csc_matrix, kron, lil_matrix
-from scipy.sparse.linalg import splu
 
 import patchfem as pf
 
 MATERIALS = (("steel", 210e9, 0.3), ("titanium", 121e9, 0.32), ("aluminium", 70e9, 0.33))
 COATING = 250e9, 0.24  # Young's modulus [Pa] and Poisson's ratio
-MASS = np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]]) / 30  # quadratic element of length 1
-STIFFNESS = np.array([[7, -8, 1], [-8, 16, -8], [1, -8, 7]]) / 3
-# Derivative of the row's function times the column's function.
-GRADIENT = np.array([[-3, -4, 1], [4, 0, -4], [-1, 4, 3]]) / 6
+FINE = 5e-4  # cell at a contact edge / width of the contact
 
 
-def line_matrix(element, lengths, scale):
-    """Return the matrix (2 n + 1, 2 n + 1) of quadratic elements; scale: (n,) factor of each."""
-    out = lil_matrix((2 * lengths.size + 1, 2 * lengths.size + 1))
-    for k, factor in enumerate(scale):
-        out[2 * k : 2 * k + 3, 2 * k : 2 * k + 3] += factor * element
-    return csc_matrix(out)
-
-
-def stiffness_of(columns, rows, young, poisson):
-    """Return the stiffness of a grid in plane strain, with the last row fixed.
-
-    The unknowns are all u, then all v, with x before y.
-
-    Parameters
-    ----------
-    columns, rows : (n + 1,), (m + 1,) array
-        Grid lines [m].
-    young, poisson : (m,) array
-        Of each row.
-    """
-    hx = np.diff(columns)
-    hy = np.diff(rows)
-    lame = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
-    shear = young / (2 + 2 * poisson)
-    mass, stiff, grad = (
-        line_matrix(*part)
-        for part in ((MASS, hx, hx), (STIFFNESS, hx, 1 / hx), (GRADIENT, hx, np.ones(hx.size)))
-    )
-    free = 2 * hy.size
-
-    def along_y(element, lengths, scale):
-        return line_matrix(element, lengths, scale)[:free, :free]
-
-    def terms(a, b):
-        return kron(stiff, along_y(MASS, hy, a * hy)) + kron(mass, along_y(STIFFNESS, hy, b / hy))
-
-    mixed = kron(grad, along_y(GRADIENT, hy, lame).T) + kron(grad.T, along_y(GRADIENT, hy, shear))
-    uu = terms(lame + 2 * shear, shear)
-    vv = kron(stiff, along_y(MASS, hy, shear * hy)) + kron(
-        mass, along_y(STIFFNESS, hy, (lame + 2 * shear) / hy)
-    )
-    return csc_matrix(bmat([[uu, mixed], [mixed.T, vv]])), free
-
-
-def compliances(columns, rows, young, poisson, cells, width):
-    """Return normal and tangential compliance (k, k) [m/N] of both pieces.
-
-    They relate averages over cells.
-    """
-    matrix, free = stiffness_of(columns, rows, young, poisson)
-    size = matrix.shape[0]
-    order = np.argsort(np.tile(np.repeat(np.arange(2 * columns.size - 1), free), 2), kind="stable")
-    factor = splu(
-        matrix[order][:, order],
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
-    place = np.empty(size, int)
-    place[order] = np.arange(size)
-    out = []
-    for offset in (size // 2, 0):  # v for pressure, u for shear
-        nodes = np.array([[place[offset + (2 * c + k) * free] for k in range(3)] for c in cells])
-        found = np.empty((len(cells), len(cells)))
-        for first in range(0, len(cells), 64):
-            part = nodes[first : first + 64]
-            load = np.zeros((size, len(part)))
-            for column, triple in enumerate(part):
-                load[triple, column] = (1 / 6, 4 / 6, 1 / 6)
-            moved = factor.solve(load)
-            found[:, first : first + 64] = (
-                moved[nodes[:, 0]] + 4 * moved[nodes[:, 1]] + moved[nodes[:, 2]]
-            ) / 6
-        out.append((found + found.T) / width)
-    return out
-
-
-def complementary(matrix, right, load=None):
-    """Solve the complementarity problem f >= 0, matrix f - right - d >= 0.
-
-    d is 0, or such that sum f = load.
-    """
-    active = np.ones(right.size, bool)
+def missing_shear(compliance, right) -> np.ndarray:
+    """Solve f >= 0, compliance f >= right, f (compliance f - right) = 0 by an active set."""
+    active = right > 0
     for _ in range(200):
         index = np.flatnonzero(active)
-        ones = np.ones(index.size)
-        block = matrix[np.ix_(index, index)]
-        both = (
-            np.linalg.solve(block, np.stack([right[index], ones], axis=1))
-            if index.size
-            else np.zeros((0, 2))
-        )
-        level = 0.0 if load is None else (load - both[:, 0].sum()) / both[:, 1].sum()
         force = np.zeros(right.size)
-        force[index] = both[:, 0] + level * both[:, 1]
-        apart = matrix @ force - right - level
+        force[index] = np.linalg.solve(compliance[np.ix_(index, index)], right[index])
+        apart = compliance @ force - right
         following = np.where(active, force > 0, apart < -1e-14 * np.abs(right).max())
         if (following == active).all():
-            return force, level
+            return force
         active = following
     raise RuntimeError("active set cycles")
-
-
-def spaced(start, stop, size):
-    """Return positions from start to stop with steps of about size(x)."""
-    x = start
-    out = [start]
-    while x < stop:
-        x += size(x + size(x) / 2)
-        out.append(x)
-    out = np.array(out)
-    return start + (out - start) * (stop - start) / (out[-1] - start)
 
 
 class Bench:
@@ -172,10 +68,16 @@ class Bench:
         self.cycles = int(draw.integers(2, 4))
         self.amplitude = None
 
-    def gap(self, x):
-        """Return the gap [m] of the unloaded faces at x [m]."""
-        return (x**2 / (2 * self.radius) if self.crowned else 0.0) + (
-            self.angle * x if self.tilted else 0.0
+    @property
+    def scene(self):
+        """What `static_reference` solves."""
+        base = (self.young, self.poisson)
+        layers = (COATING if self.thick else base, base)
+        piece = static.PieceInterface(self.length, self.height, self.thick, layers)
+        curvature = 1 / self.radius if self.crowned else 0.0
+        tilt = self.angle if self.tilted else 0.0
+        return static.Scene(
+            self.length, self.width, "strain", piece, piece, self.load, tilt, curvature
         )
 
     def text(self):
@@ -204,84 +106,16 @@ class Bench:
 
 
 class Reference:
-    """Solution of a bench by this solver; fine: number of cells relative to the coarse grid."""
+    """Solution of a bench on the columns of a lap of `static_reference`."""
 
-    def __init__(self, bench, fine):
+    def __init__(self, bench, edges, lap):
         self.bench = bench
-        half = bench.length / 2
-        cells = spaced(-half, half, lambda x: bench.length / 80)
-        low = -half
-        high = half
-        for _ in range(3):  # grids that zoom in on the contact
-            centre = (cells[1:] + cells[:-1]) / 2
-            chosen = np.flatnonzero((centre > low) & (centre < high))
-            normal, _ = self._matrices(cells, chosen, 1.0)
-            force, _ = complementary(normal, -bench.gap(centre[chosen]), bench.load)
-            ends = self._ends(cells, chosen, force)
-            wide = ends[1] - ends[0]
-            cells = spaced(-half, half, self._sizes(ends, 1 / 40, 0.25))
-            low = max(ends[0] - 0.2 * wide, -half)
-            high = min(ends[1] + 0.2 * wide, half)
-        self.ends = ends
-        cells = spaced(-half, half, self._sizes(ends, 4e-4 / fine, 0.12 / fine))
-        centre = (cells[1:] + cells[:-1]) / 2
-        margin = 0.02 * wide
-        chosen = np.flatnonzero((centre > ends[0] - margin) & (centre < ends[1] + margin))
-        normal, shear = self._matrices(cells, chosen, fine)
-        force, _ = complementary(normal, -bench.gap(centre[chosen]), bench.load)
-        index = np.flatnonzero(force > 0)
-        self.shear = shear[np.ix_(index, index)]
-        self.limit = bench.static * force[index]
+        pressed = static.press(bench.scene, edges, FINE, lap)
+        self.edges = pressed.edges
+        index = np.flatnonzero(pressed.force > 0)
+        self.shear = pressed.tangential[np.ix_(index, index)] / bench.width
+        self.limit = bench.static * bench.width * pressed.force[index]
         self.stiffness = float(np.linalg.solve(self.shear, np.ones(index.size)).sum())
-
-    def _sizes(self, ends, least, slope):
-        """Return the cell length as a function of x for a contact between `ends`.
-
-        `least` is its fraction of the contact at the open ends.
-        """
-        half = self.bench.length / 2
-        wide = ends[1] - ends[0]
-        inside = wide * max(least, 1 / 60 * slope / 0.12)
-        open_ends = [end for end in ends if abs(end) < half * (1 - 1e-9)]
-
-        def size(x):
-            out = (
-                min([wide * least + slope * abs(x - end) for end in open_ends] + [inside])
-                if ends[0] <= x <= ends[1]
-                else min([wide * least + slope * abs(x - end) for end in ends])
-            )
-            corner = self.bench.length * 2e-3 + 3 * slope * min(half - x, half + x)
-            return min(out, max(corner, self.bench.length * 1e-3), self.bench.length / 12)
-
-        return size
-
-    def _ends(self, cells, chosen, force):
-        """Return the ends of the contact [m]."""
-        loaded = np.flatnonzero(force > 0)
-        first = chosen[loaded[0]]
-        last = chosen[loaded[-1]]
-        return float(cells[first]), float(cells[last + 1])
-
-    def _matrices(self, cells, chosen, fine):
-        bench = self.bench
-        near = float(np.diff(cells)[chosen].min())
-
-        def size(y):
-            far = bench.height * 4e-3 + 0.5 / fine * (bench.height - y)
-            at_coat = (
-                np.inf if not bench.thick else bench.thick / 3 + 0.4 / fine * abs(y - bench.thick)
-            )
-            return max(min(near + 0.35 / fine * y, far, at_coat), near)
-
-        rows = spaced(0.0, bench.height, size)
-        if bench.thick:
-            rows = np.append(
-                spaced(0.0, bench.thick, size), spaced(bench.thick, bench.height, size)[1:]
-            )
-        middle = (rows[1:] + rows[:-1]) / 2
-        young = np.where(middle < bench.thick, COATING[0], bench.young)
-        poisson = np.where(middle < bench.thick, COATING[1], bench.poisson)
-        return compliances(cells, rows, young, poisson, chosen, bench.width)
 
     def measures(self):
         """Return the measures by their names in patchfem."""
@@ -291,7 +125,7 @@ class Reference:
         slides = amplitude * (np.arange(161) / 160) ** 2
         lack = np.array(
             [
-                self.stiffness * q - self.limit.sum() + complementary(self.shear, free - q)[0].sum()
+                self.stiffness * q - self.limit.sum() + missing_shear(self.shear, free - q).sum()
                 for q in slides
             ]
         )
@@ -331,10 +165,13 @@ class Reference:
 
 
 def solve_bench(seed: int) -> tuple:
-    """Return a bench, its measures on the fine grid, and their differences from the coarse grid."""
+    """Return a bench, its measures on the fine grid, and their differences from a coarser grid."""
     bench = Bench(seed)
-    fine = Reference(bench, 1.5)
-    coarse = Reference(bench, 1.0)
+    edges = static.find_edges(bench.scene)
+    for lap in static.LAPS[:2]:
+        coarse = Reference(bench, edges, lap)
+        edges = coarse.edges
+    fine = Reference(bench, edges, static.LAPS[2])
     bench.amplitude = float(bench.share * bench.static * bench.load / fine.stiffness)
     found = fine.measures()
     other = coarse.measures()

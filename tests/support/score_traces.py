@@ -2,8 +2,7 @@
 
     python tests/support/score_traces.py --first 1 --count 16 -j 2 --table scores.json
 
-A seed gives one pair: the kinds take turns. With --all each seed gives a pair of every kind; with --generator
-stylus_pairs the pairs are those of another generator. Flanks that run out flat
+A seed gives one pair: the kinds take turns. With --all each seed gives a pair of every kind. Flanks that run out flat
 (`trace_pairs.RUN_OUT`) are scored apart: the ends and widths of their tracks have the suffix `_flat`.
 
 Seeds 1 to 60 serve for building. The score of a method counts on seeds that nobody has used before: 2001 to 2304 are
@@ -14,7 +13,6 @@ spent; for intervals that allow for a drift of the datum they are 2401 to 2704:
 
 import tempfile
 from collections import defaultdict
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +25,7 @@ from score_pairs import (
     run_scores,
     write_table,
 )
-from trace_pairs import RUN_OUT
+from trace_pairs import HIDDEN, KINDS, RUN_OUT, UNWORN, draw_pair
 
 PLACES = (
     "track_from",
@@ -40,10 +38,9 @@ PLACES = (
 
 
 def score_pair(request: tuple) -> dict:
-    """Compare the pair (generator, kind, seed) and score the answer."""
-    name, kind, seed = request
-    generator = import_module(name)
-    pair = generator.draw_pair(kind, seed)
+    """Compare the pair (kind, seed) and score the answer."""
+    kind, seed = request
+    pair = draw_pair(kind, seed)
     with tempfile.TemporaryDirectory() as folder:
         try:
             answer = compare(pair, Path(folder))
@@ -67,10 +64,10 @@ def score_pair(request: tuple) -> dict:
     truth = {name: answer[name]["value"] - check[2] for name, check in intervals.items()}
     suffix = "_flat" if kind in RUN_OUT else ""
     names = {name: name + suffix if name in PLACES else name for name in intervals}
-    is_worn = kind not in (*generator.UNWORN, *generator.HIDDEN, "elsewhere", "deposits")
+    is_worn = kind not in (*UNWORN, *HIDDEN, "elsewhere", "deposits")
     return row | {
         "sentences": answer.get("sentences", []),
-        "faults": find_faults(pair, kind in generator.UNWORN, answer),
+        "faults": find_faults(pair, kind in UNWORN, answer),
         "intervals": {names[name]: check for name, check in intervals.items()},
         "truth": {names[name]: value for name, value in truth.items()},
         "missed": is_worn and "worn" not in row["headline"].lower(),
@@ -127,15 +124,11 @@ def main() -> None:
     """Score the pairs of consecutive seeds."""
     parser = make_parser(__doc__)
     parser.add_argument("--all", action="store_true", help="every kind for each seed")
-    parser.add_argument(
-        "--generator", default="trace_pairs", choices=("trace_pairs", "stylus_pairs")
-    )
     request = parser.parse_args()
-    kinds = import_module(request.generator).KINDS
     seeds = range(request.first, request.first + request.count)
-    wanted = [(request.generator, kinds[(seed - 1) % len(kinds)], seed) for seed in seeds]
+    wanted = [(KINDS[(seed - 1) % len(KINDS)], seed) for seed in seeds]
     if request.all:
-        wanted = [(request.generator, kind, seed) for seed in seeds for kind in kinds]
+        wanted = [(kind, seed) for seed in seeds for kind in KINDS]
     rows = run_scores(score_pair, wanted, request, print_row)
     summary = print_precision(rows)
     print()

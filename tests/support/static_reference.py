@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -121,7 +122,7 @@ def face(body: PieceInterface, plane: str, inner, growth: float, corner: float) 
             continue
         iy, ix = (grid.ravel() for grid in np.meshgrid(layer, np.arange(x.size - 1), indexing="ij"))
         ratio = np.diff(deep)[iy] / np.diff(x)[ix]
-        cells, local = cells_of.without_interior(
+        cells, local = cells_of.condense_interior(
             cells_of.cell_stiffness(ORDER, ratio, young, nu), ORDER
         )
         node = place[
@@ -155,32 +156,73 @@ def face(body: PieceInterface, plane: str, inner, growth: float, corner: float) 
     return c[m:, m:][own, own], c[:m, :m][own, own], c[m:, :m][own, own]
 
 
-def contact(c, g, load: float, theta_x) -> tuple:
-    """Return nodal forces (m,) >= 0 of total `load`, and the approach d.
+def contact(compliance, gap, load: float, active=None) -> tuple:
+    """Solve the contact by an active set that starts from `active`.
 
-    The gaps c f + g + theta_x - d are >= 0, and zero where the force is not.
+    Parameters
+    ----------
+    compliance : (m, m) array
+        Normal compliance [m/N].
+    gap : (m,) array
+        Of the unloaded faces [m].
+    load : float
+        Sum of the nodal forces.
+    active : (m,) array of bool, optional
+        By default the smallest three tenths of the gaps.
+
+    Returns
+    -------
+    tuple
+        Nodal forces (m,) >= 0, the approach, and the nodes in contact. The gaps under load are >= 0, and zero where
+        the force is not.
     """
-    gap = g + theta_x
-    active = gap <= np.quantile(gap, 0.3)
+    if active is None:
+        active = gap <= np.quantile(gap, 0.3)
     for _ in range(400):
         index = np.flatnonzero(active)
-        rows = np.linalg.solve(
-            c[np.ix_(index, index)], np.stack([np.ones(index.size), gap[index]], axis=1)
-        )
-        d = (load + rows[:, 1].sum()) / rows[:, 0].sum()
-        f = np.zeros(g.size)
-        f[index] = d * rows[:, 0] - rows[:, 1]
-        left = c @ f + gap - d
-        wrong_in = active & (f < 0)
-        wrong_out = ~active & (left < -1e-13 * np.abs(c @ f).max())
-        if not wrong_in.any() and not wrong_out.any():
-            return f, d
-        active = (active & ~wrong_in) | (wrong_out if not wrong_in.any() else False)
+        columns = np.stack([np.ones(index.size), gap[index]], axis=1)
+        rows = np.linalg.solve(compliance[np.ix_(index, index)], columns)
+        approach = (load + rows[:, 1].sum()) / rows[:, 0].sum()
+        force = np.zeros(gap.size)
+        force[index] = approach * rows[:, 0] - rows[:, 1]
+        bent = compliance @ force
+        leaves = active & (force < 0)
+        enters = ~active & (bent + gap - approach < -1e-13 * np.abs(bent).max())
+        if not leaves.any() and not enters.any():
+            return force, approach, active
+        active = active & ~leaves if leaves.any() else active | enters
     raise RuntimeError("no contact found")
 
 
-def solve(scene: Scene, edges, fine: float, lap: tuple = FIRST) -> tuple:
-    """Solve a scene on columns that are graded to `edges`.
+def unloaded_gap(scene: Scene, place) -> np.ndarray:
+    """Return the gap (m,) [m] of the unloaded faces; the corner of a step belongs to the side in contact."""
+    gap = place**2 / 2 * scene.curvature + scene.tilt * place
+    if scene.step:
+        height, at = scene.step
+        gap = gap + height * (place > at + 1e-15 if height > 0 else place > at - 1e-15)
+    return gap
+
+
+class Pressed(NamedTuple):
+    """A pressed patch: compliances (m, m) [m2/N] per unit width, places and weights (m,) [m], and the contact.
+
+    - normal, tangential, cross: sums of both pieces; cross is the normal motion by shear
+    - force: nodal forces (m,) per unit width [N/m]
+    - edges: (from, to, free) of every stretch in contact
+    """
+
+    normal: np.ndarray
+    tangential: np.ndarray
+    cross: np.ndarray
+    place: np.ndarray
+    weight: np.ndarray
+    force: np.ndarray
+    approach: float
+    edges: list
+
+
+def press(scene: Scene, edges, fine: float, lap: tuple = FIRST) -> Pressed:
+    """Press a scene on columns that are graded to `edges`.
 
     Parameters
     ----------
@@ -191,11 +233,6 @@ def solve(scene: Scene, edges, fine: float, lap: tuple = FIRST) -> tuple:
         Cell at an edge / shortest stretch.
     lap : tuple
         One of LAPS.
-
-    Returns
-    -------
-    tuple
-        Values by name, and the edges (from, to, free) of every stretch.
     """
     half, (share, corner, growth, inside) = scene.length / 2, lap
     fine *= share
@@ -218,18 +255,10 @@ def solve(scene: Scene, edges, fine: float, lap: tuple = FIRST) -> tuple:
     low = parts[0]
     high = parts[-1]
     nn = low[0] + high[0]
-    tt = low[1] + high[1]
-    nt = low[2] - high[2]
     if scene.skin:
         nn = nn + np.diag(1 / (scene.skin * weight))
-    gap = place**2 / 2 * scene.curvature
-    if scene.step:
-        height, at = scene.step
-        # The corner node of a step belongs to the side in contact, up to its edge.
-        gap = gap + height * (place > at + 1e-15 if height > 0 else place > at - 1e-15)
-    f, d = contact(nn, gap, scene.load / scene.width, scene.tilt * place)
+    f, d, active = contact(nn, unloaded_gap(scene, place), scene.load / scene.width)
     pressure = f / weight
-    active = f > 0
     change = np.flatnonzero(np.diff(np.concatenate([[0], active.astype(int), [0]])))
     found = []
     for a, b in zip(change[::2], change[1::2] - 1):
@@ -238,27 +267,44 @@ def solve(scene: Scene, edges, fine: float, lap: tuple = FIRST) -> tuple:
             found.append(
                 (ends[0], max(ends[1], ends[0] + 1e-7 * scene.length), (a > 0, b < place.size - 1))
             )
-    index = np.flatnonzero(active)
-    own = np.linalg.inv(nn[np.ix_(index, index)])
+    return Pressed(nn, low[1] + high[1], low[2] - high[2], place, weight, f, d, found)
+
+
+def find_edges(scene: Scene, start=()) -> list:
+    """Find the contact edges on two coarse grids."""
+    edges = list(start)
+    for size in (0.03, 0.01):
+        edges = press(scene, edges, size).edges
+    return edges
+
+
+def measures(scene: Scene, pressed: Pressed) -> dict:
+    """Return the measures of a pressed patch by name."""
+    place = pressed.place
+    force = pressed.force
+    pressure = force / pressed.weight
+    index = np.flatnonzero(force > 0)
+    own = np.linalg.inv(pressed.normal[np.ix_(index, index)])
     xs = place[index]
-    cross = nt[np.ix_(index, index)]
-    soft = tt[np.ix_(index, index)] - (cross.T @ own @ cross if scene.upper != scene.lower else 0.0)
-    total = scene.width
-    # A curve cannot follow a jump.
-    largest = float(pressure.max()) if scene.step else peak(place, pressure)
-    values = {
+    cross = pressed.cross[np.ix_(index, index)]
+    soft = pressed.tangential[np.ix_(index, index)]
+    if scene.upper != scene.lower:
+        soft = soft - cross.T @ own @ cross
+    width = scene.width
+    stretches = pressed.edges
+    return {
         "normal_load": scene.load,
-        "approach": d,
-        "moment": f @ place * total,
-        "contact_fraction": sum(b - a for a, b, _ in found) / scene.length,
-        "contact_half_width": (found[-1][1] - found[0][0]) / 2,
-        "pressure_peak": largest,
-        "pressure_centre": f @ place * total / scene.load,
-        "normal_stiffness": own.sum() * total,
-        "tangential_stiffness": np.linalg.solve(soft, np.ones(index.size)).sum() * total,
-        "rotational_stiffness": xs @ own @ xs * total,
+        "approach": pressed.approach,
+        "moment": force @ place * width,
+        "contact_fraction": sum(b - a for a, b, _ in stretches) / scene.length,
+        "contact_half_width": (stretches[-1][1] - stretches[0][0]) / 2,
+        # a curve cannot follow a jump
+        "pressure_peak": float(pressure.max()) if scene.step else peak(place, pressure),
+        "pressure_centre": force @ place * width / scene.load,
+        "normal_stiffness": own.sum() * width,
+        "tangential_stiffness": np.linalg.solve(soft, np.ones(index.size)).sum() * width,
+        "rotational_stiffness": xs @ own @ xs * width,
     }
-    return values, found
 
 
 def peak(x, pressure) -> float:
@@ -302,13 +348,12 @@ def answer(scene: Scene, fine: float = 5e-4, start=()) -> tuple:
 
     The uncertainty is the largest of the last change and a third of the change before.
     """
-    edges = list(start)
+    edges = find_edges(scene, start)
     found = []
-    for size in (0.03, 0.01):
-        edges = solve(scene, edges, size)[1]
     for lap in LAPS:
-        values, edges = solve(scene, edges, fine, lap)
-        found.append(values)
+        pressed = press(scene, edges, fine, lap)
+        edges = pressed.edges
+        found.append(measures(scene, pressed))
     first, second, last = found
     return last, {
         name: max(abs(value - second[name]), abs(second[name] - first[name]) / 3)

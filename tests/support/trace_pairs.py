@@ -1,15 +1,16 @@
 """Traces before and after wear with known truth: five finishes, other shapes of wear, autoregressive noise and gaps.
 
-Independent of `known_pairs` and of the method that compares the traces; the record and the function `draw_pair` are
-those of `stylus_pairs`. The surfaces are lapped, two-scale, spark-eroded, shaped or porous. The instrument has AR(1)
-noise, a slow drift, a digitisation step and, in half of the pairs, another spacing in the second trace; missing
-heights are NaN. All lengths are in metres. Seeds 1 to 30 served to check the generator.
+Independent of `known_pairs` and of the method that compares the traces. The surfaces are lapped, two-scale, spark-
+eroded, shaped or porous. The instrument has AR(1) noise, a slow drift, a digitisation step and, in half of the pairs,
+another spacing in the second trace; missing heights are NaN. All lengths are in metres. Seeds 1 to 30 served to check
+the generator.
 """
+
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
-from stylus_pairs import StylusPair
 
 STEP = 0.25e-6  # [m] spacing of the surface from which both traces are cut
 FINISHES = ("lapped", "two-scale", "eroded", "shaped", "porous")
@@ -41,6 +42,27 @@ RUN_OUT = (
     "cosine scar",
     "run-out scar",
 )
+
+
+@dataclass(frozen=True)
+class TracePair:
+    """Two traces and their truth.
+
+    - `kind`: one of `KINDS`
+    - `before`, `after`: positions and heights (n,) [m] of each trace
+    - `worn` (n,) [m]: height lost (> 0) or gained (< 0) at the samples of `after`
+    - `shift` [m]: position on the piece of the first sample of `after` minus that of `before`
+    - `span` [m]: start and end of the worn part in the coordinates of `after`; None if there is not a single worn part.
+      A trace is interpolated between the samples of the surface, so the worn part begins half a sample before the first
+      lowered one and ends half a sample after the last.
+    """
+
+    kind: str
+    before: tuple
+    after: tuple
+    worn: np.ndarray = field(repr=False)
+    shift: float = 0.0
+    span: tuple | None = None
 
 
 def draw_surface(random, length: float) -> np.ndarray:
@@ -261,7 +283,7 @@ def cut_gaps(random, trace: tuple, places=()) -> tuple:
     return x, z
 
 
-def draw_pair(kind: str, seed: int) -> StylusPair:
+def draw_pair(kind: str, seed: int) -> TracePair:
     """Draw the pair of traces of `kind` that belongs to `seed`."""
     random = np.random.default_rng([seed, 523, KINDS.index(kind)])
     length = random.uniform(1.5e-3, 7e-3)
@@ -289,4 +311,4 @@ def draw_pair(kind: str, seed: int) -> StylusPair:
     worn = np.interp(after[0] + begin, x, wear)
     if span is not None:
         span = (span[0] - begin, span[1] - begin)
-    return StylusPair(kind, before, after, worn, float(begin - margin), span)
+    return TracePair(kind, before, after, worn, float(begin - margin), span)

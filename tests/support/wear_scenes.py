@@ -100,32 +100,10 @@ def discretize(patch: reference.Scene, span: tuple, cells: int) -> Model:
     normal = low[0] + high[0]
     if patch.skin:
         normal = normal + np.diag(1 / (patch.skin * weight))
-    gap = place**2 / 2 * patch.curvature + patch.tilt * place
-    if patch.step:
-        height, at = patch.step
-        gap = gap + height * (place > at + 1e-15 if height > 0 else place > at - 1e-15)
+    gap = reference.unloaded_gap(patch, place)
     return Model(
         normal, low[1] + high[1] if patch.upper == patch.lower else np.empty(0), place, weight, gap
     )
-
-
-def press(model: Model, gap, softening, load: float, active) -> tuple:
-    """Solve the contact by an active set that starts from `active`; return forces, approach and the new set."""
-    compliance = model.normal + np.diag(softening)
-    for _ in range(400):
-        index = np.flatnonzero(active)
-        columns = np.stack([np.ones(index.size), gap[index]], axis=1)
-        rows = np.linalg.solve(compliance[np.ix_(index, index)], columns)
-        approach = (load + rows[:, 1].sum()) / rows[:, 0].sum()
-        force = np.zeros(gap.size)
-        force[index] = approach * rows[:, 0] - rows[:, 1]
-        remaining = compliance @ force + gap - approach
-        leaves = active & (force < 0)
-        enters = ~active & (remaining < -1e-13 * np.abs(compliance @ force).max())
-        if not leaves.any() and not enters.any():
-            return force, approach, active
-        active = active & ~leaves if leaves.any() else active | enters
-    raise RuntimeError("no contact found")
 
 
 def wear(model: Model, scene: WearScene, steps: int) -> dict:
@@ -134,11 +112,13 @@ def wear(model: Model, scene: WearScene, steps: int) -> dict:
     edges = (
         np.expm1(np.linspace(0, 1, steps + 1) * np.log1p(1 / FIRST_STEP)) * FIRST_STEP * scene.path
     )
-    active = model.gap <= np.quantile(model.gap, 0.3)
+    active = None
     depth = np.zeros(model.gap.size)
     for begin, end in pairwise(edges):
         rate = scene.coefficient * (end - begin) / model.weight
-        force, approach, active = press(model, model.gap + depth, rate, load, active)
+        force, approach, active = reference.contact(
+            model.normal + np.diag(rate), model.gap + depth, load, active
+        )
         depth = depth + rate * force
     pressure = force / model.weight
     index = np.flatnonzero(active)
@@ -170,10 +150,9 @@ def wear(model: Model, scene: WearScene, steps: int) -> dict:
 def contact_span(model: Model, scene: WearScene) -> tuple:
     """Find the smallest and largest place in contact before and after wear."""
     load = scene.patch.load / scene.patch.width
-    active = model.gap <= np.quantile(model.gap, 0.3)
     rate = scene.coefficient * scene.path / model.weight
-    new = press(model, model.gap, np.zeros(rate.size), load, active)[2]
-    worn = press(model, model.gap, rate, load, active)[2]
+    new = reference.contact(model.normal, model.gap, load)[2]
+    worn = reference.contact(model.normal + np.diag(rate), model.gap, load)[2]
     places = model.place[new | worn]
     return float(places.min()), float(places.max())
 

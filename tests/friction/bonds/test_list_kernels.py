@@ -2,8 +2,16 @@
 
 import numpy as np
 import pytest
-from friction_paths import pulled, random_walk, sum_by_hand, triangle, upper_pressure, walk
-from list_paths import STATUS, energy_by_hand, follow_list
+from friction_paths import (
+    energy_by_hand,
+    pulled,
+    random_walk,
+    sum_by_hand,
+    triangle,
+    upper_pressure,
+    walk,
+)
+from list_paths import STATUS, follow_list
 from scipy.special import gammainc
 
 from patchfem.friction.bonds.parameters import Bonds

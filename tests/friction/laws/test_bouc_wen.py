@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 from law_runs import LOAD, bench_along, shrinking
-from scene_texts import COATED, DRIVE, MODE, mistakes, only
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from patchfem import load
 from patchfem.friction.laws.bouc_wen import loop_from_keys
 from patchfem.scene.keys.tables import Friction
 
@@ -97,23 +95,3 @@ def test_exact_one_and_one_is_the_stretch_reading():
     b = bench_along(bonds, time, slide)
     assert a.force == pytest.approx(b.force, abs=1e-10 * LIMIT)
     assert a.ledger[0] == pytest.approx(b.ledger[0], abs=1e-10 * a.ledger[0, -1])
-
-
-def test_refuses_what_the_law_cannot_do():
-    scene = '[normal]\nload = "100 N"\n[friction]\n' + law_of(2.0, 0.5) + MODE + DRIVE
-    assert "friction.stiffness: missing" in only(scene.replace('stiffness = "1.3e7 N/m"\n', ""))
-    assert "friction.exponent" in only(scene, "friction.exponent=0")
-    assert "friction.shape" in only(scene, "friction.shape=0") and "friction.shape" in only(
-        scene, "friction.shape=1.1"
-    )
-    assert "'bouc-wen' with [contact.shear]" in only(
-        COATED + "[contact.shear]\n[friction]\n" + LAW + MODE + DRIVE
-    )
-    assert (
-        "'bouc-wen' with normal.amplitude"
-        in mistakes(scene, "normal.amplitude=1 N", "normal.frequency=3 Hz")[0]
-    )
-    assert (
-        load(scene).friction.exponent == 2.0
-        and load(scene.replace("exponent = 2.0\n", "")).friction.exponent == 1
-    )

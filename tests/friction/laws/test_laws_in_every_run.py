@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 from law_runs import bench_along, fitted, masses, plain_masses, released, rig, shrinking
 from march_paths import share_one_loop
+from scene_texts import COATED, DRIVE, MODE, mistakes, only
+
+from patchfem import load
 
 IWAN = 'law = "iwan"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\nchi = -0.4\nbeta = 0.3\n'
 BOUC_WEN = 'law = "bouc-wen"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\nexponent = {}\nshape = {}\n'
@@ -105,3 +108,68 @@ def test_exact_a_fit_finds_the_parameters_of_a_loop(tmp_path, law, start, free, 
     assert fitted(tmp_path, guess, (time, slide, force), free).keys.fit.values == pytest.approx(
         values, rel=1e-5
     )
+
+
+TANH = 'law = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n'
+POWER = BOUC_WEN.format(2.0, 0.5)
+
+
+def rig_scene(law: str) -> str:
+    """Return the scene of one mode under 100 N with a law."""
+    return '[normal]\nload = "100 N"\n[friction]\n' + law + MODE + DRIVE
+
+
+def without_key(scene: str, key: str) -> str:
+    """Return a scene without the lines of a key."""
+    return "".join(line for line in scene.splitlines(True) if not line.startswith(f"{key} ="))
+
+
+@pytest.mark.parametrize(
+    "law, keys",
+    [
+        (IWAN, "stiffness chi beta"),
+        (POWER, "stiffness"),
+        (DAMPED, "stiffness stribeck_speed"),
+        (TANH, "reference_speed"),
+    ],
+)
+def test_refuses_a_law_without_a_key_that_it_needs(law, keys):
+    for key in keys.split():
+        assert f"friction.{key}: missing" in only(without_key(rig_scene(law), key))
+
+
+@pytest.mark.parametrize(
+    "law, change, message",
+    [
+        (IWAN, "chi=0.1", "friction.chi"),
+        (IWAN, "chi=-1", "friction.chi"),
+        (IWAN, "stiffness=3", "5e6 N/m"),
+        (IWAN, "static=0", "static: must be > 0"),
+        (IWAN, "kinetic=0.2", "laws with a kinetic coefficient are coulomb"),
+        (POWER, "exponent=0", "friction.exponent"),
+        (POWER, "shape=0", "friction.shape"),
+        (POWER, "shape=1.1", "friction.shape"),
+        (DAMPED, "kinetic=0.4", "larger than static"),
+        (DAMPED, "viscous=3", "10 N s/m"),
+        (DAMPED, "viscous=-1 N s/m", "friction.viscous"),
+    ],
+)
+def test_refuses_a_value_outside_the_range_of_a_law(law, change, message):
+    assert message in only(rig_scene(law), f"friction.{change}")
+
+
+@pytest.mark.parametrize("law", [IWAN, POWER, DAHL, TANH])
+def test_refuses_a_law_with_partial_slip(law):
+    scene = COATED + "[contact.shear]\n[friction]\n" + law + MODE + DRIVE
+    assert "with [contact.shear]" in only(scene)
+
+
+@pytest.mark.parametrize("law", [IWAN, POWER, DAMPED])
+def test_refuses_a_law_under_a_varying_load(law):
+    sets = ("normal.amplitude=1 N", "normal.frequency=3 Hz")
+    assert "with normal.amplitude" in mistakes(rig_scene(law), *sets)[0]
+
+
+def test_exact_keys_left_out_have_their_defaults():
+    assert load(without_key(rig_scene(POWER), "exponent")).friction.exponent == 1
+    assert load(rig_scene(DAHL)).friction.kinetic == 0.31

@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 from law_runs import LOAD, bench_along, shrinking
-from scene_texts import COATED, DRIVE, MODE, mistakes, only
 from scipy.integrate import solve_ivp
-
-from patchfem import load
 
 STATIC, KINETIC, STIFFNESS, SPEED = 0.31 * LOAD, 0.22 * LOAD, 1.3e7, 2e-3
 DAHL = 'law = "lugre"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\nstribeck_speed = "2 mm/s"\n'
@@ -66,24 +63,3 @@ def test_exact_straight_legs_are_the_equations():
         )
     work, stored, dissipated, created = found.ledger
     assert work[-1] == pytest.approx(stored[-1] + dissipated[-1], rel=1e-12) and not created.any()
-
-
-def test_refuses_what_the_law_cannot_do():
-    scene = '[normal]\nload = "100 N"\n[friction]\n' + DAMPED + MODE + DRIVE
-    for key in ("stiffness", "stribeck_speed"):
-        bare = "".join(line for line in scene.splitlines(True) if not line.startswith(f"{key} ="))
-        assert f"friction.{key}: missing" in only(bare)
-    assert "larger than static" in only(scene, "friction.kinetic=0.4")
-    assert "10 N s/m" in only(scene, "friction.viscous=3")
-    assert "friction.viscous" in only(scene, "friction.viscous=-1 N s/m")
-    assert "'lugre' with [contact.shear]" in only(
-        COATED + "[contact.shear]\n[friction]\n" + DAHL + MODE + DRIVE
-    )
-    assert (
-        "'lugre' with normal.amplitude"
-        in mistakes(scene, "normal.amplitude=1 N", "normal.frequency=3 Hz")[0]
-    )
-    assert (
-        load('[normal]\nload = "100 N"\n[friction]\n' + DAHL + MODE + DRIVE).friction.kinetic
-        == 0.31
-    )

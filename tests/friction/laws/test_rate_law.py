@@ -5,7 +5,7 @@ import pytest
 from scene_texts import DRIVE, MODE, POINT
 from scipy.integrate import quad, solve_ivp
 
-from patchfem import SceneError, load, plan, run
+from patchfem import plan, run
 from patchfem.core import Outcome
 from patchfem.friction.laws.tanh import TanhLaw
 
@@ -127,17 +127,3 @@ def test_exact_below_the_limit_it_is_a_damper_that_never_holds():
     )
     assert result.outcome is Outcome.STEADY
     assert any("never sticks" in text and "54.9 mm/s" in text for text in result.extra["notes"])
-
-
-def test_refuses_the_rate_law_behind_shear_and_without_its_speed():
-    patch = (
-        '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "26 lbf"\n'
-        'substrate = "steel"\n[contact.shear]\n[friction]\nlaw = "tanh"\nstatic = 0.3\n{}'
-        '[slide]\nkind = "triangle"\namplitude = "1 um"\nspeed = "1 mm/s"\n'
-    )
-    with pytest.raises(
-        SceneError, match=r"'tanh' with .contact\.shear. is not supported yet; leave out"
-    ):
-        load(patch.format('reference_speed = "1 mm/s"\n'))
-    with pytest.raises(SceneError, match="reference_speed: missing"):
-        load(patch.format("").replace("[contact.shear]\n", ""))
