@@ -89,7 +89,7 @@ def main(starts: int = 8) -> dict:
         seconds = time.process_time() - begin
         each = {
             "model": found.score(found.logs, found.left_out_logs),
-            "constant": found.scored(*found.nulls["constant"][:2]),
+            "constant": found.score(*found.nulls["constant"][:2]),
         }
         for what, scored in each.items():
             for part in ("fitted", "held_out"):
