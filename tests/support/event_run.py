@@ -6,7 +6,7 @@ import numpy as np
 
 from patchfem.dynamics.events import histories, stick_steady
 from patchfem.dynamics.events.elements import make_coulomb_elements
-from patchfem.dynamics.events.positions_kernels import BEGIN, COLUMN
+from patchfem.dynamics.events.positions_kernels import BEGIN, Column
 
 
 def groups_of(modes, static, kinetic) -> list:
@@ -127,7 +127,7 @@ def run(modes, drive, static, kinetic, duration, start=None) -> list:
     for first, end in zip([0, *begins[begins > 0]], [*begins[begins > 0], len(rows)]):
         part = rows[first:end]
         ways = tuple(
-            int(part[0, one._column(f, COLUMN.direction)]) if group.static else 1
+            int(part[0, one._column(f, Column.DIRECTION)]) if group.static else 1
             for f, group in enumerate(one.groups)
         )
         modal = [Signal(one, part, (k,), (n + k,), (1.0,)) for k in range(n)]

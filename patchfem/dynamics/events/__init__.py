@@ -25,6 +25,7 @@ fastest rate)/2 pieces and one for each event.
 | to read | module |
 |---|---|
 | first: the loop from event to event | `march_kernels` |
+| the record of arrays that its kernels take | `modal_system.RunArrays` |
 | which elements slip (Masing) | `memory_kernels` |
 | which interfaces stick | `stick_kernels` |
 | motion of a piece, roots of polynomials | `series_kernels`, `search_kernels` |

@@ -30,16 +30,18 @@ def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) ->
     -------
     float
     """
-    faces = len(modes.interfaces)
-    damper = float(np.linalg.norm(modes.damping_matrix, 2)) / 2
-    most = stiffness * float((modes.interfaces**2).sum(axis=1).max(initial=0.0)) / modes.mass
-    rate = damper + sqrt(damper**2 + float(modes.omega.max()) ** 2 + most)
+    n_interfaces = len(modes.interfaces)
+    half_damping = float(np.linalg.norm(modes.damping_matrix, 2)) / 2
+    added_stiffness = (
+        stiffness * float((modes.interfaces**2).sum(axis=1).max(initial=0.0)) / modes.mass
+    )
+    rate = half_damping + sqrt(half_damping**2 + float(modes.omega.max()) ** 2 + added_stiffness)
     pieces = (
         max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / 2
-        + 4 * faces
+        + 4 * n_interfaces
         + 2 * elements
     )
-    return PYTHON_PIECE_SECONDS * (1 + modes.omega.size) * (1 + faces) * pieces
+    return PYTHON_PIECE_SECONDS * (1 + modes.omega.size) * (1 + n_interfaces) * pieces
 
 
 def sample_seconds(modes: ModalBasis) -> float:

@@ -1,50 +1,64 @@
 """Drive of a run over a short piece as a power series (compiled).
 
 A segment of the drive is a sine, a straight line, or a sweep with linear or logarithmic frequency;
-its numbers are named in `positions_kernels.SegmentColumns`.
+its numbers are named in `positions_kernels.Segment`.
 """
 
 from math import cos, exp, expm1, floor, pi, sin
+from typing import NamedTuple
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .positions_kernels import KIND, SEGMENT
+from ...friction.flags_kernels import NJIT_INLINE, NJIT_KERNEL
+from .positions_kernels import KIND, Segment, Time
 from .series_kernels import DOUBLE_INTEGRAL
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def time_since_start(segment, cycle, offset, period):
+class Instant(NamedTuple):
+    """Number of a cycle, time since the cycle began [s], and duration of a cycle [s]."""
+
+    cycle: float
+    offset: float
+    period: float
+
+
+@njit(**NJIT_INLINE)
+def present_instant(time_state):
+    """Return the `Instant` of a `TimeState`."""
+    now = time_state.now
+    return Instant(now[Time.CYCLE], now[Time.OFFSET], time_state.period[0])
+
+
+@njit(**NJIT_INLINE)
+def time_since_start(segment, instant):
     """Return the time [s] since a segment began.
 
     Parameters
     ----------
     segment : ndarray
-        (12,) segment of the drive, see `SegmentColumns`.
-    cycle : float
-        Number of the cycle.
-    offset : float
-        Time since the start of the cycle [s].
-    period : float
-        Duration of a cycle [s].
+        (12,) segment of the drive, see `Segment`.
+    instant : Instant
 
     Returns
     -------
     float
     """
-    return (cycle - segment[SEGMENT.cycle]) * period + (offset - segment[SEGMENT.offset])
+    return (instant.cycle - segment[Segment.CYCLE]) * instant.period + (
+        instant.offset - segment[Segment.OFFSET]
+    )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def fastest_drive_rate(segment, period):
-    """Return the fastest rate [1/s] that a piece must resolve: of the drive, and of its cycles.
+@njit(**NJIT_INLINE)
+def fastest_drive_rate(time_state):
+    """Return the fastest rate [1/s] that the next piece must resolve: of the drive, and of its cycles.
 
     The motion is integrated with sines and cosines of the cycle.
     """
-    return max(segment[SEGMENT.rate], 2 * pi / period)
+    segment = time_state.segments[int(time_state.now[Time.SEGMENT])]
+    return max(segment[Segment.RATE], 2 * pi / time_state.period[0])
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def drive_phase(segment, cycle, offset, period):
+@njit(**NJIT_INLINE)
+def drive_phase(segment, instant):
     """Return the phase of the drive [rad] in [0, 2 pi).
 
     Along a straight line it is the phase of the cycle.
@@ -52,85 +66,79 @@ def drive_phase(segment, cycle, offset, period):
     Parameters
     ----------
     segment : ndarray
-        (12,) segment of the drive, see `SegmentColumns`.
-    cycle : float
-        Number of the cycle.
-    offset : float
-        Time since the start of the cycle [s].
-    period : float
-        Duration of a cycle [s].
+        (12,) segment of the drive, see `Segment`.
+    instant : Instant
 
     Returns
     -------
     float
     """
-    if segment[SEGMENT.kind] == KIND.sine:
-        theta = segment[SEGMENT.phase] + segment[SEGMENT.omega] * offset
-        cycles = cycle - segment[SEGMENT.cycle]
-        if segment[SEGMENT.turns] != 0.0:
-            extra = cycles * segment[SEGMENT.turns]
-            theta += 2 * pi * (extra - floor(extra) + cycles * segment[SEGMENT.turns_remainder])
+    offset = instant.offset
+    if segment[Segment.KIND] == KIND.sine:
+        theta = segment[Segment.PHASE] + segment[Segment.OMEGA] * offset
+        cycles = instant.cycle - segment[Segment.CYCLE]
+        if segment[Segment.TURNS] != 0.0:
+            extra = cycles * segment[Segment.TURNS]
+            theta += 2 * pi * (extra - floor(extra) + cycles * segment[Segment.TURNS_REMAINDER])
         # takes a tenth of the time of the operator %
         return theta - 2 * pi * floor(theta / (2 * pi))
-    if segment[SEGMENT.kind] == KIND.line:
-        return 2 * pi * offset / period
-    time = time_since_start(segment, cycle, offset, period)
-    if segment[SEGMENT.kind] == KIND.chirp:
+    if segment[Segment.KIND] == KIND.line:
+        return 2 * pi * offset / instant.period
+    time = time_since_start(segment, instant)
+    if segment[Segment.KIND] == KIND.chirp:
         return (
-            segment[SEGMENT.phase]
-            + time * (segment[SEGMENT.omega] + 0.5 * segment[SEGMENT.slope] * time)
+            segment[Segment.PHASE]
+            + time * (segment[Segment.OMEGA] + 0.5 * segment[Segment.SLOPE] * time)
         ) % (2 * pi)
     return (
-        segment[SEGMENT.phase]
-        + segment[SEGMENT.omega] * expm1(segment[SEGMENT.slope] * time) / segment[SEGMENT.slope]
+        segment[Segment.PHASE]
+        + segment[Segment.OMEGA] * expm1(segment[Segment.SLOPE] * time) / segment[Segment.SLOPE]
     ) % (2 * pi)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def drive_value(segment, cycle, offset, period):
+@njit(**NJIT_INLINE)
+def swept_frequency(segment, time):
+    """Return the angular frequency [rad/s] of a sweep at a time [s] since its segment began."""
+    if segment[Segment.KIND] == KIND.chirp:
+        return segment[Segment.OMEGA] + segment[Segment.SLOPE] * time
+    return segment[Segment.OMEGA] * exp(segment[Segment.SLOPE] * time)
+
+
+@njit(**NJIT_INLINE)
+def drive_value(segment, instant):
     """Return the acceleration of a segment of the drive [m s-2].
 
     Parameters
     ----------
     segment : ndarray
-        (12,) segment of the drive, see `SegmentColumns`.
-    cycle : float
-        Number of the cycle.
-    offset : float
-        Time since the start of the cycle [s].
-    period : float
-        Duration of a cycle [s].
+        (12,) segment of the drive, see `Segment`.
+    instant : Instant
 
     Returns
     -------
     float
     """
-    kind = segment[SEGMENT.kind]
-    theta = drive_phase(segment, cycle, offset, period)
-    time = time_since_start(segment, cycle, offset, period)
+    kind = segment[Segment.KIND]
+    theta = drive_phase(segment, instant)
+    time = time_since_start(segment, instant)
     if kind == KIND.line:
-        return segment[SEGMENT.constant] + segment[SEGMENT.slope] * time
-    size = segment[SEGMENT.amplitude]
-    if segment[SEGMENT.is_displacement] == 1.0:
-        omega = (
-            segment[SEGMENT.omega] + segment[SEGMENT.slope] * time
-            if kind == KIND.chirp
-            else segment[SEGMENT.omega] * exp(segment[SEGMENT.slope] * time)
-        )
+        return segment[Segment.CONSTANT] + segment[Segment.SLOPE] * time
+    size = segment[Segment.AMPLITUDE]
+    if segment[Segment.IS_DISPLACEMENT] == 1.0:
+        omega = swept_frequency(segment, time)
         size *= omega * omega
-    return segment[SEGMENT.constant] + size * sin(theta)
+    return segment[Segment.CONSTANT] + size * sin(theta)
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def expand_drive(segment, cycle, offset, period, h, top, waves):
+@njit(**NJIT_KERNEL)
+def expand_drive(segment, instant, h, top, waves):
     """Write the series of the drive [m s-2] over u = t/h into waves[0].
 
     Parameters
     ----------
     segment : ndarray
-        (12,) see `SegmentColumns`.
-    cycle, offset, period : float
-        Cycle and offset [s] of the start of the piece, and duration of a cycle [s].
+        (12,) see `Segment`.
+    instant : Instant
     h : float
         Duration of the piece [s].
     top : int
@@ -139,36 +147,32 @@ def expand_drive(segment, cycle, offset, period, h, top, waves):
         (3, >= top + 1); rows 1 and 2 are workspace.
     """
     series = waves[0]
-    kind = segment[SEGMENT.kind]
-    theta = drive_phase(segment, cycle, offset, period)
+    kind = segment[Segment.KIND]
+    theta = drive_phase(segment, instant)
     if kind == KIND.sine:
-        angle = segment[SEGMENT.omega] * h
-        series[0] = segment[SEGMENT.amplitude] * sin(theta)
-        series[1] = segment[SEGMENT.amplitude] * cos(theta) * angle
+        angle = segment[Segment.OMEGA] * h
+        series[0] = segment[Segment.AMPLITUDE] * sin(theta)
+        series[1] = segment[Segment.AMPLITUDE] * cos(theta) * angle
         for k in range(2, top + 1):
             series[k] = -series[k - 2] * (angle * angle * DOUBLE_INTEGRAL[k])
-        series[0] += segment[SEGMENT.constant]
+        series[0] += segment[Segment.CONSTANT]
         return
-    time = time_since_start(segment, cycle, offset, period)
+    time = time_since_start(segment, instant)
     if kind == KIND.line:
         for k in range(top + 1):
             series[k] = 0.0
-        series[0] = segment[SEGMENT.constant] + segment[SEGMENT.slope] * time
-        series[1] = segment[SEGMENT.slope] * h
+        series[0] = segment[Segment.CONSTANT] + segment[Segment.SLOPE] * time
+        series[1] = segment[Segment.SLOPE] * h
         return
-    omega = (
-        segment[SEGMENT.omega] + segment[SEGMENT.slope] * time
-        if kind == KIND.chirp
-        else segment[SEGMENT.omega] * exp(segment[SEGMENT.slope] * time)
-    )
-    expand_sweep(kind, omega, theta, segment[SEGMENT.slope] * h, h, top, waves)
-    if segment[SEGMENT.is_displacement] == 1.0:
-        multiply_by_squared_frequency(kind, omega, segment[SEGMENT.slope] * h, top, waves)
+    omega = swept_frequency(segment, time)
+    expand_sweep(kind, omega, theta, segment[Segment.SLOPE] * h, h, top, waves)
+    if segment[Segment.IS_DISPLACEMENT] == 1.0:
+        multiply_by_squared_frequency(kind, omega, segment[Segment.SLOPE] * h, top, waves)
     for k in range(top + 1):
-        series[k] *= segment[SEGMENT.amplitude]
+        series[k] *= segment[Segment.AMPLITUDE]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def expand_sweep(kind, omega, theta, slope, h, top, waves):
     """Write the series of the sine of a swept phase into waves[0].
 
@@ -212,7 +216,7 @@ def expand_sweep(kind, omega, theta, slope, h, top, waves):
         cosine[k + 1] = c / (k + 1)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def multiply_by_squared_frequency(kind, omega, slope, top, waves):
     """Multiply waves[0] by the series of the squared frequency of a sweep.
 

@@ -24,11 +24,10 @@ class Elements:
     - stiffness: (t,) k_j [N/m]
     - yield_displacement: (t,) y_j [m], in increasing order
     - rank: (a,) number of the element that each given element became part of; -1 for one without
-    stiffness or yield
-      slide, which carries nothing
+      stiffness or yield slide, which carries nothing
     - static, kinetic: limits of the rigid element [N]; it holds the relative displacement until its
-    reaction reaches
-      `static` and then slips under `kinetic`; static = 0 stands for no rigid element
+      reaction reaches `static` and then slips under `kinetic`; static = 0 stands for no rigid
+      element
     """
 
     stiffness: np.ndarray
@@ -165,7 +164,7 @@ class ElementTable(NamedTuple):
     - n_elements: (i,) number of elements
     - yield_slide: (i, t + 1) [m], infinite after the last element
     - stiffness_sum, limit_sum, energy_sum: (i, t + 1) sums of k [N/m], k y [N] and k y^2 [J] over
-    the first j elements
+      the first j elements
     - static_limit, kinetic_limit: (i,) limits of the rigid elements [N], 0 where there is none
     """
 
@@ -204,19 +203,17 @@ class Memory(NamedTuple):
 
     - slide: (i,) relative displacement [m]
     - n_slipping, direction: (i,) number of elements that slip, the first ones of the list, and the
-    sign of their slip
+      sign of their slip
     - n_groups: (i,) groups of elements that stopped together at a turning point, the innermost
-    group last
+      group last
     - group_end: (i, t + 2) end of a group in the list; it begins where the group inside it ends
     - group_slide, group_sign: (i, t + 2) relative displacement [m] at which a group stopped, and
-    the sign of its slip
-      before; the sign is 0 for elements that never slipped, which are unstretched at that
-      displacement
+      the sign of its slip before; the sign is 0 for elements that never slipped, which are
+      unstretched at that displacement
     - force, slip: (i,) force [N], and mean slip [m] weighted with k y
     - work, loss: (i,) work done on the elements and energy that they dissipated [J]
     - rigid_state: (i,) sign of the slip of the rigid element, 0 in stick, and twice the sign where
-    it is at its limit
-      while other interfaces hold this relative displacement
+      it is at its limit while other interfaces hold this relative displacement
     """
 
     slide: np.ndarray

@@ -26,6 +26,7 @@ from .elements import (
 )
 from .event_list import BORDER, MAX_EVENTS, RELEASE, REVERSAL, STOP, EventLog
 from .modal_system import (
+    RunArrays,
     clear_workspace,
     copy_into,
     make_modal_system,
@@ -37,16 +38,16 @@ from .modal_system import (
 )
 from .positions_kernels import (
     BEGIN,
-    COLUMN,
-    INTERFACE,
-    LEDGER,
     N_COLUMNS,
-    PREVIOUS,
-    ROW,
-    RUN,
-    SEGMENT,
     STATUS,
-    TIME,
+    Column,
+    InterfaceMeasure,
+    Ledger,
+    PreviousStatus,
+    Row,
+    RunMeasure,
+    Segment,
+    Time,
 )
 from .reading import Reading, find_sticking_ring
 
@@ -78,8 +79,8 @@ class PieceRun:
     """Result of a run of rigid and elastic-plastic elements.
 
     - amplitudes: (c, 2) smallest and largest output of every cycle [m]
-    - phasors: (c,) output at the frequency of the drive in the last cycle of every window [m], 0
-      in the other cycles
+    - phasors: (c,) output at the frequency of the drive in the last cycle of every window [m], 0 in
+      the other cycles
     - ledger: energies [J] by name
     - outcome: None where the run reached its end
     - reading: measures of the window
@@ -156,13 +157,17 @@ def announce_runs(
         Number of runs.
     """
     march, dense, read = load_event_kernels()
-    stiff = max((float(group.stiffness.sum()) for group in groups), default=0.0)
-    shown = min(cycles, window)
-    each = python_seconds(modes, drive, stiff, sum(group.stiffness.size for group in groups))
-    march.march.add_python_cost(runs * cycles * each)
-    march.stored_energy.add_python_cost(runs * each)
-    dense.evaluate_rows.add_python_cost(runs * shown * SAMPLES_PER_CYCLE * sample_seconds(modes))
-    read.read_rows.add_python_cost(PYTHON_READ_TIME_RATIO * runs * shown * each)
+    max_stiffness = max((float(group.stiffness.sum()) for group in groups), default=0.0)
+    cycles_read = min(cycles, window)
+    seconds_per_cycle = python_seconds(
+        modes, drive, max_stiffness, sum(group.stiffness.size for group in groups)
+    )
+    march.march.add_python_cost(runs * cycles * seconds_per_cycle)
+    march.stored_energy.add_python_cost(runs * seconds_per_cycle)
+    dense.evaluate_rows.add_python_cost(
+        runs * cycles_read * SAMPLES_PER_CYCLE * sample_seconds(modes)
+    )
+    read.read_rows.add_python_cost(PYTHON_READ_TIME_RATIO * runs * cycles_read * seconds_per_cycle)
 
 
 def is_loop_kept(modes: ModalBasis, drive) -> bool:
@@ -173,22 +178,18 @@ def is_loop_kept(modes: ModalBasis, drive) -> bool:
     """
     modal_system = make_modal_system(modes)
     table = make_element_table([make_coulomb_elements(1.0)] * len(modal_system.interfaces))
-    motion = np.zeros((2, modes.omega.size))
-    rows = np.zeros((1, 1))
-    memory = unstretched_memory(table, np.zeros(len(modal_system.interfaces)))
-    march = get_kernel_module(f"{FOLDER}.march_kernels").march
-    return march.is_stored(
-        (0.0, 0.0),
-        motion,
+    arrays = RunArrays(
         modal_system,
         table,
-        memory,
+        np.zeros((2, modes.omega.size)),
+        unstretched_memory(table, np.zeros(len(modal_system.interfaces))),
         start_previous_cycle(modal_system, table),
         start_time_state(drive, len(modal_system.interfaces)),
         start_sums(1, np.zeros(1)),
         make_workspace(modal_system),
-        rows,
     )
+    march = get_kernel_module(f"{FOLDER}.march_kernels").march
+    return march.is_stored((0.0, 0.0), arrays, np.zeros((1, 1)))
 
 
 def start_event_run(
@@ -272,16 +273,16 @@ def simulate(
             "travel, or start nearer to the middle"
         )
     run = start_event_run(modes, drive, groups, cycles, window, travel, start, memory)
-    done = run.run(frames, progress, even=even)
+    result = run.run(frames, progress, even=even)
     # the output exceeded the travel: the run is repeated up to that time, because only a run whose end is known
     # keeps the samples of its last cycles
-    if done is None:
-        again = start_event_run(
+    if result is None:
+        shortened_run = start_event_run(
             modes, drive, groups, run.now / drive.period, window, np.inf, start, memory
         )
-        again.outcome = Outcome.EXCEEDS_TRAVEL
-        done = again.run(frames, None, even=even)
-    return done
+        shortened_run.outcome = Outcome.EXCEEDS_TRAVEL
+        result = shortened_run.run(frames, None, even=even)
+    return result
 
 
 def simulate_batch(cases, cycles: int, window: int) -> list:
@@ -332,9 +333,9 @@ def evaluate_motion(
     run = start_event_run(modes, drive, groups, cycles, start=start)
     run.run_to(cycles, run._collect_into(rows))
     rows = np.concatenate(rows)
-    owner = np.clip(np.searchsorted(rows[:, ROW.time], times, side="right") - 1, 0, len(rows) - 1)
+    owner = np.clip(np.searchsorted(rows[:, Row.TIME], times, side="right") - 1, 0, len(rows) - 1)
     return run._make_response(
-        rows, owner, np.clip(times - rows[owner, ROW.time], 0.0, rows[owner, ROW.duration]), times
+        rows, owner, np.clip(times - rows[owner, Row.TIME], 0.0, rows[owner, Row.DURATION]), times
     )
 
 
@@ -351,7 +352,7 @@ class _Run:
         self.n_window = window
         self.kernels, self.dense, self.reader = load_event_kernels()
         self.modal_system = make_modal_system(modes)
-        old = like.arrays if like is not None else (None,) * 5
+        old = (None,) * 5 if like is None else like.reusable_arrays
         n = modes.omega.size
         count = max(1, ceil(cycles - WHOLE_CYCLES_TOL))
         table = make_element_table(self.groups)
@@ -372,8 +373,10 @@ class _Run:
             start_time_state(drive, len(self.groups)),
             start_sums(count, wanted, travel),
         )
-        self.arrays = tuple(map(copy_into, old, new))
-        self.table, self.memory, self.previous, self.time_state, self.run_sums = self.arrays
+        self.reusable_arrays = tuple(map(copy_into, old, new))
+        self.table, self.memory, self.previous, self.time_state, self.run_sums = (
+            self.reusable_arrays
+        )
         if (
             like is not None
             and like.modal_system.interfaces.shape == self.modal_system.interfaces.shape
@@ -384,9 +387,20 @@ class _Run:
             self.workspace = make_workspace(self.modal_system)
             self.scratch = make_workspace(self.modal_system)
         self.motion = motion
+        self.arrays = RunArrays(
+            self.modal_system,
+            self.table,
+            motion,
+            self.memory,
+            self.previous,
+            self.time_state,
+            self.run_sums,
+            self.workspace,
+        )
+        self.evaluation_arrays = self.arrays._replace(workspace=self.scratch)
         self.cycles = cycles
         self.period = drive.period
-        self.n_columns = ROW.motion + 2 * n + N_COLUMNS * len(self.groups)
+        self.n_columns = Row.MOTION + 2 * n + N_COLUMNS * len(self.groups)
         self.early_rows = []
         self.equal_samples = []
         self.n_kept = 0
@@ -410,11 +424,10 @@ class _Run:
         )
         # energy [J] of the stretched elements minus their work and loss so far, before the energy balance of the run begins
         self.start_stretch_energy = still - float(np.sum(self.memory.work - self.memory.loss))
-        self.rows = (
-            np.empty((ROWS_PER_CALL, self.n_columns))
-            if like is None or like.n_columns != self.n_columns
-            else like.rows
-        )
+        if like is not None and like.n_columns == self.n_columns:
+            self.rows = like.rows
+        else:
+            self.rows = np.empty((ROWS_PER_CALL, self.n_columns))
 
     def run_to(self, cycles: float, keep=None, progress=None) -> None:
         """Run up to a time in cycles.
@@ -461,33 +474,20 @@ class _Run:
         Its sums are added to those of the run as a whole: added piece by piece, the energies of a
         million cycles of four pieces were wrong by 6e-11.
         """
-        sums = self.run_sums.ledger[: LEDGER.max_stored]
+        sums = self.run_sums.ledger[: Ledger.MAX_STORED]
         before = sums.copy()
         sums[:] = 0.0
-        code, used = self.kernels.march(
-            stop,
-            self.motion,
-            self.modal_system,
-            self.table,
-            self.memory,
-            self.previous,
-            self.time_state,
-            self.run_sums,
-            self.workspace,
-            rows,
-        )
+        code, used = self.kernels.march(stop, self.arrays, rows)
         sums += before
         if code == STATUS.idle:
             raise NotConverged(
-                f"dynamics: at t = {rows[max(used - 1, 0), ROW.time]:.9g} s the contact changes between stick "
+                f"dynamics: at t = {rows[max(used - 1, 0), Row.TIME]:.9g} s the contact changes between stick "
                 "and slip again and again without time passing"
             )
         if code == STATUS.undetermined:
-            nearer = (
-                "bring friction.kinetic nearer to friction.static, or "
-                if np.any(self.table.kinetic_limit < self.table.static_limit)
-                else ""
-            )
+            nearer = ""
+            if np.any(self.table.kinetic_limit < self.table.static_limit):
+                nearer = "bring friction.kinetic nearer to friction.static, or "
             raise NotConverged(
                 "dynamics: after a change between stick and slip no state was found that satisfies the "
                 f'friction law; {nearer}use accuracy.method = "march"'
@@ -506,7 +506,7 @@ class _Run:
 
     def _keep_turning_rows(self, rows) -> None:
         """Keep the turning points and slips among rows from before the window."""
-        self.is_marked = self._log_events(rows) | (rows[:, ROW.begin] == BEGIN.reversal)
+        self.is_marked = self._log_events(rows) | (rows[:, Row.BEGIN] == BEGIN.reversal)
         if not self.n_kept and len(rows):
             self.is_marked[0] = True  # the first row is the start of the run
         if self.n_kept < MAX_TURNING_ROWS:
@@ -518,17 +518,17 @@ class _Run:
 
         It also keeps those of `sample_rows`.
         """
-        last = np.empty((0, self.n_columns))
+        last_row = np.empty((0, self.n_columns))
 
         def keep(rows) -> None:
-            nonlocal last
+            nonlocal last_row
             self._log_events(rows)
             if len(rows):
-                rows = np.concatenate([last, rows])
-                last = rows[-1:].copy()
+                rows = np.concatenate([last_row, rows])
+                last_row = rows[-1:].copy()
                 grid = step * np.arange(
-                    ceil(rows[0, ROW.time] / step),
-                    ceil((rows[-1, ROW.time] + rows[-1, ROW.duration]) / step),
+                    ceil(rows[0, Row.TIME] / step),
+                    ceil((rows[-1, Row.TIME] + rows[-1, Row.DURATION]) / step),
                 )
                 self.equal_samples.append(
                     self.sample_rows(rows, grid if grid.size else rows[:1, 0])
@@ -543,56 +543,64 @@ class _Run:
         computed one by one where that cycle needs more than `rows`.
         """
         run_sums = self.run_sums
-        begin = int(self.time_state.now[TIME.cycle])
-        k = int(self.time_state.now[TIME.segment]) + 1
+        begin = int(self.time_state.now[Time.CYCLE])
+        k = int(self.time_state.now[Time.SEGMENT]) + 1
         if k < len(self.time_state.segments):
-            end = min(end, int(self.time_state.segments[k, SEGMENT.cycle]))
+            end = min(end, int(self.time_state.segments[k, Segment.CYCLE]))
         end -= 1  # the last cycle is marched, because it crosses the border
-        many = end - begin - 1
-        if many < 1:
+        n_skipped = end - begin - 1
+        if n_skipped < 1:
             return
-        sums = run_sums.ledger, self.memory.work, self.memory.loss
-        before = [part.copy() for part in sums]
-        noted = (len(self.events), self.n_events)
-        asked = run_sums.is_phasor_wanted[begin]
+        growing = run_sums.ledger, self.memory.work, self.memory.loss
+        values_before = [total.copy() for total in growing]
+        events_before = (len(self.events), self.n_events)
+        is_phasor_wanted = run_sums.is_phasor_wanted[begin]
         run_sums.is_phasor_wanted[begin] = 1.0
-        code, done = self._march((begin + 1.0, 0.0), rows)
-        run_sums.is_phasor_wanted[begin] = asked
+        status, cycle_rows = self._march((begin + 1.0, 0.0), rows)
+        run_sums.is_phasor_wanted[begin] = is_phasor_wanted
         if len(rows):
-            self._keep_turning_rows(done)
-        if code != STATUS.done:
+            self._keep_turning_rows(cycle_rows)
+        if status != STATUS.done:
             return
-        before[0][[LEDGER.max_stored, LEDGER.has_slipped]] = run_sums.ledger[
-            [LEDGER.max_stored, LEDGER.has_slipped]
+        values_before[0][[Ledger.MAX_STORED, Ledger.HAS_SLIPPED]] = run_sums.ledger[
+            [Ledger.MAX_STORED, Ledger.HAS_SLIPPED]
         ]
-        for part, was in zip(sums, before):
-            part += many * (part - was)
-        for part in (run_sums.extremes, run_sums.phasors):
-            part[begin + 1 : end] = part[begin]
+        for total, value_before in zip(growing, values_before):
+            total += n_skipped * (total - value_before)
+        for total in (run_sums.extremes, run_sums.phasors):
+            total[begin + 1 : end] = total[begin]
         run_sums.phasors[begin:end] *= run_sums.is_phasor_wanted[begin:end, None]
-        self.time_state.now[TIME.cycle] = end
+        self.time_state.now[Time.CYCLE] = end
         if len(rows):
-            gained = self.memory.work - before[1], self.memory.loss - before[2]
-            self._repeat_rows(done, many, *noted, [part / (many + 1) for part in gained])
+            gains = self.memory.work - values_before[1], self.memory.loss - values_before[2]
+            self._repeat_rows(
+                cycle_rows, n_skipped, *events_before, [total / (n_skipped + 1) for total in gains]
+            )
 
-    def _repeat_rows(self, rows, many: int, first: int, count: int, gained) -> None:
+    def _repeat_rows(self, rows, n_cycles: int, first: int, count: int, gained) -> None:
         """Keep the rows (k, w) of a cycle and its events for `many` more cycles.
 
         first: number of its first event; count: events before it; gained: work and loss (i,) [J]
         of the elements in a cycle. Rows are kept for at most MAX_REPEATED_CYCLES cycles.
         """
-        turned = rows[self.is_marked]
-        cycles = np.unique(np.linspace(1, many, min(many, MAX_REPEATED_CYCLES)).round())
-        again = _shift_rows(turned, self.period * cycles)
-        for column, each in zip((COLUMN.work, COLUMN.loss), gained):
-            for f, part in enumerate(each):
-                again[:, self._column(f, column)] += np.repeat(cycles * part, len(turned))
-        self.early_rows.append(again)
-        self.n_kept += len(again)
-        found = np.concatenate([np.empty((0, 5)), *self.events[first:]])
-        few = min(many, -(-MAX_EVENTS // max(len(found), 1)))
-        self.events.append(_shift_rows(found, self.period * np.arange(many - few + 1, many + 1)))
-        self.n_events += many * (self.n_events - count)
+        turning_rows = rows[self.is_marked]
+        cycles = np.unique(np.linspace(1, n_cycles, min(n_cycles, MAX_REPEATED_CYCLES)).round())
+        repeated_rows = _shift_rows(turning_rows, self.period * cycles)
+        for column, gain in zip((Column.WORK, Column.LOSS), gained):
+            for f, interface_gain in enumerate(gain):
+                repeated_rows[:, self._column(f, column)] += np.repeat(
+                    cycles * interface_gain, len(turning_rows)
+                )
+        self.early_rows.append(repeated_rows)
+        self.n_kept += len(repeated_rows)
+        cycle_events = np.concatenate([np.empty((0, 5)), *self.events[first:]])
+        n_logged = min(n_cycles, -(-MAX_EVENTS // max(len(cycle_events), 1)))
+        self.events.append(
+            _shift_rows(
+                cycle_events, self.period * np.arange(n_cycles - n_logged + 1, n_cycles + 1)
+            )
+        )
+        self.n_events += n_cycles * (self.n_events - count)
 
     def _log_events(self, rows) -> np.ndarray:
         """Log stops, releases, reversals and borders of the drive.
@@ -603,22 +611,22 @@ class _Run:
         if not len(rows):
             return is_event
         for f, interface in enumerate(self.modal_system.interfaces):
-            slips = rows[:, self._column(f, COLUMN.slipping)] >= SLIP_FRACTION
-            direction = np.where(slips, rows[:, self._column(f, COLUMN.direction)], 0.0)
+            is_slipping = rows[:, self._column(f, Column.SLIPPING)] >= SLIP_FRACTION
+            direction = np.where(is_slipping, rows[:, self._column(f, Column.DIRECTION)], 0.0)
             before = np.concatenate([self.slip_signs[f : f + 1], direction[:-1]])
             self.slip_signs[f] = direction[-1]
             changed = np.flatnonzero(before != direction)
             start = np.where(before[changed] == 0, RELEASE, REVERSAL)
             kind = np.where(direction[changed] == 0, STOP, start * direction[changed])
             if self.has_rigid:
-                slide = rows[changed, self._column(f, COLUMN.slide)]
+                slide = rows[changed, self._column(f, Column.SLIDE)]
             else:
-                z = rows[changed, ROW.motion : ROW.motion + self.modes.omega.size]
+                z = rows[changed, Row.MOTION : Row.MOTION + self.modes.omega.size]
                 slide = z @ interface
             self._add_events(rows[changed], f, kind, slide)
             is_event[changed] = True
         if self.has_rigid:
-            borders = np.flatnonzero(rows[:, ROW.begin] == BEGIN.drive_border)
+            borders = np.flatnonzero(rows[:, Row.BEGIN] == BEGIN.drive_border)
             self._add_events(rows[borders], -1, BORDER, 0.0)
             is_event[borders] = True
         return is_event
@@ -628,8 +636,8 @@ class _Run:
         if not len(rows):
             return
         events = np.empty((len(rows), 5))
-        events[:, 0] = rows[:, ROW.time]
-        events[:, 1] = rows[:, ROW.phase] % (2 * np.pi)
+        events[:, 0] = rows[:, Row.TIME]
+        events[:, 1] = rows[:, Row.PHASE] % (2 * np.pi)
         events[:, 2] = interface
         events[:, 3] = kind
         events[:, 4] = slide
@@ -637,8 +645,8 @@ class _Run:
         self.n_events += len(events)
 
     def _column(self, interface: int, column: int) -> int:
-        """Return the position in a row of a column of an interface, see `InterfaceColumns`."""
-        return ROW.motion + 2 * self.modes.omega.size + N_COLUMNS * interface + column
+        """Return the position in a row of a column of an interface, see `Column`."""
+        return Row.MOTION + 2 * self.modes.omega.size + N_COLUMNS * interface + column
 
     def run(self, frames: int, progress, *, even: bool = False) -> PieceRun | None:
         """Run to the end.
@@ -646,28 +654,33 @@ class _Run:
         Returns None where the output passed the travel. The parameters are those of `simulate`.
         """
         end = self.cycles
-        wide = []
-        late = []
+        early_rows = []
+        window_rows = []
         even = choose_samples_per_cycle(self.drive, self.cycles, needs_history=even)
-        first = max(0.0, end - self.n_window)
-        last = max(0.0, end - 1)
-        begin = max(0.0, min(first, end - 2))
-        if begin > 0:
+        window_start = max(0.0, end - self.n_window)
+        last_cycle_start = max(0.0, end - 1)
+        sampled_start = max(0.0, min(window_start, end - 2))
+        if sampled_start > 0:
             self.run_to(
-                begin,
+                sampled_start,
                 self._keep_equal_steps(self.period / even) if even else self._keep_turning_rows,
                 progress,
             )
-        if first > begin:
-            self.run_to(first, self._collect_into(wide), progress)
-        self.is_repeating = bool(self.previous.status[PREVIOUS.repeats])
-        for stop in self._cycle_ends(first, last):
-            self.run_to(stop, self._collect_into(late), progress)
+        if window_start > sampled_start:
+            self.run_to(window_start, self._collect_into(early_rows), progress)
+        self.is_repeating = bool(self.previous.status[PreviousStatus.REPEATS])
+        for stop in self._cycle_ends(window_start, last_cycle_start):
+            self.run_to(stop, self._collect_into(window_rows), progress)
         for k in range(frames):
-            self.run_to(last + (end - last) * (k + 1) / frames, self._collect_into(late))
+            self.run_to(
+                last_cycle_start + (end - last_cycle_start) * (k + 1) / frames,
+                self._collect_into(window_rows),
+            )
             self.snapshots.append(self._snapshot())
-        self.run_to(end, self._collect_into(late), progress)
-        return None if self.has_passed_travel else self._make_result(wide, self._close_rows(late))
+        self.run_to(end, self._collect_into(window_rows), progress)
+        if self.has_passed_travel:
+            return None
+        return self._make_result(early_rows, self._close_rows(window_rows))
 
     def run_without_histories(self) -> PieceRun:
         """Run to the end without histories and events.
@@ -675,13 +688,13 @@ class _Run:
         Few cycles are read where the motion repeats.
         """
         end = self.cycles
-        late = []
+        window_rows = []
         self.run_to(end - self.n_window)
-        self.is_repeating = bool(self.previous.status[PREVIOUS.repeats])
+        self.is_repeating = bool(self.previous.status[PreviousStatus.REPEATS])
         if self.is_repeating:
             self.run_to(end - min(MIN_CYCLES_READ, self.n_window))
-        self.run_to(end, lambda rows: late.append(rows.copy()))
-        return self._summarise(self._close_rows(late))
+        self.run_to(end, lambda rows: window_rows.append(rows.copy()))
+        return self._summarise(self._close_rows(window_rows))
 
     def _cycle_ends(self, first: float, last: float) -> list:
         """Return the ends of the cycles of the window, for a run that ends within a cycle."""
@@ -690,28 +703,28 @@ class _Run:
         ends = self.cycles - np.arange(self.n_window, 0, -1)
         return [end for end in ends if first < end <= last]
 
-    def _close_rows(self, late) -> np.ndarray:
+    def _close_rows(self, window_rows) -> np.ndarray:
         """Return the rows (k + 1, w) of the window and one without duration for its end."""
         n = self.modes.omega.size
         memory = self.memory
         row = np.zeros(self.n_columns)
-        row[ROW.time] = self.now
-        row[ROW.segment] = self.time_state.now[TIME.segment]
-        row[ROW.cycle] = self.time_state.now[TIME.cycle]
-        row[ROW.offset] = self.time_state.now[TIME.offset]
-        row[ROW.motion : ROW.motion + 2 * n] = self.motion.ravel()
+        row[Row.TIME] = self.now
+        row[Row.SEGMENT] = self.time_state.now[Time.SEGMENT]
+        row[Row.CYCLE] = self.time_state.now[Time.CYCLE]
+        row[Row.OFFSET] = self.time_state.now[Time.OFFSET]
+        row[Row.MOTION : Row.MOTION + 2 * n] = self.motion.ravel()
         for column, values in (
-            (COLUMN.force, memory.force),
-            (COLUMN.slip, memory.slip),
-            (COLUMN.work, memory.work),
-            (COLUMN.loss, memory.loss),
-            (COLUMN.slide, memory.slide),
+            (Column.FORCE, memory.force),
+            (Column.SLIP, memory.slip),
+            (Column.WORK, memory.work),
+            (Column.LOSS, memory.loss),
+            (Column.SLIDE, memory.slide),
         ):
             row[self._column(0, column) :: N_COLUMNS] = values
-        rows = np.concatenate([*late, row[None]])
+        rows = np.concatenate([*window_rows, row[None]])
         if self.has_rigid:
             # an event within round-off of the start of the window counts as before it
-            is_long = rows[:, ROW.duration] > SAME_TIME_TOL * self.period
+            is_long = rows[:, Row.DURATION] > SAME_TIME_TOL * self.period
             rows = rows[min(int(np.argmax(is_long)), len(rows) - 2) :]
         return rows
 
@@ -719,104 +732,106 @@ class _Run:
     def now(self) -> float:
         """Time [s] of the run."""
         return float(
-            self.time_state.now[TIME.cycle] * self.period + self.time_state.now[TIME.offset]
+            self.time_state.now[Time.CYCLE] * self.period + self.time_state.now[Time.OFFSET]
         )
 
     def _snapshot(self) -> dict:
         """Return time, motion and stretches of the elements at the present time."""
+        faces = []
+        for k, group in enumerate(self.groups):
+            faces.append((float(self.memory.slide[k]), element_stretches(group, self.memory, k)))
         return {
             "time": self.now,
             "slide": float(self.memory.slide[0]),
             "force": float(self.memory.force[0]),
             "rate": float(self.modal_system.interfaces[0] @ self.motion[1]),
             "slip": float(self.memory.slip[0]),
-            "stretch": element_stretches(self.groups[0], self.memory, 0),
-            "faces": [
-                (float(self.memory.slide[k]), element_stretches(group, self.memory, k))
-                for k, group in enumerate(self.groups)
-            ],
+            "stretch": faces[0][1],
+            "faces": faces,
         }
 
     def _summarise(self, rows) -> PieceRun:
         """Return the result without histories, from the rows of the window."""
-        begun = rows[0, ROW.time]
-        stop = rows[-1, ROW.time]
-        faces = len(self.groups)
-        span = stop - begun
-        numbers = np.zeros(len(RUN)), np.zeros((faces, len(INTERFACE)))
+        start_time = rows[0, Row.TIME]
+        end_time = rows[-1, Row.TIME]
+        n_interfaces = len(self.groups)
+        span = end_time - start_time
+        measures = np.zeros(len(RunMeasure)), np.zeros((n_interfaces, len(InterfaceMeasure)))
         cycles = max(1, round(span / self.period))
         self.reader.read_rows(
-            rows,
-            cycles,
-            self.modal_system,
-            self.time_state,
-            float(self.drive.moving),
-            self.scratch,
-            *numbers,
+            rows, cycles, float(self.drive.moving), self.evaluation_arrays, *measures
         )
-        reading = Reading(*numbers, float(span), self.period)
-        done = slice(0, max(1, ceil(stop / self.period - WHOLE_CYCLES_TOL)))
+        reading = Reading(*measures, float(span), self.period)
+        cycles_done = slice(0, max(1, ceil(end_time / self.period - WHOLE_CYCLES_TOL)))
         names = ("work_in", "viscous", "power")
-        book = dict(zip(names, map(float, self.run_sums.ledger[:3]))) | {
-            "friction": float(self.run_sums.ledger[LEDGER.friction_loss])
+        energies = dict(zip(names, map(float, self.run_sums.ledger[:3]))) | {
+            "friction": float(self.run_sums.ledger[Ledger.FRICTION_LOSS])
         }
-        now = self.kernels.stored_energy(self.motion, self.modal_system, self.table, self.memory)
-        book |= {
-            "stored": now - self.start_energy,
-            "peak_stored": max(float(self.run_sums.ledger[LEDGER.max_stored]), self.start_energy),
+        energy = self.kernels.stored_energy(self.motion, self.modal_system, self.table, self.memory)
+        energies |= {
+            "stored": energy - self.start_energy,
+            "peak_stored": max(float(self.run_sums.ledger[Ledger.MAX_STORED]), self.start_energy),
         }
-        alone = (
+        has_closed_form = (
             len(self.drive.segments) == 1
             and self.modal_system.interfaces.shape == (1, 1)
             and self.modal_system.interfaces[0, 0] != 0
             and not self.has_rigid
         )
-        ring = find_sticking_ring(self.modal_system, self.table, reading) if alone else None
+        ring = (
+            find_sticking_ring(self.modal_system, self.table, reading) if has_closed_form else None
+        )
         end = (
             InitialState(*self.motion.copy()),
             type(self.memory)(*(part.copy() for part in self.memory)),
         )
         ledger = self.run_sums.ledger
-        phasors = self.run_sums.phasors[done] @ [1, 1j]
+        phasors = self.run_sums.phasors[cycles_done] @ [1, 1j]
         return PieceRun(
-            self.run_sums.extremes[done].copy(),
+            self.run_sums.extremes[cycles_done].copy(),
             phasors,
-            book,
+            energies,
             self.outcome,
             reading,
-            int(ledger[LEDGER.n_pieces]),
-            stop / self.period,
+            int(ledger[Ledger.N_PIECES]),
+            end_time / self.period,
             end,
-            bool(ledger[LEDGER.has_slipped]),
+            bool(ledger[Ledger.HAS_SLIPPED]),
             ring,
             self.is_repeating,
         )
 
-    def _make_result(self, wide, rows) -> PieceRun:
+    def _make_result(self, early_rows, rows) -> PieceRun:
         """Return the result with histories.
 
         wide, rows: rows before the window and of the window.
         """
-        none = np.empty((0, self.n_columns))
-        late = rows[:-1]
-        begun = rows[0, ROW.time]
-        stop = rows[-1, ROW.time]
-        early = np.concatenate([none, *self.early_rows])
-        wide = np.concatenate([none, *wide])
-        number = max(MIN_SAMPLES, round((stop - begun) / self.period * SAMPLES_PER_CYCLE) + 1)
-        window = self.sample_rows(late, np.linspace(begun, stop, number))
-        if len(early):
-            at_start = np.zeros(len(early))
-            time = early[:, ROW.time]
-            parts = [self._make_response(early, np.arange(len(early)), at_start, time)]
+        no_rows = np.empty((0, self.n_columns))
+        window_rows = rows[:-1]
+        start_time = rows[0, Row.TIME]
+        end_time = rows[-1, Row.TIME]
+        turning_rows = np.concatenate([no_rows, *self.early_rows])
+        early_rows = np.concatenate([no_rows, *early_rows])
+        n_samples_in_window = max(
+            MIN_SAMPLES, round((end_time - start_time) / self.period * SAMPLES_PER_CYCLE) + 1
+        )
+        window = self.sample_rows(
+            window_rows, np.linspace(start_time, end_time, n_samples_in_window)
+        )
+        if len(turning_rows):
+            at_start = np.zeros(len(turning_rows))
+            time = turning_rows[:, Row.TIME]
+            parts = [
+                self._make_response(turning_rows, np.arange(len(turning_rows)), at_start, time)
+            ]
         else:
-            end = (wide if len(wide) else rows)[0, ROW.time]
+            end = (early_rows if len(early_rows) else rows)[0, Row.TIME]
             parts = [_select_samples(part, part.time < end) for part in self.equal_samples]
-        if len(wide):
-            first = wide[0, ROW.time]
-            n_samples = round((begun - first) / self.period * SAMPLES_PER_CYCLE) + 1
-            more = self.sample_rows(wide, np.linspace(first, begun, n_samples))
-            parts.append(_select_samples(more, more.time < begun))
+        if len(early_rows):
+            first = early_rows[0, Row.TIME]
+            n_samples = round((start_time - first) / self.period * SAMPLES_PER_CYCLE) + 1
+            early_samples = self.sample_rows(early_rows, np.linspace(first, start_time, n_samples))
+            parts.append(_select_samples(early_samples, early_samples.time < start_time))
         return replace(
             self._summarise(rows),
             response=_join_responses([*parts, window]),
@@ -828,7 +843,7 @@ class _Run:
     def event_log(self) -> EventLog:
         """Return the last events."""
         rows = np.concatenate([np.empty((0, 5)), *self.events])
-        rows = rows[np.argsort(rows[:, ROW.time], kind="stable")][-MAX_EVENTS:]
+        rows = rows[np.argsort(rows[:, Row.TIME], kind="stable")][-MAX_EVENTS:]
         time, phase, interface, what, slide = rows.T
         return EventLog(
             frozen_array(time),
@@ -844,22 +859,24 @@ class _Run:
 
         The force of rigid elements jumps, so there are samples on both sides of their events.
         """
-        shares = rows[:, self._column(0, COLUMN.slipping) :: N_COLUMNS] >= SLIP_FRACTION
-        jumps = (rows[:, ROW.begin] > BEGIN.reversal) & self.has_rigid
-        turns = rows[:, ROW.begin] == BEGIN.reversal
-        events = jumps | turns | np.any(np.diff(shares, axis=0, prepend=shares[:1]), axis=1)
-        if np.count_nonzero(rows[:, ROW.begin]) <= 2 * grid.size:
+        slipping = rows[:, self._column(0, Column.SLIPPING) :: N_COLUMNS] >= SLIP_FRACTION
+        is_jump = (rows[:, Row.BEGIN] > BEGIN.reversal) & self.has_rigid
+        is_reversal = rows[:, Row.BEGIN] == BEGIN.reversal
+        is_sampled = (
+            is_jump | is_reversal | np.any(np.diff(slipping, axis=0, prepend=slipping[:1]), axis=1)
+        )
+        if np.count_nonzero(rows[:, Row.BEGIN]) <= 2 * grid.size:
             # the force has a kink at a yield, so a sample there closes the energy balance of the samples
-            events |= rows[:, ROW.begin] == BEGIN.yielding
-        jumps = rows[jumps & (rows[:, ROW.time] > grid[0]), ROW.time]
+            is_sampled |= rows[:, Row.BEGIN] == BEGIN.yielding
+        is_jump = rows[is_jump & (rows[:, Row.TIME] > grid[0]), Row.TIME]
         time = np.unique(
-            np.concatenate([grid, rows[events, ROW.time], np.nextafter(jumps, -np.inf)])
+            np.concatenate([grid, rows[is_sampled, Row.TIME], np.nextafter(is_jump, -np.inf)])
         )
         owner = np.clip(
-            np.searchsorted(rows[:, ROW.time], time, side="right") - 1, 0, len(rows) - 1
+            np.searchsorted(rows[:, Row.TIME], time, side="right") - 1, 0, len(rows) - 1
         )
         return self._make_response(
-            rows, owner, np.clip(time - rows[owner, ROW.time], 0.0, rows[owner, ROW.duration]), time
+            rows, owner, np.clip(time - rows[owner, Row.TIME], 0.0, rows[owner, Row.DURATION]), time
         )
 
     def evaluate_rows(self, rows, owner, tau) -> np.ndarray:
@@ -880,49 +897,54 @@ class _Run:
             (k, c) columns, see `dense_kernels.evaluate_rows`.
         """
         out = np.empty((owner.size, 2 * self.modes.omega.size + 1 + 6 * len(self.groups)))
-        self.dense.evaluate_rows(
-            rows, owner, tau, self.modal_system, self.time_state, self.scratch, out
-        )
+        self.dense.evaluate_rows(rows, owner, tau, self.evaluation_arrays, out)
         return out
 
     def _make_response(self, rows, owner, tau, time) -> Response:
         """Return histories at times (k,) [s], tau (k,) [s] after the starts of rows (k,)."""
         return self._response_from_columns(self.evaluate_rows(rows, owner, tau), time)
 
-    def _response_from_columns(self, out, time) -> Response:
+    def _response_from_columns(self, columns, time) -> Response:
         """Return histories at times (k,) [s] from the columns of `evaluate_rows`."""
         modes = self.modes
         n = self.modes.omega.size
-        z = out[:, :n].copy()
-        v = out[:, n : 2 * n].copy()
-        push = out[:, 2 * n]
-        slides, rates, forces, slips, works, losses = (out[:, 2 * n + 1 + k :: 6] for k in range(6))
-        base = push if self.drive.moving else np.zeros_like(push)
+        z = columns[:, :n].copy()
+        v = columns[:, n : 2 * n].copy()
+        drive = columns[:, 2 * n]
+        first = 2 * n + 1
+        slides = columns[:, first::6]
+        rates = columns[:, first + 1 :: 6]
+        forces = columns[:, first + 2 :: 6]
+        slips = columns[:, first + 3 :: 6]
+        base = drive if self.drive.moving else np.zeros_like(drive)
         accel = (
-            -np.outer(push, modes.base)
+            -np.outer(drive, modes.base)
             - v @ self.modal_system.damping.T
             - z * self.modal_system.omega_squared
             - forces @ self.modal_system.interfaces / modes.mass
         )
-        work = works.sum(axis=1)
-        lost = losses.sum(axis=1)
+        work = columns[:, first + 4 :: 6].sum(axis=1)
+        losses_sum = columns[:, first + 5 :: 6].sum(axis=1)
         extra = {
-            "ledger": np.stack([work, self.start_stretch_energy + work - lost, lost, 0 * lost])
+            "ledger": np.stack(
+                [work, self.start_stretch_energy + work - losses_sum, losses_sum, 0 * losses_sum]
+            )
         }
         if len(self.groups) > 1:
             extra |= {"slides": slides, "slide_rates": rates, "forces": forces, "slips": slips}
         return Response(
             time,
-            z,
-            v,
-            *(part[:, 0].copy() for part in (slides, rates)),
-            z @ modes.output,
-            v @ modes.output,
-            accel @ modes.output + base,
-            base,
-            forces[:, 0].copy(),
-            slips[:, 0].copy(),
-            extra,
+            modal=z,
+            modal_rate=v,
+            slide=slides[:, 0].copy(),
+            slide_rate=rates[:, 0].copy(),
+            output=z @ modes.output,
+            output_rate=v @ modes.output,
+            acceleration=accel @ modes.output + base,
+            base_acceleration=base,
+            force=forces[:, 0].copy(),
+            slip=slips[:, 0].copy(),
+            extra=extra,
         )
 
 
@@ -933,6 +955,7 @@ def _shift_rows(rows, times) -> np.ndarray:
     return out
 
 
+# fields of a Response that are histories
 _COLUMNS = (
     "time",
     "modal",
@@ -949,22 +972,25 @@ _COLUMNS = (
 
 
 def _select_samples(response: Response, which) -> Response:
-    extra = {
-        name: part[:, which] if name == "ledger" else part[which]
-        for name, part in response.extra.items()
-    }
-    return Response(*(getattr(response, name)[which] for name in _COLUMNS), extra)
+    """Return the samples of a Response that an index or a mask selects."""
+    columns = [getattr(response, name)[which] for name in _COLUMNS]
+    extra = {}
+    for name, values in response.extra.items():
+        extra[name] = values[:, which] if name == "ledger" else values[which]
+    return Response(*columns, extra)
 
 
-def _join_responses(parts) -> Response:
-    if len(parts) == 1:
-        return parts[0]
-    extra = {
-        name: np.concatenate([r.extra[name] for r in parts], axis=1 if name == "ledger" else 0)
-        for name in parts[0].extra
-    }
-    whole = Response(
-        *(np.concatenate([getattr(r, name) for r in parts]) for name in _COLUMNS), extra
-    )
-    later = np.diff(np.maximum.accumulate(whole.time), prepend=-np.inf) > 0
-    return whole if later.all() else _select_samples(whole, later)
+def _join_responses(responses) -> Response:
+    """Join Responses to one whose times increase."""
+    if len(responses) == 1:
+        return responses[0]
+    columns = []
+    for name in _COLUMNS:
+        columns.append(np.concatenate([getattr(response, name) for response in responses]))
+    extra = {}
+    for name in responses[0].extra:
+        axis = 1 if name == "ledger" else 0
+        extra[name] = np.concatenate([response.extra[name] for response in responses], axis)
+    joined = Response(*columns, extra)
+    is_later = np.diff(np.maximum.accumulate(joined.time), prepend=-np.inf) > 0
+    return joined if is_later.all() else _select_samples(joined, is_later)

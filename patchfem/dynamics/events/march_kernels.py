@@ -9,8 +9,15 @@ of an interface or of the output (`search_kernels`), or a border of the drive.
 from typing import NamedTuple
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .drive_kernels import drive_phase, drive_value, expand_drive, fastest_drive_rate
+from ...friction.flags_kernels import NJIT_INLINE, NJIT_KERNEL
+from .drive_kernels import (
+    Instant,
+    drive_phase,
+    drive_value,
+    expand_drive,
+    fastest_drive_rate,
+    present_instant,
+)
 from .memory_kernels import (
     find_force_and_energy,
     find_tangent,
@@ -22,16 +29,16 @@ from .memory_kernels import (
 )
 from .positions_kernels import (
     BEGIN,
-    COLUMN,
     EVENT,
     KIND,
-    LEDGER,
-    LIMIT,
     N_COLUMNS,
-    ROW,
-    SEGMENT,
     STATUS,
-    TIME,
+    Column,
+    Ledger,
+    Limit,
+    Row,
+    Segment,
+    Time,
 )
 from .repeat_kernels import detect_repeat, forget_previous
 from .search_kernels import (
@@ -45,6 +52,8 @@ from .series_kernels import (
     EPS,
     MAX_RATE_TIME,
     NO_ROOT,
+    MotionSeries,
+    MotionStart,
     bound_fastest_rate,
     bound_modal_rate,
     evaluate_polynomial,
@@ -89,7 +98,7 @@ class Piece(NamedTuple):
     remaining: float
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def time_to_border(time_state, stop):
     """Return the time [s] to the next border.
 
@@ -97,19 +106,19 @@ def time_to_border(time_state, stop):
     """
     now = time_state.now
     period = time_state.period[0]
-    remaining = period - now[TIME.offset]
-    if stop[0] == now[TIME.cycle]:
-        remaining = min(remaining, stop[1] - now[TIME.offset])
-    k = int(now[TIME.segment]) + 1
+    remaining = period - now[Time.OFFSET]
+    if stop[0] == now[Time.CYCLE]:
+        remaining = min(remaining, stop[1] - now[Time.OFFSET])
+    k = int(now[Time.SEGMENT]) + 1
     if (
         k < time_state.segments.shape[0]
-        and time_state.segments[k, SEGMENT.cycle] == now[TIME.cycle]
+        and time_state.segments[k, Segment.CYCLE] == now[Time.CYCLE]
     ):
-        remaining = min(remaining, time_state.segments[k, SEGMENT.offset] - now[TIME.offset])
+        remaining = min(remaining, time_state.segments[k, Segment.OFFSET] - now[Time.OFFSET])
     return max(remaining, 0.0)
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def step_to_border(time_state, stop, remaining):
     """Move the time to the next border.
 
@@ -126,117 +135,118 @@ def step_to_border(time_state, stop, remaining):
     bool
         Whether the drive changes there, from one sine to another or by a jump.
     """
-    before = int(time_state.now[TIME.segment])
-    cycle = time_state.now[TIME.cycle]
-    offset = time_state.now[TIME.offset] + remaining
+    before = int(time_state.now[Time.SEGMENT])
+    cycle = time_state.now[Time.CYCLE]
+    offset = time_state.now[Time.OFFSET] + remaining
     drive_changes = False
     now = time_state.now
     period = time_state.period[0]
-    k = int(now[TIME.segment]) + 1
+    k = int(now[Time.SEGMENT]) + 1
     after = (
         k < time_state.segments.shape[0]
-        and time_state.segments[k, SEGMENT.cycle] == now[TIME.cycle]
-        and time_state.segments[k, SEGMENT.offset] - now[TIME.offset] <= remaining
+        and time_state.segments[k, Segment.CYCLE] == now[Time.CYCLE]
+        and time_state.segments[k, Segment.OFFSET] - now[Time.OFFSET] <= remaining
     )
     if after:
-        now[TIME.offset] = time_state.segments[k, SEGMENT.offset]
-        now[TIME.segment] = k
-    elif stop[0] == now[TIME.cycle] and stop[1] - now[TIME.offset] <= remaining:
-        now[TIME.offset] = stop[1]
+        now[Time.OFFSET] = time_state.segments[k, Segment.OFFSET]
+        now[Time.SEGMENT] = k
+    elif stop[0] == now[Time.CYCLE] and stop[1] - now[Time.OFFSET] <= remaining:
+        now[Time.OFFSET] = stop[1]
     else:
-        now[TIME.cycle] = now[TIME.cycle] + 1
-        now[TIME.offset] = 0.0
-    if now[TIME.offset] >= period:
-        now[TIME.cycle] = now[TIME.cycle] + 1
-        now[TIME.offset] = 0.0
-    k = int(now[TIME.segment]) + 1
+        now[Time.CYCLE] = now[Time.CYCLE] + 1
+        now[Time.OFFSET] = 0.0
+    if now[Time.OFFSET] >= period:
+        now[Time.CYCLE] = now[Time.CYCLE] + 1
+        now[Time.OFFSET] = 0.0
+    k = int(now[Time.SEGMENT]) + 1
     if (
         k < time_state.segments.shape[0]
-        and time_state.segments[k, SEGMENT.cycle] == now[TIME.cycle]
-        and time_state.segments[k, SEGMENT.offset] <= now[TIME.offset]
+        and time_state.segments[k, Segment.CYCLE] == now[Time.CYCLE]
+        and time_state.segments[k, Segment.OFFSET] <= now[Time.OFFSET]
     ):
-        now[TIME.segment] = k
-    if int(now[TIME.segment]) != before:
-        segment = time_state.segments[int(now[TIME.segment])]
-        old = drive_value(time_state.segments[before], cycle, offset, period)
-        new = drive_value(segment, now[TIME.cycle], now[TIME.offset], period)
+        now[Time.SEGMENT] = k
+    if int(now[Time.SEGMENT]) != before:
+        segment = time_state.segments[int(now[Time.SEGMENT])]
+        old = drive_value(time_state.segments[before], Instant(cycle, offset, period))
+        new = drive_value(segment, present_instant(time_state))
         drive_changes = (
-            segment[SEGMENT.kind] == KIND.sine
-            and time_state.segments[before, SEGMENT.kind] == KIND.sine
+            segment[Segment.KIND] == KIND.sine
+            and time_state.segments[before, Segment.KIND] == KIND.sine
         ) or abs(new - old) > 1e-12 * max(abs(old), abs(new))
     return drive_changes
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def write_row(row, motion, duration, phase, begin, modal_system, table, memory, time_state):
+@njit(**NJIT_INLINE)
+def write_row(row, duration, phase, begin, run):
     """Write the row of a piece as it begins.
 
     Parameters
     ----------
     row : ndarray
-        (w,) see `RowColumns` and `InterfaceColumns`.
-    motion, modal_system, table, memory, time_state
+        (w,) see `Row` and `Column`.
     duration : float
         [s].
     phase : float
         Phase of the drive [rad].
     begin : float
         A number of `RowBegins`.
+    run : RunArrays
     """
+    motion = run.motion
+    modal_system = run.modal_system
+    table = run.table
+    memory = run.memory
+    time_state = run.time_state
     n = len(modal_system.omega_squared)
     now = time_state.now
-    row[ROW.time] = now[TIME.cycle] * time_state.period[0] + now[TIME.offset]
-    row[ROW.duration] = duration
-    row[ROW.phase] = phase
-    row[ROW.segment] = now[TIME.segment]
-    row[ROW.begin] = begin
-    row[ROW.cycle] = now[TIME.cycle]
-    row[ROW.offset] = now[TIME.offset]
+    row[Row.TIME] = now[Time.CYCLE] * time_state.period[0] + now[Time.OFFSET]
+    row[Row.DURATION] = duration
+    row[Row.PHASE] = phase
+    row[Row.SEGMENT] = now[Time.SEGMENT]
+    row[Row.BEGIN] = begin
+    row[Row.CYCLE] = now[Time.CYCLE]
+    row[Row.OFFSET] = now[Time.OFFSET]
     for i in range(n):
-        row[ROW.motion + i] = motion[0, i]
-        row[ROW.motion + n + i] = motion[1, i]
+        row[Row.MOTION + i] = motion[0, i]
+        row[Row.MOTION + n + i] = motion[1, i]
     for f in range(len(modal_system.inverse_mass)):
-        at = ROW.motion + 2 * n + N_COLUMNS * f
+        at = Row.MOTION + 2 * n + N_COLUMNS * f
         tangent = find_tangent(f, table, memory)
-        row[at + COLUMN.force] = memory.force[f]
-        row[at + COLUMN.stiffness] = tangent.stiffness
-        row[at + COLUMN.slipping] = tangent.slipping
-        row[at + COLUMN.limit] = tangent.limit
-        row[at + COLUMN.slip] = memory.slip[f]
-        row[at + COLUMN.work] = memory.work[f]
-        row[at + COLUMN.loss] = memory.loss[f]
+        row[at + Column.FORCE] = memory.force[f]
+        row[at + Column.STIFFNESS] = tangent.stiffness
+        row[at + Column.SLIPPING] = tangent.slipping
+        row[at + Column.LIMIT] = tangent.limit
+        row[at + Column.SLIP] = memory.slip[f]
+        row[at + Column.WORK] = memory.work[f]
+        row[at + Column.LOSS] = memory.loss[f]
         direction = memory.direction[f]
         if table.static_limit[f] > 0.0:
             direction = memory.rigid_state[f] if abs(memory.rigid_state[f]) < 2.0 else 0.0
-        row[at + COLUMN.direction] = direction
-        row[at + COLUMN.slide] = memory.slide[f]
+        row[at + Column.DIRECTION] = direction
+        row[at + Column.SLIDE] = memory.slide[f]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def move_state(u, h, top, motion, modal_system, table, memory, time_state, run_sums, workspace):
+@njit(**NJIT_INLINE)
+def move_state(u, piece, run):
     """Move coordinates, interfaces and elements over a piece up to u, and add their energies.
 
     Parameters
     ----------
     u : float
         Fraction of the piece.
-    h : float
-        Duration of the piece [s].
-    top : int
-        Highest power of the series.
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
-    time_state : TimeState
-    run_sums : RunSums
-    workspace : Workspace
+    piece : Piece
+    run : RunArrays
     """
+    top = piece.top
+    motion = run.motion
+    modal_system = run.modal_system
+    table = run.table
+    memory = run.memory
+    workspace = run.workspace
     n_interfaces = len(modal_system.inverse_mass)
     n = len(modal_system.omega_squared)
     coefs = workspace.coefficients
-    ledger = run_sums.ledger
+    ledger = run.sums.ledger
     for f in range(n_interfaces):
         if is_sticking(f, table, memory):
             memory.force[f] = evaluate_polynomial(workspace.constraint.reactions[f], 0, top - 2, u)
@@ -248,10 +258,10 @@ def move_state(u, h, top, motion, modal_system, table, memory, time_state, run_s
         memory.loss[f] += limit * abs(step)
         memory.slip[f] += slipping * step
         memory.force[f] += stiffness * step
-        ledger[LEDGER.friction_work] += work
-        ledger[LEDGER.friction_loss] += limit * abs(step)
+        ledger[Ledger.FRICTION_WORK] += work
+        ledger[Ledger.FRICTION_LOSS] += limit * abs(step)
         if slipping >= 0.5:
-            ledger[LEDGER.has_slipped] = 1.0
+            ledger[Ledger.HAS_SLIPPED] = 1.0
     out = 0.0
     for i in range(n):
         place = coefs[top, i]
@@ -260,7 +270,7 @@ def move_state(u, h, top, motion, modal_system, table, memory, time_state, run_s
             place = place * u + coefs[k, i]
             rate = rate * u + k * coefs[k, i]
         motion[0, i] += u * place
-        motion[1, i] = rate / h
+        motion[1, i] = rate / piece.duration
         out += modal_system.output[i] * motion[0, i]
     for f in range(n_interfaces):
         if is_sticking(f, table, memory):
@@ -269,29 +279,27 @@ def move_state(u, h, top, motion, modal_system, table, memory, time_state, run_s
         for i in range(n):
             place += modal_system.interfaces[f, i] * motion[0, i]
         memory.slide[f] = place
-    correct_sticking_slides(motion, modal_system, memory, workspace)
-    widen_extremes(out, time_state, run_sums)
+    correct_sticking_slides(run)
+    widen_extremes(out, run)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def widen_extremes(out, time_state, run_sums):
+@njit(**NJIT_INLINE)
+def widen_extremes(out, run):
     """Include a value of the output in the extremes of the present cycle.
 
     Parameters
     ----------
     out : float
         Displacement of the output [m].
-    time_state : TimeState
-    run_sums : RunSums
+    run : RunArrays
     """
-    cycle = int(time_state.now[TIME.cycle])
+    run_sums = run.sums
+    cycle = int(run.time_state.now[Time.CYCLE])
     run_sums.extremes[cycle, 0] = min(run_sums.extremes[cycle, 0], out)
     run_sums.extremes[cycle, 1] = max(run_sums.extremes[cycle, 1], out)
 
 
-@njit(
-    error_model="numpy", cache=True, forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT
-)
+@njit(cache=True, **NJIT_INLINE)
 def stored_energy(motion, modal_system, table, memory):
     """Return the energy of the modes and of the elements [J].
 
@@ -316,147 +324,127 @@ def stored_energy(motion, modal_system, table, memory):
     return out
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def choose_current_sticks(motion, modal_system, table, memory, time_state, workspace):
+@njit(**NJIT_KERNEL)
+def choose_current_sticks(run):
     """Choose which interfaces stick from the present time on.
 
     Parameters
     ----------
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
-    time_state : TimeState
-    workspace : Workspace
-        Its `choice` holds the guess and which interfaces are at rest.
+    run : RunArrays
 
     Returns
     -------
     bool
         Whether a choice was found.
     """
-    segment = time_state.segments[int(time_state.now[TIME.segment])]
-    now = time_state.now
+    modal_system = run.modal_system
+    table = run.table
+    time_state = run.time_state
+    workspace = run.workspace
+    segment = time_state.segments[int(time_state.now[Time.SEGMENT])]
     for f in range(len(modal_system.inverse_mass)):
-        stiffness = find_tangent(f, table, memory).stiffness
-        workspace.stiffness[f] = (
-            0.0
-            if table.static_limit[f] > 0.0 and workspace.choice.is_resting[f] == 1.0
-            else stiffness
-        )
+        workspace.stiffness[f] = find_tangent(f, table, run.memory).stiffness
+        if table.static_limit[f] > 0.0 and workspace.choice.is_resting[f] == 1.0:
+            workspace.stiffness[f] = 0.0
     h = MAX_RATE_TIME / max(
         bound_fastest_rate(modal_system, workspace.stiffness),
-        fastest_drive_rate(segment, time_state.period[0]),
+        fastest_drive_rate(time_state),
     )
-    expand_drive(
-        segment,
-        now[TIME.cycle],
-        now[TIME.offset],
-        time_state.period[0],
-        h,
-        MAX_ORDER + 1,
-        workspace.drive,
-    )
-    return choose_sticks(motion, modal_system, table, memory, h, workspace)
+    expand_drive(segment, present_instant(time_state), h, MAX_ORDER + 1, workspace.drive)
+    return choose_sticks(h, run)
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def choose_initial_sticks(motion, modal_system, table, memory, time_state, workspace):
+@njit(**NJIT_KERNEL)
+def choose_initial_sticks(run):
     """Choose which interfaces stick at the start of a run.
 
     The guess is that a rigid element sticks where its interface is at rest.
 
     Parameters
     ----------
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
-    time_state : TimeState
-    workspace : Workspace
+    run : RunArrays
 
     Returns
     -------
     bool
         Whether a choice was found.
     """
-    choice = workspace.choice
+    modal_system = run.modal_system
+    choice = run.workspace.choice
     has_rigid = False
     for f in range(len(modal_system.inverse_mass)):
         speed = 0.0
         size = 0.0
         for i in range(len(modal_system.omega_squared)):
-            part = modal_system.interfaces[f, i] * motion[1, i]
-            speed += part
-            size += abs(part)
+            term = modal_system.interfaces[f, i] * run.motion[1, i]
+            speed += term
+            size += abs(term)
         moves = abs(speed) > REST_TOL * size
         choice.slip_signs[f] = 0.0
         choice.is_resting[f] = 0.0
         choice.orders[f, 0] = 0.0
         choice.orders[f, 1] = 0.0
-        if table.static_limit[f] == 0.0:
+        if run.table.static_limit[f] == 0.0:
             continue
         has_rigid = True
         if moves:
             choice.slip_signs[f] = 1.0 if speed > 0 else -1.0
         else:
             choice.is_resting[f] = 1.0
-        memory.rigid_state[f] = choice.slip_signs[f]
+        run.memory.rigid_state[f] = choice.slip_signs[f]
     if not has_rigid:
         return True
-    return choose_current_sticks(motion, modal_system, table, memory, time_state, workspace)
+    return choose_current_sticks(run)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def estimate_time_to_yield(motion, modal_system, table, memory):
+@njit(**NJIT_INLINE)
+def estimate_time_to_yield(run):
     """Estimate the time to the next yield [s] from the present speeds.
 
     Parameters
     ----------
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
+    run : RunArrays
 
     Returns
     -------
     float
     """
+    modal_system = run.modal_system
+    memory = run.memory
     time = 1e300
     for f in range(len(modal_system.inverse_mass)):
         speed = 0.0
         for i in range(len(modal_system.omega_squared)):
-            speed += modal_system.interfaces[f, i] * motion[1, i]
-        gap = next_yield_slide(f, 1.0 if speed > 0 else -1.0, table, memory) - memory.slide[f]
+            speed += modal_system.interfaces[f, i] * run.motion[1, i]
+        gap = next_yield_slide(f, 1.0 if speed > 0 else -1.0, run.table, memory) - memory.slide[f]
         if speed * gap > 0:
             time = min(time, gap / speed)
     return YIELD_MARGIN / MAX_RATE_TIME * time
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def output_displacement(motion, modal_system):
+@njit(**NJIT_INLINE)
+def output_displacement(run):
     """Return the displacement of the output [m]."""
+    modal_system = run.modal_system
     out = 0.0
     for i in range(len(modal_system.omega_squared)):
-        out += modal_system.output[i] * motion[0, i]
+        out += modal_system.output[i] * run.motion[0, i]
     return out
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def apply_event(event, modal_system, table, memory, time_state):
+@njit(**NJIT_INLINE)
+def apply_event(event, run):
     """Apply an event to the elements, and record which interfaces are at rest.
 
     Parameters
     ----------
     event : NextEvent
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
-    time_state : TimeState
+    run : RunArrays
     """
+    modal_system = run.modal_system
+    table = run.table
+    memory = run.memory
+    time_state = run.time_state
     kind = event.kind
     interface = event.interface
     if kind == EVENT.yielding:
@@ -472,8 +460,8 @@ def apply_event(event, modal_system, table, memory, time_state):
         memory.force[interface] = find_force_and_energy(interface, table, memory)[0]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def expand_piece(h, rate, motion, force, modal_system, time_state, workspace):
+@njit(**NJIT_INLINE)
+def expand_piece(h, rate, run):
     """Expand the motion over a piece.
 
     Parameters
@@ -482,74 +470,51 @@ def expand_piece(h, rate, motion, force, modal_system, time_state, workspace):
         Duration of the piece [s].
     rate : float
         Fastest rate [1/s].
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    force : ndarray
-        (i,) forces at the start [N].
-    modal_system : ModalSystem
-    time_state : TimeState
-    workspace : Workspace
+    run : RunArrays
 
     Returns
     -------
     int
         Highest power of the series.
     """
+    time_state = run.time_state
+    workspace = run.workspace
     top = find_highest_power(rate * h)
-    now = time_state.now
-    segment = time_state.segments[int(time_state.now[TIME.segment])]
-    expand_drive(
-        segment,
-        now[TIME.cycle],
-        now[TIME.offset],
-        time_state.period[0],
-        h,
-        top,
-        workspace.drive,
-    )
-    expand_motion(
-        motion[0],
-        motion[1],
-        force,
-        workspace.stiffness,
-        modal_system,
-        workspace.drive[0],
-        h,
-        top,
-        workspace.coefficients,
-        workspace,
-    )
+    segment = time_state.segments[int(time_state.now[Time.SEGMENT])]
+    expand_drive(segment, present_instant(time_state), h, top, workspace.drive)
+    start = MotionStart(run.motion[0], run.motion[1], run.memory.force)
+    series = MotionSeries(workspace.drive[0], workspace.coefficients)
+    expand_motion(start, series, h, top, run.modal_system, workspace)
     return top
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def find_travel_crossing(top, modal_system, motion, workspace, travel, u):
+@njit(**NJIT_INLINE)
+def find_travel_crossing(travel, u, top, run):
     """Return the fraction of a piece at which the output passes +-travel.
 
     Parameters
     ----------
-    top : int
-        Highest power of the series.
-    modal_system : ModalSystem
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    workspace : Workspace
     travel : float
         Travel of the output [m].
     u : float
         Fraction of the piece up to which the output is monotone.
+    top : int
+        Highest power of the series.
+    run : RunArrays
 
     Returns
     -------
     float
         NO_ROOT if it does not.
     """
+    modal_system = run.modal_system
+    workspace = run.workspace
     n_interfaces = len(modal_system.inverse_mass)
     poly = workspace.polynomials[n_interfaces + 1]
     expand_speed(
         modal_system.output, len(modal_system.omega_squared), workspace.coefficients, top, poly
     )
-    here = output_displacement(motion, modal_system)
+    here = output_displacement(run)
     step = displacement_at(poly, top, u)
     if abs(here + step) <= travel or step == 0.0:
         return NO_ROOT
@@ -558,8 +523,8 @@ def find_travel_crossing(top, modal_system, motion, workspace, travel, u):
     )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def choose_length(rate, remaining, motion, modal_system, table, memory):
+@njit(**NJIT_INLINE)
+def choose_length(rate, remaining, run):
     """Return the duration of the next piece [s].
 
     The piece ends just after the next yield that the present speeds predict, but lasts at least
@@ -571,85 +536,72 @@ def choose_length(rate, remaining, motion, modal_system, table, memory):
         Fastest rate [1/s].
     remaining : float
         Time to the next border [s], the largest duration.
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
+    run : RunArrays
 
     Returns
     -------
     float
     """
-    to_yield = rate * estimate_time_to_yield(motion, modal_system, table, memory)
+    to_yield = rate * estimate_time_to_yield(run)
     return min(MAX_RATE_TIME / rate * min(1.0, max(to_yield, MIN_FRACTION)), remaining)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def start_piece(remaining, motion, modal_system, table, memory, time_state, workspace):
+@njit(**NJIT_INLINE)
+def start_piece(remaining, run):
     """Choose the length of the next piece and expand the motion over it.
 
     Parameters
     ----------
     remaining : float
         Time to the next border [s].
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
-    time_state : TimeState
-    workspace : Workspace
+    run : RunArrays
 
     Returns
     -------
     Piece
     """
+    modal_system = run.modal_system
+    table = run.table
+    memory = run.memory
+    time_state = run.time_state
+    workspace = run.workspace
     n_interfaces = len(modal_system.inverse_mass)
-    segment = time_state.segments[int(time_state.now[TIME.segment])]
     for f in range(n_interfaces):
         workspace.stiffness[f] = find_tangent(f, table, memory).stiffness
     modal_rate = bound_modal_rate(modal_system, workspace)
-    rate = max(modal_rate, fastest_drive_rate(segment, time_state.period[0]))
-    h = choose_length(rate, remaining, motion, modal_system, table, memory)
-    top = expand_piece(h, rate, motion, memory.force, modal_system, time_state, workspace)
+    rate = max(modal_rate, fastest_drive_rate(time_state))
+    h = choose_length(rate, remaining, run)
+    top = expand_piece(h, rate, run)
     for f in range(n_interfaces):
         if is_sticking(f, table, memory):
             memory.force[f] = workspace.constraint.reactions[f, 0]
     return Piece(h, rate, top, remaining)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def find_piece_end(top, motion, modal_system, table, memory, time_state, run_sums, workspace):
+@njit(**NJIT_INLINE)
+def find_piece_end(top, run):
     """Find the first event of a piece, including the end of the travel of the output.
 
     Parameters
     ----------
     top : int
         Highest power of the series.
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
-    time_state : TimeState
-    run_sums : RunSums
-    workspace : Workspace
+    run : RunArrays
 
     Returns
     -------
     NextEvent
     """
-    event = find_next_event(top, modal_system, table, memory, time_state, workspace)
-    travel = run_sums.limits[LIMIT.travel]
+    event = find_next_event(top, run)
+    travel = run.sums.limits[Limit.TRAVEL]
     if travel < 1e300 and event.u > 0:
-        root = find_travel_crossing(top, modal_system, motion, workspace, travel, event.u)
+        root = find_travel_crossing(travel, event.u, top, run)
         if root <= event.u:
             return NextEvent(root, EVENT.travel, event.interface, event.sign)
     return event
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def reaches_border(piece, u, now):
     """Return whether a motion up to u of a piece reaches the border, to round-off.
 
@@ -667,27 +619,25 @@ def reaches_border(piece, u, now):
     """
     if piece.duration != piece.remaining:
         return False
-    offset = now[TIME.offset]
+    offset = now[Time.OFFSET]
     return u == 1.0 or offset + u * piece.duration >= offset + piece.remaining
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def reset_forces(modal_system, table, memory):
+@njit(**NJIT_INLINE)
+def reset_forces(run):
     """Compute the forces of all interfaces from their memory, without accumulated round-off.
 
     Parameters
     ----------
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
-        Its forces are written.
+    run : RunArrays
     """
-    for f in range(len(modal_system.inverse_mass)):
-        memory.force[f] = interface_force(f, table, memory)
+    memory = run.memory
+    for f in range(len(run.modal_system.inverse_mass)):
+        memory.force[f] = interface_force(f, run.table, memory)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def cross_border(kind, remaining, stop, motion, modal_system, table, memory, previous, time_state):
+@njit(**NJIT_INLINE)
+def cross_border(kind, remaining, stop, run):
     """Pass the end of a cycle or of a segment of the drive.
 
     Parameters
@@ -698,14 +648,7 @@ def cross_border(kind, remaining, stop, motion, modal_system, table, memory, pre
         Time to the border [s].
     stop : tuple
         Cycle and offset [s] at which the march stops.
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
-    previous : PreviousCycle
-        State at the end of the cycle before.
-    time_state : TimeState
+    run : RunArrays
 
     Returns
     -------
@@ -713,56 +656,57 @@ def cross_border(kind, remaining, stop, motion, modal_system, table, memory, pre
     repeats : bool
         Whether the motion repeats from here on.
     """
+    time_state = run.time_state
     drive_changes = step_to_border(time_state, stop, remaining)
     repeats = False
-    if time_state.now[TIME.offset] == 0.0 and kind == EVENT.none:
-        repeats = detect_repeat(motion, modal_system, memory, time_state, previous)
-    elif time_state.now[TIME.offset] == 0.0:
-        forget_previous(previous)
+    if time_state.now[Time.OFFSET] == 0.0 and kind == EVENT.none:
+        repeats = detect_repeat(run)
+    elif time_state.now[Time.OFFSET] == 0.0:
+        forget_previous(run.previous)
     # at every border, so that a run in parts gives the same result as a single run
-    reset_forces(modal_system, table, memory)
+    reset_forces(run)
     return drive_changes, repeats
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def clear_rests(u, time_state):
     """Clear the marks of interfaces that rested at a turning point, after a motion up to u."""
     if u > MIN_MOVING_FRACTION:
         time_state.is_at_turn[:] = 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def is_before(now, stop):
     """Return whether the time lies before `stop` (cycle, offset [s])."""
-    if now[TIME.cycle] == stop[0]:
-        return now[TIME.offset] < stop[1]
-    return now[TIME.cycle] < stop[0]
+    if now[Time.CYCLE] == stop[0]:
+        return now[Time.OFFSET] < stop[1]
+    return now[Time.CYCLE] < stop[0]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def is_idle(progress, time_state, run_sums):
+@njit(**NJIT_INLINE)
+def is_idle(progress, run):
     """Count events without progress in time, and return whether there are too many.
 
     Parameters
     ----------
     progress : float
         Time from the event before [s].
-    time_state : TimeState
-    run_sums : RunSums
+    run : RunArrays
 
     Returns
     -------
     bool
         Whether there are too many in a row.
     """
-    if progress < MIN_PROGRESS * time_state.period[0]:
-        run_sums.limits[LIMIT.n_idle] += 1
+    run_sums = run.sums
+    if progress < MIN_PROGRESS * run.time_state.period[0]:
+        run_sums.limits[Limit.N_IDLE] += 1
     else:
-        run_sums.limits[LIMIT.n_idle] = 0.0
-    return run_sums.limits[LIMIT.n_idle] > MAX_IDLE_EVENTS
+        run_sums.limits[Limit.N_IDLE] = 0.0
+    return run_sums.limits[Limit.N_IDLE] > MAX_IDLE_EVENTS
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def next_begin(kind, changes_stick, drive_changes):
     """Return the reason for which a row begins after an event.
 
@@ -791,28 +735,17 @@ def next_begin(kind, changes_stick, drive_changes):
     return float(BEGIN.none)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def move_over_piece(
-    piece,
-    event,
-    stop,
-    motion,
-    modal_system,
-    table,
-    memory,
-    previous,
-    time_state,
-    run_sums,
-    workspace,
-):
+@njit(**NJIT_INLINE)
+def move_over_piece(piece, event, stop, run):
     """Move motion, time and sums over a piece up to its event.
 
     Parameters
     ----------
     piece : Piece
     event : NextEvent
-    stop, motion, modal_system, table, memory, previous, time_state, run_sums, workspace
+    stop
         See `march`.
+    run : RunArrays
 
     Returns
     -------
@@ -821,56 +754,37 @@ def move_over_piece(
     repeats : bool
         Whether the motion repeats from there on.
     """
+    time_state = run.time_state
     now = time_state.now
     h = piece.duration
     u = event.u
     drive_changes = False
     repeats = False
-    add_piece_sums(piece.rate * h, u, h, piece.top, modal_system, time_state, run_sums, workspace)
+    add_piece_sums(u, piece, run)
     clear_rests(u, time_state)
-    workspace.choice.orders[:] = 0.0
-    move_state(
-        u, h, piece.top, motion, modal_system, table, memory, time_state, run_sums, workspace
-    )
+    run.workspace.choice.orders[:] = 0.0
+    move_state(u, piece, run)
     if reaches_border(piece, u, now):
-        drive_changes, repeats = cross_border(
-            event.kind,
-            piece.remaining,
-            stop,
-            motion,
-            modal_system,
-            table,
-            memory,
-            previous,
-            time_state,
-        )
+        drive_changes, repeats = cross_border(event.kind, piece.remaining, stop, run)
     else:
-        now[TIME.offset] += u * h
-    ledger = run_sums.ledger
-    energy = stored_energy(motion, modal_system, table, memory)
-    ledger[LEDGER.max_stored] = max(ledger[LEDGER.max_stored], energy)
-    ledger[LEDGER.n_pieces] += 1
+        now[Time.OFFSET] += u * h
+    ledger = run.sums.ledger
+    energy = stored_energy(run.motion, run.modal_system, run.table, run.memory)
+    ledger[Ledger.MAX_STORED] = max(ledger[Ledger.MAX_STORED], energy)
+    ledger[Ledger.N_PIECES] += 1
     return drive_changes, repeats
 
 
-@njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def march(
-    stop, motion, modal_system, table, memory, previous, time_state, run_sums, workspace, rows
-):
+@njit(cache=True, **NJIT_KERNEL)
+def march(stop, run, rows):
     """March from the present time to `stop` (cycle, offset [s]).
 
     Parameters
     ----------
     stop : tuple
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s]; they move along, as do memory, time_state and
-        run_sums.
-    modal_system, table, memory
-    previous : PreviousCycle
-        State at the end of the cycle before, for `repeat_kernels`.
-    time_state, run_sums, workspace
+    run : RunArrays
     rows : ndarray
-        (r, w) becomes one row per piece, see `RowColumns`; none is written where r = 0.
+        (r, w) becomes one row per piece, see `Row`; none is written where r = 0.
 
     Returns
     -------
@@ -883,86 +797,57 @@ def march(
     -----
     A run that is made in parts is the same bit by bit. Cost: 0.2 to 0.5 us per piece of one mode.
     """
-    choice = workspace.choice
+    time_state = run.time_state
+    choice = run.workspace.choice
     used = 0
     now = time_state.now
     repeats = False
-    begin = max(now[TIME.begin], float(BEGIN.yielding))
-    now[TIME.begin] = 0.0
-    if choice.orders[0, 0] < 0.0 and not choose_initial_sticks(
-        motion, modal_system, table, memory, time_state, workspace
-    ):
+    begin = max(now[Time.BEGIN], float(BEGIN.yielding))
+    now[Time.BEGIN] = 0.0
+    if choice.orders[0, 0] < 0.0 and not choose_initial_sticks(run):
         return STATUS.undetermined, used
-    if now[TIME.is_paused] == 0.0:
-        reset_forces(modal_system, table, memory)
-    now[TIME.is_paused] = 0.0
+    if now[Time.IS_PAUSED] == 0.0:
+        reset_forces(run)
+    now[Time.IS_PAUSED] = 0.0
     while is_before(now, stop):
         if used == rows.shape[0] and used > 0:
             # the forces continue unchanged
-            now[TIME.begin] = begin
-            now[TIME.is_paused] = 1.0
+            now[Time.BEGIN] = begin
+            now[Time.IS_PAUSED] = 1.0
             return STATUS.full, used
-        segment = time_state.segments[int(now[TIME.segment])]
-        phase = drive_phase(segment, now[TIME.cycle], now[TIME.offset], time_state.period[0])
+        segment = time_state.segments[int(now[Time.SEGMENT])]
+        phase = drive_phase(segment, present_instant(time_state))
         remaining = time_to_border(time_state, stop)
-        piece = start_piece(remaining, motion, modal_system, table, memory, time_state, workspace)
-        event = find_piece_end(
-            piece.top, motion, modal_system, table, memory, time_state, run_sums, workspace
-        )
+        piece = start_piece(remaining, run)
+        event = find_piece_end(piece.top, run)
         changes_stick = False
         if event.kind == EVENT.reversal or event.kind == EVENT.release:
-            changes_stick = table.static_limit[event.interface] > 0.0
+            changes_stick = run.table.static_limit[event.interface] > 0.0
         drive_changes = False
         if changes_stick or piece.duration == remaining:
-            find_resting_interfaces(
-                event.u, piece.duration, piece.top, modal_system, table, memory, workspace
-            )
+            find_resting_interfaces(event.u, piece, run)
         if event.u > 0:
-            if now[TIME.offset] == 0.0:
-                widen_extremes(output_displacement(motion, modal_system), time_state, run_sums)
+            if now[Time.OFFSET] == 0.0:
+                widen_extremes(output_displacement(run), run)
             if rows.shape[0] > 0:
                 duration = event.u * piece.duration
-                write_row(
-                    rows[used],
-                    motion,
-                    duration,
-                    phase,
-                    begin,
-                    modal_system,
-                    table,
-                    memory,
-                    time_state,
-                )
+                write_row(rows[used], duration, phase, begin, run)
                 used += 1
-            drive_changes, repeats = move_over_piece(
-                piece,
-                event,
-                stop,
-                motion,
-                modal_system,
-                table,
-                memory,
-                previous,
-                time_state,
-                run_sums,
-                workspace,
-            )
-        if is_idle(event.u * piece.duration, time_state, run_sums):
+            drive_changes, repeats = move_over_piece(piece, event, stop, run)
+        if is_idle(event.u * piece.duration, run):
             return STATUS.idle, used
         begin = next_begin(event.kind, changes_stick, drive_changes)
-        apply_event(event, modal_system, table, memory, time_state)
+        apply_event(event, run)
         if changes_stick:
             choice.is_resting[event.interface] = 1.0
             choice.slip_signs[event.interface] = event.sign if event.kind == EVENT.release else 0.0
-        if (changes_stick or drive_changes) and not choose_current_sticks(
-            motion, modal_system, table, memory, time_state, workspace
-        ):
+        if (changes_stick or drive_changes) and not choose_current_sticks(run):
             return STATUS.undetermined, used
         if event.kind == EVENT.travel:
-            now[TIME.begin] = 0.0
+            now[Time.BEGIN] = 0.0
             return STATUS.travel, used
         if repeats:
-            now[TIME.begin] = begin
+            now[Time.BEGIN] = begin
             return STATUS.repeats, used
-    now[TIME.begin] = begin
+    now[Time.BEGIN] = begin
     return STATUS.done, used

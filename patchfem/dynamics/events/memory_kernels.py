@@ -17,7 +17,7 @@ from math import inf
 from typing import NamedTuple
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ...friction.flags_kernels import NJIT_INLINE
 
 # [N/m] stiffness of an interface while its rigid element sticks
 RIGID_STIFFNESS = inf
@@ -38,7 +38,7 @@ class Tangent(NamedTuple):
     limit: float
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def next_yield_slide(interface, direction, table, memory):
     """Return the relative displacement [m] at which the next element slips in a direction.
 
@@ -66,7 +66,7 @@ def next_yield_slide(interface, direction, table, memory):
     return slide + (direction - sign) * table.yield_slide[interface, first]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def release_next_element(interface, direction, table, memory):
     """Let the next element slip in a direction.
 
@@ -90,7 +90,7 @@ def release_next_element(interface, direction, table, memory):
         memory.n_groups[interface] = group
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def store_turning_point(interface, memory):
     """Stop all elements that slip; they stay one group, stretched to their yield slides."""
     if memory.n_slipping[interface] == 0:
@@ -104,7 +104,7 @@ def store_turning_point(interface, memory):
     memory.direction[interface] = 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def is_sticking(interface, table, memory):
     """Return whether the rigid element of an interface sticks.
 
@@ -121,7 +121,7 @@ def is_sticking(interface, table, memory):
     return table.static_limit[interface] > 0.0 and memory.rigid_state[interface] == 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def rigid_friction(interface, table, memory):
     """Return the friction force of the rigid element of an interface [N].
 
@@ -145,7 +145,7 @@ def rigid_friction(interface, table, memory):
     return 0.5 * state * table.static_limit[interface]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def interface_force(interface, table, memory):
     """Return the friction force [N] of an interface without the reaction of its rigid element.
 
@@ -165,7 +165,7 @@ def interface_force(interface, table, memory):
     )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def find_force_and_energy(interface, table, memory):
     """Sum the forces and energies of the elastic-plastic elements, group by group.
 
@@ -199,7 +199,7 @@ def find_force_and_energy(interface, table, memory):
     return force, 0.5 * energy
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def find_tangent(interface, table, memory):
     """Return the tangent of an interface.
 

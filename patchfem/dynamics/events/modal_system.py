@@ -7,7 +7,7 @@ import numpy as np
 from ...compiled import get_kernel_module
 from ...core import ModalBasis, PatchfemError
 from .elements import ElementTable, Memory, unstretched_memory
-from .positions_kernels import CONSTRAINT, KIND, LEDGER, LIMIT, PREVIOUS, SEGMENT, TIME
+from .positions_kernels import KIND, ConstraintStatus, Ledger, Limit, PreviousStatus, Segment, Time
 
 # revolutions per cycle closer to a whole number than this many times their size count as that number [1]
 WHOLE_TOL = 4e-15
@@ -29,10 +29,10 @@ class ModalSystem(NamedTuple):
     - base, output: (n,) excitation by the base, and participation of the output [1]
     - interfaces: (i, n) relative displacement of every interface per modal coordinate [1]
     - inverse_mass: (i,) |row of interfaces|^2/mass [1/kg]; a spring there adds it times its
-    stiffness to a squared rate
+      stiffness to a squared rate
     - mass: modal mass [kg]
     - max_omega_squared, damping_norm: norms of the stiffness [1/s2] and of the damping [1/s] of the
-    modes
+      modes
     - output_interface: number of an interface that moves as the output does, -1 where none does
     """
 
@@ -84,8 +84,8 @@ def make_modal_system(modes: ModalBasis) -> ModalSystem:
 class TimeState(NamedTuple):
     """Time of a run.
 
-    - now: (6,) time and what the march notes of it, see `TimePositions`
-    - segments: (p, 12) segments of the drive, see `SegmentColumns`
+    - now: (6,) time and what the march notes of it, see `Time`
+    - segments: (p, 12) segments of the drive, see `Segment`
     - period: (1,) duration of a cycle [s]
     - is_at_turn: (i + 1,) 1 where an interface, or last the output, is at rest at a turning point
     """
@@ -118,14 +118,14 @@ def start_time_state(drive, n_interfaces: int) -> TimeState:
     if segments[0, :2].any():
         raise PatchfemError("drive: the first segment of the drive must start at 0 s")
     return TimeState(
-        np.zeros(len(TIME)), segments, np.array([drive.period]), np.zeros(n_interfaces + 1)
+        np.zeros(len(Time)), segments, np.array([drive.period]), np.zeros(n_interfaces + 1)
     )
 
 
 def drive_segments(drive) -> np.ndarray:
-    """Return the segments (p, 12) of a drive of `core` or `structure.drives`, see `SegmentColumns`."""
+    """Return the segments (p, 12) of a drive of `core` or `structure.drives`, see `Segment`."""
     if drive.segments:
-        return np.array([_sine_segment(part, drive.period) for part in drive.segments])
+        return np.array([_sine_segment(segment, drive.period) for segment in drive.segments])
     return np.array(_sweep_segments(drive) if hasattr(drive, "low") else _record_segments(drive))
 
 
@@ -142,31 +142,31 @@ def split_time(time: float, period: float) -> tuple:
 
 
 def _make_segment(start: float, period: float, kind: float, **columns) -> np.ndarray:
-    """Return one segment (12,) that starts at a time [s]; columns: values by the names of `SegmentColumns`."""
-    segment = np.zeros(len(SEGMENT))
-    segment[: SEGMENT.kind] = split_time(start, period)
-    segment[SEGMENT.kind] = kind
+    """Return one segment (12,) that starts at a time [s]; columns: values by the names of `Segment`."""
+    segment = np.zeros(len(Segment))
+    segment[: Segment.KIND] = split_time(start, period)
+    segment[Segment.KIND] = kind
     for name, value in columns.items():
-        segment[getattr(SEGMENT, name)] = value
+        segment[Segment[name.upper()]] = value
     return segment
 
 
-def _sine_segment(part, period: float) -> np.ndarray:
+def _sine_segment(sine, period: float) -> np.ndarray:
     """Return the segment of a sine, or of a constant where its amplitude or frequency is 0."""
-    omega = part.omega if part.amplitude else 0.0
-    constant = part.constant + (0.0 if omega else part.amplitude * np.sin(part.phase))
+    omega = sine.omega if sine.amplitude else 0.0
+    constant = sine.constant + (0.0 if omega else sine.amplitude * np.sin(sine.phase))
     revolutions = omega * period / (2 * np.pi)
     is_whole = abs(revolutions - round(revolutions)) < WHOLE_TOL * max(1.0, revolutions)
     excess = 0.0 if is_whole else revolutions - int(revolutions)
     rounded = round(excess * 2**TURN_BITS) / 2**TURN_BITS
     return _make_segment(
-        part.start,
+        sine.start,
         period,
         KIND.sine,
         constant=constant,
-        amplitude=part.amplitude if omega else 0.0,
+        amplitude=sine.amplitude if omega else 0.0,
         omega=omega,
-        phase=part.phase - omega * split_time(part.start, period)[1],
+        phase=sine.phase - omega * split_time(sine.start, period)[1],
         rate=omega,
         turns=rounded,
         turns_remainder=excess - rounded,
@@ -175,21 +175,25 @@ def _sine_segment(part, period: float) -> np.ndarray:
 
 def _sweep_segments(sweep) -> list:
     """Return the segments of a sweep: the sweep itself, then a sine at its last frequency."""
-    low = 2 * np.pi * sweep.low
-    high = 2 * np.pi * sweep.high
+    first_omega = 2 * np.pi * sweep.low
+    last_omega = 2 * np.pi * sweep.high
     duration = sweep.duration
-    is_logarithmic = sweep.logarithmic and high != low
-    slope = np.log(high / low) / duration if is_logarithmic else (high - low) / duration
+    is_logarithmic = sweep.logarithmic and last_omega != first_omega
+    slope = (
+        np.log(last_omega / first_omega) / duration
+        if is_logarithmic
+        else (last_omega - first_omega) / duration
+    )
     is_displacement = sweep.displacement is not None
     amplitude = sweep.displacement if is_displacement else sweep.acceleration
-    last_phase = float(sweep.phase(duration)) - high * split_time(duration, sweep.period)[1]
+    last_phase = float(sweep.phase(duration)) - last_omega * split_time(duration, sweep.period)[1]
     return [
         _make_segment(
             0.0,
             sweep.period,
             KIND.log_chirp if is_logarithmic else KIND.chirp,
             amplitude=amplitude,
-            omega=low,
+            omega=first_omega,
             slope=slope,
             is_displacement=is_displacement,
             rate=sweep.rate,
@@ -198,21 +202,21 @@ def _sweep_segments(sweep) -> list:
             duration,
             sweep.period,
             KIND.sine,
-            amplitude=amplitude * high**2 if is_displacement else amplitude,
-            omega=high,
+            amplitude=amplitude * last_omega**2 if is_displacement else amplitude,
+            omega=last_omega,
             phase=last_phase,
-            rate=high,
+            rate=last_omega,
         ),
     ]
 
 
 def _record_segments(record) -> np.ndarray:
     """Return the segments (p, 12) of a record: straight lines between its rows, then nothing."""
-    segments = np.zeros((len(record.time), len(SEGMENT)))
-    segments[:, : SEGMENT.kind] = [split_time(float(time), record.period) for time in record.time]
-    segments[:, SEGMENT.kind] = KIND.line
-    segments[:-1, SEGMENT.constant] = record.value[:-1]
-    segments[:-1, SEGMENT.slope] = np.diff(record.value) / np.diff(record.time)
+    segments = np.zeros((len(record.time), len(Segment)))
+    segments[:, : Segment.KIND] = [split_time(float(time), record.period) for time in record.time]
+    segments[:, Segment.KIND] = KIND.line
+    segments[:-1, Segment.CONSTANT] = record.value[:-1]
+    segments[:-1, Segment.SLOPE] = np.diff(record.value) / np.diff(record.time)
     return segments
 
 
@@ -243,16 +247,17 @@ def copy_into(old, new):
 
 def _has_same_shapes(old, new) -> bool:
     """Return whether two tuples of arrays have the same shapes."""
-    return all(
-        _has_same_shapes(a, b) if isinstance(a, tuple) else a.shape == b.shape
-        for a, b in zip(old, new)
-    )
+    for a, b in zip(old, new):
+        same = _has_same_shapes(a, b) if isinstance(a, tuple) else a.shape == b.shape
+        if not same:
+            return False
+    return True
 
 
 class PreviousCycle(NamedTuple):
     """State at the last end of a cycle, by which `repeat_kernels` recognises a motion that repeats.
 
-    - status: (3,) see `PreviousPositions`
+    - status: (3,) see `PreviousStatus`
     - motion: (2, n) modal coordinates [m] and rates [m/s]
     - memory: of the elements
     """
@@ -264,8 +269,8 @@ class PreviousCycle(NamedTuple):
 
 def start_previous_cycle(modal_system: ModalSystem, table: ElementTable) -> PreviousCycle:
     """Return the PreviousCycle of a run that begins, which holds no state."""
-    status = np.zeros(len(PREVIOUS))
-    status[PREVIOUS.segment] = -1.0
+    status = np.zeros(len(PreviousStatus))
+    status[PreviousStatus.SEGMENT] = -1.0
     return PreviousCycle(
         status,
         np.zeros((2, len(modal_system.omega_squared))),
@@ -277,11 +282,11 @@ class Constraint(NamedTuple):
     """Interfaces whose rigid elements stick, as a constraint on the modes (`stick_kernels.constrain_slides`).
 
     - is_sticking: (i,) 1 where the rigid element of an interface sticks
-    - status: (2,) see `ConstraintPositions`
+    - status: (2,) see `ConstraintStatus`
     - basis: (i, n) orthogonal rows that span those of the sticking interfaces, 0 in the dependent
-    ones
+      ones
     - inverse: (i, n) transposed pseudo-inverse of the rows of the sticking interfaces, 0 in the
-    others
+      others
     - is_tied: (i,) 1 where the sticking interfaces hold this one too
     - reactions: (i, terms) series of the reactions [N] over a piece
     - matrix: (i, i) the transformation to `basis`, or a matrix to solve with
@@ -304,10 +309,9 @@ class Choice(NamedTuple):
     - is_resting: (i,) 1 where an interface with a rigid element has no velocity
     - slip_signs, guess: (i,) directions of slip, 0 in stick, at first and as they are tried
     - orders: (i, 2) orders of the terms that vanish where the next piece begins, -1 before the
-    first choice
+      first choice
     - motion_sizes, reaction_sizes: (terms, n), (i, terms) magnitudes that the terms of motion and
-    reactions are added
-      from, the scale of their round-off
+      reactions are added from, the scale of their round-off
     """
 
     is_resting: np.ndarray
@@ -348,7 +352,7 @@ def make_workspace(modal_system: ModalSystem) -> Workspace:
     n_terms = series_kernels.MAX_POWER + 5
     constraint = Constraint(
         is_sticking=np.empty(i),
-        status=np.empty(len(CONSTRAINT)),
+        status=np.empty(len(ConstraintStatus)),
         basis=np.empty((i, n)),
         inverse=np.empty((i, n)),
         is_tied=np.empty(i),
@@ -380,8 +384,8 @@ def make_workspace(modal_system: ModalSystem) -> Workspace:
 
 def clear_workspace(workspace: Workspace) -> Workspace:
     """Reset a workspace to its state before a run, and return it."""
-    for part in (*workspace[:-2], *workspace.constraint, *workspace.choice):
-        part.fill(0.0)
+    for array in (*workspace[:-2], *workspace.constraint, *workspace.choice):
+        array.fill(0.0)
     workspace.choice.orders.fill(-1.0)
     return workspace
 
@@ -389,11 +393,11 @@ def clear_workspace(workspace: Workspace) -> Workspace:
 class RunSums(NamedTuple):
     """Sums over a run.
 
-    - ledger: (8,) energies and counts, see `LedgerPositions`
+    - ledger: (8,) energies and counts, see `Ledger`
     - extremes: (c, 2) smallest and largest output [m] of every cycle
     - phasors: (c, 2) real and imaginary part of the output [m] at the frequency of the cycle
     - is_phasor_wanted: (c,) 1 in the cycles whose phasor is computed
-    - limits: (2,) see `LimitPositions`
+    - limits: (2,) see `Limit`
     """
 
     ledger: np.ndarray
@@ -401,6 +405,29 @@ class RunSums(NamedTuple):
     phasors: np.ndarray
     is_phasor_wanted: np.ndarray
     limits: np.ndarray
+
+
+class RunArrays(NamedTuple):
+    """All that the kernels of a run work on.
+
+    - modal_system: modes, which do not change
+    - table: elements of the interfaces, which do not change
+    - motion: (2, n) modal coordinates [m] and rates [m/s]
+    - memory: of the elements
+    - previous: state at the end of the cycle before
+    - time_state: time, and the segments of the drive
+    - sums: energies, extremes and phasors
+    - workspace: of the present piece
+    """
+
+    modal_system: ModalSystem
+    table: ElementTable
+    motion: np.ndarray
+    memory: Memory
+    previous: PreviousCycle
+    time_state: TimeState
+    sums: RunSums
+    workspace: Workspace
 
 
 def start_sums(n_cycles: int, is_phasor_wanted, travel: float = np.inf) -> RunSums:
@@ -419,10 +446,10 @@ def start_sums(n_cycles: int, is_phasor_wanted, travel: float = np.inf) -> RunSu
     -------
     RunSums
     """
-    limits = np.zeros(len(LIMIT))
-    limits[LIMIT.travel] = travel
+    limits = np.zeros(len(Limit))
+    limits[Limit.TRAVEL] = travel
     return RunSums(
-        np.zeros(len(LEDGER)),
+        np.zeros(len(Ledger)),
         np.tile([np.inf, -np.inf], (n_cycles, 1)),
         np.zeros((n_cycles, 2)),
         np.array(is_phasor_wanted, float),

@@ -10,9 +10,9 @@ from ...core import InitialState, ModalBasis, NotConverged, Response
 from ...cost_model import PYTHON_READ_TIME_RATIO
 from . import histories
 from .elements import Memory
-from .modal_system import make_modal_system, start_previous_cycle, start_sums
+from .modal_system import make_modal_system, start_sums
 from .period import PeriodMap, Point
-from .positions_kernels import LIMIT, N_COLUMNS, ROW, STATUS
+from .positions_kernels import N_COLUMNS, STATUS, Limit, Row
 from .steady import find_antisymmetric_motion
 
 # rows for the pieces of half a period; their number is doubled where it does not suffice
@@ -47,11 +47,10 @@ class PeriodicMotionFinder:
         self.period_map = PeriodMap(modes, groups)
         self.march = self.kernels.march
         self.peak = load("dynamics.events.dense_kernels").find_peaks
-        self.wide = ROW.motion + 2 * modes.omega.size + N_COLUMNS * len(groups)
+        self.wide = Row.MOTION + 2 * modes.omega.size + N_COLUMNS * len(groups)
         self.rows = np.zeros((INITIAL_ROWS, self.wide))
         self.run_sums = start_sums(1, np.ones(1))
         self.forces = np.zeros(len(groups))
-        self.past = start_previous_cycle(self.period_map.modal_system, self.period_map.table)
         self._set_system(modes)
 
     def _set_system(self, modes: ModalBasis) -> None:
@@ -67,29 +66,29 @@ class PeriodicMotionFinder:
 
         Returns False where they do not fit.
         """
-        same = self.period_map.replace_system(modes, groups)
-        if same:
+        fits = self.period_map.replace_system(modes, groups)
+        if fits:
             self._set_system(modes)
-        return same
+        return fits
 
     def __call__(self, drive, near: Point | None = None) -> PeriodicMotion:
         period_map = self.period_map
         point = find_antisymmetric_motion(
             period_map, drive, near if self._is_compatible(near) else None
         )[0].point
-        used, swing = self._march_half_period(drive, point, period_map.modal_system)
+        n_rows, peak_output = self._march_half_period(drive, point, period_map.modal_system)
         self.peak.add_python_cost(PYTHON_READ_TIME_RATIO * period_map.seconds / 2)
-        high = self.peak.call_with_bound_args(
+        peak_acceleration = self.peak.call_with_bound_args(
             self._bound_arguments("peak", period_map.modal_system, float(drive.moving)),
-            self.rows[:used],
+            self.rows[:n_rows],
         )
-        first = (
+        fundamental = (
             -2 * drive.omega**2 * complex(*self.run_sums.phasors[0])
             - 1j * drive.acceleration * drive.moving
         )
         if self.gauge is not None:
-            swing = self._march_half_period(drive, point, self.gauge)[1]
-        return PeriodicMotion(point, float(high), first, swing)
+            peak_output = self._march_half_period(drive, point, self.gauge)[1]
+        return PeriodicMotion(point, float(peak_acceleration), fundamental, peak_output)
 
     def window(self, drive, point: Point) -> Response:
         """Return the histories of the period that begins at a Point."""
@@ -102,13 +101,13 @@ class PeriodicMotionFinder:
 
     def _is_compatible(self, near: Point | None) -> bool:
         """Return whether a Point belongs to these modes and elements."""
-        still = self.period_map.still
-        count = self.period_map.table.n_elements
+        rest_memory = self.period_map.still
+        n_elements = self.period_map.table.n_elements
         return (
             near is not None
             and near.motion.size == 2 * self.period_map.n
-            and near.memory.group_slide.shape == still.group_slide.shape
-            and np.array_equal(_count_elements(near.memory), count)
+            and near.memory.group_slide.shape == rest_memory.group_slide.shape
+            and np.array_equal(_count_elements(near.memory), n_elements)
         )
 
     def _march_half_period(self, drive, point: Point, modal_system) -> tuple:
@@ -124,14 +123,14 @@ class PeriodicMotionFinder:
             self.march.add_python_cost(period_map.seconds / 2)
             run_sums.ledger[:] = 0.0
             run_sums.phasors[:] = 0.0
-            run_sums.limits[LIMIT.n_idle] = 0.0
+            run_sums.limits[Limit.N_IDLE] = 0.0
             run_sums.extremes[:] = (np.inf, -np.inf)
-            code, used = self.march.call_with_bound_args(
+            status, n_rows = self.march.call_with_bound_args(
                 self._bound_arguments("march", modal_system), stop
             )
-            if code == STATUS.done:
-                return used, float(max(run_sums.extremes[0, 1], -run_sums.extremes[0, 0]))
-            if code != STATUS.full:
+            if status == STATUS.done:
+                return n_rows, float(max(run_sums.extremes[0, 1], -run_sums.extremes[0, 0]))
+            if status != STATUS.full:
                 raise NotConverged(
                     "dynamics: within a period the contact changes between stick and slip again and "
                     "again without time passing"
@@ -144,23 +143,11 @@ class PeriodicMotionFinder:
         period_map = self.period_map
         key = (name, id(modal_system), moving)
         if key not in self.held:
-            self.held[key] = (
-                self.peak.bind_arguments(
-                    modal_system, period_map.time_state, moving, period_map.workspace, self.forces
-                )
-                if name == "peak"
-                else self.march.bind_arguments(
-                    period_map.motion,
-                    modal_system,
-                    period_map.table,
-                    period_map.memory,
-                    self.past,
-                    period_map.time_state,
-                    self.run_sums,
-                    period_map.workspace,
-                    self.rows,
-                )
-            )
+            arrays = period_map.run_arrays(modal_system, self.run_sums)
+            if name == "peak":
+                self.held[key] = self.peak.bind_arguments(moving, arrays, self.forces)
+            else:
+                self.held[key] = self.march.bind_arguments(arrays, self.rows)
         return self.held[key]
 
 

@@ -13,14 +13,16 @@ from ...core import ModalBasis, NotConverged, PatchfemError
 from .cost import python_seconds
 from .elements import Memory, make_element_table, sorted_stretches, unstretched_memory
 from .modal_system import (
+    RunArrays,
     TimeState,
     make_modal_system,
     make_workspace,
     split_time,
+    start_previous_cycle,
     start_sums,
     start_time_state,
 )
-from .positions_kernels import LIMIT
+from .positions_kernels import Limit
 
 # computing time of a map with slopes over that of a map without them, both as interpreted Python
 SLOPE_COST_FACTOR = 2.0
@@ -63,12 +65,13 @@ class Point(NamedTuple):
 
 def find_turning_places(memory: Memory) -> tuple:
     """Return interfaces (d,) and groups (d,) of the turning points in a memory."""
-    found = [
-        row[:deep].nonzero()[0] for row, deep in zip(memory.group_sign, memory.n_groups.tolist())
-    ]
-    if len(found) == 1:
-        return np.zeros_like(found[0]), found[0]
-    return np.repeat(np.arange(len(found)), [part.size for part in found]), np.concatenate(found)
+    groups = []
+    for signs, n_groups in zip(memory.group_sign, memory.n_groups.tolist()):
+        groups.append(signs[:n_groups].nonzero()[0])
+    if len(groups) == 1:
+        return np.zeros_like(groups[0]), groups[0]
+    interfaces = np.repeat(np.arange(len(groups)), [indices.size for indices in groups])
+    return interfaces, np.concatenate(groups)
 
 
 def copy_memory(memory: Memory) -> Memory:
@@ -111,6 +114,7 @@ class PeriodMap:
         faces = len(self.groups)
         self.workspace = make_workspace(self.modal_system)
         self.run_sums = start_sums(2, np.zeros(2))
+        self.previous = start_previous_cycle(self.modal_system, self.table)
         self.scratch = (
             np.zeros((2, self.n)),
             np.zeros(faces),
@@ -140,13 +144,13 @@ class PeriodMap:
 
         Returns False where their numbers differ from the present ones.
         """
-        same = (
+        fits = (
             modes.omega.size == self.n
             and [group.stiffness.size for group in groups] == self.table.n_elements.tolist()
         )
-        if same:
+        if fits:
             self._set_system(modes, groups)
-        return same
+        return fits
 
     def make_rest_point(self) -> Point:
         """Return the Point at rest with unstretched elements."""
@@ -156,14 +160,37 @@ class PeriodMap:
         """Return the memory of a Point with displacement and slip computed from its motion."""
         memory = copy_memory(point.memory)
         memory.slide[:] = self.faces @ point.motion[: self.n]
-        for f, one in enumerate(self.groups):
-            share = one.stiffness * one.yield_displacement
+        for f, elements in enumerate(self.groups):
+            limits = elements.stiffness * elements.yield_displacement
             memory.slip[f] = (
-                share
-                @ (memory.slide[f] - sorted_stretches(one, memory, f))
-                / max(share.sum(), 1e-300)
+                limits
+                @ (memory.slide[f] - sorted_stretches(elements, memory, f))
+                / max(limits.sum(), 1e-300)
             )
         return memory
+
+    def run_arrays(self, modal_system, sums) -> RunArrays:
+        """Return the arrays of a run from the state of this map.
+
+        Parameters
+        ----------
+        modal_system : ModalSystem
+        sums : RunSums
+
+        Returns
+        -------
+        RunArrays
+        """
+        return RunArrays(
+            modal_system,
+            self.table,
+            self.motion,
+            self.memory,
+            self.previous,
+            self.time_state,
+            sums,
+            self.workspace,
+        )
 
     def start_period(self, drive, point: Point) -> None:
         """Set time, sums, motion and memory to the start of a period of a sine at a Point.
@@ -178,13 +205,13 @@ class PeriodMap:
         time_state = self.time_state
         run_sums = self.run_sums
         self.motion[:] = point.motion.reshape(2, self.n)
-        for mine, given in zip(self.memory, point.memory):
-            mine[...] = given
+        for array, values in zip(self.memory, point.memory):
+            array[...] = values
         self.memory.slide[:] = self.faces @ self.motion[0]
         time_state.now[:] = 0.0
         time_state.is_at_turn[:] = 0.0
         run_sums.ledger[:] = 0.0
-        run_sums.limits[LIMIT.n_idle] = 0.0
+        run_sums.limits[Limit.N_IDLE] = 0.0
         run_sums.extremes[:] = (np.inf, -np.inf)
         self.workspace.choice.orders[:] = -1.0
 
@@ -234,33 +261,24 @@ class PeriodMap:
         self.start_period(drive, point)
         n = self.n
         memory = self.memory
-        seen = self.seen
+        counts = self.seen
         period = drive.period
-        face, group = point.turning_places
-        size = 2 * n + face.size if slopes else 0
-        slope, marks, unit = self._slope_arrays(size)
+        interfaces, group = point.turning_places
+        size = 2 * n + interfaces.size if slopes else 0
+        slope, turning_slopes, start_slope = self._slope_arrays(size)
         if slopes:
-            slope[:] = unit
-            marks[:, : memory.n_groups.max(initial=0)] = 0.0
-            marks[face, group, np.arange(2 * n, size)] = 1.0
-        seen[0] = memory.n_slipping
-        seen[1] = memory.n_groups
+            slope[:] = start_slope
+            turning_slopes[:, : memory.n_groups.max(initial=0)] = 0.0
+            turning_slopes[interfaces, group, np.arange(2 * n, size)] = 1.0
+        counts[0] = memory.n_slipping
+        counts[1] = memory.n_groups
         self.follow.add_python_cost(
             self.seconds * (SLOPE_COST_FACTOR if slopes else 1.0) / (1 + half)
         )
         if size not in self.held:
+            arrays = self.run_arrays(self.modal_system, self.run_sums)
             self.held[size] = self.follow.bind_arguments(
-                self.motion,
-                slope,
-                marks,
-                self.modal_system,
-                self.table,
-                memory,
-                self.time_state,
-                self.run_sums,
-                self.workspace,
-                self.scratch,
-                seen,
+                arrays, slope, turning_slopes, self.scratch, counts
             )
         pieces = self.follow.call_with_bound_args(
             self.held[size], split_time(period / 2 if half else period, period)
@@ -270,15 +288,24 @@ class PeriodMap:
                 "dynamics: within one period the contact changes between stick and slip more often than "
                 "can be computed"
             )
-        rows, columns = turned = find_turning_places(memory)
-        end = Point(self.motion.ravel().copy(), copy_memory(memory), turned)
-        kept = 2 * n + (columns < seen[1, rows]).nonzero()[0]
-        out = np.concatenate([slope.reshape(2 * n, size), marks[rows, columns]])
+        rows, columns = turning_places = find_turning_places(memory)
+        end = Point(self.motion.ravel().copy(), copy_memory(memory), turning_places)
+        kept_numbers = 2 * n + (columns < counts[1, rows]).nonzero()[0]
+        end_slope = np.concatenate([slope.reshape(2 * n, size), turning_slopes[rows, columns]])
         if half:
-            for part in (end.motion, out, *(getattr(end.memory, name) for name in ODD_FIELDS)):
-                np.negative(part, out=part)
+            for odd_part in (
+                end.motion,
+                end_slope,
+                *(getattr(end.memory, name) for name in ODD_FIELDS),
+            ):
+                np.negative(odd_part, out=odd_part)
         return PeriodMapping(
-            end, out, kept, *seen.copy(), self.run_sums.extremes[0].copy(), int(pieces)
+            end,
+            end_slope,
+            kept_numbers,
+            *counts.copy(),
+            self.run_sums.extremes[0].copy(),
+            int(pieces),
         )
 
     def _slope_arrays(self, size: int) -> tuple:

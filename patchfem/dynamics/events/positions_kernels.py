@@ -1,44 +1,43 @@
 """Named positions in the arrays of the event engine.
 
-A kernel reads `row[ROW.duration]` or `sums[LEDGER.drive_work]`. The classes below state unit and
-meaning of every position; their instances at the end of the module are what kernels and callers
-import.
+A kernel reads `row[Row.DURATION]` or `sums[Ledger.DRIVE_WORK]`. The enumerations below state unit and
+meaning of every position. Codes of kinds, causes and results, which arrays of floats hold, are the
+fields of named tuples.
 """
 
+from enum import IntEnum
 from typing import NamedTuple
 
 
-class SegmentColumns(NamedTuple):
+class Segment(IntEnum):
     """Columns of a segment of the drive.
 
-    - cycle, offset: number of the cycle in which it starts, and time since that cycle began [s]
-    - kind: a number of `SegmentKinds`
-    - constant: constant acceleration [m s-2]
-    - amplitude: of the sine, [m s-2] or, where is_displacement is 1, [m]
-    - omega, phase: angular frequency [rad/s] and phase [rad], both at the start of the first cycle
-    of a sine, or at the
-      start of a sweep
-    - slope: of the line [m s-3], of omega [rad/s2], or of the logarithm of omega [1/s]
-    - is_displacement: 1 where the amplitude is a displacement
-    - rate: largest rate [1/s]
-    - turns, turns_remainder: what the revolutions per cycle exceed a whole number by, in two parts;
-    the first has 24
-      bits, so its product with a number of cycles is exact and the phase keeps its digits over a
-      million cycles
+    - CYCLE, OFFSET: number of the cycle in which it starts, and time since that cycle began [s]
+    - KIND: a number of `SegmentKinds`
+    - CONSTANT: constant acceleration [m s-2]
+    - AMPLITUDE: of the sine, [m s-2] or, where is_displacement is 1, [m]
+    - OMEGA, PHASE: angular frequency [rad/s] and phase [rad], both at the start of the first cycle
+      of a sine, or at the start of a sweep
+    - SLOPE: of the line [m s-3], of omega [rad/s2], or of the logarithm of omega [1/s]
+    - IS_DISPLACEMENT: 1 where the amplitude is a displacement
+    - RATE: largest rate [1/s]
+    - TURNS, TURNS_REMAINDER: what the revolutions per cycle exceed a whole number by, in two parts;
+      the first has 24 bits, so its product with a number of cycles is exact and the phase keeps its
+      digits over a million cycles
     """
 
-    cycle: int = 0
-    offset: int = 1
-    kind: int = 2
-    constant: int = 3
-    amplitude: int = 4
-    omega: int = 5
-    phase: int = 6
-    slope: int = 7
-    is_displacement: int = 8
-    rate: int = 9
-    turns: int = 10
-    turns_remainder: int = 11
+    CYCLE = 0
+    OFFSET = 1
+    KIND = 2
+    CONSTANT = 3
+    AMPLITUDE = 4
+    OMEGA = 5
+    PHASE = 6
+    SLOPE = 7
+    IS_DISPLACEMENT = 8
+    RATE = 9
+    TURNS = 10
+    TURNS_REMAINDER = 11
 
 
 class SegmentKinds(NamedTuple):
@@ -50,53 +49,52 @@ class SegmentKinds(NamedTuple):
     log_chirp: float = 3.0
 
 
-class RowColumns(NamedTuple):
+class Row(IntEnum):
     """Columns of the row of a piece, as the piece begins.
 
-    - time, duration: of the piece [s]
-    - phase: of the drive [rad]
-    - segment: number of the segment of the drive
-    - begin: what begins the piece, a number of `RowBegins`
-    - cycle, offset: number of the cycle, and time since it began [s]
-    - motion: first of n modal coordinates [m] and n rates [m/s]; `InterfaceColumns` of every
-    interface follow
+    - TIME, DURATION: of the piece [s]
+    - PHASE: of the drive [rad]
+    - SEGMENT: number of the segment of the drive
+    - BEGIN: what begins the piece, a number of `RowBegins`
+    - CYCLE, OFFSET: number of the cycle, and time since it began [s]
+    - MOTION: first of n modal coordinates [m] and n rates [m/s]; `Column` of every interface follow
     """
 
-    time: int = 0
-    duration: int = 1
-    phase: int = 2
-    segment: int = 3
-    begin: int = 4
-    cycle: int = 5
-    offset: int = 6
-    motion: int = 8
+    TIME = 0
+    DURATION = 1
+    PHASE = 2
+    SEGMENT = 3
+    BEGIN = 4
+    CYCLE = 5
+    OFFSET = 6
+    MOTION = 8
 
 
-class InterfaceColumns(NamedTuple):
+class Column(IntEnum):
     """Columns of an interface in the row of a piece, measured from the first of them.
 
-    - force: friction force [N]; the reaction while a rigid element holds the relative displacement
-    - stiffness: of the elements that stick [N/m], infinite while a rigid element holds
-    - slipping, limit: fraction of the friction limit that slips, and the limit [N] of what slips
-    - slip, work, loss: irreversible slip [m], work done on the interface and energy dissipated
-    there [J]
-    - direction: sign of the slip, 0 in stick
-    - slide: relative displacement [m]
+    - FORCE: friction force [N]; the reaction while a rigid element holds the relative displacement
+    - STIFFNESS: of the elements that stick [N/m], infinite while a rigid element holds
+    - SLIPPING, LIMIT: fraction of the friction limit that slips, and the limit [N] of what slips
+    - SLIP, WORK, LOSS: irreversible slip [m], work done on the interface and energy dissipated
+      there [J]
+    - DIRECTION: sign of the slip, 0 in stick
+    - SLIDE: relative displacement [m]
     """
 
-    force: int = 0
-    stiffness: int = 1
-    slipping: int = 2
-    limit: int = 3
-    slip: int = 4
-    work: int = 5
-    loss: int = 6
-    direction: int = 7
-    slide: int = 8
+    FORCE = 0
+    STIFFNESS = 1
+    SLIPPING = 2
+    LIMIT = 3
+    SLIP = 4
+    WORK = 5
+    LOSS = 6
+    DIRECTION = 7
+    SLIDE = 8
 
 
 class RowBegins(NamedTuple):
-    """Values of `RowColumns.begin`, in increasing order of importance."""
+    """Values of `Row.begin`, in increasing order of importance."""
 
     none: int = 0
     yielding: int = 1
@@ -142,163 +140,149 @@ class EventKinds(NamedTuple):
     release: int = 5
 
 
-class TimePositions(NamedTuple):
+class Time(IntEnum):
     """Positions in `TimeState.now`.
 
-    - cycle, offset: number of the cycle, and time since it began [s]
-    - segment: number of the segment of the drive
-    - begin: what begins the next row, a number of `RowBegins`
-    - is_paused: 1 where the march stopped because no row was free
+    - CYCLE, OFFSET: number of the cycle, and time since it began [s]
+    - SEGMENT: number of the segment of the drive
+    - BEGIN: what begins the next row, a number of `RowBegins`
+    - IS_PAUSED: 1 where the march stopped because no row was free
     """
 
-    cycle: int = 0
-    offset: int = 1
-    segment: int = 2
-    begin: int = 3
-    is_paused: int = 4
+    CYCLE = 0
+    OFFSET = 1
+    SEGMENT = 2
+    BEGIN = 3
+    IS_PAUSED = 4
 
 
-class LedgerPositions(NamedTuple):
+class Ledger(IntEnum):
     """Positions in `RunSums.ledger`: energies [J] since the start, and counts.
 
-    - drive_work, viscous_loss: work of the drive, and energy dissipated by the dampers
-    - drive_power: integral of the magnitude of the power of the drive
-    - friction_work, friction_loss: work done on the interfaces, and energy dissipated there
-    - max_stored: largest energy of modes and elements
-    - n_pieces: number of pieces
-    - has_slipped: 1 where half or more of an interface has slipped
+    - DRIVE_WORK, VISCOUS_LOSS: work of the drive, and energy dissipated by the dampers
+    - DRIVE_POWER: integral of the magnitude of the power of the drive
+    - FRICTION_WORK, FRICTION_LOSS: work done on the interfaces, and energy dissipated there
+    - MAX_STORED: largest energy of modes and elements
+    - N_PIECES: number of pieces
+    - HAS_SLIPPED: 1 where half or more of an interface has slipped
     """
 
-    drive_work: int = 0
-    viscous_loss: int = 1
-    drive_power: int = 2
-    friction_work: int = 3
-    friction_loss: int = 4
-    max_stored: int = 5
-    n_pieces: int = 6
-    has_slipped: int = 7
+    DRIVE_WORK = 0
+    VISCOUS_LOSS = 1
+    DRIVE_POWER = 2
+    FRICTION_WORK = 3
+    FRICTION_LOSS = 4
+    MAX_STORED = 5
+    N_PIECES = 6
+    HAS_SLIPPED = 7
 
 
-class LimitPositions(NamedTuple):
+class Limit(IntEnum):
     """Positions in `RunSums.limits`: travel of the output [m], and events in a row without progress."""
 
-    travel: int = 0
-    n_idle: int = 1
+    TRAVEL = 0
+    N_IDLE = 1
 
 
-class ConstraintPositions(NamedTuple):
+class ConstraintStatus(IntEnum):
     """Positions in `Constraint.status`.
 
-    - n_sticking: number of interfaces whose rigid elements stick; below 0 where the constraint is
-    to be built again
-    - is_immobile: 1 where they leave no motion of the modes
+    - N_STICKING: number of interfaces whose rigid elements stick; below 0 where the constraint is
+      to be built again
+    - IS_IMMOBILE: 1 where they leave no motion of the modes
     """
 
-    n_sticking: int = 0
-    is_immobile: int = 1
+    N_STICKING = 0
+    IS_IMMOBILE = 1
 
 
-class PreviousPositions(NamedTuple):
+class PreviousStatus(IntEnum):
     """Positions in `PreviousCycle.status`.
 
-    - segment: of the drive then, -1 before there is a state
-    - last_distant: last cycle at whose end the state was far from that of the cycle before
-    - repeats: 1 where the motion repeats to the last bit
+    - SEGMENT: of the drive then, -1 before there is a state
+    - LAST_DISTANT: last cycle at whose end the state was far from that of the cycle before
+    - REPEATS: 1 where the motion repeats to the last bit
     """
 
-    segment: int = 0
-    last_distant: int = 1
-    repeats: int = 2
+    SEGMENT = 0
+    LAST_DISTANT = 1
+    REPEATS = 2
 
 
-class RunMeasures(NamedTuple):
+class RunMeasure(IntEnum):
     """Positions of the measures of a run that `read_kernels` takes from its last cycles.
 
-    - min_output, max_output: of the output [m]
-    - max_coordinate: largest modal coordinate [m]
-    - max_acceleration: largest acceleration of the output [m s-2]
-    - cos_1, sin_1, cos_3, sin_3: integrals of the acceleration times cosine and sine of the cycle
-    and of its third
-      harmonic [m s-1]
-    - n_releases, release_cos, release_sin: releases of the first interface, and sums of the cosine
-    and the sine of
-      twice their phases
-    - ring, ring_angle: of one mode behind one interface, the largest acceleration [m s-2] of the
-    free vibration while
-      the interface sticks, and the largest angle [rad] by which it turns in one stick
+    - MIN_OUTPUT, MAX_OUTPUT: of the output [m]
+    - MAX_COORDINATE: largest modal coordinate [m]
+    - MAX_ACCELERATION: largest acceleration of the output [m s-2]
+    - COS_1, SIN_1, COS_3, SIN_3: integrals of the acceleration times cosine and sine of the cycle
+      and of its third harmonic [m s-1]
+    - N_RELEASES, RELEASE_COS, RELEASE_SIN: releases of the first interface, and sums of the cosine
+      and the sine of twice their phases
+    - RING, RING_ANGLE: of one mode behind one interface, the largest acceleration [m s-2] of the
+      free vibration while the interface sticks, and the largest angle [rad] by which it turns in
+      one stick
     """
 
-    min_output: int = 0
-    max_output: int = 1
-    max_coordinate: int = 2
-    max_acceleration: int = 3
-    cos_1: int = 4
-    sin_1: int = 5
-    cos_3: int = 6
-    sin_3: int = 7
-    n_releases: int = 8
-    release_cos: int = 9
-    release_sin: int = 10
-    ring: int = 11
-    ring_angle: int = 12
+    MIN_OUTPUT = 0
+    MAX_OUTPUT = 1
+    MAX_COORDINATE = 2
+    MAX_ACCELERATION = 3
+    COS_1 = 4
+    SIN_1 = 5
+    COS_3 = 6
+    SIN_3 = 7
+    N_RELEASES = 8
+    RELEASE_COS = 9
+    RELEASE_SIN = 10
+    RING = 11
+    RING_ANGLE = 12
 
 
-class InterfaceMeasures(NamedTuple):
+class InterfaceMeasure(IntEnum):
     """Positions of the measures of an interface that `read_kernels` takes from the last cycles.
 
-    - min_slide, max_slide, min_slip, max_slip: of relative displacement and slip [m]
-    - max_force: largest force [N]
-    - stuck_time: time in which less than half of the interface slips [s]
-    - work, end_work, path_work: friction work by the sums of the march, by the ends of the pieces,
-    and the integral of
-      the magnitude of its power [J]
-    - slide_cos, slide_sin, force_cos, force_sin: integrals of relative displacement [m s] and force
-    [N s] times cosine
-      and sine of the cycle
-    - first_slide, last_slide, first_force, last_force: integrals of both over the first and over
-    the last cycle
-    - start_slide, end_slide: relative displacement at both ends [m]
-    - mean_range: mean range of the relative displacement in a cycle [m]
-    - secant: mean secant stiffness of the cycles that show it [N/m], NaN where none does
+    - MIN_SLIDE, MAX_SLIDE, MIN_SLIP, MAX_SLIP: of relative displacement and slip [m]
+    - MAX_FORCE: largest force [N]
+    - STUCK_TIME: time in which less than half of the interface slips [s]
+    - WORK, END_WORK, PATH_WORK: friction work by the sums of the march, by the ends of the pieces,
+      and the integral of the magnitude of its power [J]
+    - SLIDE_COS, SLIDE_SIN, FORCE_COS, FORCE_SIN: integrals of relative displacement [m s] and force
+      [N s] times cosine and sine of the cycle
+    - FIRST_SLIDE, LAST_SLIDE, FIRST_FORCE, LAST_FORCE: integrals of both over the first and over
+      the last cycle
+    - START_SLIDE, END_SLIDE: relative displacement at both ends [m]
+    - MEAN_RANGE: mean range of the relative displacement in a cycle [m]
+    - SECANT: mean secant stiffness of the cycles that show it [N/m], NaN where none does
     """
 
-    min_slide: int = 0
-    max_slide: int = 1
-    min_slip: int = 2
-    max_slip: int = 3
-    max_force: int = 4
-    stuck_time: int = 5
-    work: int = 6
-    end_work: int = 7
-    path_work: int = 8
-    slide_cos: int = 9
-    slide_sin: int = 10
-    force_cos: int = 11
-    force_sin: int = 12
-    first_slide: int = 13
-    last_slide: int = 14
-    first_force: int = 15
-    last_force: int = 16
-    start_slide: int = 17
-    end_slide: int = 18
-    mean_range: int = 19
-    secant: int = 20
+    MIN_SLIDE = 0
+    MAX_SLIDE = 1
+    MIN_SLIP = 2
+    MAX_SLIP = 3
+    MAX_FORCE = 4
+    STUCK_TIME = 5
+    WORK = 6
+    END_WORK = 7
+    PATH_WORK = 8
+    SLIDE_COS = 9
+    SLIDE_SIN = 10
+    FORCE_COS = 11
+    FORCE_SIN = 12
+    FIRST_SLIDE = 13
+    LAST_SLIDE = 14
+    FIRST_FORCE = 15
+    LAST_FORCE = 16
+    START_SLIDE = 17
+    END_SLIDE = 18
+    MEAN_RANGE = 19
+    SECANT = 20
 
 
-SEGMENT = SegmentColumns()
 KIND = SegmentKinds()
-ROW = RowColumns()
-COLUMN = InterfaceColumns()
 BEGIN = RowBegins()
 STATUS = MarchStatus()
 EVENT = EventKinds()
-TIME = TimePositions()
-LEDGER = LedgerPositions()
-LIMIT = LimitPositions()
-CONSTRAINT = ConstraintPositions()
-PREVIOUS = PreviousPositions()
-RUN = RunMeasures()
-INTERFACE = InterfaceMeasures()
 
 # columns of one interface in a row
-N_COLUMNS = len(COLUMN)
+N_COLUMNS = len(Column)

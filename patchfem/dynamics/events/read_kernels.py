@@ -6,10 +6,18 @@ Every measure is an integral or an extremum of the series of the pieces; nothing
 from math import cos, inf, nan, pi, sin, sqrt
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ...friction.flags_kernels import NJIT_INLINE, NJIT_KERNEL
 from .dense_kernels import expand_row
 from .memory_kernels import RIGID_STIFFNESS
-from .positions_kernels import COLUMN, CONSTRAINT, INTERFACE, N_COLUMNS, ROW, RUN, SEGMENT
+from .positions_kernels import (
+    N_COLUMNS,
+    Column,
+    ConstraintStatus,
+    InterfaceMeasure,
+    Row,
+    RunMeasure,
+    Segment,
+)
 from .search_kernels import displacement_at
 from .series_kernels import (
     GAUSS_POINTS,
@@ -32,20 +40,20 @@ MIN_MOTION_RATIO = 1e-13
 MAX_TURN_DELAY = 0.003
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def force_column(interface, modal_system):
     """Return the first column of an interface in a row."""
-    return ROW.motion + 2 * len(modal_system.omega_squared) + N_COLUMNS * interface
+    return Row.MOTION + 2 * len(modal_system.omega_squared) + N_COLUMNS * interface
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def read_slide(row, interface, modal_system):
     """Return the relative displacement [m] of an interface where a row begins.
 
     Parameters
     ----------
     row : ndarray
-        (w,) row of a piece, see `RowColumns`.
+        (w,) row of a piece, see `Row`.
     interface : int
     modal_system : ModalSystem
 
@@ -53,17 +61,17 @@ def read_slide(row, interface, modal_system):
     -------
     float
     """
-    return row[force_column(interface, modal_system) + COLUMN.slide]
+    return row[force_column(interface, modal_system) + Column.SLIDE]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def read_rate(row, interface, modal_system):
     """Return the relative velocity [m/s] of an interface where a row begins.
 
     Parameters
     ----------
     row : ndarray
-        (w,) row of a piece, see `RowColumns`.
+        (w,) row of a piece, see `Row`.
     interface : int
     modal_system : ModalSystem
 
@@ -74,18 +82,18 @@ def read_rate(row, interface, modal_system):
     n = len(modal_system.omega_squared)
     rate = 0.0
     for i in range(n):
-        rate += modal_system.interfaces[interface, i] * row[ROW.motion + n + i]
+        rate += modal_system.interfaces[interface, i] * row[Row.MOTION + n + i]
     return rate
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def find_end_force(rows, j, interface, modal_system):
     """Return the force [N] of a free interface at the end of row j.
 
     Parameters
     ----------
     rows : ndarray
-        (k, w) rows of pieces, see `RowColumns`.
+        (k, w) rows of pieces, see `Row`.
     j : int
         Number of the row.
     interface : int
@@ -99,11 +107,11 @@ def find_end_force(rows, j, interface, modal_system):
     step = read_slide(rows[j + 1], interface, modal_system) - read_slide(
         rows[j], interface, modal_system
     )
-    return rows[j, at + COLUMN.force] + rows[j, at + COLUMN.stiffness] * step
+    return rows[j, at + Column.FORCE] + rows[j, at + Column.STIFFNESS] * step
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def find_peak_acceleration(top, h, modal_system, base_moves, workspace, largest):
+@njit(**NJIT_INLINE)
+def find_peak_acceleration(top, h, base_moves, largest, run):
     """Return the larger of a bound and the peak acceleration of the output in a piece [m s-2].
 
     The series of the acceleration is left in the last but one of workspace.polynomials.
@@ -114,76 +122,73 @@ def find_peak_acceleration(top, h, modal_system, base_moves, workspace, largest)
         Highest power of the series.
     h : float
         Duration of the piece [s].
-    modal_system : ModalSystem
     base_moves : float
         1 where the base moves, else 0.
-    workspace : Workspace
     largest : float
         A lower bound of the result [m s-2].
+    run : RunArrays
 
     Returns
     -------
     float
     """
+    modal_system = run.modal_system
+    workspace = run.workspace
     poly = workspace.polynomials[len(modal_system.inverse_mass) + 1]
     bound = 0.0
     for k in range(top - 1):
-        part = 0.0
+        acceleration = 0.0
         for i in range(len(modal_system.omega_squared)):
-            part += modal_system.output[i] * workspace.coefficients[k + 2, i]
-        poly[k] = part * (k + 1) * (k + 2) / (h * h) + base_moves * workspace.drive[0, k]
+            acceleration += modal_system.output[i] * workspace.coefficients[k + 2, i]
+        poly[k] = acceleration * (k + 1) * (k + 2) / (h * h) + base_moves * workspace.drive[0, k]
         bound += abs(poly[k])
-    return (
-        largest
-        if bound <= largest
-        else find_largest_magnitude(poly, top - 2, largest, workspace.hulls)
-    )
+    if bound <= largest:
+        return largest
+    return find_largest_magnitude(poly, top - 2, largest, workspace.hulls)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def add_integrals(
-    row, h, top, border, modal_system, time_state, workspace, run_values, interface_values
-):
+@njit(**NJIT_INLINE)
+def add_integrals(row, top, border, run, run_values, interface_values):
     """Add the integrals over the piece in the workspace to the measures.
 
     Parameters
     ----------
     row : ndarray
-        (w,) row of a piece, see `RowColumns`.
-    h : float
-        Duration of the piece [s].
+        (w,) row of a piece, see `Row`.
     top : int
         Highest power of the series.
     border : tuple of bool
         Whether the piece lies in the first cycle, and whether it lies in the last.
-    modal_system : ModalSystem
-    time_state : TimeState
-    workspace : Workspace
+    run : RunArrays
     run_values : ndarray
-        (13,) see `RunMeasures`; they are written.
+        (13,) see `RunMeasure`; they are written.
     interface_values : ndarray
-        (i, 21) see `InterfaceMeasures`; they are written.
+        (i, 21) see `InterfaceMeasure`; they are written.
     """
+    h = row[Row.DURATION]
+    modal_system = run.modal_system
+    time_state = run.time_state
+    workspace = run.workspace
     n_interfaces = len(modal_system.inverse_mass)
     omega = 2 * pi / time_state.period[0]
     modal_rate = bound_modal_rate(modal_system, workspace)
     count = count_gauss_points(
         0.5
         * h
-        * (max(modal_rate, time_state.segments[int(row[ROW.segment]), SEGMENT.rate]) + 3 * omega)
+        * (max(modal_rate, time_state.segments[int(row[Row.SEGMENT]), Segment.RATE]) + 3 * omega)
     )
     acceleration = workspace.polynomials[n_interfaces + 1]
     for g in range(count):
         u = GAUSS_POINTS[count, g]
         w = h * GAUSS_WEIGHTS[count, g]
-        angle = omega * (row[ROW.offset] + h * u)
+        angle = omega * (row[Row.OFFSET] + h * u)
         cosine = cos(angle)
         sine = sin(angle)
         gain = w * evaluate_polynomial(acceleration, 0, top - 2, u)
-        run_values[RUN.cos_1] += gain * cosine
-        run_values[RUN.sin_1] += gain * sine
-        run_values[RUN.cos_3] += gain * cosine * (4 * cosine * cosine - 3)
-        run_values[RUN.sin_3] += gain * sine * (3 - 4 * sine * sine)
+        run_values[RunMeasure.COS_1] += gain * cosine
+        run_values[RunMeasure.SIN_1] += gain * sine
+        run_values[RunMeasure.COS_3] += gain * cosine * (4 * cosine * cosine - 3)
+        run_values[RunMeasure.SIN_3] += gain * sine * (3 - 4 * sine * sine)
         for f in range(n_interfaces):
             at = force_column(f, modal_system)
             values = interface_values[f]
@@ -194,62 +199,66 @@ def add_integrals(
             else:
                 step = displacement_at(workspace.polynomials[f], top, u)
                 slide = slide + w * step
-                force = w * (row[at + COLUMN.force] + row[at + COLUMN.stiffness] * step)
-                values[INTERFACE.path_work] += (
+                force = w * (row[at + Column.FORCE] + row[at + Column.STIFFNESS] * step)
+                values[InterfaceMeasure.PATH_WORK] += (
                     abs(force * evaluate_polynomial(workspace.polynomials[f], 0, top - 1, u)) / h
                 )
-            values[INTERFACE.slide_cos] += slide * cosine
-            values[INTERFACE.slide_sin] += slide * sine
-            values[INTERFACE.force_cos] += force * cosine
-            values[INTERFACE.force_sin] += force * sine
+            values[InterfaceMeasure.SLIDE_COS] += slide * cosine
+            values[InterfaceMeasure.SLIDE_SIN] += slide * sine
+            values[InterfaceMeasure.FORCE_COS] += force * cosine
+            values[InterfaceMeasure.FORCE_SIN] += force * sine
             if border[0]:
-                values[INTERFACE.first_slide] += slide
-                values[INTERFACE.first_force] += force
+                values[InterfaceMeasure.FIRST_SLIDE] += slide
+                values[InterfaceMeasure.FIRST_FORCE] += force
             if border[1]:
-                values[INTERFACE.last_slide] += slide
-                values[INTERFACE.last_force] += force
+                values[InterfaceMeasure.LAST_SLIDE] += slide
+                values[InterfaceMeasure.LAST_FORCE] += force
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def add_row_state(row, modal_system, run_values, interface_values):
     """Include the state at the start of a row in the ranges of the measures.
 
     Parameters
     ----------
     row : ndarray
-        (w,) row of a piece, see `RowColumns`.
+        (w,) row of a piece, see `Row`.
     modal_system : ModalSystem
     run_values : ndarray
-        (13,) see `RunMeasures`; they are written.
+        (13,) see `RunMeasure`; they are written.
     interface_values : ndarray
-        (i, 21) see `InterfaceMeasures`; they are written.
+        (i, 21) see `InterfaceMeasure`; they are written.
     """
     output = 0.0
     for i in range(len(modal_system.omega_squared)):
-        output += modal_system.output[i] * row[ROW.motion + i]
-        run_values[RUN.max_coordinate] = max(
-            run_values[RUN.max_coordinate], abs(row[ROW.motion + i])
+        output += modal_system.output[i] * row[Row.MOTION + i]
+        run_values[RunMeasure.MAX_COORDINATE] = max(
+            run_values[RunMeasure.MAX_COORDINATE], abs(row[Row.MOTION + i])
         )
-    run_values[RUN.min_output] = min(run_values[RUN.min_output], output)
-    run_values[RUN.max_output] = max(run_values[RUN.max_output], output)
+    run_values[RunMeasure.MIN_OUTPUT] = min(run_values[RunMeasure.MIN_OUTPUT], output)
+    run_values[RunMeasure.MAX_OUTPUT] = max(run_values[RunMeasure.MAX_OUTPUT], output)
     for f in range(len(modal_system.inverse_mass)):
         values = interface_values[f]
         at = force_column(f, modal_system)
         slide = read_slide(row, f, modal_system)
-        values[INTERFACE.min_slide] = min(values[INTERFACE.min_slide], slide)
-        values[INTERFACE.max_slide] = max(values[INTERFACE.max_slide], slide)
-        values[INTERFACE.min_slip] = min(values[INTERFACE.min_slip], row[at + COLUMN.slip])
-        values[INTERFACE.max_slip] = max(values[INTERFACE.max_slip], row[at + COLUMN.slip])
+        values[InterfaceMeasure.MIN_SLIDE] = min(values[InterfaceMeasure.MIN_SLIDE], slide)
+        values[InterfaceMeasure.MAX_SLIDE] = max(values[InterfaceMeasure.MAX_SLIDE], slide)
+        values[InterfaceMeasure.MIN_SLIP] = min(
+            values[InterfaceMeasure.MIN_SLIP], row[at + Column.SLIP]
+        )
+        values[InterfaceMeasure.MAX_SLIP] = max(
+            values[InterfaceMeasure.MAX_SLIP], row[at + Column.SLIP]
+        )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def add_forces(rows, j, top, modal_system, workspace, interface_values):
     """Update the largest forces with the piece of a row, and add its work by the trapezoidal rule.
 
     Parameters
     ----------
     rows : ndarray
-        (k, w) rows of pieces, see `RowColumns`.
+        (k, w) rows of pieces, see `Row`.
     j : int
         Number of the row.
     top : int
@@ -257,33 +266,35 @@ def add_forces(rows, j, top, modal_system, workspace, interface_values):
     modal_system : ModalSystem
     workspace : Workspace
     interface_values : ndarray
-        (i, 21) see `InterfaceMeasures`; they are written.
+        (i, 21) see `InterfaceMeasure`; they are written.
     """
     for f in range(len(modal_system.inverse_mass)):
         values = interface_values[f]
         at = force_column(f, modal_system)
-        if rows[j, at + COLUMN.slipping] < SLIP_FRACTION:
-            values[INTERFACE.stuck_time] += rows[j, ROW.duration]
+        if rows[j, at + Column.SLIPPING] < SLIP_FRACTION:
+            values[InterfaceMeasure.STUCK_TIME] += rows[j, Row.DURATION]
         if workspace.stiffness[f] == RIGID_STIFFNESS:
-            values[INTERFACE.max_force] = find_largest_magnitude(
+            values[InterfaceMeasure.MAX_FORCE] = find_largest_magnitude(
                 workspace.constraint.reactions[f],
                 top - 2,
-                values[INTERFACE.max_force],
+                values[InterfaceMeasure.MAX_FORCE],
                 workspace.hulls,
             )
             continue
-        force = rows[j, at + COLUMN.force]
+        force = rows[j, at + Column.FORCE]
         last = find_end_force(rows, j, f, modal_system)
-        values[INTERFACE.max_force] = max(values[INTERFACE.max_force], abs(force), abs(last))
-        values[INTERFACE.end_work] += (
+        values[InterfaceMeasure.MAX_FORCE] = max(
+            values[InterfaceMeasure.MAX_FORCE], abs(force), abs(last)
+        )
+        values[InterfaceMeasure.END_WORK] += (
             0.5
             * (force + last)
             * (read_slide(rows[j + 1], f, modal_system) - read_slide(rows[j], f, modal_system))
         )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def find_turning_force(rows, j, n_rows, interface, modal_system, min_motion):
+@njit(**NJIT_INLINE)
+def find_turning_force(rows, j, interface, modal_system, min_motion):
     """Return the force of an interface at a reversal where a row begins [N].
 
     It is the mean of the forces before and after the rest there.
@@ -291,11 +302,9 @@ def find_turning_force(rows, j, n_rows, interface, modal_system, min_motion):
     Parameters
     ----------
     rows : ndarray
-        (k, w) rows of pieces, see `RowColumns`.
+        (k, w) rows of pieces, see `Row`.
     j : int
         Number of the row.
-    n_rows : int
-        Number of rows but the last one.
     interface : int
     modal_system : ModalSystem
     min_motion : float
@@ -306,62 +315,60 @@ def find_turning_force(rows, j, n_rows, interface, modal_system, min_motion):
     float
         NaN where the force jumps and one of both is unknown.
     """
-    back = j - 1
-    on = j
+    n_rows = rows.shape[0] - 1
+    row_before = j - 1
+    row_after = j
     while (
-        back >= 0
+        row_before >= 0
         and abs(
-            read_slide(rows[back + 1], interface, modal_system)
-            - read_slide(rows[back], interface, modal_system)
+            read_slide(rows[row_before + 1], interface, modal_system)
+            - read_slide(rows[row_before], interface, modal_system)
         )
         <= min_motion
     ):
-        back -= 1
+        row_before -= 1
     while (
-        on < n_rows
+        row_after < n_rows
         and abs(
-            read_slide(rows[on + 1], interface, modal_system)
-            - read_slide(rows[on], interface, modal_system)
+            read_slide(rows[row_after + 1], interface, modal_system)
+            - read_slide(rows[row_after], interface, modal_system)
         )
         <= min_motion
     ):
-        on += 1
-    at = force_column(interface, modal_system)
-    if back >= 0 and on < n_rows:
+        row_after += 1
+    column = force_column(interface, modal_system)
+    if row_before >= 0 and row_after < n_rows:
         return 0.5 * (
-            find_end_force(rows, back, interface, modal_system) + rows[on, at + COLUMN.force]
+            find_end_force(rows, row_before, interface, modal_system)
+            + rows[row_after, column + Column.FORCE]
         )
-    near = j
-    if on < n_rows:
-        near = on
-    elif back >= 0:
-        near = back
-    here = rows[near, at + COLUMN.stiffness]
-    if here == 0.0 or here == RIGID_STIFFNESS or (back < 0 and on == n_rows):
+    nearest_row = j
+    if row_after < n_rows:
+        nearest_row = row_after
+    elif row_before >= 0:
+        nearest_row = row_before
+    stiffness = rows[nearest_row, column + Column.STIFFNESS]
+    if stiffness == 0.0 or stiffness == RIGID_STIFFNESS or (row_before < 0 and row_after == n_rows):
         return nan
-    if on < n_rows:
-        return rows[on, at + COLUMN.force]
-    return find_end_force(rows, back, interface, modal_system)
+    if row_after < n_rows:
+        return rows[row_after, column + Column.FORCE]
+    return find_end_force(rows, row_before, interface, modal_system)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def find_turn_near_border(rows, j, n_rows, forward, interface, modal_system, period, rest_rate):
+@njit(**NJIT_INLINE)
+def find_turn_near_border(rows, j, forward, interface, run, rest_rate):
     """Return the row near a border of a cycle at which an interface reverses.
 
     Parameters
     ----------
     rows : ndarray
-        (k, w) rows of pieces, see `RowColumns`.
+        (k, w) rows of pieces, see `Row`.
     j : int
         Number of the row at the border.
-    n_rows : int
-        Number of rows but the last one.
     forward : bool
         Whether the rows after it are examined, else those before.
     interface : int
-    modal_system : ModalSystem
-    period : float
-        Duration of a cycle [s].
+    run : RunArrays
     rest_rate : float
         Relative velocity below which the interface is at rest [m/s].
 
@@ -371,92 +378,84 @@ def find_turn_near_border(rows, j, n_rows, forward, interface, modal_system, per
         -1 if there is none.
     """
     k = j
-    while (
-        0 <= k <= n_rows and abs(rows[k, ROW.time] - rows[j, ROW.time]) <= MAX_TURN_DELAY * period
-    ):
-        if abs(read_rate(rows[k], interface, modal_system)) <= rest_rate:
+    max_delay = MAX_TURN_DELAY * run.time_state.period[0]
+    while 0 <= k < rows.shape[0] and abs(rows[k, Row.TIME] - rows[j, Row.TIME]) <= max_delay:
+        if abs(read_rate(rows[k], interface, run.modal_system)) <= rest_rate:
             return k
         k += 1 if forward else -1
     return -1
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def measure_cycles(rows, n_rows, cycles, interface, modal_system, period, values):
+@njit(**NJIT_INLINE)
+def measure_cycles(rows, cycles, interface, run, values):
     """Measure the mean range [m] and secant stiffness [N/m] of the cycles of an interface.
 
     Parameters
     ----------
     rows : ndarray
-        (k, w) rows of pieces, see `RowColumns`.
-    n_rows : int
-        Number of rows but the last one.
+        (k, w) rows of pieces, see `Row`.
     cycles : int
         Number of cycles.
     interface : int
-    modal_system : ModalSystem
-    period : float
-        Duration of a cycle [s].
+    run : RunArrays
     values : ndarray
-        (21,) see `InterfaceMeasures`; they are written.
+        (21,) see `InterfaceMeasure`; they are written.
     """
-    fast = 0.0
+    n_rows = rows.shape[0] - 1
+    modal_system = run.modal_system
+    max_rate = 0.0
     n_secants = 0
-    low = 0
-    begun = rows[0, ROW.time]
+    first_row = 0
+    start_time = rows[0, Row.TIME]
     for j in range(n_rows + 1):
-        fast = max(fast, abs(read_rate(rows[j], interface, modal_system)))
-    min_motion = MIN_MOTION_RATIO * (values[INTERFACE.max_slide] - values[INTERFACE.min_slide])
+        max_rate = max(max_rate, abs(read_rate(rows[j], interface, modal_system)))
+    min_motion = MIN_MOTION_RATIO * (
+        values[InterfaceMeasure.MAX_SLIDE] - values[InterfaceMeasure.MIN_SLIDE]
+    )
     for k in range(cycles):
-        top = low
-        bottom = low
-        high = low
+        max_row = first_row
+        min_row = first_row
+        last_row = first_row
         while (
-            high < n_rows
-            and rows[high, ROW.time] + 0.5 * rows[high, ROW.duration] < begun + (k + 1) * period
+            last_row < n_rows
+            and rows[last_row, Row.TIME] + 0.5 * rows[last_row, Row.DURATION]
+            < start_time + (k + 1) * run.time_state.period[0]
         ):
-            high += 1
-            slide = read_slide(rows[high], interface, modal_system)
-            top = high if slide > read_slide(rows[top], interface, modal_system) else top
-            bottom = high if slide < read_slide(rows[bottom], interface, modal_system) else bottom
-        size = read_slide(rows[top], interface, modal_system) - read_slide(
-            rows[bottom], interface, modal_system
+            last_row += 1
+            slide = read_slide(rows[last_row], interface, modal_system)
+            max_row = (
+                last_row if slide > read_slide(rows[max_row], interface, modal_system) else max_row
+            )
+            min_row = (
+                last_row if slide < read_slide(rows[min_row], interface, modal_system) else min_row
+            )
+        range_of_slide = read_slide(rows[max_row], interface, modal_system) - read_slide(
+            rows[min_row], interface, modal_system
         )
-        values[INTERFACE.mean_range] += size / cycles
-        if top == low or top == high:
-            top = find_turn_near_border(
-                rows,
-                top,
-                n_rows,
-                top == high,
-                interface,
-                modal_system,
-                period,
-                REST_RATE_RATIO * fast,
+        values[InterfaceMeasure.MEAN_RANGE] += range_of_slide / cycles
+        if max_row == first_row or max_row == last_row:
+            max_row = find_turn_near_border(
+                rows, max_row, max_row == last_row, interface, run, REST_RATE_RATIO * max_rate
             )
-        if bottom == low or bottom == high:
-            bottom = find_turn_near_border(
-                rows,
-                bottom,
-                n_rows,
-                bottom == high,
-                interface,
-                modal_system,
-                period,
-                REST_RATE_RATIO * fast,
+        if min_row == first_row or min_row == last_row:
+            min_row = find_turn_near_border(
+                rows, min_row, min_row == last_row, interface, run, REST_RATE_RATIO * max_rate
             )
-        if size > 0.0 and top >= 0 and bottom >= 0:
+        if range_of_slide > 0.0 and max_row >= 0 and min_row >= 0:
             secant = (
-                find_turning_force(rows, top, n_rows, interface, modal_system, min_motion)
-                - find_turning_force(rows, bottom, n_rows, interface, modal_system, min_motion)
-            ) / size
+                find_turning_force(rows, max_row, interface, modal_system, min_motion)
+                - find_turning_force(rows, min_row, interface, modal_system, min_motion)
+            ) / range_of_slide
             if secant == secant:
                 n_secants += 1
-                values[INTERFACE.secant] += secant
-        low = high
-    values[INTERFACE.secant] = values[INTERFACE.secant] / n_secants if n_secants > 0 else nan
+                values[InterfaceMeasure.SECANT] += secant
+        first_row = last_row
+    values[InterfaceMeasure.SECANT] = (
+        values[InterfaceMeasure.SECANT] / n_secants if n_secants > 0 else nan
+    )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def measure_ringing(rows, first, last, modal_system, segment, values):
     """Measure the free vibration in a stick of a single mode.
 
@@ -466,23 +465,23 @@ def measure_ringing(rows, first, last, modal_system, segment, values):
     Parameters
     ----------
     rows : ndarray
-        (k, w) rows of pieces, see `RowColumns`.
+        (k, w) rows of pieces, see `Row`.
     first : int
         First row of the stick.
     last : int
         First row after it.
     modal_system : ModalSystem
     segment : ndarray
-        (12,) segment of the drive, see `SegmentColumns`.
+        (12,) segment of the drive, see `Segment`.
     values : ndarray
-        (13,) see `RunMeasures`; they are written.
+        (13,) see `RunMeasure`; they are written.
     """
-    swing = 0.0
+    angle = 0.0
     row = rows[first]
     damp = modal_system.damping[0, 0]
-    spring = force_column(0, modal_system) + COLUMN.stiffness
+    spring = force_column(0, modal_system) + Column.STIFFNESS
     for j in range(first, last):
-        swing += (
+        angle += (
             sqrt(
                 max(
                     modal_system.omega_squared[0]
@@ -491,92 +490,95 @@ def measure_ringing(rows, first, last, modal_system, segment, values):
                     0.0,
                 )
             )
-            * rows[j, ROW.duration]
+            * rows[j, Row.DURATION]
         )
-    values[RUN.ring_angle] = max(values[RUN.ring_angle], swing)
+    values[RunMeasure.RING_ANGLE] = max(values[RunMeasure.RING_ANGLE], angle)
     beta = modal_system.omega_squared[0] + row[spring] * modal_system.inverse_mass[0]
-    omega = segment[SEGMENT.omega]
+    omega = segment[Segment.OMEGA]
     modal_rate = beta - 0.25 * damp * damp
-    far = beta - omega * omega
-    side = damp * omega
-    bound = far * far + side * side
-    if modal_rate <= 0.0 or bound <= 1e-18 * beta * beta:
+    detuning = beta - omega * omega
+    damping_term = damp * omega
+    square = detuning * detuning + damping_term * damping_term
+    if modal_rate <= 0.0 or square <= 1e-18 * beta * beta:
         return
     modal_rate = sqrt(modal_rate)
-    push = modal_system.base[0] * segment[SEGMENT.amplitude]
+    drive_amplitude = modal_system.base[0] * segment[Segment.AMPLITUDE]
     force = modal_system.interfaces[0, 0] * row[spring - 1] / modal_system.mass
-    sine = -push * sin(row[ROW.phase])
-    cosine = -push * cos(row[ROW.phase])
-    rest = (
-        -modal_system.base[0] * segment[SEGMENT.constant]
-        - modal_system.omega_squared[0] * row[ROW.motion]
+    sine = -drive_amplitude * sin(row[Row.PHASE])
+    cosine = -drive_amplitude * cos(row[Row.PHASE])
+    static_term = (
+        -modal_system.base[0] * segment[Segment.CONSTANT]
+        - modal_system.omega_squared[0] * row[Row.MOTION]
         - force
     )
-    z = -rest / beta - (far * sine - side * cosine) / bound
-    v = row[ROW.motion + 1] - omega * (far * cosine + side * sine) / bound
-    other = (v + 0.5 * damp * z) / modal_rate
+    z = -static_term / beta - (detuning * sine - damping_term * cosine) / square
+    v = row[Row.MOTION + 1] - omega * (detuning * cosine + damping_term * sine) / square
+    quadrature = (v + 0.5 * damp * z) / modal_rate
     ratio = modal_rate / omega
-    span = rows[last, ROW.time] - row[ROW.time]
+    span = rows[last, Row.TIME] - row[Row.TIME]
     damping = 0.5 * damp / sqrt(beta)
     forced = span * omega > 3 * pi and damping < 1e-3 and abs(ratio - round(ratio)) < 1e-2
     if span * modal_rate >= 3 * pi and damping < 0.5 and not forced:
-        values[RUN.ring] = max(
-            values[RUN.ring], abs(modal_system.output[0]) * beta * sqrt(z * z + other * other)
+        values[RunMeasure.RING] = max(
+            values[RunMeasure.RING],
+            abs(modal_system.output[0]) * beta * sqrt(z * z + quadrature * quadrature),
         )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def measure_sticks_and_releases(rows, n_rows, modal_system, time_state, values):
+@njit(**NJIT_INLINE)
+def measure_sticks_and_releases(rows, run, values):
     """Count the releases of the first interface, and measure the vibration in its sticks.
 
     Parameters
     ----------
     rows : ndarray
-        (k, w) rows of pieces, see `RowColumns`.
-    n_rows : int
-        Number of rows but the last one.
-    modal_system : ModalSystem
-    time_state : TimeState
+        (k, w) rows of pieces, see `Row`.
+    run : RunArrays
     values : ndarray
-        (13,) see `RunMeasures`; they are written.
+        (13,) see `RunMeasure`; they are written.
     """
-    begun = rows[0, ROW.time]
+    n_rows = rows.shape[0] - 1
+    modal_system = run.modal_system
+    time_state = run.time_state
+    start_time = rows[0, Row.TIME]
     period = time_state.period[0]
     at = force_column(0, modal_system)
     is_single = len(modal_system.omega_squared) == 1 and len(modal_system.inverse_mass) == 1
-    waits = False
+    is_pending = False
     phase = 0.0
-    begun_at = begun
-    segment = time_state.segments[int(rows[0, ROW.segment])]
-    last = rows[0, at + COLUMN.direction] if rows[0, at + COLUMN.slipping] >= SLIP_FRACTION else 0.0
-    held = 0 if last == 0.0 else -1
+    release_time = start_time
+    segment = time_state.segments[int(rows[0, Row.SEGMENT])]
+    last_direction = (
+        rows[0, at + Column.DIRECTION] if rows[0, at + Column.SLIPPING] >= SLIP_FRACTION else 0.0
+    )
+    stick_row = 0 if last_direction == 0.0 else -1
     for j in range(n_rows + 1):
-        direction = last
+        direction = last_direction
         if j < n_rows:
-            slips = rows[j, at + COLUMN.slipping] >= SLIP_FRACTION
-            direction = rows[j, at + COLUMN.direction] if slips else 0.0
-            if direction == last:
+            slips = rows[j, at + Column.SLIPPING] >= SLIP_FRACTION
+            direction = rows[j, at + Column.DIRECTION] if slips else 0.0
+            if direction == last_direction:
                 continue
-        if waits and (j == n_rows or rows[j, ROW.time] - begun_at > MIN_SLIP_DURATION * period):
-            values[RUN.n_releases] += 1.0
-            values[RUN.release_cos] += cos(2 * phase)
-            values[RUN.release_sin] += sin(2 * phase)
-        waits = last == 0.0 and direction != 0.0 and rows[j, ROW.time] > begun
-        phase = rows[j, ROW.phase]
-        begun_at = rows[j, ROW.time]
-        if held >= 0 and (direction != 0.0 or j == n_rows):
-            if is_single and rows[held, at + COLUMN.stiffness] < RIGID_STIFFNESS:
-                measure_ringing(rows, held, j, modal_system, segment, values)
-            held = -1
-        elif direction == 0.0 and held < 0:
-            held = j
-        last = direction
+        if is_pending and (
+            j == n_rows or rows[j, Row.TIME] - release_time > MIN_SLIP_DURATION * period
+        ):
+            values[RunMeasure.N_RELEASES] += 1.0
+            values[RunMeasure.RELEASE_COS] += cos(2 * phase)
+            values[RunMeasure.RELEASE_SIN] += sin(2 * phase)
+        is_pending = last_direction == 0.0 and direction != 0.0 and rows[j, Row.TIME] > start_time
+        phase = rows[j, Row.PHASE]
+        release_time = rows[j, Row.TIME]
+        if stick_row >= 0 and (direction != 0.0 or j == n_rows):
+            if is_single and rows[stick_row, at + Column.STIFFNESS] < RIGID_STIFFNESS:
+                measure_ringing(rows, stick_row, j, modal_system, segment, values)
+            stick_row = -1
+        elif direction == 0.0 and stick_row < 0:
+            stick_row = j
+        last_direction = direction
 
 
-@njit(error_model="numpy", cache=True, nogil=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def read_rows(
-    rows, cycles, modal_system, time_state, base_moves, workspace, run_values, interface_values
-):
+@njit(cache=True, nogil=True, **NJIT_KERNEL)
+def read_rows(rows, cycles, base_moves, run, run_values, interface_values):
     """Measure the last cycles of a run.
 
     Parameters
@@ -585,59 +587,51 @@ def read_rows(
         (k + 1, w) as `march_kernels.march` writes them, and one without duration for the end.
     cycles : int
         Whole cycles among them; each ends with a piece.
-    modal_system, time_state, workspace
     base_moves : float
         1 where the acceleration of the base counts, else 0.
+    run : RunArrays
     run_values : ndarray
-        (13,) see `RunMeasures`.
+        (13,) see `RunMeasure`.
     interface_values : ndarray
-        (i, 21) see `InterfaceMeasures`.
+        (i, 21) see `InterfaceMeasure`.
 
     Notes
     -----
     Cost: 1 us per piece of one mode.
     """
+    modal_system = run.modal_system
+    workspace = run.workspace
     n_interfaces = len(modal_system.inverse_mass)
     n_rows = rows.shape[0] - 1
-    period = time_state.period[0]
+    period = run.time_state.period[0]
     run_values[:] = 0.0
     interface_values[:] = 0.0
-    workspace.constraint.status[CONSTRAINT.n_sticking] = -1.0
-    run_values[RUN.min_output] = inf
-    run_values[RUN.max_output] = -inf
+    workspace.constraint.status[ConstraintStatus.N_STICKING] = -1.0
+    run_values[RunMeasure.MIN_OUTPUT] = inf
+    run_values[RunMeasure.MAX_OUTPUT] = -inf
     for f in range(n_interfaces):
         values = interface_values[f]
         at = force_column(f, modal_system)
-        values[INTERFACE.min_slide] = inf
-        values[INTERFACE.max_slide] = -inf
-        values[INTERFACE.min_slip] = inf
-        values[INTERFACE.max_slip] = -inf
-        values[INTERFACE.start_slide] = read_slide(rows[0], f, modal_system)
-        values[INTERFACE.end_slide] = read_slide(rows[n_rows], f, modal_system)
-        values[INTERFACE.work] = rows[n_rows, at + COLUMN.work] - rows[0, at + COLUMN.work]
+        values[InterfaceMeasure.MIN_SLIDE] = inf
+        values[InterfaceMeasure.MAX_SLIDE] = -inf
+        values[InterfaceMeasure.MIN_SLIP] = inf
+        values[InterfaceMeasure.MAX_SLIP] = -inf
+        values[InterfaceMeasure.START_SLIDE] = read_slide(rows[0], f, modal_system)
+        values[InterfaceMeasure.END_SLIDE] = read_slide(rows[n_rows], f, modal_system)
+        values[InterfaceMeasure.WORK] = rows[n_rows, at + Column.WORK] - rows[0, at + Column.WORK]
     for j in range(n_rows + 1):
         add_row_state(rows[j], modal_system, run_values, interface_values)
-        h = rows[j, ROW.duration]
+        h = rows[j, Row.DURATION]
         if j == n_rows or h <= 0.0:
             continue
-        top = expand_row(rows[j], h, modal_system, time_state, workspace)
-        run_values[RUN.max_acceleration] = find_peak_acceleration(
-            top, h, modal_system, base_moves, workspace, run_values[RUN.max_acceleration]
+        top = expand_row(rows[j], h, run)
+        run_values[RunMeasure.MAX_ACCELERATION] = find_peak_acceleration(
+            top, h, base_moves, run_values[RunMeasure.MAX_ACCELERATION], run
         )
         add_forces(rows, j, top, modal_system, workspace, interface_values)
-        middle = rows[j, ROW.time] + 0.5 * h
-        border = middle < rows[0, ROW.time] + period, middle > rows[n_rows, ROW.time] - period
-        add_integrals(
-            rows[j],
-            h,
-            top,
-            border,
-            modal_system,
-            time_state,
-            workspace,
-            run_values,
-            interface_values,
-        )
+        middle = rows[j, Row.TIME] + 0.5 * h
+        border = middle < rows[0, Row.TIME] + period, middle > rows[n_rows, Row.TIME] - period
+        add_integrals(rows[j], top, border, run, run_values, interface_values)
     for f in range(n_interfaces):
-        measure_cycles(rows, n_rows, cycles, f, modal_system, period, interface_values[f])
-    measure_sticks_and_releases(rows, n_rows, modal_system, time_state, run_values)
+        measure_cycles(rows, cycles, f, run, interface_values[f])
+    measure_sticks_and_releases(rows, run, run_values)

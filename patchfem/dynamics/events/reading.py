@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core import InterfaceLoop
 from ..integrated import mean_slip_phase
-from .positions_kernels import INTERFACE, RUN
+from .positions_kernels import InterfaceMeasure, RunMeasure
 
 # [rad] angle by which a free vibration must turn in a stick to be measured: a vibration is reported from 1.5 periods on,
 # and a fit to a frequency that falls while elements yield is wrong by up to 0.05 of that angle
@@ -17,8 +17,8 @@ MIN_RING_ANGLE = 0.95 * 3 * np.pi
 class Reading:
     """Numbers of the last cycles of a run, or of many runs (...).
 
-    - run: (..., 13) see `positions_kernels.RunMeasures`
-    - faces: (..., i, 21) see `positions_kernels.InterfaceMeasures`
+    - run: (..., 13) see `positions_kernels.RunMeasure`
+    - faces: (..., i, 21) see `positions_kernels.InterfaceMeasure`
     - span: (...) duration of these cycles [s]
     - period: (...) duration of a cycle [s]
     """
@@ -29,33 +29,36 @@ class Reading:
     period: float
 
     def interface_value(self, place: int, face: int = 0):
-        """Return a number of an interface; position: a field of `INTERFACE`."""
+        """Return a number of an interface; position: a member of `InterfaceMeasure`."""
         return self.faces[..., face, place]
 
     @property
     def swing(self):
         """Half the range of the output [m]."""
-        return (self.run[..., RUN.max_output] - self.run[..., RUN.min_output]) / 2
+        return (self.run[..., RunMeasure.MAX_OUTPUT] - self.run[..., RunMeasure.MIN_OUTPUT]) / 2
 
     @property
     def acceleration(self):
         """Largest absolute acceleration of the output [m s-2]."""
-        return self.run[..., RUN.max_acceleration]
+        return self.run[..., RunMeasure.MAX_ACCELERATION]
 
     @property
     def waves(self) -> tuple:
         """First and third harmonic of the absolute acceleration of the output [m s-2]."""
         x = self.run
         return (
-            2 / self.span * np.hypot(x[..., RUN.cos_1], x[..., RUN.sin_1]),
-            2 / self.span * np.hypot(x[..., RUN.cos_3], x[..., RUN.sin_3]),
+            2 / self.span * np.hypot(x[..., RunMeasure.COS_1], x[..., RunMeasure.SIN_1]),
+            2 / self.span * np.hypot(x[..., RunMeasure.COS_3], x[..., RunMeasure.SIN_3]),
         )
 
     @property
     def start(self):
         """Mean phase [rad] modulo pi of the releases of the first interface, see `mean_slip_phase`."""
         return mean_slip_phase(
-            *(self.run[..., place] for place in (RUN.n_releases, RUN.release_cos, RUN.release_sin))
+            *(
+                self.run[..., place]
+                for place in (RunMeasure.N_RELEASES, RunMeasure.RELEASE_COS, RunMeasure.RELEASE_SIN)
+            )
         )
 
     @property
@@ -68,8 +71,8 @@ class Reading:
         cycles = np.asarray(self.span / self.period)
         means = (
             (
-                self.interface_value(INTERFACE.last_slide)
-                - self.interface_value(INTERFACE.first_slide)
+                self.interface_value(InterfaceMeasure.LAST_SLIDE)
+                - self.interface_value(InterfaceMeasure.FIRST_SLIDE)
             )
             / self.period
             / np.where(cycles > 1, cycles - 1, 1.0)
@@ -77,8 +80,8 @@ class Reading:
         return np.where(
             cycles < 1.5,
             (
-                self.interface_value(INTERFACE.end_slide)
-                - self.interface_value(INTERFACE.start_slide)
+                self.interface_value(InterfaceMeasure.END_SLIDE)
+                - self.interface_value(InterfaceMeasure.START_SLIDE)
             )
             / np.maximum(cycles, 1e-9),
             means,
@@ -88,29 +91,29 @@ class Reading:
     def rise(self):
         """Mean magnitude of the first force in the last cycle minus that in the first [N]."""
         return (
-            np.abs(self.interface_value(INTERFACE.last_force))
-            - np.abs(self.interface_value(INTERFACE.first_force))
+            np.abs(self.interface_value(InterfaceMeasure.LAST_FORCE))
+            - np.abs(self.interface_value(InterfaceMeasure.FIRST_FORCE))
         ) / self.period
+
+    def _integral_with_phase(self, place: int, face: int):
+        """Return the integral with exp(-i omega t); place: that with the cosine, the sine follows."""
+        cosine = self.interface_value(place, face)
+        return cosine - 1j * self.interface_value(place + 1, face)
 
     def loop(self, face: int = 0) -> InterfaceLoop:
         """Return the InterfaceLoop of an interface."""
-        q, f = (
-            2 / self.span * (self.interface_value(c, face) - 1j * self.interface_value(s, face))
-            for c, s in (
-                (INTERFACE.slide_cos, INTERFACE.slide_sin),
-                (INTERFACE.force_cos, INTERFACE.force_sin),
-            )
-        )
-        slip = self.interface_value(INTERFACE.max_slip, face) - self.interface_value(
-            INTERFACE.min_slip, face
+        slide = 2 / self.span * self._integral_with_phase(InterfaceMeasure.SLIDE_COS, face)
+        force = 2 / self.span * self._integral_with_phase(InterfaceMeasure.FORCE_COS, face)
+        slip = self.interface_value(InterfaceMeasure.MAX_SLIP, face) - self.interface_value(
+            InterfaceMeasure.MIN_SLIP, face
         )
         return InterfaceLoop(
-            q,
-            f,
-            self.interface_value(INTERFACE.work, face),
+            slide,
+            force,
+            self.interface_value(InterfaceMeasure.WORK, face),
             slip,
-            self.interface_value(INTERFACE.stuck_time, face),
-            self.interface_value(INTERFACE.max_force, face),
+            self.interface_value(InterfaceMeasure.STUCK_TIME, face),
+            self.interface_value(InterfaceMeasure.MAX_FORCE, face),
         )
 
     @property
@@ -136,22 +139,22 @@ def find_sticking_ring(modal_system, table, reading: Reading) -> tuple | None:
         elements are too short. None where samples must tell.
     """
     if table.n_elements[0] > 1:
-        return (0.0, 0.0, 0.0) if reading.run[RUN.ring_angle] < MIN_RING_ANGLE else None
+        return (0.0, 0.0, 0.0) if reading.run[RunMeasure.RING_ANGLE] < MIN_RING_ANGLE else None
     beta = modal_system.omega_squared[0] + table.stiffness_sum[0, -1] * modal_system.inverse_mass[0]
-    half = modal_system.damping[0, 0] / 2
-    own = np.sqrt(max(beta - half**2, 0.0))
+    half_damping = modal_system.damping[0, 0] / 2
+    frequency = np.sqrt(max(beta - half_damping**2, 0.0))
+    if frequency == 0:
+        return 0.0, 0.0, 0.0
     return (
-        (float(reading.run[RUN.ring]), float(own), float(half / np.sqrt(beta)))
-        if own > 0
-        else (0.0, 0.0, 0.0)
+        float(reading.run[RunMeasure.RING]),
+        float(frequency),
+        float(half_damping / np.sqrt(beta)),
     )
 
 
 def join_readings(readings) -> Reading:
     """Join the Readings of runs with the same number of interfaces."""
-    return Reading(
-        *(
-            np.array([getattr(reading, name) for reading in readings])
-            for name in Reading.__dataclass_fields__
-        )
-    )
+    columns = []
+    for name in Reading.__dataclass_fields__:
+        columns.append(np.array([getattr(reading, name) for reading in readings]))
+    return Reading(*columns)

@@ -11,8 +11,8 @@ n/ln(APPROACH_TOL/REPEAT_TOL) more.
 from math import pi, sqrt
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .positions_kernels import KIND, PREVIOUS, SEGMENT, TIME
+from ...friction.flags_kernels import NJIT_INLINE
+from .positions_kernels import KIND, PreviousStatus, Segment, Time
 
 # change of the state in a cycle over the size of the motion, below which the motion repeats
 REPEAT_TOL = 1e-14
@@ -22,19 +22,13 @@ APPROACH_TOL = 1e-10
 MAX_APPROACH_CYCLES = 9000.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def measure_change(motion, modal_system, memory, time_state, previous):
+@njit(**NJIT_INLINE)
+def measure_change(run):
     """Return the change of the state since the last cycle and the size of the motion.
 
     Parameters
     ----------
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    modal_system : ModalSystem
-    memory : Memory
-    time_state : TimeState
-    previous : PreviousCycle
-        State at the end of the cycle before.
+    run : RunArrays
 
     Returns
     -------
@@ -43,10 +37,15 @@ def measure_change(motion, modal_system, memory, time_state, previous):
     size : float
         [m].
     """
+    motion = run.motion
+    modal_system = run.modal_system
+    memory = run.memory
+    time_state = run.time_state
+    previous = run.previous
     omega = 2 * pi / time_state.period[0]
     change = 0.0
     size = 0.0
-    segment = int(time_state.now[TIME.segment])
+    segment = int(time_state.now[Time.SEGMENT])
     for i in range(len(modal_system.omega_squared)):
         rate = max(omega, sqrt(modal_system.omega_squared[i]))
         z = previous.motion[0, i]
@@ -54,8 +53,8 @@ def measure_change(motion, modal_system, memory, time_state, previous):
         size = max(size, max(abs(z), abs(motion[0, i])), max(abs(v), abs(motion[1, i])) / rate)
         change = max(change, abs(motion[0, i] - z), abs(motion[1, i] - v) / rate)
     if (
-        previous.status[PREVIOUS.segment] != segment
-        or time_state.segments[segment, SEGMENT.kind] != KIND.sine
+        previous.status[PreviousStatus.SEGMENT] != segment
+        or time_state.segments[segment, Segment.KIND] != KIND.sine
     ):
         return 1e300, size
     previous_memory = previous.memory
@@ -83,15 +82,15 @@ def measure_change(motion, modal_system, memory, time_state, previous):
     return change, size
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def forget_previous(previous):
     """Clear the state at the end of the previous cycle."""
-    previous.status[PREVIOUS.segment] = -1.0
-    previous.status[PREVIOUS.repeats] = 0.0
+    previous.status[PreviousStatus.SEGMENT] = -1.0
+    previous.status[PreviousStatus.REPEATS] = 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def detect_repeat(motion, modal_system, memory, time_state, previous):
+@njit(**NJIT_INLINE)
+def detect_repeat(run):
     """Return whether the state equals the previous one to round-off for the first time.
 
     There and at all later ends of cycles the state takes the digits of the previous one; elsewhere
@@ -99,28 +98,27 @@ def detect_repeat(motion, modal_system, memory, time_state, previous):
 
     Parameters
     ----------
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    modal_system : ModalSystem
-    memory : Memory
-    time_state : TimeState
-    previous : PreviousCycle
-        State at the end of the cycle before.
+    run : RunArrays
 
     Returns
     -------
     bool
     """
+    motion = run.motion
+    modal_system = run.modal_system
+    memory = run.memory
+    time_state = run.time_state
+    previous = run.previous
     n = len(modal_system.omega_squared)
     n_interfaces = len(modal_system.inverse_mass)
     status = previous.status
     previous_memory = previous.memory
-    change, size = measure_change(motion, modal_system, memory, time_state, previous)
+    change, size = measure_change(run)
     if change > APPROACH_TOL * size:
-        status[PREVIOUS.last_distant] = time_state.now[TIME.cycle]
+        status[PreviousStatus.LAST_DISTANT] = time_state.now[Time.CYCLE]
     if change <= REPEAT_TOL * size and (
-        status[PREVIOUS.repeats] == 1.0
-        or time_state.now[TIME.cycle] - status[PREVIOUS.last_distant] <= MAX_APPROACH_CYCLES
+        status[PreviousStatus.REPEATS] == 1.0
+        or time_state.now[Time.CYCLE] - status[PreviousStatus.LAST_DISTANT] <= MAX_APPROACH_CYCLES
     ):
         for i in range(n):
             motion[0, i] = previous.motion[0, i]
@@ -129,11 +127,11 @@ def detect_repeat(motion, modal_system, memory, time_state, previous):
             memory.slide[f] = previous_memory.slide[f]
             for k in range(memory.n_groups[f]):
                 memory.group_slide[f, k] = previous_memory.group_slide[f, k]
-        first = status[PREVIOUS.repeats] == 0.0
-        status[PREVIOUS.repeats] = 1.0
+        first = status[PreviousStatus.REPEATS] == 0.0
+        status[PreviousStatus.REPEATS] = 1.0
         return first
-    status[PREVIOUS.segment] = time_state.now[TIME.segment]
-    status[PREVIOUS.repeats] = 0.0
+    status[PreviousStatus.SEGMENT] = time_state.now[Time.SEGMENT]
+    status[PreviousStatus.REPEATS] = 0.0
     for i in range(n):
         previous.motion[0, i] = motion[0, i]
         previous.motion[1, i] = motion[1, i]

@@ -10,7 +10,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ...friction.flags_kernels import NJIT_INLINE, NJIT_KERNEL
 from .memory_kernels import is_sticking, next_yield_slide
 from .positions_kernels import EVENT
 from .series_kernels import EPS, NO_ROOT, SINGLE_INTEGRAL, find_first_root, refine_root
@@ -35,7 +35,7 @@ class NextEvent(NamedTuple):
     sign: float
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def initial_direction(poly, top, is_at_rest):
     """Return the order of the first term of a speed that is not round-off, and its sign.
 
@@ -67,7 +67,7 @@ def initial_direction(poly, top, is_at_rest):
     return 0, 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def expand_speed(row, count, coefs, top, poly):
     """Write the series over u of the speed along a row of participations.
 
@@ -85,13 +85,13 @@ def expand_speed(row, count, coefs, top, poly):
         (top,) series of the speed, which is written.
     """
     for k in range(top):
-        part = 0.0
+        term = 0.0
         for i in range(count):
-            part += row[i] * coefs[k + 1, i]
-        poly[k] = (k + 1) * part
+            term += row[i] * coefs[k + 1, i]
+        poly[k] = (k + 1) * term
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def displacement_at(poly, top, u):
     """Return the integral of a speed from 0 to u.
 
@@ -114,7 +114,7 @@ def displacement_at(poly, top, u):
     return out * u
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def find_crossing(poly, top, distance, limit, scratch):
     """Return u in (0, limit] at which an interface has moved by a distance, else NO_ROOT.
 
@@ -149,7 +149,7 @@ def find_crossing(poly, top, distance, limit, scratch):
     return refine_root(scratch, 0, top, 0.0, limit, start)
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def find_release(interface, top, limit, workspace):
     """Find where the reaction of a sticking interface first exceeds its limit.
 
@@ -191,18 +191,16 @@ def find_release(interface, top, limit, workspace):
             scratch[0] += limit
             if scratch[0] <= 4 * EPS * size:
                 scratch[0] = max(scratch[0], 0.0)
-        root = (
-            find_first_root(scratch, order, top - 2, workspace.hulls)
-            if order < top - 1
-            else NO_ROOT
-        )
+        root = NO_ROOT
+        if order < top - 1:
+            root = find_first_root(scratch, order, top - 2, workspace.hulls)
         if root < best:
             best = root
             release_sign = float(side)
     return best, release_sign
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def find_speed_root(order, direction, poly, top, workspace):
     """Return the first u at which a speed reverses, NO_ROOT if it does not.
 
@@ -230,7 +228,7 @@ def find_speed_root(order, direction, poly, top, workspace):
     return find_first_root(scratch, order, top - 1, workspace.hulls)
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def find_stop(interface, direction, poly, top, workspace):
     """Return u at which the slip of a rigid element first comes to rest; NO_ROOT if it does not.
 
@@ -250,8 +248,8 @@ def find_stop(interface, direction, poly, top, workspace):
     return find_speed_root(order, direction, poly, top, workspace)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def find_output_reversal(event, top, modal_system, time_state, workspace):
+@njit(**NJIT_INLINE)
+def find_output_reversal(event, top, run):
     """Return the reversal of the output if it comes before an event, else the event.
 
     Parameters
@@ -260,19 +258,19 @@ def find_output_reversal(event, top, modal_system, time_state, workspace):
         First event of the interfaces.
     top : int
         Highest power of the series.
-    modal_system : ModalSystem
-    time_state : TimeState
-    workspace : Workspace
+    run : RunArrays
 
     Returns
     -------
     NextEvent
     """
+    modal_system = run.modal_system
+    workspace = run.workspace
     n_interfaces = len(modal_system.inverse_mass)
     poly = workspace.polynomials[n_interfaces + 1]
     n = len(modal_system.omega_squared)
     expand_speed(modal_system.output, n, workspace.coefficients, top, poly)
-    is_at_rest = time_state.is_at_turn[n_interfaces] == 1.0
+    is_at_rest = run.time_state.is_at_turn[n_interfaces] == 1.0
     order, direction = initial_direction(poly, top, is_at_rest)
     if direction == 0.0:
         return event
@@ -282,26 +280,24 @@ def find_output_reversal(event, top, modal_system, time_state, workspace):
     return event
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def find_next_event(top, modal_system, table, memory, time_state, workspace):
+@njit(**NJIT_KERNEL)
+def find_next_event(top, run):
     """Find the first event of a piece.
 
     Parameters
     ----------
     top : int
         Highest power of the series.
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
-    time_state : TimeState
-    workspace : Workspace
-        Its coefficients are the series of the coordinates; polynomials[i] becomes that of the speed
-        of interface i.
+    run : RunArrays
 
     Returns
     -------
     NextEvent
     """
+    modal_system = run.modal_system
+    table = run.table
+    memory = run.memory
+    workspace = run.workspace
     n = len(modal_system.omega_squared)
     n_interfaces = len(modal_system.inverse_mass)
     polynomials = workspace.polynomials
@@ -324,7 +320,7 @@ def find_next_event(top, modal_system, table, memory, time_state, workspace):
             if table.n_elements[f] == 0 or event.u == 0.0:
                 continue
         else:
-            order, direction = initial_direction(poly, top, time_state.is_at_turn[f] == 1.0)
+            order, direction = initial_direction(poly, top, run.time_state.is_at_turn[f] == 1.0)
             if direction == 0.0:
                 continue
             if memory.n_slipping[f] > 0 and direction != memory.direction[f]:
@@ -339,5 +335,5 @@ def find_next_event(top, modal_system, table, memory, time_state, workspace):
         if root <= event.u:
             event = NextEvent(root, EVENT.yielding, f, direction)
     if modal_system.output_interface < 0:
-        return find_output_reversal(event, top, modal_system, time_state, workspace)
+        return find_output_reversal(event, top, run)
     return event

@@ -8,13 +8,14 @@ coefficients are all positive has no root; if their sign changes once, it has ex
 """
 
 from math import comb, factorial, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ...friction.flags_kernels import NJIT_INLINE, NJIT_KERNEL
 from .memory_kernels import RIGID_STIFFNESS
-from .positions_kernels import CONSTRAINT
+from .positions_kernels import ConstraintStatus
 
 # longest piece times the fastest rate of the system [1]; 28 powers are then exact to round-off
 MAX_RATE_TIME = 2.0
@@ -75,7 +76,30 @@ for _g in range(1, MAX_GAUSS_POINTS + 1):
     GAUSS_WEIGHTS[_g, :_g] = _weights / 2
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+class MotionStart(NamedTuple):
+    """State of a linear motion at the start of a piece.
+
+    - coordinates, rate: (n,) modal coordinates [m] and rates [m/s]
+    - force: (i,) friction forces of the interfaces [N]
+    """
+
+    coordinates: np.ndarray
+    rate: np.ndarray
+    force: np.ndarray
+
+
+class MotionSeries(NamedTuple):
+    """Power series over a piece.
+
+    - drive: (> top,) acceleration of the drive [m s-2]
+    - coefficients: (> top, n) modal coordinates [m]
+    """
+
+    drive: np.ndarray
+    coefficients: np.ndarray
+
+
+@njit(**NJIT_KERNEL)
 def find_highest_power(x):
     """Return the highest power that a piece needs; x: its duration times the fastest rate."""
     k = 4
@@ -84,7 +108,7 @@ def find_highest_power(x):
     return k
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def count_gauss_points(x):
     """Return the number of Gauss points that integrate squares of the motion over a piece.
 
@@ -96,7 +120,7 @@ def count_gauss_points(x):
     return g
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def bound_fastest_rate(modal_system, springs):
     """Return an upper bound [1/s] of the rates of modes with springs (i,) [N/m].
 
@@ -109,65 +133,62 @@ def bound_fastest_rate(modal_system, springs):
     return 0.5 * modal_system.damping_norm + sqrt(0.25 * modal_system.damping_norm**2 + square)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def bound_modal_rate(modal_system, workspace):
     """Return the bound of `bound_fastest_rate` for workspace.stiffness; 0 without free motions."""
-    if workspace.constraint.status[CONSTRAINT.is_immobile] == 1.0:
+    if workspace.constraint.status[ConstraintStatus.IS_IMMOBILE] == 1.0:
         return 0.0
     return bound_fastest_rate(modal_system, workspace.stiffness)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def expand_single_mode(coordinates, rate, force, spring, modal_system, drive, h, top, coefs):
+@njit(**NJIT_INLINE)
+def expand_single_mode(start, series, h, top, modal_system, spring):
     """Write the series of one mode with one interface, like `expand_motion` but faster.
 
     It takes a third of the time.
 
     Parameters
     ----------
-    coordinates, rate, modal_system, drive, h, top, coefs
+    start, series, h, top, modal_system
         See `expand_motion`.
-    force, spring : float
-        Of the interface [N], [N/m].
+    spring : float
+        Stiffness of the interface [N/m].
     """
-    row = modal_system.interfaces[0, 0] / modal_system.mass
+    drive, coefs = series
+    friction = modal_system.interfaces[0, 0] / modal_system.mass * start.force[0]
     h_squared = h * h
     base = modal_system.base[0]
     stiff = h_squared * (modal_system.omega_squared[0] + spring * modal_system.inverse_mass[0])
     damp = h * modal_system.damping[0, 0]
-    here = coordinates[0]
-    after = h * rate[0]
-    coefs[0, 0] = here
-    coefs[1, 0] = after
-    here, after = (
-        after,
-        -0.5
-        * (
-            h_squared * (modal_system.omega_squared[0] * here + base * drive[0] + row * force)
-            + damp * after
-        ),
-    )
-    coefs[2, 0] = after
+    # coefficients k and k + 1 of the series
+    present = start.coordinates[0]
+    following = h * start.rate[0]
+    coefs[0, 0] = present
+    coefs[1, 0] = following
+    forces = modal_system.omega_squared[0] * present + base * drive[0] + friction
+    new = -0.5 * (h_squared * forces + damp * following)
+    present = following
+    following = new
+    coefs[2, 0] = following
     for k in range(1, top - 1):
-        here, after = (
-            after,
-            -DOUBLE_INTEGRAL[k + 2]
-            * (stiff * here + h_squared * base * drive[k] + damp * (k + 1) * after),
-        )
-        coefs[k + 2, 0] = after
+        forces = stiff * present + h_squared * base * drive[k] + damp * (k + 1) * following
+        present = following
+        following = -DOUBLE_INTEGRAL[k + 2] * forces
+        coefs[k + 2, 0] = following
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def expand_two_modes(coordinates, rate, force, spring, modal_system, drive, h, top, coefs):
+@njit(**NJIT_INLINE)
+def expand_two_modes(start, series, h, top, modal_system, spring):
     """Write the series of two uncoupled modes with one interface, like `expand_motion`.
 
     Parameters
     ----------
-    coordinates, rate, modal_system, drive, h, top, coefs
+    start, series, h, top, modal_system
         See `expand_motion`.
-    force, spring : float
-        Of the interface [N], [N/m].
+    spring : float
+        Stiffness of the interface [N/m].
     """
+    drive, coefs = series
     h_squared = h * h
     face_1 = modal_system.interfaces[0, 0]
     face_2 = modal_system.interfaces[0, 1]
@@ -180,25 +201,25 @@ def expand_two_modes(coordinates, rate, force, spring, modal_system, drive, h, t
     stiff = h_squared * spring / modal_system.mass
     damp_1 = h * modal_system.damping[0, 0]
     damp_2 = h * modal_system.damping[1, 1]
-    pulls = h_squared * force / modal_system.mass
-    here_1 = coordinates[0]
-    here_2 = coordinates[1]
-    after_1 = h * rate[0]
-    after_2 = h * rate[1]
+    friction = h_squared * start.force[0] / modal_system.mass
+    here_1 = start.coordinates[0]
+    here_2 = start.coordinates[1]
+    after_1 = h * start.rate[0]
+    after_2 = h * start.rate[1]
     coefs[0, 0] = here_1
     coefs[0, 1] = here_2
     coefs[1, 0] = after_1
     coefs[1, 1] = after_2
     for k in range(top - 1):
-        push = h_squared * drive[k]
+        base_term = h_squared * drive[k]
         count = k + 1
         new_1 = -DOUBLE_INTEGRAL[k + 2] * (
-            stiff_1 * here_1 + base_1 * push + face_1 * pulls + damp_1 * count * after_1
+            stiff_1 * here_1 + base_1 * base_term + face_1 * friction + damp_1 * count * after_1
         )
         new_2 = -DOUBLE_INTEGRAL[k + 2] * (
-            stiff_2 * here_2 + base_2 * push + face_2 * pulls + damp_2 * count * after_2
+            stiff_2 * here_2 + base_2 * base_term + face_2 * friction + damp_2 * count * after_2
         )
-        pulls = stiff * (face_1 * after_1 + face_2 * after_2)
+        friction = stiff * (face_1 * after_1 + face_2 * after_2)
         here_1 = after_1
         here_2 = after_2
         after_1 = new_1
@@ -207,17 +228,19 @@ def expand_two_modes(coordinates, rate, force, spring, modal_system, drive, h, t
         coefs[k + 2, 1] = new_2
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def expand_immobile(coordinates, force, modal_system, drive, top, coefs, workspace):
+@njit(**NJIT_KERNEL)
+def expand_immobile(start, series, top, modal_system, workspace):
     """Write the series of `expand_motion` where the sticking interfaces stop all motion.
 
     Only the reactions depend on time.
 
     Parameters
     ----------
-    coordinates, force, modal_system, drive, top, coefs, workspace
+    start, series, top, modal_system, workspace
         See `expand_motion`.
     """
+    drive, coefs = series
+    coordinates = start.coordinates
     constraint = workspace.constraint
     n_interfaces = len(modal_system.inverse_mass)
     n = len(modal_system.omega_squared)
@@ -225,21 +248,23 @@ def expand_immobile(coordinates, force, modal_system, drive, top, coefs, workspa
         for i in range(n):
             coefs[k, i] = coordinates[i] if k == 0 else 0.0
     for f in range(n_interfaces):
-        level = 0.0
-        share = 0.0
+        static_reaction = 0.0
+        drive_reaction = 0.0
         for i in range(n):
-            part = modal_system.omega_squared[i] * coordinates[i]
+            modal_force = modal_system.omega_squared[i] * coordinates[i]
             for g in range(n_interfaces):
                 if workspace.stiffness[g] < RIGID_STIFFNESS:
-                    part += modal_system.interfaces[g, i] * force[g] / modal_system.mass
-            level -= constraint.inverse[f, i] * part
-            share -= constraint.inverse[f, i] * modal_system.base[i]
+                    modal_force += (
+                        modal_system.interfaces[g, i] * start.force[g] / modal_system.mass
+                    )
+            static_reaction -= constraint.inverse[f, i] * modal_force
+            drive_reaction -= constraint.inverse[f, i] * modal_system.base[i]
         for k in range(top - 1):
-            constraint.reactions[f, k] = modal_system.mass * share * drive[k]
-        constraint.reactions[f, 0] += modal_system.mass * level
+            constraint.reactions[f, k] = modal_system.mass * drive_reaction * drive[k]
+        constraint.reactions[f, 0] += modal_system.mass * static_reaction
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def remove_sticking_motion(k, scale, modal_system, coefs, workspace):
     """Remove the motion of sticking interfaces from coefficients k + 2, and store the reactions.
 
@@ -252,25 +277,27 @@ def remove_sticking_motion(k, scale, modal_system, coefs, workspace):
         Power of the acceleration.
     scale : float
         Ratio of the coefficient to the acceleration [s2].
-    modal_system, coefs, workspace
+    modal_system, workspace
         See `expand_motion`.
+    coefs : ndarray
+        (>= top + 1, n) coefficients of the motion.
     """
     constraint = workspace.constraint
     n = len(modal_system.omega_squared)
     n_interfaces = len(modal_system.inverse_mass)
     for f in range(n_interfaces):
-        part = 0.0
+        reaction = 0.0
         for i in range(n):
-            part += constraint.inverse[f, i] * coefs[k + 2, i]
-        constraint.reactions[f, k] = part
+            reaction += constraint.inverse[f, i] * coefs[k + 2, i]
+        constraint.reactions[f, k] = reaction
     for f in range(n_interfaces):
         for i in range(n):
             coefs[k + 2, i] -= modal_system.interfaces[f, i] * constraint.reactions[f, k]
         constraint.reactions[f, k] *= modal_system.mass / scale
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def expand_motion(coordinates, rate, force, springs, modal_system, drive, h, top, coefs, workspace):
+@njit(**NJIT_KERNEL)
+def expand_motion(start, series, h, top, modal_system, workspace):
     """Write the power series of the modes over a piece, and the reactions of sticking interfaces.
 
     The equation is z'' = -D z' - omega^2 z - base a - interfaces^T (force + springs slide)/mass.
@@ -279,73 +306,67 @@ def expand_motion(coordinates, rate, force, springs, modal_system, drive, h, top
 
     Parameters
     ----------
-    coordinates, rate : ndarray
-        (n,) modal coordinates [m] and rates [m/s] at the start.
-    force, springs : ndarray
-        (i,) forces at the start [N] and stiffness [N/m] of the interfaces.
-    modal_system : ModalSystem
-    drive : ndarray
-        Series of the drive a [m s-2].
+    start : MotionStart
+    series : MotionSeries
+        Its coefficients are written.
     h : float
         Duration of the piece [s].
     top : int
         Highest power.
-    coefs : ndarray
-        (>= top + 1, n) output.
+    modal_system : ModalSystem
     workspace : Workspace
-        Its constraint is as `stick_kernels.constrain_slides` leaves it.
+        Its constraint is as `stick_kernels.constrain_slides` leaves it, and its stiffness that of
+        the interfaces.
     """
     n_interfaces = len(modal_system.inverse_mass)
     n = len(modal_system.omega_squared)
-    faces = modal_system.interfaces
+    interfaces = modal_system.interfaces
+    drive, coefs = series
+    springs = workspace.stiffness
     h_squared = h * h
-    pulls = workspace.friction_accel
-    held = workspace.constraint.status[CONSTRAINT.n_sticking] > 0.0
-    if workspace.constraint.status[CONSTRAINT.is_immobile] == 1.0:
-        expand_immobile(coordinates, force, modal_system, drive, top, coefs, workspace)
+    friction_accel = workspace.friction_accel
+    has_sticking = workspace.constraint.status[ConstraintStatus.N_STICKING] > 0.0
+    if workspace.constraint.status[ConstraintStatus.IS_IMMOBILE] == 1.0:
+        expand_immobile(start, series, top, modal_system, workspace)
         return
     if n == 1 and n_interfaces == 1:
-        expand_single_mode(
-            coordinates, rate, force[0], springs[0], modal_system, drive, h, top, coefs
-        )
+        expand_single_mode(start, series, h, top, modal_system, springs[0])
         return
-    if n == 2 and n_interfaces == 1 and not modal_system.is_coupled and not held:
-        expand_two_modes(
-            coordinates, rate, force[0], springs[0], modal_system, drive, h, top, coefs
-        )
+    if n == 2 and n_interfaces == 1 and not modal_system.is_coupled and not has_sticking:
+        expand_two_modes(start, series, h, top, modal_system, springs[0])
         return
     for i in range(n):
-        coefs[0, i] = coordinates[i]
-        coefs[1, i] = h * rate[i]
+        coefs[0, i] = start.coordinates[i]
+        coefs[1, i] = h * start.rate[i]
     for f in range(n_interfaces):
-        pulls[f] = force[f] / modal_system.mass if springs[f] < RIGID_STIFFNESS else 0.0
+        is_free = springs[f] < RIGID_STIFFNESS
+        friction_accel[f] = start.force[f] / modal_system.mass if is_free else 0.0
     for k in range(top - 1):
         scale = DOUBLE_INTEGRAL[k + 2] * h_squared
         damp = DOUBLE_INTEGRAL[k + 2] * h * (k + 1)
         if k > 0:
             for f in range(n_interfaces):
-                part = 0.0
+                term = 0.0
                 for i in range(n):
-                    part += faces[f, i] * coefs[k, i]
-                pulls[f] = (
-                    part * springs[f] / modal_system.mass if springs[f] < RIGID_STIFFNESS else 0.0
-                )
+                    term += interfaces[f, i] * coefs[k, i]
+                is_free = springs[f] < RIGID_STIFFNESS
+                friction_accel[f] = term * springs[f] / modal_system.mass if is_free else 0.0
         for i in range(n):
-            part = -modal_system.omega_squared[i] * coefs[k, i] - modal_system.base[i] * drive[k]
+            term = -modal_system.omega_squared[i] * coefs[k, i] - modal_system.base[i] * drive[k]
             for f in range(n_interfaces):
-                part -= faces[f, i] * pulls[f]
+                term -= interfaces[f, i] * friction_accel[f]
             damped = 0.0
             if modal_system.is_coupled:
                 for j in range(n):
                     damped += modal_system.damping[i, j] * coefs[k + 1, j]
             else:
                 damped = modal_system.damping[i, i] * coefs[k + 1, i]
-            coefs[k + 2, i] = scale * part - damp * damped
-        if held:
+            coefs[k + 2, i] = scale * term - damp * damped
+        if has_sticking:
             remove_sticking_motion(k, scale, modal_system, coefs, workspace)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def evaluate_polynomial(poly, low, top, u):
     """Return the sum of poly[k] u^(k - low) for k from low to top.
 
@@ -379,7 +400,7 @@ def evaluate_polynomial(poly, low, top, u):
     return even + u * odd if k < low else even * u + odd * square + poly[low]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def evaluate_with_slope(poly, low, top, u):
     """Return the sum of `evaluate_polynomial` and its derivative.
 
@@ -414,7 +435,7 @@ def evaluate_with_slope(poly, low, top, u):
     return odd + u * even, even + 2 * u * (odd_slope + u * even_slope)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def refine_root(poly, low, top, left, right, u):
     """Return the root in [left, right] of a polynomial that decreases through zero there.
 
@@ -435,14 +456,14 @@ def refine_root(poly, low, top, left, right, u):
     """
     last = right - left
     for _ in range(100):
-        here, slope = evaluate_with_slope(poly, low, top, u)
-        if here > 0:
+        value, slope = evaluate_with_slope(poly, low, top, u)
+        if value > 0:
             left = u
-        elif here < 0:
+        elif value < 0:
             right = u
         else:
             return u
-        new = u - here / slope if slope < 0 else left
+        new = u - value / slope if slope < 0 else left
         if not left < new < right:
             new = 0.5 * (left + right)
         step = abs(new - u)
@@ -456,7 +477,7 @@ def refine_root(poly, low, top, left, right, u):
     return u
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def fill_bernstein(poly, low, top, hull):
     """Write the Bernstein coefficients of a polynomial.
 
@@ -469,16 +490,16 @@ def fill_bernstein(poly, low, top, hull):
     """
     # whole registers
     degree = top - low
-    wide = (top - low) // 4 * 4 + 4
-    for i in range(wide):
+    n_padded = (top - low) // 4 * 4 + 4
+    for i in range(n_padded):
         hull[i] = poly[low]
     for k in range(1, degree + 1):
-        part = poly[low + k]
-        for i in range(wide):
-            hull[i] += part * _BERNSTEIN[degree, k, i]
+        coefficient = poly[low + k]
+        for i in range(n_padded):
+            hull[i] += coefficient * _BERNSTEIN[degree, k, i]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def find_possible_root(poly, low, top, hull):
     """Return a position near which the first root in [0, 1] may lie.
 
@@ -498,15 +519,15 @@ def find_possible_root(poly, low, top, hull):
         NO_ROOT if there is none.
     """
     remainder = 0.0
-    wide = FIRST_LOOK_POWER // 4 * 4 + 4
+    n_padded = FIRST_LOOK_POWER // 4 * 4 + 4
     for k in range(low + FIRST_LOOK_POWER + 1, top + 1):
         remainder += abs(poly[k])
-    for i in range(wide):
+    for i in range(n_padded):
         hull[i] = poly[low]
     for k in range(1, FIRST_LOOK_POWER + 1):
-        part = poly[low + k]
-        for i in range(wide):
-            hull[i] += part * _BERNSTEIN[FIRST_LOOK_POWER, k, i]
+        coefficient = poly[low + k]
+        for i in range(n_padded):
+            hull[i] += coefficient * _BERNSTEIN[FIRST_LOOK_POWER, k, i]
     for i in range(FIRST_LOOK_POWER + 1):
         if hull[i] <= remainder:
             return (
@@ -515,7 +536,7 @@ def find_possible_root(poly, low, top, hull):
     return NO_ROOT
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def prove_first_root(poly, low, top, u, workspace):
     """Return the root near u if it is proved to be the first one, else NO_ROOT.
 
@@ -538,20 +559,20 @@ def prove_first_root(poly, low, top, u, workspace):
     """
     last = 1.0
     for _ in range(9):
-        here, slope = evaluate_with_slope(poly, low, top, u)
+        value, slope = evaluate_with_slope(poly, low, top, u)
         if not slope < 0.0:
             return NO_ROOT
-        step = here / slope
+        step = value / slope
         u -= step
         step = abs(step)
         if not 0.0 < u <= 1.0:
             return NO_ROOT
         # the same step as in `refine_root`
-        done = step <= 2 * EPS * u or (
+        has_converged = step <= 2 * EPS * u or (
             step < 0.01 * last and step * (step / last) ** 2 <= 0.1 * EPS * u
         )
         last = step
-        if done:
+        if has_converged:
             power = 1.0
             rows = workspace[0]
             total = 0.0
@@ -563,15 +584,13 @@ def prove_first_root(poly, low, top, u, workspace):
                 rows[k] = total
             for k in range(top - low):
                 rows[k] = rows[k + 1]
-            return (
-                u
-                if find_possible_root(rows, 0, top - low - 1, workspace[1]) == NO_ROOT
-                else NO_ROOT
-            )
+            if find_possible_root(rows, 0, top - low - 1, workspace[1]) == NO_ROOT:
+                return u
+            return NO_ROOT
     return NO_ROOT
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def find_first_root(poly, low, top, hulls):
     """Return the first u in (0, 1] at which a polynomial is no longer positive.
 
@@ -618,12 +637,12 @@ def find_first_root(poly, low, top, hulls):
         hull = hulls[depth]
         lowest = 0.0
         changes = 0
-        at = 0
+        k_change = 0
         for k in range(degree + 1):
             lowest = min(lowest, hull[k])
             if k > 0 and (hull[k] < 0) != (hull[k - 1] < 0):
                 changes += 1
-                at = k
+                k_change = k
         # the interval has no root, so the search goes on in the part to its right that an earlier halving left
         if lowest >= -noise:
             left += width
@@ -632,8 +651,10 @@ def find_first_root(poly, low, top, hulls):
                 return NO_ROOT
             continue
         if hull[0] > 0 and changes == 1:
-            share = (at - 1 + hull[at - 1] / (hull[at - 1] - hull[at])) / degree
-            return refine_root(poly, low, top, left, left + width, left + width * share)
+            fraction = (
+                k_change - 1 + hull[k_change - 1] / (hull[k_change - 1] - hull[k_change])
+            ) / degree
+            return refine_root(poly, low, top, left, left + width, left + width * fraction)
         if depth == MAX_HALVINGS:
             return left
         _halve_interval(hull, hulls[depth + 1], degree, True)
@@ -642,7 +663,7 @@ def find_first_root(poly, low, top, hulls):
         hulls[depth, HULL_WIDTH - 1] = 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def _halve_interval(hull, half, degree, first):
     """Write the Bernstein coefficients of one half of an interval (de Casteljau)."""
     for k in range(degree + 1):
@@ -657,7 +678,7 @@ def _halve_interval(hull, half, degree, first):
                 half[k] = 0.5 * (half[k] + half[k + 1])
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def _take_right_half(hulls, depth, width, degree):
     """Return depth and width of the next right half; depth 0 where none is left."""
     while depth > 0 and hulls[depth, HULL_WIDTH - 1] == 1.0:
@@ -669,7 +690,7 @@ def _take_right_half(hulls, depth, width, degree):
     return depth, width
 
 
-@njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(cache=True, **NJIT_KERNEL)
 def find_largest_magnitude(poly, top, best, hulls):
     """Return the larger of `best` and the largest magnitude of a polynomial on [0, 1].
 
@@ -715,8 +736,8 @@ def find_largest_magnitude(poly, top, best, hulls):
                 after = hull[at] - hull[at - 1]
                 for k in range(top):
                     rate[k] = sense * (k + 1) * poly[k + 1]
-                share = (at - 2 + before / (before - after)) / (top - 1)
-                u = refine_root(rate, 0, top - 1, left, left + width, left + width * share)
+                fraction = (at - 2 + before / (before - after)) / (top - 1)
+                u = refine_root(rate, 0, top - 1, left, left + width, left + width * fraction)
                 best = max(best, abs(evaluate_polynomial(poly, 0, top, u)))
             known = True
         if known:

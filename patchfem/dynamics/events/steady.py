@@ -30,8 +30,8 @@ class SteadyState:
 
     - point, start, memory: state at phase 0 of the drive
     - residual: |state after a period - start| over the size of the motion
-    - multipliers: (m,) complex Floquet multipliers of motion and turning places, the largest
-      first; the motion is stable where all magnitudes are below 1
+    - multipliers: (m,) complex Floquet multipliers of motion and turning places, the largest first;
+      the motion is stable where all magnitudes are below 1
     - amplitude: half the range of the output [m]
     - slipping: fraction of the friction limit of all interfaces that slips within a cycle
     - symmetric: whether it changes sign after half a period
@@ -164,29 +164,31 @@ class YieldShooting(Shooting):
 
     def map_point(self, point: Point) -> MappedPoint:
         """Return the map of a Point; raise NotConverged where events accumulate."""
-        found = self.period_map(self.drive, point, self.half)
+        mapping = self.period_map(self.drive, point, self.half)
         n = self.period_map.n
         omega = self.drive.segments[0].omega
         a = point.motion
-        b = found.end.motion
-        both = np.abs([a, b])
-        width = max(float(both[:, :n].max()), float(both[:, n:].max()) / omega, 1e-300)
-        scale = np.repeat([width, width * omega], n)
-        alike = _have_same_numbers(point, found.end)
-        if alike:
-            scale = np.concatenate([scale, width * self.rows[point.turning_places[0]]])
+        b = mapping.end.motion
+        magnitudes = np.abs([a, b])
+        motion_size = max(
+            float(magnitudes[:, :n].max()), float(magnitudes[:, n:].max()) / omega, 1e-300
+        )
+        scale = np.repeat([motion_size, motion_size * omega], n)
+        has_same_numbers = _have_same_numbers(point, mapping.end)
+        if has_same_numbers:
+            scale = np.concatenate([scale, motion_size * self.rows[point.turning_places[0]]])
             a = point.numbers
-            b = found.end.numbers
+            b = mapping.end.numbers
         return MappedPoint(
             point,
-            found,
-            found.slope,
+            mapping,
+            mapping.slope,
             scale,
             (a - b) / scale,
-            width / self.moved_by,
-            alike,
-            alike and _have_same_elements(point, found.end),
-            found.kept,
+            motion_size / self.moved_by,
+            has_same_numbers,
+            has_same_numbers and _have_same_elements(point, mapping.end),
+            mapping.kept,
         )
 
     def step_from(self, mapped_point: MappedPoint, step) -> Point:
@@ -203,36 +205,33 @@ class YieldShooting(Shooting):
             point = self._next(self.period_map(self.drive, point, self.half, False))
         return point
 
-    def _next(self, found: PeriodMapping) -> Point:
+    def _next(self, mapping: PeriodMapping) -> Point:
         """Return the end of a map as the start of the next one.
 
         For a motion that changes sign, the turning places that no slip has passed are left out, as
         if their elements had never slipped.
         """
-        if not self.half or not found.min_groups.any():
-            return found.end
-        memory = copy_memory(found.end.memory)
-        for f, least in enumerate(found.min_groups):
-            if least:
-                for part in (memory.group_end, memory.group_slide, memory.group_sign):
-                    part[f, 1 : 1 + memory.n_groups[f] - least] = part[
-                        f, least : memory.n_groups[f]
+        if not self.half or not mapping.min_groups.any():
+            return mapping.end
+        memory = copy_memory(mapping.end.memory)
+        for f, n_kept in enumerate(mapping.min_groups):
+            if n_kept:
+                for array in (memory.group_end, memory.group_slide, memory.group_sign):
+                    array[f, 1 : 1 + memory.n_groups[f] - n_kept] = array[
+                        f, n_kept : memory.n_groups[f]
                     ].copy()
                 memory.group_end[f, 0] = self.period_map.table.n_elements[f]
                 memory.group_slide[f, 0] = 0.0
                 memory.group_sign[f, 0] = 0.0
-                memory.n_groups[f] += 1 - least
-        return Point(found.end.motion, memory)
+                memory.n_groups[f] += 1 - n_kept
+        return Point(mapping.end.motion, memory)
 
 
 def _have_same_numbers(point: Point, end: Point) -> bool:
     """Return whether two Points have the same numbers: turning points of the same kind."""
     a = point.memory
     b = end.memory
-    deep = a.n_groups.tolist()
-    return deep == b.n_groups.tolist() and all(
-        x[:d].tolist() == y[:d].tolist() for x, y, d in zip(a.group_sign, b.group_sign, deep)
-    )
+    return _have_same_groups(a, b, a.group_sign, b.group_sign)
 
 
 def _have_same_elements(point: Point, end: Point) -> bool:
@@ -242,34 +241,39 @@ def _have_same_elements(point: Point, end: Point) -> bool:
     return (
         a.n_slipping.tolist() == b.n_slipping.tolist()
         and a.direction.tolist() == b.direction.tolist()
-        and all(
-            x[:d].tolist() == y[:d].tolist()
-            for x, y, d in zip(a.group_end, b.group_end, a.n_groups.tolist())
-        )
+        and _have_same_groups(a, b, a.group_end, b.group_end)
     )
+
+
+def _have_same_groups(a: Memory, b: Memory, values, other_values) -> bool:
+    """Return whether two memories have as many groups, and the same values (i, t) of them."""
+    n_groups = a.n_groups.tolist()
+    if n_groups != b.n_groups.tolist():
+        return False
+    is_group = np.arange(values.shape[1]) < a.n_groups[:, None]
+    return np.array_equal(values[is_group], other_values[is_group])
 
 
 def _make_steady(
     period_map: PeriodMap, mapped_point: MappedPoint, used: int, half: bool
 ) -> SteadyState:
     point = mapped_point.point
-    found = mapped_point.image
-    values = mapped_point.multipliers()
-    low, high = found.extremes
-    limit = period_map.table.limit_sum
+    mapping = mapped_point.image
+    multipliers = mapped_point.multipliers()
+    minimum, maximum = mapping.extremes
+    limits = period_map.table.limit_sum
     n = period_map.n
-    share = sum(row[k] for row, k in zip(limit, found.max_slipping)) / max(
-        limit[:, -1].sum(), 1e-300
-    )
+    slipping_limit = limits[np.arange(len(limits)), mapping.max_slipping].sum()
+    slipping = slipping_limit / max(limits[:, -1].sum(), 1e-300)
     start = InitialState(frozen_array(point.motion[:n]), frozen_array(point.motion[n:]))
     return SteadyState(
         point,
         start,
         period_map.complete_memory(point),
         mapped_point.max_residual,
-        frozen_array(values**2 if half else values, complex),
-        float(max(high, -low) if half else (high - low) / 2),
-        float(share),
+        frozen_array(multipliers**2 if half else multipliers, complex),
+        float(max(maximum, -minimum) if half else (maximum - minimum) / 2),
+        float(slipping),
         half,
         used,
     )

@@ -17,10 +17,10 @@ none, it tries all choices of up to eight interfaces.
 from math import sqrt
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ...friction.flags_kernels import NJIT_KERNEL
 from .memory_kernels import RIGID_STIFFNESS, find_tangent, interface_force, is_sticking
-from .positions_kernels import CONSTRAINT
-from .series_kernels import DOUBLE_INTEGRAL, EPS, expand_motion
+from .positions_kernels import ConstraintStatus
+from .series_kernels import DOUBLE_INTEGRAL, EPS, MotionSeries, MotionStart, expand_motion
 
 # fraction of the sum of magnitudes of a term, below which the term counts as round-off
 NOISE_TOL = 64 * EPS
@@ -40,7 +40,7 @@ DEPENDENT_TOL = 1e-10
 TIED_TOL = 1e-9
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def orthogonalise_rows(modal_system, workspace):
     """Transform the rows of the sticking interfaces until they are orthogonal.
 
@@ -58,8 +58,10 @@ def orthogonalise_rows(modal_system, workspace):
             )
         for g in range(n_interfaces):
             constraint.matrix[f, g] = 1.0 if f == g else 0.0
-    for _ in range(MAX_JACOBI_SWEEPS if constraint.status[CONSTRAINT.n_sticking] > 1.0 else 0):
-        quiet = True
+    for _ in range(
+        MAX_JACOBI_SWEEPS if constraint.status[ConstraintStatus.N_STICKING] > 1.0 else 0
+    ):
+        is_orthogonal = True
         for f in range(n_interfaces):
             for g in range(f + 1, n_interfaces):
                 a = 0.0
@@ -71,32 +73,34 @@ def orthogonalise_rows(modal_system, workspace):
                     c += constraint.basis[f, i] * constraint.basis[g, i]
                 if abs(c) <= EPS * sqrt(a * b):
                     continue
-                quiet = False
-                steep = (b - a) / (2 * c)
-                slope = (1.0 if steep >= 0 else -1.0) / (abs(steep) + sqrt(1 + steep * steep))
-                cosine = 1 / sqrt(1 + slope * slope)
+                is_orthogonal = False
+                cotangent = (b - a) / (2 * c)
+                tangent = (1.0 if cotangent >= 0 else -1.0) / (
+                    abs(cotangent) + sqrt(1 + cotangent * cotangent)
+                )
+                cosine = 1 / sqrt(1 + tangent * tangent)
                 for i in range(n):
                     p = constraint.basis[f, i]
                     q = constraint.basis[g, i]
-                    constraint.basis[f, i] = cosine * (p - slope * q)
-                    constraint.basis[g, i] = cosine * (slope * p + q)
+                    constraint.basis[f, i] = cosine * (p - tangent * q)
+                    constraint.basis[g, i] = cosine * (tangent * p + q)
                 for h in range(n_interfaces):
                     p = constraint.matrix[f, h]
                     q = constraint.matrix[g, h]
-                    constraint.matrix[f, h] = cosine * (p - slope * q)
-                    constraint.matrix[g, h] = cosine * (slope * p + q)
-        if quiet:
+                    constraint.matrix[f, h] = cosine * (p - tangent * q)
+                    constraint.matrix[g, h] = cosine * (tangent * p + q)
+        if is_orthogonal:
             break
-    most = 0.0
+    max_square = 0.0
     for f in range(n_interfaces):
         size = 0.0
         for i in range(n):
             size += constraint.basis[f, i] ** 2
-        most = max(most, size)
-    return sqrt(most)
+        max_square = max(max_square, size)
+    return sqrt(max_square)
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def constrain_slides(modal_system, workspace):
     """Build the constraint of the interfaces in constraint.is_sticking (i,).
 
@@ -111,16 +115,16 @@ def constrain_slides(modal_system, workspace):
         constraint.is_tied[f] = 0.0
         for i in range(n):
             constraint.inverse[f, i] = 0.0
-    constraint.status[CONSTRAINT.n_sticking] = count
-    constraint.status[CONSTRAINT.is_immobile] = 0.0
+    constraint.status[ConstraintStatus.N_STICKING] = count
+    constraint.status[ConstraintStatus.IS_IMMOBILE] = 0.0
     if count == 0.0:
         return
-    most = orthogonalise_rows(modal_system, workspace)
+    max_length = orthogonalise_rows(modal_system, workspace)
     for p in range(n_interfaces):
         size = 0.0
         for i in range(n):
             size += constraint.basis[p, i] ** 2
-        if sqrt(size) <= DEPENDENT_TOL * most:
+        if sqrt(size) <= DEPENDENT_TOL * max_length:
             for i in range(n):
                 constraint.basis[p, i] = 0.0
             continue
@@ -134,29 +138,29 @@ def constrain_slides(modal_system, workspace):
     if count >= n:
         for i in range(n):
             for j in range(n):
-                part = 1.0 if i == j else 0.0
+                remainder = 1.0 if i == j else 0.0
                 for f in range(n_interfaces):
-                    part -= constraint.inverse[f, i] * modal_system.interfaces[f, j]
-                mobility = max(mobility, abs(part))
+                    remainder -= constraint.inverse[f, i] * modal_system.interfaces[f, j]
+                mobility = max(mobility, abs(remainder))
     if mobility < TIED_TOL:
-        constraint.status[CONSTRAINT.is_immobile] = 1.0
+        constraint.status[ConstraintStatus.IS_IMMOBILE] = 1.0
     for f in range(n_interfaces):
         gap = 0.0
         size = 0.0
         for j in range(n):
-            part = modal_system.interfaces[f, j]
+            remainder = modal_system.interfaces[f, j]
             for g in range(n_interfaces):
                 along = 0.0
                 for i in range(n):
                     along += modal_system.interfaces[f, i] * constraint.inverse[g, i]
-                part -= along * modal_system.interfaces[g, j]
-            gap += part * part
+                remainder -= along * modal_system.interfaces[g, j]
+            gap += remainder * remainder
             size += modal_system.interfaces[f, j] ** 2
-        if constraint.status[CONSTRAINT.is_immobile] == 1.0 or gap < TIED_TOL**2 * size:
+        if constraint.status[ConstraintStatus.IS_IMMOBILE] == 1.0 or gap < TIED_TOL**2 * size:
             constraint.is_tied[f] = 1.0
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def remove_sticking_rates(rates, modal_system, workspace):
     """Remove the part of modal rates that moves the sticking interfaces.
 
@@ -170,7 +174,7 @@ def remove_sticking_rates(rates, modal_system, workspace):
     constraint = workspace.constraint
     n_interfaces = len(modal_system.inverse_mass)
     n = len(modal_system.omega_squared)
-    if constraint.status[CONSTRAINT.is_immobile] == 1.0:
+    if constraint.status[ConstraintStatus.IS_IMMOBILE] == 1.0:
         for i in range(n):
             rates[i] = 0.0
         return
@@ -183,29 +187,28 @@ def remove_sticking_rates(rates, modal_system, workspace):
             rates[i] -= constraint.inverse[f, i] * constraint.scratch[0, f]
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def correct_sticking_slides(motion, modal_system, memory, workspace):
+@njit(**NJIT_KERNEL)
+def correct_sticking_slides(run):
     """Remove the round-off of sticking interfaces from coordinates and rates.
 
     Parameters
     ----------
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    modal_system : ModalSystem
-    memory : Memory
-    workspace : Workspace
+    run : RunArrays
     """
+    motion = run.motion
+    modal_system = run.modal_system
+    workspace = run.workspace
     constraint = workspace.constraint
     n_interfaces = len(modal_system.inverse_mass)
     if (
-        constraint.status[CONSTRAINT.n_sticking] == 0.0
-        or constraint.status[CONSTRAINT.is_immobile] == 1.0
+        constraint.status[ConstraintStatus.N_STICKING] == 0.0
+        or constraint.status[ConstraintStatus.IS_IMMOBILE] == 1.0
     ):
         return
     n = len(modal_system.omega_squared)
     remove_sticking_rates(motion[1], modal_system, workspace)
     for f in range(n_interfaces):
-        constraint.scratch[0, f] = memory.slide[f]
+        constraint.scratch[0, f] = run.memory.slide[f]
         for i in range(n):
             constraint.scratch[0, f] -= modal_system.interfaces[f, i] * motion[0, i]
     for f in range(n_interfaces):
@@ -213,34 +216,38 @@ def correct_sticking_slides(motion, modal_system, memory, workspace):
             motion[0, i] += constraint.inverse[f, i] * constraint.scratch[0, f]
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def estimate_round_off(motion, force, springs, modal_system, h, workspace):
+@njit(**NJIT_KERNEL)
+def estimate_round_off(h, run):
     """Write the sizes that terms of motion and reactions are added from.
 
     Parameters
     ----------
-    motion, force, springs, modal_system, h
-        See `expand_motion`.
-    workspace : Workspace
-        choice.motion_sizes (MAX_ORDER + 2, n) and choice.reaction_sizes (i, MAX_ORDER) are
+    h : float
+        Duration of the piece [s].
+    run : RunArrays
+        Its choice.motion_sizes (MAX_ORDER + 2, n) and choice.reaction_sizes (i, MAX_ORDER) are
         written.
     """
+    motion = run.motion
+    springs = run.workspace.stiffness
+    modal_system = run.modal_system
+    workspace = run.workspace
     choice = workspace.choice
     n = len(modal_system.omega_squared)
     n_interfaces = len(modal_system.inverse_mass)
     interfaces = modal_system.interfaces
-    squared = h * h
-    wave = workspace.drive[0]
+    h_squared = h * h
+    drive = workspace.drive[0]
     for i in range(n):
         choice.motion_sizes[0, i] = abs(motion[0, i])
         choice.motion_sizes[1, i] = abs(h * motion[1, i])
     for k in range(MAX_ORDER):
-        scale = DOUBLE_INTEGRAL[k + 2] * squared
+        scale = DOUBLE_INTEGRAL[k + 2] * h_squared
         damp = DOUBLE_INTEGRAL[k + 2] * h * (k + 1)
         for f in range(n_interfaces):
             workspace.friction_accel[f] = 0.0
             if springs[f] < RIGID_STIFFNESS and k == 0:
-                workspace.friction_accel[f] = abs(force[f]) / modal_system.mass
+                workspace.friction_accel[f] = abs(run.memory.force[f]) / modal_system.mass
             elif springs[f] < RIGID_STIFFNESS:
                 for i in range(n):
                     workspace.friction_accel[f] += (
@@ -250,16 +257,16 @@ def estimate_round_off(motion, force, springs, modal_system, h, workspace):
                         / modal_system.mass
                     )
         for i in range(n):
-            part = modal_system.omega_squared[i] * choice.motion_sizes[k, i] + abs(
-                modal_system.base[i] * wave[k]
+            size = modal_system.omega_squared[i] * choice.motion_sizes[k, i] + abs(
+                modal_system.base[i] * drive[k]
             )
             damped = 0.0
             for f in range(n_interfaces):
-                part += abs(interfaces[f, i]) * workspace.friction_accel[f]
+                size += abs(interfaces[f, i]) * workspace.friction_accel[f]
             for j in range(n):
                 damped += abs(modal_system.damping[i, j]) * choice.motion_sizes[k + 1, j]
-            choice.motion_sizes[k + 2, i] = scale * part + damp * damped
-        if workspace.constraint.status[CONSTRAINT.n_sticking] == 0.0:
+            choice.motion_sizes[k + 2, i] = scale * size + damp * damped
+        if workspace.constraint.status[ConstraintStatus.N_STICKING] == 0.0:
             continue
         for f in range(n_interfaces):
             choice.reaction_sizes[f, k] = 0.0
@@ -273,7 +280,7 @@ def estimate_round_off(motion, force, springs, modal_system, h, workspace):
             choice.reaction_sizes[f, k] *= modal_system.mass / scale
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def leading_slip_term(interface, sign, noise, modal_system, workspace):
     """Find the first term of the slip speed above round-off.
 
@@ -307,7 +314,7 @@ def leading_slip_term(interface, sign, noise, modal_system, workspace):
     return float(MAX_ORDER), 0.0
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def leading_margin_term(interface, side, noise, limit, workspace):
     """Find the first term of limit - side reaction above round-off.
 
@@ -340,8 +347,8 @@ def leading_margin_term(interface, side, noise, limit, workspace):
     return float(MAX_ORDER), 0.0
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def find_violation(noise, motion, modal_system, table, memory, h, workspace):
+@njit(**NJIT_KERNEL)
+def find_violation(noise, h, run):
     """Return the first interface that violates the law under the guess, and the violation.
 
     Interfaces in choice.is_resting have no velocity. The memory, force and stiffness are left as
@@ -354,6 +361,11 @@ def find_violation(noise, motion, modal_system, table, memory, h, workspace):
     side : int
         1 or -1: overloaded in this direction; 0: it does not move in the direction of its slip.
     """
+    motion = run.motion
+    modal_system = run.modal_system
+    table = run.table
+    memory = run.memory
+    workspace = run.workspace
     choice = workspace.choice
     n_interfaces = len(modal_system.inverse_mass)
     for f in range(n_interfaces):
@@ -363,29 +375,20 @@ def find_violation(noise, motion, modal_system, table, memory, h, workspace):
     constrain_slides(modal_system, workspace)
     for f in range(n_interfaces):
         if table.static_limit[f] > 0.0:
-            others = (
+            is_held_by_others = (
                 choice.guess[f] != 0.0
                 and workspace.constraint.is_tied[f] == 1.0
                 and choice.is_resting[f] == 1.0
             )
-            memory.rigid_state[f] = 2.0 * choice.guess[f] if others else choice.guess[f]
+            memory.rigid_state[f] = 2.0 * choice.guess[f] if is_held_by_others else choice.guess[f]
         memory.force[f] = interface_force(f, table, memory)
         workspace.stiffness[f] = find_tangent(f, table, memory).stiffness
         choice.orders[f, 0] = 0.0
         choice.orders[f, 1] = 0.0
-    expand_motion(
-        motion[0],
-        motion[1],
-        memory.force,
-        workspace.stiffness,
-        modal_system,
-        workspace.drive[0],
-        h,
-        MAX_ORDER + 1,
-        workspace.coefficients,
-        workspace,
-    )
-    estimate_round_off(motion, memory.force, workspace.stiffness, modal_system, h, workspace)
+    start = MotionStart(motion[0], motion[1], memory.force)
+    series = MotionSeries(workspace.drive[0], workspace.coefficients)
+    expand_motion(start, series, h, MAX_ORDER + 1, modal_system, workspace)
+    estimate_round_off(h, run)
     for f in range(n_interfaces):
         if (
             choice.is_resting[f] == 0.0
@@ -410,8 +413,8 @@ def find_violation(noise, motion, modal_system, table, memory, h, workspace):
     return -1, 0
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def choose_by_exchange(noise, motion, modal_system, table, memory, h, workspace):
+@njit(**NJIT_KERNEL)
+def choose_by_exchange(noise, h, run):
     """Exchange the first interface that violates the law, until none does.
 
     This is the rule of least index (Murty, Opsearch 11, 148, 1974). It ends with the only solution
@@ -424,95 +427,81 @@ def choose_by_exchange(noise, motion, modal_system, table, memory, h, workspace)
     ----------
     noise : float
         Fraction of the sum of magnitudes of a term, below which the term is round-off.
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
     h : float
         Duration of the piece [s].
-    workspace : Workspace
+    run : RunArrays
 
     Returns
     -------
     bool
         Whether a choice was found.
     """
-    for _ in range(MAX_EXCHANGES_PER_INTERFACE * len(modal_system.inverse_mass)):
-        slide, side = find_violation(noise, motion, modal_system, table, memory, h, workspace)
-        if slide < 0:
+    for _ in range(MAX_EXCHANGES_PER_INTERFACE * len(run.modal_system.inverse_mass)):
+        interface, side = find_violation(noise, h, run)
+        if interface < 0:
             return True
-        workspace.choice.guess[slide] = float(side)
+        run.workspace.choice.guess[interface] = float(side)
     return False
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def choose_by_enumeration(noise, motion, modal_system, table, memory, h, workspace):
+@njit(**NJIT_KERNEL)
+def choose_by_enumeration(noise, h, run):
     """Try all choices of the interfaces at rest, those with few slipping first.
 
     Parameters
     ----------
     noise : float
         Fraction of the sum of magnitudes of a term, below which the term is round-off.
-    motion : ndarray
-        (2, n) modal coordinates [m] and rates [m/s].
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
     h : float
         Duration of the piece [s].
-    workspace : Workspace
+    run : RunArrays
 
     Returns
     -------
     bool
         Whether one satisfies the law.
     """
-    choice = workspace.choice
-    n_interfaces = len(modal_system.inverse_mass)
-    count = 0
-    codes = 1
+    choice = run.workspace.choice
+    n_interfaces = len(run.modal_system.inverse_mass)
+    n_resting = 0
+    n_codes = 1
     for f in range(n_interfaces):
         if choice.is_resting[f] == 1.0:
-            count = count + 1
-            codes = codes * 3
-    for slips in range(count + 1):
-        for code in range(codes):
-            gap = code
-            found = 0
+            n_resting = n_resting + 1
+            n_codes = n_codes * 3
+    for n_wanted in range(n_resting + 1):
+        for code in range(n_codes):
+            digits = code
+            n_slipping = 0
             for f in range(n_interfaces - 1, -1, -1):
                 choice.guess[f] = choice.slip_signs[f]
                 if choice.is_resting[f] == 1.0:
-                    digit = gap % 3
+                    digit = digits % 3
                     choice.guess[f] = -1.0 if digit == 2 else float(digit)
-                    gap = gap // 3
-                    found = found + (digit > 0)
-            if (
-                found == slips
-                and find_violation(noise, motion, modal_system, table, memory, h, workspace)[0] < 0
-            ):
+                    digits = digits // 3
+                    n_slipping = n_slipping + (digit > 0)
+            if n_slipping == n_wanted and find_violation(noise, h, run)[0] < 0:
                 return True
     return False
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def choose_sticks(motion, modal_system, table, memory, h, workspace):
+@njit(**NJIT_KERNEL)
+def choose_sticks(h, run):
     """Choose which interfaces stick and which slip just after an event.
 
     Parameters
     ----------
-    motion, modal_system, table, memory
     h : float
         Duration [s] of the piece whose drive is in workspace.drive[0].
-    workspace : Workspace
-        choice.slip_signs (i,) is the first guess, and the slip of interfaces outside
-        choice.is_resting.
+    run : RunArrays
 
     Returns
     -------
     bool
         Whether a choice was found. The rates of sticking interfaces are removed from the motion.
     """
+    modal_system = run.modal_system
+    workspace = run.workspace
     choice = workspace.choice
     constraint = workspace.constraint
     n_interfaces = len(modal_system.inverse_mass)
@@ -520,26 +509,24 @@ def choose_sticks(motion, modal_system, table, memory, h, workspace):
     for f in range(n_interfaces):
         constraint.is_sticking[f] = choice.is_resting[f]
     constrain_slides(modal_system, workspace)
-    if constraint.status[CONSTRAINT.n_sticking] > 0.0:
-        remove_sticking_rates(motion[1], modal_system, workspace)
+    if constraint.status[ConstraintStatus.N_STICKING] > 0.0:
+        remove_sticking_rates(run.motion[1], modal_system, workspace)
     for f in range(n_interfaces):
-        if table.static_limit[f] > 0.0 and constraint.is_tied[f] == 1.0:
+        if run.table.static_limit[f] > 0.0 and constraint.is_tied[f] == 1.0:
             choice.is_resting[f] = 1.0
         count += int(choice.is_resting[f])
     for noise in (NOISE_TOL, LOOSE_NOISE_FACTOR * NOISE_TOL):
         for f in range(n_interfaces):
             choice.guess[f] = choice.slip_signs[f]
-        if choose_by_exchange(noise, motion, modal_system, table, memory, h, workspace):
+        if choose_by_exchange(noise, h, run):
             return True
-        if count <= MAX_ENUMERATED and choose_by_enumeration(
-            noise, motion, modal_system, table, memory, h, workspace
-        ):
+        if count <= MAX_ENUMERATED and choose_by_enumeration(noise, h, run):
             return True
     return False
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def find_resting_interfaces(u, h, top, modal_system, table, memory, workspace):
+@njit(**NJIT_KERNEL)
+def find_resting_interfaces(u, piece, run):
     """Find the interfaces with rigid elements that have no velocity at u of a piece.
 
     They are those that stick and those whose speed is round-off; choice.is_resting and
@@ -549,30 +536,28 @@ def find_resting_interfaces(u, h, top, modal_system, table, memory, workspace):
     ----------
     u : float
         Fraction of the piece.
-    h : float
-        Duration of the piece [s].
-    top : int
-        Highest power of the series.
-    modal_system : ModalSystem
-    table : ElementTable
-    memory : Memory
-    workspace : Workspace
+    piece : Piece
+    run : RunArrays
     """
+    modal_system = run.modal_system
+    table = run.table
+    memory = run.memory
+    workspace = run.workspace
     choice = workspace.choice
     for f in range(len(modal_system.inverse_mass)):
-        head = memory.rigid_state[f]
-        choice.slip_signs[f] = min(max(head, -1.0), 1.0)
+        state = memory.rigid_state[f]
+        choice.slip_signs[f] = min(max(state, -1.0), 1.0)
         choice.is_resting[f] = 1.0 if table.static_limit[f] > 0.0 else 0.0
-        if is_sticking(f, table, memory) or table.static_limit[f] == 0.0 or abs(head) == 2.0:
+        if is_sticking(f, table, memory) or table.static_limit[f] == 0.0 or abs(state) == 2.0:
             continue
         speed = 0.0
         size = 0.0
         power = 1.0
-        for k in range(1, top + 1):
+        for k in range(1, piece.top + 1):
             for i in range(len(modal_system.omega_squared)):
-                part = modal_system.interfaces[f, i] * workspace.coefficients[k, i] * (k * power)
-                speed += part
-                size += abs(part)
+                term = modal_system.interfaces[f, i] * workspace.coefficients[k, i] * (k * power)
+                speed += term
+                size += abs(term)
             power *= u
         if choice.slip_signs[f] * speed > NOISE_TOL * size:
             choice.is_resting[f] = 0.0

@@ -18,7 +18,7 @@ import numpy as np
 from ...core import InitialState, ModalBasis, PatchfemError, frozen_array
 from ..periodic import MappedPoint, MotionGrows, Shooting
 from . import histories
-from .positions_kernels import BEGIN, COLUMN, N_COLUMNS, ROW
+from .positions_kernels import BEGIN, N_COLUMNS, Column, Row
 
 # periods of a run where Newton's method leads away from the periodic motion
 MAX_APPROACH_PERIODS = 400
@@ -61,7 +61,7 @@ class CoulombPeriodMapping(NamedTuple):
     - swing: half the range of the output [m]
     - sizes: (2n,) sizes of the state on the way
     - first: (n, n) projector of the first phase onto motions that leave the sticking interfaces
-    alone
+      alone
     - alone: see `SteadyState`
     """
 
@@ -78,29 +78,27 @@ class CoulombPeriodMapping(NamedTuple):
 class LinearPhase:
     """Motion from one event to the next, in which the same interfaces stick.
 
-    run: the run; row, after: first row of the phase and of the next one, None at the end; span:
-    duration [s].
+    run: the run; row: first row of the phase; span: duration [s].
     """
 
-    def __init__(self, run, row, after, span: float):
+    def __init__(self, run, row, span: float):
         modes = run.modes
         modal_system = run.modal_system
         n = run.modes.omega.size
         self.run = run
         self.row = row
-        self.after = after
         self.span = span
         at = run._column(0, 0)
         columns = row[at:].reshape(len(run.groups), N_COLUMNS)
-        self.held = np.isinf(columns[:, COLUMN.stiffness])
-        self.signs = columns[:, COLUMN.direction]
+        self.held = np.isinf(columns[:, Column.STIFFNESS])
+        self.signs = columns[:, Column.DIRECTION]
         rows = modal_system.interfaces[self.held]
         self.pinv = np.linalg.pinv(rows, rcond=1e-10)
         self.project = np.eye(n) - self.pinv @ rows
         if len(rows) and np.abs(self.project).max() < 1e-9:
             self.project = np.zeros((n, n))
         self.given = (
-            np.where(self.held, 0.0, columns[:, COLUMN.force])
+            np.where(self.held, 0.0, columns[:, Column.FORCE])
             @ modal_system.interfaces
             / modes.mass
         )
@@ -111,8 +109,8 @@ class LinearPhase:
         """Return the derivative (2n, 2n) of the end state with respect to the start state."""
         n = len(self.square)
         p = self.project
-        left = np.block([[np.zeros((n, n)), p], [-p @ self.square, -p @ self.dampers]])
-        return exponentiate_modal_matrix(left * self.span) @ self.taken_out()
+        system_matrix = np.block([[np.zeros((n, n)), p], [-p @ self.square, -p @ self.dampers]])
+        return exponentiate_modal_matrix(system_matrix * self.span) @ self.taken_out()
 
     def taken_out(self) -> np.ndarray:
         """Return the derivative (2n, 2n) of a state whose sticking interfaces come to rest."""
@@ -120,7 +118,7 @@ class LinearPhase:
         out[len(self.square) :, len(self.square) :] = self.project
         return out
 
-    def acceleration(self, z, v, push: float) -> tuple:
+    def acceleration(self, z, v, drive: float) -> tuple:
         """Return the modal accelerations with and without the reactions.
 
         Parameters
@@ -137,8 +135,10 @@ class LinearPhase:
         with_reactions, without_reactions : ndarray
             (n,) [m s-2].
         """
-        pull = -self.square @ z - self.dampers @ v - self.run.modes.base * push - self.given
-        return self.project @ pull, pull
+        free_acceleration = (
+            -self.square @ z - self.dampers @ v - self.run.modes.base * drive - self.given
+        )
+        return self.project @ free_acceleration, free_acceleration
 
     def saltation(self, later: "LinearPhase") -> tuple:
         """Return the saltation matrix of the event at the end.
@@ -149,71 +149,76 @@ class LinearPhase:
         modes = self.run.modes
         n = len(self.square)
         row = later.row
-        z = row[ROW.motion : ROW.motion + n]
-        v = row[ROW.motion + n : ROW.motion + 2 * n]
-        part = run.drive.segments[0]
-        push = part.constant + part.amplitude * np.sin(row[ROW.phase])
-        rise = part.amplitude * part.omega * np.cos(row[ROW.phase])
-        before, pull = self.acceleration(z, v, push)
+        z = row[Row.MOTION : Row.MOTION + n]
+        v = row[Row.MOTION + n : Row.MOTION + 2 * n]
+        segment = run.drive.segments[0]
+        drive = segment.constant + segment.amplitude * np.sin(row[Row.PHASE])
+        drive_rate = segment.amplitude * segment.omega * np.cos(row[Row.PHASE])
+        before, free_acceleration = self.acceleration(z, v, drive)
         changed = self.signs != later.signs
-        face, stops = _identify_event(self, later, changed, modes.mass * pull @ self.pinv)
+        interface, stops = _identify_event(
+            self, later, changed, modes.mass * free_acceleration @ self.pinv
+        )
         gradient = np.zeros(2 * n)
-        static = run.table.static_limit[face]
-        kinetic = run.table.kinetic_limit[face]
+        static = run.table.static_limit[interface]
+        kinetic = run.table.kinetic_limit[interface]
         if stops:
-            gradient[n:] = run.modal_system.interfaces[face]
-            speed = float(run.modal_system.interfaces[face] @ before)
+            gradient[n:] = run.modal_system.interfaces[interface]
+            speed = float(run.modal_system.interfaces[interface] @ before)
         else:
-            react = self.pinv[:, np.flatnonzero(self.held) == face][:, 0]
-            gradient[:n] = -react @ self.square
-            gradient[n:] = -react @ self.dampers
-            speed = float(gradient[:n] @ v + gradient[n:] @ before - react @ modes.base * rise)
+            reaction_row = self.pinv[:, np.flatnonzero(self.held) == interface][:, 0]
+            gradient[:n] = -reaction_row @ self.square
+            gradient[n:] = -reaction_row @ self.dampers
+            speed = float(
+                gradient[:n] @ v + gradient[n:] @ before - reaction_row @ modes.base * drive_rate
+            )
         jump = np.zeros(2 * n)
         if stops or static != kinetic:  # else nothing jumps at a release
-            jump[n:] = before - later.acceleration(z, v, push)[0]
-        out = later.taken_out()
+            jump[n:] = before - later.acceleration(z, v, drive)[0]
+        matrix = later.taken_out()
         if speed != 0:
-            out -= np.outer(out @ jump, gradient) / speed
-        others = [
-            a not in (0, b) for f, (a, b) in enumerate(zip(self.signs, later.signs)) if f != face
-        ]
-        return out, not any(others)
+            matrix -= np.outer(matrix @ jump, gradient) / speed
+        changes = (self.signs != 0) & (self.signs != later.signs)
+        changes[interface] = False
+        return matrix, not changes.any()
 
 
-def exponentiate_modal_matrix(left) -> np.ndarray:
+def exponentiate_modal_matrix(matrix) -> np.ndarray:
     """Return the exponential of a small matrix (2n, 2n) of coordinates and rates.
 
     Taylor's series of 2^-s of the matrix, squared s times. SciPy's function starts the threads of
     its linear algebra, which takes up to milliseconds for two rows.
     """
-    half = len(left) // 2
-    sizes = np.abs(left)
+    n = len(matrix) // 2
+    sizes = np.abs(matrix)
     # of rates
-    scale = np.sqrt(max(float(sizes.max()), 1e-300) / max(float(sizes[:half].max()), 1e-300))
-    weight = np.repeat([scale, 1.0], half)
-    even = left * (weight[:, None] / weight)
-    times = max(0, int(np.ceil(np.log2(max(float(np.abs(even).sum(axis=0).max()), 1e-300)))) + 1)
-    even = even / 2.0**times
-    out = np.eye(len(left))
+    scale = np.sqrt(max(float(sizes.max()), 1e-300) / max(float(sizes[:n].max()), 1e-300))
+    weight = np.repeat([scale, 1.0], n)
+    balanced = matrix * (weight[:, None] / weight)
+    n_squarings = max(
+        0, int(np.ceil(np.log2(max(float(np.abs(balanced).sum(axis=0).max()), 1e-300)))) + 1
+    )
+    balanced = balanced / 2.0**n_squarings
+    exponential = np.eye(len(matrix))
     for k in range(16, 0, -1):
-        out = np.eye(len(left)) + even @ out / k
-    for _ in range(times):
-        out = out @ out
-    return out * (weight / weight[:, None])
+        exponential = np.eye(len(matrix)) + balanced @ exponential / k
+    for _ in range(n_squarings):
+        exponential = exponential @ exponential
+    return exponential * (weight / weight[:, None])
 
 
-def _identify_event(one: LinearPhase, later: LinearPhase, changed, reactions) -> tuple:
+def _identify_event(phase: LinearPhase, next_phase: LinearPhase, changed, reactions) -> tuple:
     """Return the interface of the event between two phases and whether its slip stopped.
 
     reactions: (h,) [N] of the sticking interfaces.
     """
-    turned = np.flatnonzero(changed & (one.signs != 0))
-    if turned.size:
-        return int(turned[0]), True
-    limits = one.run.table.static_limit[one.held]
-    near = np.abs(np.abs(reactions) / np.maximum(limits, 1e-300) - 1)
-    near[~changed[one.held]] = np.inf
-    return int(np.flatnonzero(one.held)[int(np.argmin(near))]), False
+    stopped = np.flatnonzero(changed & (phase.signs != 0))
+    if stopped.size:
+        return int(stopped[0]), True
+    limits = phase.run.table.static_limit[phase.held]
+    distance_to_limit = np.abs(np.abs(reactions) / np.maximum(limits, 1e-300) - 1)
+    distance_to_limit[~changed[phase.held]] = np.inf
+    return int(np.flatnonzero(phase.held)[int(np.argmin(distance_to_limit))]), False
 
 
 def map_period(modes: ModalBasis, drive, groups, state, periods: int = 1) -> CoulombPeriodMapping:
@@ -239,38 +244,37 @@ def map_period(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Cou
     run = histories.start_event_run(
         modes, drive, groups, periods, periods, start=InitialState(state[:n], state[n:])
     )
-    kept = []
-    run.run_to(periods, lambda done: kept.append(done.copy()))
-    rows = np.concatenate(kept)
-    begins = [0, *(k for k in np.flatnonzero(rows[:, ROW.begin] >= BEGIN.stick_or_slip) if k)]
-    parts = [
-        LinearPhase(run, rows[a], None, float(rows[a:b, ROW.duration].sum()))
-        for a, b in zip(begins, [*begins[1:], len(rows)])
-    ]
-    slope = parts[0].slope()
-    alone = True
-    for before, after in pairwise(parts):
+    collected_rows = []
+    run.run_to(periods, lambda rows: collected_rows.append(rows.copy()))
+    rows = np.concatenate(collected_rows)
+    borders = np.flatnonzero(rows[1:, Row.BEGIN] >= BEGIN.stick_or_slip) + 1
+    phases = []
+    for first, end in pairwise([0, *borders.tolist(), len(rows)]):
+        phases.append(LinearPhase(run, rows[first], float(rows[first:end, Row.DURATION].sum())))
+    slope = phases[0].slope()
+    has_single_events = True
+    for before, after in pairwise(phases):
         if np.any(before.signs != after.signs):
-            jump, own = before.saltation(after)
-            slope = jump @ slope
-            alone = alone and own
+            saltation, is_single = before.saltation(after)
+            slope = saltation @ slope
+            has_single_events = has_single_events and is_single
         slope = after.slope() @ slope
     owner = np.repeat(np.arange(len(rows)), 3)
     dense = run.evaluate_rows(
-        rows, owner, np.tile([0.0, 0.5, 1.0], len(rows)) * rows[owner, ROW.duration]
+        rows, owner, np.tile([0.0, 0.5, 1.0], len(rows)) * rows[owner, Row.DURATION]
     )
-    sizes = [max(float(np.abs(part).max()), 1e-300) for part in (dense[:, :n], dense[:, n : 2 * n])]
-    low = run.run_sums.extremes[:, 0].min()
-    high = run.run_sums.extremes[:, 1].max()
+    magnitudes = np.abs(dense[:, : 2 * n]).max(axis=0)
+    sizes = [max(float(half.max()), 1e-300) for half in (magnitudes[:n], magnitudes[n:])]
+    extremes = run.run_sums.extremes
     return CoulombPeriodMapping(
         run.motion.ravel().copy(),
         slope,
-        np.array([part.signs for part in parts]),
+        np.array([phase.signs for phase in phases]),
         run.table.static_limit > 0,
-        float(high - low) / 2,
+        float(extremes[:, 1].max() - extremes[:, 0].min()) / 2,
         np.repeat(sizes, n),
-        parts[0].project,
-        alone,
+        phases[0].project,
+        has_single_events,
     )
 
 
@@ -341,14 +345,14 @@ class CoulombShooting(Shooting):
 
     def map_point(self, point) -> MappedPoint:
         """Return the map of a state (2n,)."""
-        found = map_period(self.modes, self.drive, self.groups, point, self.periods)
+        mapping = map_period(self.modes, self.drive, self.groups, point, self.periods)
         return MappedPoint(
             point,
-            found,
-            found.slope,
-            found.sizes,
-            (point - found.end) / found.sizes,
-            found.sizes[0] / self.moved_by,
+            mapping,
+            mapping.slope,
+            mapping.sizes,
+            (point - mapping.end) / mapping.sizes,
+            mapping.sizes[0] / self.moved_by,
         )
 
     def step_from(self, mapped_point: MappedPoint, step):
@@ -373,14 +377,13 @@ class CoulombShooting(Shooting):
 
 
 def _make_steady(mapped_point: MappedPoint, n: int, regime, used: int) -> CoulombSteadyState:
-    one = mapped_point.image
+    mapping = mapped_point.image
     state = mapped_point.point
-    stops = tuple(
-        int(k) for k in np.count_nonzero((one.signs[:-1] != 0) & (one.signs[1:] == 0), axis=0)
-    )
+    is_stop = (mapping.signs[:-1] != 0) & (mapping.signs[1:] == 0)
+    stops = tuple(np.count_nonzero(is_stop, axis=0).tolist())
     if regime is None:
-        signs = one.signs[:, one.rubs]
-        most = max(stops)
+        signs = mapping.signs[:, mapping.rubs]
+        max_stops = max(stops)
         slips = bool(np.any(signs != 0)) or signs.shape[1] == 0
         rests = bool(np.any(signs == 0))
         if not slips:
@@ -388,14 +391,14 @@ def _make_steady(mapped_point: MappedPoint, n: int, regime, used: int) -> Coulom
         elif not rests:
             regime = "sliding"
         else:
-            regime = f"{most} stop{'s' if most != 1 else ''}"
+            regime = f"{max_stops} stop{'s' if max_stops != 1 else ''}"
     return CoulombSteadyState(
         InitialState(frozen_array(state[:n]), frozen_array(state[n:])),
         mapped_point.max_residual,
         frozen_array(mapped_point.multipliers(), complex),
-        one.swing,
+        mapping.swing,
         regime,
         stops,
-        one.alone,
+        mapping.alone,
         used,
     )

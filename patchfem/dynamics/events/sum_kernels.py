@@ -3,12 +3,12 @@
 from math import cos, pi, sin
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .positions_kernels import LEDGER, TIME
+from ...friction.flags_kernels import NJIT_INLINE
+from .positions_kernels import Ledger, Time
 from .series_kernels import GAUSS_POINTS, GAUSS_WEIGHTS, count_gauss_points, evaluate_polynomial
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def evaluate_at_four(poly, low, top, u):
     """Return the values of a polynomial at four points, as `evaluate_polynomial` does.
 
@@ -29,15 +29,15 @@ def evaluate_at_four(poly, low, top, u):
     """
     a = b = c = d = poly[top]
     for k in range(top - 1, low - 1, -1):
-        part = poly[k]
-        a = a * u[0] + part
-        b = b * u[1] + part
-        c = c * u[2] + part
-        d = d * u[3] + part
+        coefficient = poly[k]
+        a = a * u[0] + coefficient
+        b = b * u[1] + coefficient
+        c = c * u[2] + coefficient
+        d = d * u[3] + coefficient
     return a, b, c, d
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_INLINE)
 def evaluate_rates_at_four(coefs, i, top, u):
     """Return the derivatives of a coordinate with respect to u at four points.
 
@@ -58,37 +58,35 @@ def evaluate_rates_at_four(coefs, i, top, u):
     """
     a = b = c = d = top * coefs[top, i]
     for k in range(top - 1, 0, -1):
-        part = k * coefs[k, i]
-        a = a * u[0] + part
-        b = b * u[1] + part
-        c = c * u[2] + part
-        d = d * u[3] + part
+        coefficient = k * coefs[k, i]
+        a = a * u[0] + coefficient
+        b = b * u[1] + coefficient
+        c = c * u[2] + coefficient
+        d = d * u[3] + coefficient
     return a, b, c, d
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def add_piece_sums(x, u, h, top, modal_system, time_state, run_sums, workspace):
+@njit(**NJIT_INLINE)
+def add_piece_sums(u, piece, run):
     """Add drive work, viscous loss and output phasor of a piece up to u to the sums.
 
     Four points are evaluated at a time, in registers.
 
     Parameters
     ----------
-    x : float
-        Duration of the piece times the fastest rate.
     u : float
         Fraction of the piece.
-    h : float
-        Duration of the piece [s].
-    top : int
-        Highest power of the series.
-    modal_system : ModalSystem
-    time_state : TimeState
-    run_sums : RunSums
-    workspace : Workspace
+    piece : Piece
+    run : RunArrays
     """
+    h = piece.duration
+    top = piece.top
+    modal_system = run.modal_system
+    time_state = run.time_state
+    run_sums = run.sums
+    workspace = run.workspace
     n = len(modal_system.omega_squared)
-    count = count_gauss_points(x * u)
+    count = count_gauss_points(piece.rate * piece.duration * u)
     ledger = run_sums.ledger
     nodes = workspace.rates
     work = 0.0
@@ -133,20 +131,20 @@ def add_piece_sums(x, u, h, top, modal_system, time_state, run_sums, workspace):
         )
         work += power[0] + power[1] + power[2] + power[3]
         power_size += abs(power[0]) + abs(power[1]) + abs(power[2]) + abs(power[3])
-    ledger[LEDGER.drive_work] += modal_system.mass * u * work
-    ledger[LEDGER.viscous_loss] += modal_system.mass * u * loss / h
-    ledger[LEDGER.drive_power] += modal_system.mass * u * power_size
-    cycle = int(time_state.now[TIME.cycle])
+    ledger[Ledger.DRIVE_WORK] += modal_system.mass * u * work
+    ledger[Ledger.VISCOUS_LOSS] += modal_system.mass * u * loss / h
+    ledger[Ledger.DRIVE_POWER] += modal_system.mass * u * power_size
+    cycle = int(time_state.now[Time.CYCLE])
     if run_sums.is_phasor_wanted[cycle] == 1.0:
         for g in range(count):
-            share = u * GAUSS_POINTS[count, g]
-            at = time_state.now[TIME.offset] + h * share
-            out = 0.0
-            angle = 2 * pi * at / time_state.period[0]
+            fraction = u * GAUSS_POINTS[count, g]
+            time = time_state.now[Time.OFFSET] + h * fraction
+            output = 0.0
+            angle = 2 * pi * time / time_state.period[0]
             for i in range(n):
-                out += modal_system.output[i] * evaluate_polynomial(
-                    workspace.coefficients[:, i], 0, top, share
+                output += modal_system.output[i] * evaluate_polynomial(
+                    workspace.coefficients[:, i], 0, top, fraction
                 )
-            out *= 2 * u * h * GAUSS_WEIGHTS[count, g] / time_state.period[0]
-            run_sums.phasors[cycle, 0] += out * cos(angle)
-            run_sums.phasors[cycle, 1] -= out * sin(angle)
+            output *= 2 * u * h * GAUSS_WEIGHTS[count, g] / time_state.period[0]
+            run_sums.phasors[cycle, 0] += output * cos(angle)
+            run_sums.phasors[cycle, 1] -= output * sin(angle)

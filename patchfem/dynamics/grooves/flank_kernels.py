@@ -5,7 +5,7 @@ It is Coulomb's law, or a force that follows the speed.
 It is a law of `dynamics.smooth` that holds the interface at rest; its numbers are `LawNumbers`,
 its memory the last force [N]. Its states are the friction loss along the flank [J], and two whose
 rates alone count: what remains of the hold and of the normal force [N]. In stick,
-turn[TURN.direction] is 0.
+turn[Turn.DIRECTION] is 0.
 """
 
 from math import cos, inf, nan, sin, sqrt, tanh
@@ -14,7 +14,7 @@ from typing import NamedTuple
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
-from ..smooth.arrays import TURN
+from ..smooth.arrays import Turn
 
 # the law holds the relative displacement at rest
 IS_SET_VALUED = True
@@ -53,7 +53,7 @@ def find_flank_slope(numbers, q):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_hold_range(numbers, turn):
     """Return the smallest and largest force [N] with which the flank holds at rest."""
-    t = find_flank_slope(numbers, turn[TURN.slide])[0]
+    t = find_flank_slope(numbers, turn[Turn.SLIDE])[0]
     mu = numbers[LAW.static]
     load = numbers[LAW.load]
     return load * (t - mu) / (1 + mu * t), load * (t + mu) / (1 - mu * t)
@@ -68,11 +68,11 @@ def release_direction(numbers, turn):
     if numbers[LAW.speed] > 0:
         return (
             1.0
-            if turn[TURN.free_acceleration] >= turn[TURN.inverse_mass] * turn[TURN.force]
+            if turn[Turn.FREE_ACCELERATION] >= turn[Turn.INVERSE_MASS] * turn[Turn.FORCE]
             else -1.0
         )
     low, high = find_hold_range(numbers, turn)
-    return 1.0 if turn[TURN.force] > high else -1.0 if turn[TURN.force] < low else 0.0
+    return 1.0 if turn[Turn.FORCE] > high else -1.0 if turn[Turn.FORCE] < low else 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -113,7 +113,7 @@ def state_rates(numbers, memory, turn, dq, v, y, out):
     memory : ndarray
         (1,) the last force [N].
     turn : ndarray
-        (10,) see `smooth.arrays.TurnPositions`.
+        (10,) see `smooth.arrays.Turn`.
     dq : float
         Path since the start of the motion in this direction [m].
     v : float
@@ -127,36 +127,36 @@ def state_rates(numbers, memory, turn, dq, v, y, out):
     -------
     float
     """
-    steep, bend = find_flank_slope(numbers, turn[TURN.slide])
+    steep, bend = find_flank_slope(numbers, turn[Turn.SLIDE])
     load = numbers[LAW.load]
-    free = turn[TURN.free_acceleration]
-    share = turn[TURN.inverse_mass]
+    free = turn[Turn.FREE_ACCELERATION]
+    share = turn[Turn.INVERSE_MASS]
     heavy = numbers[LAW.lifted_mass]
     out[1] = 1.0
     normal = load
-    if turn[TURN.direction] == 0.0 and numbers[LAW.speed] == 0.0:
-        turn[TURN.force] = free / share
+    if turn[Turn.DIRECTION] == 0.0 and numbers[LAW.speed] == 0.0:
+        turn[Turn.FORCE] = free / share
         out[0] = 0.0
         low, high = find_hold_range(numbers, turn)
-        out[1] = min(high - turn[TURN.force], turn[TURN.force] - low)
+        out[1] = min(high - turn[Turn.FORCE], turn[Turn.FORCE] - low)
     else:
-        phi = turn[TURN.direction] * numbers[LAW.kinetic]
+        phi = turn[Turn.DIRECTION] * numbers[LAW.kinetic]
         if numbers[LAW.speed] > 0:
             phi = numbers[LAW.static] * tanh(sqrt(1 + steep * steep) * v / numbers[LAW.speed])
         ratio = (steep + phi) / (1 - phi * steep)
-        turn[TURN.force] = (
+        turn[Turn.FORCE] = (
             ratio
             * (load + heavy * (bend * v * v + steep * free))
             / (1 + heavy * steep * ratio * share)
         )
-        normal += heavy * (steep * (free - share * turn[TURN.force]) + bend * v * v)
+        normal += heavy * (steep * (free - share * turn[Turn.FORCE]) + bend * v * v)
         out[0] = phi * (1 + steep * steep) / (1 - phi * steep) * normal * v
     out[2] = normal
-    turn[TURN.normal_force] = normal
-    if turn[TURN.direction] == 0.0:
-        turn[TURN.release_direction] = release_direction(numbers, turn)
-    memory[0] = turn[TURN.force]
-    return turn[TURN.force]
+    turn[Turn.NORMAL_FORCE] = normal
+    if turn[Turn.DIRECTION] == 0.0:
+        turn[Turn.RELEASE_DIRECTION] = release_direction(numbers, turn)
+    memory[0] = turn[Turn.FORCE]
+    return turn[Turn.FORCE]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -195,7 +195,7 @@ def end_motion(numbers, memory, turn, dq, v, y):
     memory : ndarray
         (1,) the last force [N].
     turn : ndarray
-        (10,) see `smooth.arrays.TurnPositions`.
+        (10,) see `smooth.arrays.Turn`.
     dq : float
         Path since the start of the motion in this direction [m].
     v : float

@@ -16,7 +16,7 @@ from ...friction.protocol import Element
 from ..ledger import LEDGER
 from ..march.models import coulomb_model
 from ..smooth import run as smooth
-from ..smooth.arrays import COUNT, SCALAR, WORK
+from ..smooth.arrays import Counter, Scalar, Work
 from .climbing import FlankModel, GroovesRun, check_lifted_mass
 
 # relative tolerance of a step
@@ -133,10 +133,10 @@ class SampledRun(GroovesRun):
         )
         self.smooth_motion.request_last_phasors(1)
         n = self.modes.omega.size
-        least = self.smooth_motion.arrays.work[WORK.sizes]
+        least = self.smooth_motion.arrays.work[Work.SIZES]
         least[:n] = REST_RATIO / g.wave_number
         least[n : 2 * n] = (
-            REST_RATIO / g.wave_number * self.smooth_motion.arrays.scalars[SCALAR.fastest_rate]
+            REST_RATIO / g.wave_number * self.smooth_motion.arrays.scalars[Scalar.FASTEST_RATE]
         )
         self.booked = self._read_sums()
 
@@ -149,7 +149,9 @@ class SampledRun(GroovesRun):
         y = self.smooth_motion.arrays.state
         own = self.smooth_motion.record.counters
         n = 2 * self.modes.omega.size
-        return np.array([y[-3], y[-2], own[COUNT.drive_power], y[n], own[COUNT.accepted], y[-1]])
+        return np.array(
+            [y[-3], y[-2], own[Counter.DRIVE_POWER], y[n], own[Counter.ACCEPTED], y[-1]]
+        )
 
     def fork(self, drive):
         """Return an independent copy, like `Run.fork`."""
@@ -207,7 +209,7 @@ class SampledRun(GroovesRun):
         sums = self._read_sums()
         self.ledger[LEDGER_SUMS] += sums - self.booked
         self.ledger[LEDGER.max_stored] = max(
-            self.ledger[LEDGER.max_stored], motion.record.counters[COUNT.max_stored]
+            self.ledger[LEDGER.max_stored], motion.record.counters[Counter.MAX_STORED]
         )
         self.booked = sums
         return last, status

@@ -27,5 +27,6 @@ to 12 ns for bonds and LuGre, 25 to 40 ns for Iwan and Jenkins elements, 200 ns 
 to 4 us, and 20 us for Bouc-Wen.
 
 In: `run.Cases`. Out: `run.Marched`, from which `reading` computes what the engine `events` reads of its runs. Read
-`rigid_kernels` first, which is the pattern of a law, then `lane_kernels`, `loop_kernels` and `run`.
+`rigid_kernels` first, which is the pattern of a law, then `rows_kernels` (the workspace), `lane_kernels`, `loop_kernels`
+and `run`.
 """

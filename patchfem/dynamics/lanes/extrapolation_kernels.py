@@ -19,6 +19,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from ...compiled.jit import njit
+from ...friction.flags_kernels import NJIT_INLINE
 from . import lane_kernels as lanes
 from . import rigid_kernels as law
 from .rows_kernels import (
@@ -26,17 +27,12 @@ from .rows_kernels import (
     CYCLE_ENDS,
     LANES,
     LAW_STATE,
-    MAX_SLIDE,
-    MEMORY,
-    MIN_SLIDE,
     N_CYCLE_ENDS,
-    NJIT_INLINE,
     PERIODIC_TOL,
-    SLIDE,
-    SLIP_SIGN,
-    SPEED,
     STATE_ROWS,
     SUM_ROWS,
+    At,
+    CycleEnd,
 )
 
 # The motion is near a periodic one if a cycle changes its state by less than this fraction of the range.
@@ -49,10 +45,6 @@ SUM_TOL = 1e-6
 PARALLEL_TOL = 1e-6
 # Numbers of a cycle in the history: its extremes and its phasor.
 N_HISTORY = 4
-# Places of the sign of the slip and of the first sum in a cycle end.
-SIGN_PLACE = STATE_ROWS.index(SLIP_SIGN)
-SUMS_PLACE = len(STATE_ROWS)
-LAW_PLACE = len(STATE_ROWS) + len(SUM_ROWS)
 
 
 class CycleMap(NamedTuple):
@@ -72,15 +64,34 @@ class Changes(NamedTuple):
 
 
 @njit(**NJIT_INLINE)
-def last_changes(row, place, workspace, lane):
-    """Return the last `Changes` of a row of the workspace.
+def cycle_end_element(k, place, lane):
+    """Return the element of the workspace with a number of a cycle end.
 
     Parameters
     ----------
-    row : int
-        Row of the workspace.
+    k : int
+        0 for the latest cycle end.
     place : int
-        Index of the row in the end of a cycle.
+        Place of the number (`rows_kernels.CycleEnd`).
+    lane : int
+
+    Returns
+    -------
+    int
+    """
+    return (CYCLE_ENDS + k * CYCLE_END_SIZE + place) * LANES + lane
+
+
+@njit(**NJIT_INLINE)
+def last_changes(value, place, workspace, lane):
+    """Return the last `Changes` of a number.
+
+    Parameters
+    ----------
+    value : float
+        Present value of the number.
+    place : int
+        Place of the number in the end of a cycle (`rows_kernels.CycleEnd`).
     workspace, lane
         See `rigid_kernels.friction_force`.
 
@@ -88,30 +99,27 @@ def last_changes(row, place, workspace, lane):
     -------
     Changes
     """
-    last = workspace[(CYCLE_ENDS + place) * LANES + lane]
-    second = workspace[(CYCLE_ENDS + CYCLE_END_SIZE + place) * LANES + lane]
-    third = workspace[(CYCLE_ENDS + 2 * CYCLE_END_SIZE + place) * LANES + lane]
-    return Changes(workspace[row * LANES + lane] - last, last - second, second - third)
+    last = workspace[cycle_end_element(0, place, lane)]
+    second = workspace[cycle_end_element(1, place, lane)]
+    third = workspace[cycle_end_element(2, place, lane)]
+    return Changes(value - last, last - second, second - third)
 
 
 @njit(**NJIT_INLINE)
 def push_cycle_end(lane, workspace):
     """Store the present cycle end in front of those of the cycles before."""
     for k in range(N_CYCLE_ENDS - 1, 0, -1):
-        for n in range(LAW_PLACE + law.N_KEPT):
-            workspace[(CYCLE_ENDS + k * CYCLE_END_SIZE + n) * LANES + lane] = workspace[
-                (CYCLE_ENDS + (k - 1) * CYCLE_END_SIZE + n) * LANES + lane
-            ]
+        for n in range(CycleEnd.LAW_STATE + law.N_KEPT):
+            older = workspace[cycle_end_element(k - 1, n, lane)]
+            workspace[cycle_end_element(k, n, lane)] = older
     for n in range(len(STATE_ROWS)):
-        workspace[(CYCLE_ENDS + n) * LANES + lane] = workspace[STATE_ROWS[n] * LANES + lane]
+        workspace[cycle_end_element(0, n, lane)] = workspace[STATE_ROWS[n] * LANES + lane]
     for n in range(len(SUM_ROWS)):
-        workspace[(CYCLE_ENDS + SUMS_PLACE + n) * LANES + lane] = workspace[
-            SUM_ROWS[n] * LANES + lane
-        ]
+        value = workspace[SUM_ROWS[n] * LANES + lane]
+        workspace[cycle_end_element(0, CycleEnd.SLIP_PATH + n, lane)] = value
     for n in range(law.N_KEPT):
-        workspace[(CYCLE_ENDS + LAW_PLACE + n) * LANES + lane] = workspace[
-            (LAW_STATE + n) * LANES + lane
-        ]
+        value = workspace[(LAW_STATE + n) * LANES + lane]
+        workspace[cycle_end_element(0, CycleEnd.LAW_STATE + n, lane)] = value
 
 
 @njit(**NJIT_INLINE)
@@ -129,10 +137,10 @@ def has_cut_extremes(lane, workspace, lowest, highest):
     -------
     bool
     """
-    x = workspace[SLIDE * LANES + lane]
-    start = workspace[CYCLE_ENDS * LANES + lane]
-    start_speed = workspace[(CYCLE_ENDS + 1) * LANES + lane]
-    ends_cut = workspace[SPEED * LANES + lane] != 0.0 and (x == lowest or x == highest)
+    x = workspace[At.SLIDE + lane]
+    start = workspace[cycle_end_element(0, CycleEnd.SLIDE, lane)]
+    start_speed = workspace[cycle_end_element(0, CycleEnd.SPEED, lane)]
+    ends_cut = workspace[At.SPEED + lane] != 0.0 and (x == lowest or x == highest)
     starts_cut = start_speed != 0.0 and (start == lowest or start == highest)
     return ends_cut or starts_cut
 
@@ -156,17 +164,17 @@ def fit_cycle_map(lane, workspace, history, size):
     CycleMap
     """
     n_done = len(history)
-    x = last_changes(SLIDE, 0, workspace, lane)
-    v = last_changes(SPEED, 1, workspace, lane)
-    p = last_changes(MEMORY, 2, workspace, lane)
+    x = last_changes(workspace[At.SLIDE + lane], CycleEnd.SLIDE, workspace, lane)
+    v = last_changes(workspace[At.SPEED + lane], CycleEnd.SPEED, workspace, lane)
+    p = last_changes(workspace[At.MEMORY + lane], CycleEnd.MEMORY, workspace, lane)
     is_near = (
         max(abs(x.last), abs(v.last)) < MAX_CYCLE_CHANGE * size
         and law.can_extrapolate(workspace, lane)
         and not has_cut_extremes(lane, workspace, history[n_done - 1, 0], history[n_done - 1, 1])
     )
     for n in range(N_CYCLE_ENDS):
-        sign = workspace[(CYCLE_ENDS + n * CYCLE_END_SIZE + SIGN_PLACE) * LANES + lane]
-        is_near = is_near and sign == workspace[SLIP_SIGN * LANES + lane]
+        sign = workspace[cycle_end_element(n, CycleEnd.SLIP_SIGN, lane)]
+        is_near = is_near and sign == workspace[At.SLIP_SIGN + lane]
     if not is_near:
         return CycleMap(0.0, 0.0, False)
     cross = x.second * v.third - v.second * x.third
@@ -191,15 +199,15 @@ def fit_cycle_map(lane, workspace, history, size):
     fraction = (1 - slow) * (1 - slow * slow)
     is_sure = slow < 1.0 and miss < STATE_TOL * size * fraction
     for n in range(len(SUM_ROWS)):
-        change = last_changes(SUM_ROWS[n], SUMS_PLACE + n, workspace, lane)
+        value = workspace[SUM_ROWS[n] * LANES + lane]
+        change = last_changes(value, CycleEnd.SLIP_PATH + n, workspace, lane)
         fourth = (
-            workspace[(CYCLE_ENDS + 2 * CYCLE_END_SIZE + SUMS_PLACE + n) * LANES + lane]
-            - workspace[(CYCLE_ENDS + 3 * CYCLE_END_SIZE + SUMS_PLACE + n) * LANES + lane]
+            workspace[cycle_end_element(2, CycleEnd.SLIP_PATH + n, lane)]
+            - workspace[cycle_end_element(3, CycleEnd.SLIP_PATH + n, lane)]
         )
         second = change.second - change.third
         miss = abs(change.last - change.second - a * second - b * (change.third - fourth))
-        value = abs(workspace[SUM_ROWS[n] * LANES + lane])
-        is_sure = is_sure and miss <= SUM_TOL * value * fraction * (1 - slow)
+        is_sure = is_sure and miss <= SUM_TOL * abs(value) * fraction * (1 - slow)
     return CycleMap(a, b, is_sure)
 
 
@@ -240,11 +248,16 @@ def extrapolate_cycles(lane, workspace, history, n_done, until):
     e = 0.0
     f = 0.0
     n = 0
-    x = last_changes(SLIDE, 0, workspace, lane)
-    v = last_changes(SPEED, 1, workspace, lane)
+    x = last_changes(workspace[At.SLIDE + lane], CycleEnd.SLIDE, workspace, lane)
+    v = last_changes(workspace[At.SPEED + lane], CycleEnd.SPEED, workspace, lane)
     is_moving = True
     while is_moving:
-        p, q, p_before, q_before = a * p + b * p_before, a * q + b * q_before, p, q
+        p_next = a * p + b * p_before
+        q_next = a * q + b * q_before
+        p_before = p
+        q_before = q
+        p = p_next
+        q = q_next
         c += p
         d += q
         e += c
@@ -258,12 +271,14 @@ def extrapolate_cycles(lane, workspace, history, n_done, until):
         change = max(abs(p * x.last + q * x.second), abs(p * v.last + q * v.second))
         is_moving = n_done + n < until and change > PERIODIC_TOL * size
     for m in range(len(SUM_ROWS)):
-        sums = last_changes(SUM_ROWS[m], SUMS_PLACE + m, workspace, lane)
+        value = workspace[SUM_ROWS[m] * LANES + lane]
+        sums = last_changes(value, CycleEnd.SLIP_PATH + m, workspace, lane)
         change = e * (sums.last - sums.second) + f * (sums.second - sums.third)
         workspace[SUM_ROWS[m] * LANES + lane] += n * sums.last + change
     predict_next_end(lane, workspace, (c, d), (a * p + b * p_before, a * q + b * q_before))
     for m in range(law.N_KEPT):
-        number = last_changes(LAW_STATE + m, LAW_PLACE + m, workspace, lane)
+        value = workspace[(LAW_STATE + m) * LANES + lane]
+        number = last_changes(value, CycleEnd.LAW_STATE + m, workspace, lane)
         workspace[(LAW_STATE + m) * LANES + lane] += c * number.last + d * number.second
     lanes.start_cycle(lane, workspace)
     law.restore_derived_state(workspace, lane)
@@ -282,25 +297,27 @@ def predict_next_end(lane, workspace, change, next_change):
         Factors of the last two changes of the state, which give its change up to here and in the next cycle.
     """
     for m in range(len(STATE_ROWS) - 1):
-        number = last_changes(STATE_ROWS[m], m, workspace, lane)
+        number = last_changes(workspace[STATE_ROWS[m] * LANES + lane], m, workspace, lane)
         workspace[STATE_ROWS[m] * LANES + lane] += (
             change[0] * number.last + change[1] * number.second
         )
-        workspace[(CYCLE_ENDS + m) * LANES + lane] = (
+        workspace[cycle_end_element(0, m, lane)] = (
             workspace[STATE_ROWS[m] * LANES + lane]
             + next_change[0] * number.last
             + next_change[1] * number.second
         )
-    workspace[(CYCLE_ENDS + SUMS_PLACE) * LANES + lane] = workspace[SUM_ROWS[0] * LANES + lane]
+    workspace[cycle_end_element(0, CycleEnd.SLIP_PATH, lane)] = workspace[
+        SUM_ROWS[0] * LANES + lane
+    ]
 
 
 @njit(**NJIT_INLINE)
 def confirms_extrapolation(lane, workspace):
     """Return whether the cycle after an extrapolation ends as the map predicts."""
-    size = workspace[MAX_SLIDE * LANES + lane] - workspace[MIN_SLIDE * LANES + lane]
+    size = workspace[At.MAX_SLIDE + lane] - workspace[At.MIN_SLIDE + lane]
     confirms = True
     for m in range(len(STATE_ROWS) - 1):
-        predicted = workspace[(CYCLE_ENDS + m) * LANES + lane]
+        predicted = workspace[cycle_end_element(0, m, lane)]
         miss = abs(workspace[STATE_ROWS[m] * LANES + lane] - predicted)
         confirms = confirms and miss <= law.PROOF_TOL * size
     return confirms

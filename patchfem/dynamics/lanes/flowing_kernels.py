@@ -13,7 +13,7 @@ from math import cos, nan, sin
 from typing import NamedTuple
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
 from ...friction.laws import tanh_kernels as friction
 from .rigid_kernels import (
     PROOF_TOL,
@@ -27,30 +27,7 @@ from .rigid_kernels import (
     newton_on_cubic,
     prepare_step,
 )
-from .rows_kernels import (
-    BASE_GAIN,
-    DAMPING,
-    DRIVE,
-    LANES,
-    LAW_NUMBERS,
-    LAW_STATE,
-    LOOP_WORK,
-    LOOP_WORK_SIZE,
-    LOSS_SUM,
-    MAX_ACCELERATION,
-    MAX_FORCE,
-    MAX_SLIP,
-    MEMORY,
-    MIDPOINT_FACTOR,
-    MIN_SLIP,
-    NJIT_INLINE,
-    OUTPUT_GAIN,
-    SLIDE,
-    SLIP_SIGN,
-    SPEED,
-    STIFFNESS,
-    WORK_SUM,
-)
+from .rows_kernels import LANES, At, StretchAt
 
 __all__ = [
     "EVENT_KEEPS_STICK",
@@ -76,12 +53,6 @@ __all__ = [
 
 STICK_IS_RIGID = False
 EVENT_KEEPS_STICK = False
-# These rows are the state of the law.
-FRICTION = LAW_STATE  # friction over the mass [m]
-STRETCH_SQUARE = LAW_STATE + 1  # mean square of the stretches [m^2]
-STEP_WORK = LAW_STATE + 2  # friction work of the last step [m^2]
-IS_OBSERVED = LAW_STATE + 3  # 1 if the step is read
-N_LAW_STATE = 4
 N_KEPT = 2  # the friction and the mean square of the stretches follow the map of a cycle
 
 MAX_PARTS = 4  # a step has at most a reversal, and a kink on either side of it
@@ -121,8 +92,8 @@ class FirstEvent(NamedTuple):
 class LayerPlan(NamedTuple):
     """Division into parts of a step that passes through a layer of speeds.
 
-    - `flies`: whether the other forces drive the speed one way whatever the friction is; the parts are then equal in
-      speed, otherwise equal in angle.
+    - `flies`: whether the other forces drive the speed one way whatever the friction is; the parts
+      are then equal in speed, otherwise equal in angle.
     - `side`: sign of the acceleration without friction.
     - `n_parts`: largest number of parts.
     - `edge_speed`: speed at the edge of the layer.
@@ -152,15 +123,15 @@ def law_numbers(workspace, lane):
 
     The first number is not used.
     """
-    first = LAW_NUMBERS
+    first = At.LAW_NUMBERS + lane
     return (
         0.0,
-        workspace[first * LANES + lane],
-        workspace[(first + 1) * LANES + lane],
-        workspace[(first + 2) * LANES + lane],
-        workspace[(first + 3) * LANES + lane],
-        workspace[(first + 4) * LANES + lane],
-        workspace[(first + 5) * LANES + lane],
+        workspace[first],
+        workspace[first + LANES],
+        workspace[first + 2 * LANES],
+        workspace[first + 3 * LANES],
+        workspace[first + 4 * LANES],
+        workspace[first + 5 * LANES],
     )
 
 
@@ -255,7 +226,7 @@ def slip_increment(memory, event_memory, memory1, workspace, lane):
     -------
     float
     """
-    return workspace[STEP_WORK * LANES + lane]
+    return workspace[StretchAt.STEP_WORK + lane]
 
 
 @njit(**NJIT_INLINE)
@@ -303,9 +274,9 @@ def runge_kutta_step(workspace, lane, state, slip_sign, sines, angle):
     """
     x, v, f, z, q = state
     k = law_numbers(workspace, lane)
-    drive = workspace[DRIVE * LANES + lane]
-    damping = workspace[DAMPING * LANES + lane]
-    stiffness = workspace[STIFFNESS * LANES + lane]
+    drive = workspace[At.DRIVE + lane]
+    damping = workspace[At.DAMPING + lane]
+    stiffness = workspace[At.STIFFNESS + lane]
     half = angle / 2
     g = friction.rate_equation(k, z, v, slip_sign)[1] * v
     a = drive * sines[0] - damping * v - stiffness * x - f
@@ -340,12 +311,12 @@ def runge_kutta_step(workspace, lane, state, slip_sign, sines, angle):
 def set_derived_state(workspace, lane):
     """Set the friction of a lane from its state."""
     state = LaneState(
-        workspace[SLIDE * LANES + lane],
-        workspace[SPEED * LANES + lane],
-        workspace[SLIP_SIGN * LANES + lane],
-        workspace[MEMORY * LANES + lane],
+        workspace[At.SLIDE + lane],
+        workspace[At.SPEED + lane],
+        workspace[At.SLIP_SIGN + lane],
+        workspace[At.MEMORY + lane],
     )
-    workspace[FRICTION * LANES + lane] = friction_force(state, 0.0, workspace, lane)
+    workspace[StretchAt.FRICTION + lane] = friction_force(state, 0.0, workspace, lane)
 
 
 restore_derived_state = set_derived_state
@@ -355,11 +326,11 @@ restore_derived_state = set_derived_state
 def flow_state(workspace, lane):
     """Return the `FlowState` of a lane."""
     return FlowState(
-        workspace[SLIDE * LANES + lane],
-        workspace[SPEED * LANES + lane],
-        workspace[FRICTION * LANES + lane],
-        workspace[MEMORY * LANES + lane],
-        workspace[STRETCH_SQUARE * LANES + lane],
+        workspace[At.SLIDE + lane],
+        workspace[At.SPEED + lane],
+        workspace[StretchAt.FRICTION + lane],
+        workspace[At.MEMORY + lane],
+        workspace[StretchAt.STRETCH_SQUARE + lane],
     )
 
 
@@ -395,9 +366,9 @@ def try_step(workspace, lane, step, is_observed):
     -------
     TriedStep
     """
-    slip_sign = workspace[SLIP_SIGN * LANES + lane]
+    slip_sign = workspace[At.SLIP_SIGN + lane]
     state = flow_state(workspace, lane)
-    sines = (step.s0, workspace[MIDPOINT_FACTOR * LANES + lane] * (step.s0 + step.s1), step.s1)
+    sines = (step.s0, workspace[At.MIDPOINT_FACTOR + lane] * (step.s0 + step.s1), step.s1)
     end, work = runge_kutta_step(workspace, lane, state, slip_sign, sines, step.angle)
     if friction.HAS_SPEED_LAYER:
         edge_speed, width = speed_layer(law_numbers(workspace, lane), step.angle)
@@ -418,10 +389,10 @@ def try_step(workspace, lane, step, is_observed):
                 )
             )
         )
-    workspace[FRICTION * LANES + lane] = state.friction if event else end.friction
-    workspace[STRETCH_SQUARE * LANES + lane] = state.square if event else end.square
-    workspace[STEP_WORK * LANES + lane] = work
-    workspace[IS_OBSERVED * LANES + lane] = 1.0 if is_observed else 0.0
+    workspace[StretchAt.FRICTION + lane] = state.friction if event else end.friction
+    workspace[StretchAt.STRETCH_SQUARE + lane] = state.square if event else end.square
+    workspace[StretchAt.STEP_WORK + lane] = work
+    workspace[StretchAt.IS_OBSERVED + lane] = 1.0 if is_observed else 0.0
     return TriedStep(end.slide, end.speed, end.stretch, event)
 
 
@@ -461,9 +432,9 @@ def flow_acceleration(workspace, lane, state, sine):
         [m]
     """
     return (
-        workspace[DRIVE * LANES + lane] * sine
-        - workspace[DAMPING * LANES + lane] * state.speed
-        - workspace[STIFFNESS * LANES + lane] * state.slide
+        workspace[At.DRIVE + lane] * sine
+        - workspace[At.DAMPING + lane] * state.speed
+        - workspace[At.STIFFNESS + lane] * state.slide
         - state.friction
     )
 
@@ -590,9 +561,9 @@ def step_in_speed(workspace, lane, state, sine, cosine, end_speed):
     """
     x, v, f, z, q = state
     numbers = law_numbers(workspace, lane)
-    drive = workspace[DRIVE * LANES + lane]
-    damping = workspace[DAMPING * LANES + lane]
-    stiffness = workspace[STIFFNESS * LANES + lane]
+    drive = workspace[At.DRIVE + lane]
+    damping = workspace[At.DAMPING + lane]
+    stiffness = workspace[At.STIFFNESS + lane]
     half = (end_speed - v) / 2
     middle = v + half
     third = half / 3
@@ -629,11 +600,11 @@ def add_part_readings(workspace, lane, start, first, end, last, angle):
     angle : float
         [rad]
     """
-    output = workspace[OUTPUT_GAIN * LANES + lane]
-    base = workspace[BASE_GAIN * LANES + lane]
-    drive = workspace[DRIVE * LANES + lane]
-    damping = workspace[DAMPING * LANES + lane]
-    stiffness = workspace[STIFFNESS * LANES + lane]
+    output = workspace[At.OUTPUT_GAIN + lane]
+    base = workspace[At.BASE_GAIN + lane]
+    drive = workspace[At.DRIVE + lane]
+    damping = workspace[At.DAMPING + lane]
+    stiffness = workspace[At.STIFFNESS + lane]
     sine, cosine, a = first
     sine1, cosine1, a1 = last
     first_state = LaneState(start.slide, start.speed, SIGN_IN_LAYER, 0.0)
@@ -649,12 +620,10 @@ def add_part_readings(workspace, lane, start, first, end, last, angle):
     )
     force = cubic_peak(start.friction, end.friction, angle * rate, angle * rate1)
     work = 0.5 * (start.friction + end.friction) * (end.slide - start.slide)
-    workspace[MAX_ACCELERATION * LANES + lane] = max(
-        workspace[MAX_ACCELERATION * LANES + lane], peak
-    )
-    workspace[MAX_FORCE * LANES + lane] = max(workspace[MAX_FORCE * LANES + lane], force)
-    workspace[LOOP_WORK * LANES + lane] += work
-    workspace[LOOP_WORK_SIZE * LANES + lane] += abs(work)
+    workspace[At.MAX_ACCELERATION + lane] = max(workspace[At.MAX_ACCELERATION + lane], peak)
+    workspace[At.MAX_FORCE + lane] = max(workspace[At.MAX_FORCE + lane], force)
+    workspace[At.LOOP_WORK + lane] += work
+    workspace[At.LOOP_WORK_SIZE + lane] += abs(work)
 
 
 @njit(**NJIT_INLINE)
@@ -678,7 +647,7 @@ def count_layer_parts(workspace, lane, state, s0, s1, angle):
     """
     numbers = law_numbers(workspace, lane)
     edge_speed, width = speed_layer(numbers, angle)
-    sines = (s0, workspace[MIDPOINT_FACTOR * LANES + lane] * (s0 + s1), s1)
+    sines = (s0, workspace[At.MIDPOINT_FACTOR + lane] * (s0 + s1), s1)
     end, _ = runge_kutta_step(workspace, lane, state, SIGN_IN_LAYER, sines, angle)
     v = state.speed
     slowest = 0.0 if v * end.speed < 0.0 else min(abs(v), abs(end.speed))
@@ -704,9 +673,9 @@ def plan_layer_step(workspace, lane, state, step):
     LayerPlan
     """
     numbers = law_numbers(workspace, lane)
-    drive = workspace[DRIVE * LANES + lane]
-    damping = workspace[DAMPING * LANES + lane]
-    stiffness = workspace[STIFFNESS * LANES + lane]
+    drive = workspace[At.DRIVE + lane]
+    damping = workspace[At.DAMPING + lane]
+    stiffness = workspace[At.STIFFNESS + lane]
     edge_speed, width = speed_layer(numbers, step.angle)
     free = drive * step.s0 - damping * state.speed - stiffness * state.slide
     side = 1.0 if free > 0.0 else -1.0
@@ -781,14 +750,14 @@ def resolve_layer_step(workspace, lane, step):
     s = step.s0
     c = step.c0
     a = start_rate
-    done = 0.0
+    elapsed = 0.0
     work = 0.0
     event = 1.0
     event_slide = nan
     work_sum = 0.0
     loss_sum = 0.0
     for n in range(plan.n_parts):
-        rest = AngleStep(s, c, step.s1, step.c1, angle - done)
+        rest = AngleStep(s, c, step.s1, step.c1, angle - elapsed)
         part, is_last = next_layer_part(workspace, lane, state, rest, plan, n == plan.n_parts - 1)
         t = part.angle
         end = part.end
@@ -799,17 +768,17 @@ def resolve_layer_step(workspace, lane, step):
         v = state.speed
         v1 = end.speed
         a1 = flow_acceleration(workspace, lane, end, s2)
-        if workspace[IS_OBSERVED * LANES + lane] > 0.0:
+        if workspace[StretchAt.IS_OBSERVED + lane] > 0.0:
             add_part_readings(workspace, lane, state, (s, c, a), end, (s2, c2, a1), t)
         if v * v1 <= 0.0 and v != 0.0:
             place = hermite_root(v, v1, t * a, t * a1)
-            event = (done + place * t) / angle
+            event = (elapsed + place * t) / angle
             event_slide = hermite_cubic(state.slide, end.slide, t * v, t * v1, place)
         # Hermite's rule of the integrals of sin x' and x'^2 over the part.
         work_sum += t * (s * v + s2 * v1 + t / 6 * (c * v + s * a - c2 * v1 - s2 * a1)) / 2
         loss_sum += t * (v * v + v1 * v1 + t / 3 * (v * a - v1 * a1)) / 2
         work += part.work
-        done += t
+        elapsed += t
         state = end
         s = s2
         c = c2
@@ -821,15 +790,13 @@ def resolve_layer_step(workspace, lane, step):
     # The trapezoidal rule over the run adds the ends of this step, and its correction the ends of the run.
     work_ends = angle / 12 * (step.c1 * v1 + step.s1 * a - step.c0 * v - step.s0 * start_rate)
     loss_ends = angle / 6 * (v1 * a - v * start_rate)
-    workspace[WORK_SUM * LANES + lane] += (
-        work_sum / angle + work_ends - (step.s0 * v + step.s1 * v1) / 2
-    )
-    workspace[LOSS_SUM * LANES + lane] += loss_sum / angle + loss_ends - (v * v + v1 * v1) / 2
-    workspace[FRICTION * LANES + lane] = state.friction
-    workspace[STRETCH_SQUARE * LANES + lane] = state.square
-    workspace[STEP_WORK * LANES + lane] = work
+    workspace[At.WORK_SUM + lane] += work_sum / angle + work_ends - (step.s0 * v + step.s1 * v1) / 2
+    workspace[At.LOSS_SUM + lane] += loss_sum / angle + loss_ends - (v * v + v1 * v1) / 2
+    workspace[StretchAt.FRICTION + lane] = state.friction
+    workspace[StretchAt.STRETCH_SQUARE + lane] = state.square
+    workspace[StretchAt.STEP_WORK + lane] = work
     is_reversed = event_slide == event_slide
-    slip_sign = -workspace[SLIP_SIGN * LANES + lane]
+    slip_sign = -workspace[At.SLIP_SIGN + lane]
     if v1 != 0.0:
         slip_sign = 1.0 if v1 > 0.0 else -1.0
     if not is_reversed:
@@ -868,16 +835,16 @@ def resolve_step(workspace, lane, step):
         return resolve_layer_step(workspace, lane, step)
     numbers = law_numbers(workspace, lane)
     state = flow_state(workspace, lane)
-    first_sign = workspace[SLIP_SIGN * LANES + lane]
+    first_sign = workspace[At.SLIP_SIGN + lane]
     slip_sign = first_sign
     event = 1.0
     at_reversal = state
-    done = 0.0
+    elapsed = 0.0
     work = 0.0
     for part in range(MAX_PARTS):
-        rest = step.angle - done
-        sine = step.s0 * cos(done) + step.c0 * sin(done)
-        middle = done + rest / 2
+        rest = step.angle - elapsed
+        sine = step.s0 * cos(elapsed) + step.c0 * sin(elapsed)
+        middle = elapsed + rest / 2
         sines = (sine, step.s0 * cos(middle) + step.c0 * sin(middle), step.s1)
         end, part_work = runge_kutta_step(workspace, lane, state, slip_sign, sines, rest)
         first = find_first_event(workspace, lane, state, end, slip_sign, sines, rest)
@@ -887,8 +854,8 @@ def resolve_step(workspace, lane, step):
         if fraction > 0.0:
             reached = state
             for _ in range(1 + N_CORRECTIONS):
-                event_angle = done + fraction * rest
-                middle = done + fraction * rest / 2
+                event_angle = elapsed + fraction * rest
+                middle = elapsed + fraction * rest / 2
                 event_sine = step.s0 * cos(event_angle) + step.c0 * sin(event_angle)
                 sines = (sine, step.s0 * cos(middle) + step.c0 * sin(middle), event_sine)
                 reached, part_work = runge_kutta_step(
@@ -896,30 +863,30 @@ def resolve_step(workspace, lane, step):
                 )
                 v = reached.speed
                 z = reached.stretch
-                miss = z
+                distance = z
                 rate = friction.rate_equation(numbers, z, v, slip_sign)[1] * v
                 if first.is_reversal:
-                    miss = v
+                    distance = v
                     rate = flow_acceleration(workspace, lane, reached, event_sine)
-                if abs(miss) < rest * abs(rate):
-                    fraction = min(max(fraction - miss / (rest * rate), 0.0), 1.0)
+                if abs(distance) < rest * abs(rate):
+                    fraction = min(max(fraction - distance / (rest * rate), 0.0), 1.0)
             work += part_work
-            done = event_angle
+            elapsed = event_angle
             v = 0.0 if first.is_reversal else reached.speed
             z = reached.stretch if first.is_reversal else 0.0
             force = friction.rate_equation(numbers, z, v, slip_sign)[0]
             state = FlowState(reached.slide, v, force, z, reached.square)
-            if not first.is_reversal and workspace[IS_OBSERVED * LANES + lane] > 0.0:
+            if not first.is_reversal and workspace[StretchAt.IS_OBSERVED + lane] > 0.0:
                 slip = reached.slide
-                workspace[MAX_SLIP * LANES + lane] = max(workspace[MAX_SLIP * LANES + lane], slip)
-                workspace[MIN_SLIP * LANES + lane] = min(workspace[MIN_SLIP * LANES + lane], slip)
+                workspace[At.MAX_SLIP + lane] = max(workspace[At.MAX_SLIP + lane], slip)
+                workspace[At.MIN_SLIP + lane] = min(workspace[At.MIN_SLIP + lane], slip)
         if first.is_reversal:
             slip_sign = -slip_sign
-            event = done / step.angle
+            event = elapsed / step.angle
             at_reversal = state
-    workspace[FRICTION * LANES + lane] = end.friction
-    workspace[STRETCH_SQUARE * LANES + lane] = end.square
-    workspace[STEP_WORK * LANES + lane] = work + part_work
+    workspace[StretchAt.FRICTION + lane] = end.friction
+    workspace[StretchAt.STRETCH_SQUARE + lane] = end.square
+    workspace[StretchAt.STEP_WORK + lane] = work + part_work
     if slip_sign == first_sign:
         event = 1.0
         at_reversal = end

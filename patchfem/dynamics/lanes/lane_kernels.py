@@ -6,45 +6,20 @@ have an event are then computed one by one (`resolve_lane_step`).
 """
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
 from . import rigid_kernels as law
 from .rigid_kernels import LaneState
-from .rows_kernels import (
-    CASE_INDEX,
-    COS_SUM,
-    CYCLE_INDEX,
-    FIRST_NUMBER,
-    HAS_EVENT,
-    LANES,
-    LAW_STATE,
-    LOSS_SUM,
-    MAX_SLIDE,
-    MEMORY,
-    MIN_SLIDE,
-    N_NUMBERS,
-    N_STATE,
-    NJIT_INLINE,
-    POWER_SUM,
-    SIN_SUM,
-    SLIDE,
-    SLIP_PATH,
-    SLIP_SIGN,
-    SPEED,
-    START_MEMORY,
-    START_SLIDE,
-    START_SPEED,
-    WORK_SUM,
-)
+from .rows_kernels import FIRST_NUMBER, LANES, LAW_STATE, N_NUMBERS, N_STATE, At
 
 
 @njit(**NJIT_INLINE)
 def lane_state(workspace, lane):
     """Return the `LaneState` of a lane."""
     return LaneState(
-        workspace[SLIDE * LANES + lane],
-        workspace[SPEED * LANES + lane],
-        workspace[SLIP_SIGN * LANES + lane],
-        workspace[MEMORY * LANES + lane],
+        workspace[At.SLIDE + lane],
+        workspace[At.SPEED + lane],
+        workspace[At.SLIP_SIGN + lane],
+        workspace[At.MEMORY + lane],
     )
 
 
@@ -69,25 +44,25 @@ def resolve_lane_step(workspace, lane, step):
     outcome = law.resolve_step(workspace, lane, step)
     x1 = outcome.slide
     v1 = outcome.speed
-    workspace[SLIDE * LANES + lane] = x1
-    workspace[SPEED * LANES + lane] = v1
-    workspace[SLIP_SIGN * LANES + lane] = outcome.slip_sign
-    workspace[MEMORY * LANES + lane] = outcome.memory
-    workspace[SLIP_PATH * LANES + lane] += law.slip_increment(
+    workspace[At.SLIDE + lane] = x1
+    workspace[At.SPEED + lane] = v1
+    workspace[At.SLIP_SIGN + lane] = outcome.slip_sign
+    workspace[At.MEMORY + lane] = outcome.memory
+    workspace[At.SLIP_PATH + lane] += law.slip_increment(
         before.memory, outcome.event_memory, outcome.memory, workspace, lane
     )
     # A jump of the acceleration inside the step adds this to the error of the trapezoidal rule.
     u = outcome.event
     edge = outcome.jump * step.angle * (u * (1 - u) / 2 - 1 / 12)
-    workspace[WORK_SUM * LANES + lane] += step.s1 * v1 - (step.s0 + u * (step.s1 - step.s0)) * edge
-    workspace[LOSS_SUM * LANES + lane] += v1 * v1 - 2 * outcome.event_speed * edge
-    workspace[POWER_SUM * LANES + lane] += abs(step.s1 * v1)
+    workspace[At.WORK_SUM + lane] += step.s1 * v1 - (step.s0 + u * (step.s1 - step.s0)) * edge
+    workspace[At.LOSS_SUM + lane] += v1 * v1 - 2 * outcome.event_speed * edge
+    workspace[At.POWER_SUM + lane] += abs(step.s1 * v1)
     highest = max(x1, outcome.reversal_slide)
     lowest = min(x1, outcome.reversal_slide)
-    workspace[MAX_SLIDE * LANES + lane] = max(workspace[MAX_SLIDE * LANES + lane], highest)
-    workspace[MIN_SLIDE * LANES + lane] = min(workspace[MIN_SLIDE * LANES + lane], lowest)
-    workspace[COS_SUM * LANES + lane] += x1 * step.c1
-    workspace[SIN_SUM * LANES + lane] += x1 * step.s1
+    workspace[At.MAX_SLIDE + lane] = max(workspace[At.MAX_SLIDE + lane], highest)
+    workspace[At.MIN_SLIDE + lane] = min(workspace[At.MIN_SLIDE + lane], lowest)
+    workspace[At.COS_SUM + lane] += x1 * step.c1
+    workspace[At.SIN_SUM + lane] += x1 * step.s1
     return before, outcome
 
 
@@ -113,21 +88,21 @@ def accept_step(workspace, lane, before, step, tried, extreme):
     event = tried.has_event
     moves = 0.0 if event else 1.0
     power = moves * (step.s1 * tried.speed)
-    highest = workspace[MAX_SLIDE * LANES + lane]
-    lowest = workspace[MIN_SLIDE * LANES + lane]
+    highest = workspace[At.MAX_SLIDE + lane]
+    lowest = workspace[At.MIN_SLIDE + lane]
     path = law.slip_increment(before.memory, tried.memory, tried.memory, workspace, lane)
-    workspace[HAS_EVENT * LANES + lane] = 1.0 - moves
-    workspace[SLIDE * LANES + lane] = before.slide if event else tried.slide
-    workspace[SPEED * LANES + lane] = before.speed if event else tried.speed
-    workspace[MEMORY * LANES + lane] = before.memory if event else tried.memory
-    workspace[SLIP_PATH * LANES + lane] += moves * path
-    workspace[WORK_SUM * LANES + lane] += power
-    workspace[LOSS_SUM * LANES + lane] += moves * (tried.speed * tried.speed)
-    workspace[POWER_SUM * LANES + lane] += abs(power)
-    workspace[MAX_SLIDE * LANES + lane] = highest if event else max(highest, extreme)
-    workspace[MIN_SLIDE * LANES + lane] = lowest if event else min(lowest, extreme)
-    workspace[COS_SUM * LANES + lane] += moves * (tried.slide * step.c1)
-    workspace[SIN_SUM * LANES + lane] += moves * (tried.slide * step.s1)
+    workspace[At.HAS_EVENT + lane] = 1.0 - moves
+    workspace[At.SLIDE + lane] = before.slide if event else tried.slide
+    workspace[At.SPEED + lane] = before.speed if event else tried.speed
+    workspace[At.MEMORY + lane] = before.memory if event else tried.memory
+    workspace[At.SLIP_PATH + lane] += moves * path
+    workspace[At.WORK_SUM + lane] += power
+    workspace[At.LOSS_SUM + lane] += moves * (tried.speed * tried.speed)
+    workspace[At.POWER_SUM + lane] += abs(power)
+    workspace[At.MAX_SLIDE + lane] = highest if event else max(highest, extreme)
+    workspace[At.MIN_SLIDE + lane] = lowest if event else min(lowest, extreme)
+    workspace[At.COS_SUM + lane] += moves * (tried.slide * step.c1)
+    workspace[At.SIN_SUM + lane] += moves * (tried.slide * step.s1)
     return moves
 
 
@@ -173,7 +148,7 @@ def collect_marked_lanes(workspace, marked, n_busy):
     count = 0
     for lane in range(n_busy):
         marked[count] = lane
-        count += 1 if workspace[HAS_EVENT * LANES + lane] > 0.0 else 0
+        count += 1 if workspace[At.HAS_EVENT + lane] > 0.0 else 0
     return count
 
 
@@ -198,8 +173,8 @@ def load_case(case, lane, cases, motion, workspace):
         workspace[table + n] = cases[case, N_NUMBERS + n]
     for n in range(motion.shape[1]):
         workspace[(n if n < N_STATE else n - N_STATE + LAW_STATE) * LANES + lane] = motion[case, n]
-    workspace[CASE_INDEX * LANES + lane] = case
-    workspace[CYCLE_INDEX * LANES + lane] = 0.0
+    workspace[At.CASE_INDEX + lane] = case
+    workspace[At.CYCLE_INDEX + lane] = 0.0
     note_cycle_start(lane, workspace)
     law.set_derived_state(workspace, lane)
 
@@ -243,16 +218,16 @@ def store_motion(case, lane, workspace, motion):
 @njit(**NJIT_INLINE)
 def note_cycle_start(lane, workspace):
     """Note the state at the start of a cycle."""
-    workspace[START_SLIDE * LANES + lane] = workspace[SLIDE * LANES + lane]
-    workspace[START_SPEED * LANES + lane] = workspace[SPEED * LANES + lane]
-    workspace[START_MEMORY * LANES + lane] = workspace[MEMORY * LANES + lane]
+    workspace[At.START_SLIDE + lane] = workspace[At.SLIDE + lane]
+    workspace[At.START_SPEED + lane] = workspace[At.SPEED + lane]
+    workspace[At.START_MEMORY + lane] = workspace[At.MEMORY + lane]
 
 
 @njit(**NJIT_INLINE)
 def start_cycle(lane, workspace):
     """Note the state at the start of a cycle, and begin its extremes there."""
-    x = workspace[SLIDE * LANES + lane]
-    workspace[MAX_SLIDE * LANES + lane] = workspace[MIN_SLIDE * LANES + lane] = x
+    x = workspace[At.SLIDE + lane]
+    workspace[At.MAX_SLIDE + lane] = workspace[At.MIN_SLIDE + lane] = x
     note_cycle_start(lane, workspace)
 
 
@@ -269,10 +244,10 @@ def finish_cycle(lane, workspace, cycle_history, phasor_factor):
     phasor_factor : float
         2 over the number of steps of a cycle.
     """
-    drift = workspace[START_SLIDE * LANES + lane] - workspace[SLIDE * LANES + lane]
-    cycle_history[0] = workspace[MIN_SLIDE * LANES + lane]
-    cycle_history[1] = workspace[MAX_SLIDE * LANES + lane]
-    cycle_history[2] = phasor_factor * (workspace[COS_SUM * LANES + lane] + 0.5 * drift)
-    cycle_history[3] = phasor_factor * workspace[SIN_SUM * LANES + lane]
-    workspace[COS_SUM * LANES + lane] = workspace[SIN_SUM * LANES + lane] = 0.0
+    drift = workspace[At.START_SLIDE + lane] - workspace[At.SLIDE + lane]
+    cycle_history[0] = workspace[At.MIN_SLIDE + lane]
+    cycle_history[1] = workspace[At.MAX_SLIDE + lane]
+    cycle_history[2] = phasor_factor * (workspace[At.COS_SUM + lane] + 0.5 * drift)
+    cycle_history[3] = phasor_factor * workspace[At.SIN_SUM + lane]
+    workspace[At.COS_SUM + lane] = workspace[At.SIN_SUM + lane] = 0.0
     start_cycle(lane, workspace)

@@ -6,31 +6,13 @@ core with vectors of eight numbers.
 """
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ...friction.flags_kernels import NJIT_INLINE, NJIT_KERNEL
 from . import extrapolation_kernels as extrapolation
 from . import lane_kernels as lanes
 from . import observation_kernels as observation
 from . import rigid_kernels as law
 from .rigid_kernels import AngleStep
-from .rows_kernels import (
-    CASE_INDEX,
-    CYCLE_INDEX,
-    FIRST_READING,
-    GROUP_BITS,
-    LANES,
-    MAX_SLIDE,
-    MEMORY,
-    MIN_SLIDE,
-    N_NUMBERS,
-    N_READINGS,
-    NJIT_INLINE,
-    PERIODIC_TOL,
-    SLIDE,
-    SPEED,
-    START_MEMORY,
-    START_SLIDE,
-    START_SPEED,
-)
+from .rows_kernels import FIRST_READING, GROUP_BITS, LANES, N_NUMBERS, N_READINGS, PERIODIC_TOL, At
 
 
 @njit(**NJIT_INLINE)
@@ -58,15 +40,15 @@ def march_cycle(workspace, marked, table, n_busy):
 @njit(**NJIT_INLINE)
 def is_periodic(lane, workspace):
     """Return whether the cycle of a lane ends where it started."""
-    size = workspace[MAX_SLIDE * LANES + lane] - workspace[MIN_SLIDE * LANES + lane]
-    slide = workspace[SLIDE * LANES + lane] - workspace[START_SLIDE * LANES + lane]
-    speed = workspace[SPEED * LANES + lane] - workspace[START_SPEED * LANES + lane]
-    memory = workspace[MEMORY * LANES + lane] - workspace[START_MEMORY * LANES + lane]
+    size = workspace[At.MAX_SLIDE + lane] - workspace[At.MIN_SLIDE + lane]
+    slide = workspace[At.SLIDE + lane] - workspace[At.START_SLIDE + lane]
+    speed = workspace[At.SPEED + lane] - workspace[At.START_SPEED + lane]
+    memory = workspace[At.MEMORY + lane] - workspace[At.START_MEMORY + lane]
     tolerance = PERIODIC_TOL * size
     return abs(slide) <= tolerance and abs(speed) <= tolerance and abs(memory) <= tolerance
 
 
-@njit(error_model="numpy", cache=True, nogil=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(cache=True, nogil=True, **NJIT_KERNEL)
 def march(cases, order, motion, table, until, history, n_cycles, workspace, marked):
     """March cases up to the end of a cycle, or of one that repeats.
 
@@ -103,8 +85,8 @@ def march(cases, order, motion, table, until, history, n_cycles, workspace, mark
         march_cycle(workspace, marked, table, n_busy)
         lane = 0
         while lane < n_busy:
-            case = int(workspace[CASE_INDEX * LANES + lane])
-            k = int(workspace[CYCLE_INDEX * LANES + lane])
+            case = int(workspace[At.CASE_INDEX + lane])
+            k = int(workspace[At.CYCLE_INDEX + lane])
             is_proof = n_cycles[case] > 0
             if is_proof:
                 repeats = extrapolation.confirms_extrapolation(lane, workspace)
@@ -117,7 +99,7 @@ def march(cases, order, motion, table, until, history, n_cycles, workspace, mark
                 goes_on = False
                 if not (repeats and law.can_extrapolate(workspace, lane)):
                     lanes.load_case(case, lane, cases, motion, workspace)
-                    workspace[CYCLE_INDEX * LANES + lane] = n_cycles[case]
+                    workspace[At.CYCLE_INDEX + lane] = n_cycles[case]
                     n_cycles[case] = -1
                     lane += 1
                     continue
@@ -131,7 +113,7 @@ def march(cases, order, motion, table, until, history, n_cycles, workspace, mark
                 if proof and not goes_on:
                     n_cycles[case] = k + 1
                     goes_on = True
-            workspace[CYCLE_INDEX * LANES + lane] = n_done
+            workspace[At.CYCLE_INDEX + lane] = n_done
             if goes_on:
                 if n_cycles[case] <= 0:
                     extrapolation.push_cycle_end(lane, workspace)
@@ -148,7 +130,7 @@ def march(cases, order, motion, table, until, history, n_cycles, workspace, mark
                 lanes.copy_lane(lane, n_busy, workspace, cases.shape[1] - N_NUMBERS)
 
 
-@njit(error_model="numpy", cache=True, nogil=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(cache=True, nogil=True, **NJIT_KERNEL)
 def observe(
     cases,
     order,

@@ -16,7 +16,7 @@ engine `dynamics.events` with many elements.
 from typing import NamedTuple
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ...friction.flags_kernels import NJIT_INLINE, NJIT_KERNEL, NJIT_NO_REFCOUNT
 from . import power_curve_kernels as curve
 from .rigid_kernels import (
     PROOF_TOL,
@@ -30,29 +30,19 @@ from .rigid_kernels import (
     slide_at_reversal,
 )
 from .rows_kernels import (
-    CURVE_PLACE,
-    CURVE_STATE,
     CYCLE_END_SIZE,
     CYCLE_ENDS,
-    DAMPING,
-    DRIVE,
-    HALF_SLIP,
-    KINETIC,
     LANES,
     LAW_STATE,
     MAX_KEPT,
-    MEMORY,
+    MAX_REVERSALS,
     N_CYCLE_ENDS,
-    NJIT_INLINE,
-    SLIDE,
-    SLIP_SIGN,
-    SPEED,
-    SPRING,
-    STATE_ROWS,
-    STEP,
-    STIFFNESS,
-    SUM_ROWS,
-    YIELD_LENGTH,
+    REVERSAL_SIZE,
+    At,
+    CycleEnd,
+    SliderAt,
+    SliderRow,
+    TableAt,
 )
 
 __all__ = [
@@ -80,44 +70,15 @@ __all__ = [
 STICK_IS_RIGID = False
 EVENT_KEEPS_STICK = True
 
-# These rows are the state of the law. The four of the last reversal are pushed onto the stack together.
-DIRECTION = LAW_STATE  # sign of the speed
-BRANCH_SCALE = LAW_STATE + 1  # m of Masing's rule
-TURN_SLIDE = LAW_STATE + 2  # slide at the last reversal [m]
-TURN_FORCE = LAW_STATE + 3  # friction over the mass at the last reversal [m]
-TURN_SLIP = LAW_STATE + 4  # irreversible slide at the last reversal [m]
-TURN_ENERGY = LAW_STATE + 5  # elastic energy at the last reversal [m^2]
-NEXT_EVENT = LAW_STATE + 6  # slide of the next event [m]
-TANGENT = LAW_STATE + 7  # present slope of the friction over the slide
-TANGENT_START = LAW_STATE + 8  # the same at the start of the step
-TANGENT_BEFORE = LAW_STATE + 9  # the same before the event of the step
-TANGENT_AFTER = LAW_STATE + 10  # the same after the event
-TANGENT_END = LAW_STATE + 11  # the same at the end of the step
-STEP_SLIP = LAW_STATE + 12  # path of slip in the step [m]
-REVERSAL_FORCE = (
-    LAW_STATE + 13
-)  # friction over the mass at the last reversal that happened, also if its loop has closed [m]
-EVER_SLIPPED = LAW_STATE + 14  # 1 once half of the friction has slipped
-KEEPS_FIRST_LOADING = (
-    LAW_STATE + 15
-)  # 1 while the start of the first loading is at the bottom of the stack
-ALL_SLIP = LAW_STATE + 16  # 1 while all sliders slip
-MAX_DROPPED_GAP = (
-    LAW_STATE + 17
-)  # largest gap, over its size, of a loop that was dropped from a full stack
-N_REVERSALS = LAW_STATE + 18  # number of reversals on the stack
-# fraction of the segment before the event in which the interface sticks
-STICK_FRACTION = LAW_STATE + 19
-INVERSE_LENGTH = LAW_STATE + 20  # DIRECTION over m YIELD_LENGTH
-FORCE_RATIO = LAW_STATE + 21  # SPRING YIELD_LENGTH over KINETIC
-REVERSALS = (
-    LAW_STATE + 22
-)  # stack of slide, friction, irreversible slide and energy of the reversals
-REVERSAL_SIZE = 4
-MAX_REVERSALS = (CURVE_STATE - REVERSALS) // REVERSAL_SIZE
 N_KEPT = MAX_KEPT
-FORM_ROWS = (DIRECTION, BRANCH_SCALE, KEEPS_FIRST_LOADING, ALL_SLIP, N_REVERSALS)
-N_LAW_STATE = CURVE_STATE - LAW_STATE + curve.N_CURVE_STATE
+# The extrapolation is possible while these rows are the same at the ends of the last cycles.
+FORM_ROWS = (
+    int(SliderRow.DIRECTION),
+    int(SliderRow.BRANCH_SCALE),
+    int(SliderRow.KEEPS_FIRST_LOADING),
+    int(SliderRow.ALL_SLIP),
+    int(SliderRow.N_REVERSALS),
+)
 
 MIN_PLACE = 1e-30  # smallest abscissa on the curve, because a power needs its logarithm
 EVENT_TOL = 1e-9  # last Newton step, as a fraction of a step; the error left is its square
@@ -152,20 +113,20 @@ class FirstEvent(NamedTuple):
 @njit(**NJIT_INLINE)
 def set_derived_state(workspace, lane):
     """Set the rows that follow from the numbers of the case and from its branch."""
-    length = workspace[YIELD_LENGTH * LANES + lane]
-    branch_length = workspace[BRANCH_SCALE * LANES + lane] * length
-    full_force = workspace[SPRING * LANES + lane] * length
-    workspace[INVERSE_LENGTH * LANES + lane] = workspace[DIRECTION * LANES + lane] / branch_length
-    workspace[FORCE_RATIO * LANES + lane] = full_force / workspace[KINETIC * LANES + lane]
+    length = workspace[At.YIELD_LENGTH + lane]
+    branch_length = workspace[SliderAt.BRANCH_SCALE + lane] * length
+    full_force = workspace[At.SPRING + lane] * length
+    workspace[SliderAt.INVERSE_LENGTH + lane] = workspace[SliderAt.DIRECTION + lane] / branch_length
+    workspace[SliderAt.FORCE_RATIO + lane] = full_force / workspace[At.KINETIC + lane]
 
 
 @njit(**NJIT_INLINE)
 def can_extrapolate(workspace, lane):
     """Return whether the stack has had the same form at the last cycle ends, and is kept in full there."""
-    stack_end = REVERSALS + REVERSAL_SIZE * workspace[N_REVERSALS * LANES + lane]
-    is_same = stack_end <= LAW_STATE + N_KEPT
+    n_stacked = REVERSAL_SIZE * workspace[SliderAt.N_REVERSALS + lane]
+    is_same = n_stacked <= LAW_STATE + N_KEPT - SliderRow.REVERSALS
     for k in range(N_CYCLE_ENDS):
-        first = CYCLE_ENDS + k * CYCLE_END_SIZE + len(STATE_ROWS) + len(SUM_ROWS) - LAW_STATE
+        first = CYCLE_ENDS + k * CYCLE_END_SIZE + CycleEnd.LAW_STATE - LAW_STATE
         for row in FORM_ROWS:
             before = workspace[(first + row) * LANES + lane]
             is_same = is_same and before == workspace[row * LANES + lane]
@@ -176,9 +137,7 @@ def can_extrapolate(workspace, lane):
 def restore_derived_state(workspace, lane):
     """Set the rows that follow from an extrapolated motion."""
     set_derived_state(workspace, lane)
-    curve.start_lookup(
-        clamped_place(workspace[SLIDE * LANES + lane], workspace, lane), workspace, lane
-    )
+    curve.start_lookup(clamped_place(workspace[At.SLIDE + lane], workspace, lane), workspace, lane)
 
 
 @njit(**NJIT_INLINE)
@@ -196,7 +155,7 @@ def place_on_curve(x, workspace, lane):
     -------
     float
     """
-    return workspace[INVERSE_LENGTH * LANES + lane] * (x - workspace[TURN_SLIDE * LANES + lane])
+    return workspace[SliderAt.INVERSE_LENGTH + lane] * (x - workspace[SliderAt.TURN_SLIDE + lane])
 
 
 @njit(**NJIT_INLINE)
@@ -217,7 +176,7 @@ def clamped_place(x, workspace, lane):
     float
     """
     place = max(place_on_curve(x, workspace, lane), MIN_PLACE)
-    return min(place, 2.0 - workspace[ALL_SLIP * LANES + lane])
+    return min(place, 2.0 - workspace[SliderAt.ALL_SLIP + lane])
 
 
 @njit(**NJIT_INLINE)
@@ -240,13 +199,13 @@ def branch_friction(x, workspace, lane, when=curve.IN_TABLE):
     float
         Slope.
     """
-    m = workspace[BRANCH_SCALE * LANES + lane]
-    side = workspace[DIRECTION * LANES + lane]
-    spring = workspace[SPRING * LANES + lane]
+    m = workspace[SliderAt.BRANCH_SCALE + lane]
+    side = workspace[SliderAt.DIRECTION + lane]
+    spring = workspace[At.SPRING + lane]
     force, slope = curve.force_and_slope(clamped_place(x, workspace, lane), workspace, lane, when)
-    friction = side * m * spring * workspace[YIELD_LENGTH * LANES + lane] * force
-    tangent = (1.0 - workspace[ALL_SLIP * LANES + lane]) * spring * slope
-    return workspace[TURN_FORCE * LANES + lane] + friction, tangent
+    friction = side * m * spring * workspace[At.YIELD_LENGTH + lane] * force
+    tangent = (1.0 - workspace[SliderAt.ALL_SLIP + lane]) * spring * slope
+    return workspace[SliderAt.TURN_FORCE + lane] + friction, tangent
 
 
 @njit(**NJIT_INLINE)
@@ -266,18 +225,18 @@ def irreversible_slide(x, memory, workspace, lane, when=curve.IN_TABLE):
     -------
     float
     """
-    m = workspace[BRANCH_SCALE * LANES + lane]
-    side = workspace[DIRECTION * LANES + lane]
-    length = workspace[YIELD_LENGTH * LANES + lane]
-    full_force = workspace[SPRING * LANES + lane] * length
+    m = workspace[SliderAt.BRANCH_SCALE + lane]
+    side = workspace[SliderAt.DIRECTION + lane]
+    length = workspace[At.YIELD_LENGTH + lane]
+    full_force = workspace[At.SPRING + lane] * length
     u = place_on_curve(x, workspace, lane)
     w = min(u, 1.0)
-    force = side * (memory - workspace[TURN_FORCE * LANES + lane]) / (m * full_force)
-    slip = workspace[FORCE_RATIO * LANES + lane] * curve.mean_slip(w, force, workspace, lane, when)
-    return workspace[TURN_SLIP * LANES + lane] + side * m * length * (slip + (u - w))
+    force = side * (memory - workspace[SliderAt.TURN_FORCE + lane]) / (m * full_force)
+    slip = workspace[SliderAt.FORCE_RATIO + lane] * curve.mean_slip(w, force, workspace, lane, when)
+    return workspace[SliderAt.TURN_SLIP + lane] + side * m * length * (slip + (u - w))
 
 
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(**NJIT_KERNEL)
 def slider_energy(x, memory, slip, workspace, lane):
     """Return the elastic energy of the sliders over the mass [m^2].
 
@@ -296,19 +255,19 @@ def slider_energy(x, memory, slip, workspace, lane):
     -------
     float
     """
-    m = workspace[BRANCH_SCALE * LANES + lane]
-    side = workspace[DIRECTION * LANES + lane]
-    length = workspace[YIELD_LENGTH * LANES + lane]
-    limit = workspace[KINETIC * LANES + lane]
-    full_force = workspace[SPRING * LANES + lane] * length
-    distance = side * (x - workspace[TURN_SLIDE * LANES + lane])
-    turn_force = side * workspace[TURN_FORCE * LANES + lane]
+    m = workspace[SliderAt.BRANCH_SCALE + lane]
+    side = workspace[SliderAt.DIRECTION + lane]
+    length = workspace[At.YIELD_LENGTH + lane]
+    limit = workspace[At.KINETIC + lane]
+    full_force = workspace[At.SPRING + lane] * length
+    distance = side * (x - workspace[SliderAt.TURN_SLIDE + lane])
+    turn_force = side * workspace[SliderAt.TURN_FORCE + lane]
     w = min(distance / (m * length), 1.0)
     force = (side * memory - turn_force) / (m * full_force)
     loading = full_force * length * curve.loading_work(w, force, workspace, lane)
     work = m * m * (loading + limit * (distance / m - w * length))
-    slip_loss = limit * side * (slip - workspace[TURN_SLIP * LANES + lane])
-    return workspace[TURN_ENERGY * LANES + lane] + turn_force * distance + work - slip_loss
+    slip_loss = limit * side * (slip - workspace[SliderAt.TURN_SLIP + lane])
+    return workspace[SliderAt.TURN_ENERGY + lane] + turn_force * distance + work - slip_loss
 
 
 @njit(**NJIT_INLINE)
@@ -340,7 +299,7 @@ def friction_rate(state, acceleration, workspace, lane, when):
     -------
     float
     """
-    return state.speed * workspace[(TANGENT_START + when) * LANES + lane]
+    return state.speed * workspace[SliderAt.TANGENT_START + when * LANES + lane]
 
 
 @njit(**NJIT_INLINE)
@@ -356,7 +315,7 @@ def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
     -------
     float
     """
-    return workspace[REVERSAL_FORCE * LANES + lane]
+    return workspace[SliderAt.REVERSAL_FORCE + lane]
 
 
 @njit(**NJIT_INLINE)
@@ -376,11 +335,11 @@ def stick_fractions(start, end, workspace, lane, angle):
     """
     slip = irreversible_slide(end.state.slide, end.state.memory, workspace, lane)
     # The noted fraction is that of the first segment, so it is deleted after that one has been read.
-    noted = workspace[STICK_FRACTION * LANES + lane]
-    workspace[STICK_FRACTION * LANES + lane] = 0.0
+    first_fraction = workspace[SliderAt.STICK_FRACTION + lane]
+    workspace[SliderAt.STICK_FRACTION + lane] = 0.0
     if start.state.slip_sign == 0.0:
         return StickReading(1.0, 2.0, slip)
-    return StickReading(noted, 1.0 if noted > 0.0 else 2.0, slip)
+    return StickReading(first_fraction, 1.0 if first_fraction > 0.0 else 2.0, slip)
 
 
 @njit(**NJIT_INLINE)
@@ -396,7 +355,7 @@ def slip_increment(memory, event_memory, memory1, workspace, lane):
     -------
     float
     """
-    return workspace[STEP_SLIP * LANES + lane]
+    return workspace[SliderAt.STEP_SLIP + lane]
 
 
 @njit(**NJIT_INLINE)
@@ -418,9 +377,9 @@ def acceleration_and_rate(workspace, lane, state, s0, c0):
     float
         Its rate [m].
     """
-    damping = workspace[DAMPING * LANES + lane]
-    stiffness = workspace[STIFFNESS * LANES + lane]
-    drive = workspace[DRIVE * LANES + lane]
+    damping = workspace[At.DAMPING + lane]
+    stiffness = workspace[At.STIFFNESS + lane]
+    drive = workspace[At.DRIVE + lane]
     a0 = drive * s0 - damping * state.speed - stiffness * state.slide - state.friction
     j0 = drive * c0 - damping * a0 - (stiffness + state.tangent) * state.speed
     return a0, j0
@@ -430,10 +389,10 @@ def acceleration_and_rate(workspace, lane, state, s0, c0):
 def branch_state(workspace, lane):
     """Return the `BranchState` of a lane."""
     return BranchState(
-        workspace[SLIDE * LANES + lane],
-        workspace[SPEED * LANES + lane],
-        workspace[MEMORY * LANES + lane],
-        workspace[TANGENT * LANES + lane],
+        workspace[At.SLIDE + lane],
+        workspace[At.SPEED + lane],
+        workspace[At.MEMORY + lane],
+        workspace[SliderAt.TANGENT + lane],
     )
 
 
@@ -450,11 +409,11 @@ def prepare_step(workspace, s0, c0):
     """
     if curve.LOOKS_AHEAD:
         for lane in range(LANES):
-            t = workspace[STEP * LANES + lane]
+            t = workspace[At.STEP + lane]
             state = branch_state(workspace, lane)
             a0, j0 = acceleration_and_rate(workspace, lane, state, s0, c0)
             x1 = state.slide + t * (state.speed + t * (a0 / 2 + t * j0 / 6))
-            workspace[CURVE_PLACE * LANES + lane] = clamped_place(x1, workspace, lane)
+            workspace[TableAt.CURVE_PLACE + lane] = clamped_place(x1, workspace, lane)
         for lane in range(LANES):
             curve.prepare_lookup(workspace, lane)
 
@@ -479,9 +438,9 @@ def hermite_step(workspace, lane, start, step, when=curve.IN_TABLE):
     -------
     BranchState
     """
-    damping = workspace[DAMPING * LANES + lane]
-    stiffness = workspace[STIFFNESS * LANES + lane]
-    drive = workspace[DRIVE * LANES + lane]
+    damping = workspace[At.DAMPING + lane]
+    stiffness = workspace[At.STIFFNESS + lane]
+    drive = workspace[At.DRIVE + lane]
     x = start.slide
     v = start.speed
     t = step.angle
@@ -515,10 +474,10 @@ def next_event_slide(x, workspace, lane):
     float
         [m]
     """
-    side = workspace[DIRECTION * LANES + lane]
-    length = workspace[BRANCH_SCALE * LANES + lane] * workspace[YIELD_LENGTH * LANES + lane]
-    longest = curve.MAX_STEP + BEYOND_ALL * workspace[ALL_SLIP * LANES + lane]
-    event = workspace[NEXT_EVENT * LANES + lane]
+    side = workspace[SliderAt.DIRECTION + lane]
+    length = workspace[SliderAt.BRANCH_SCALE + lane] * workspace[At.YIELD_LENGTH + lane]
+    longest = curve.MAX_STEP + BEYOND_ALL * workspace[SliderAt.ALL_SLIP + lane]
+    event = workspace[SliderAt.NEXT_EVENT + lane]
     end = x + side * length * longest
     return min(event, end) if side > 0.0 else max(event, end)
 
@@ -537,7 +496,7 @@ def try_step(workspace, lane, step, is_observed):
     TriedStep
     """
     state = branch_state(workspace, lane)
-    side = workspace[DIRECTION * LANES + lane]
+    side = workspace[SliderAt.DIRECTION + lane]
     end = hermite_step(workspace, lane, state, step, curve.PREPARED)
     event = (
         side * end.speed < 0.0
@@ -545,12 +504,12 @@ def try_step(workspace, lane, step, is_observed):
         or (is_observed and end.speed == 0.0)
     )
     if is_observed:
-        workspace[TANGENT_START * LANES + lane] = state.tangent
-        workspace[TANGENT_END * LANES + lane] = end.tangent
-    workspace[TANGENT * LANES + lane] = state.tangent if event else end.tangent
+        workspace[SliderAt.TANGENT_START + lane] = state.tangent
+        workspace[SliderAt.TANGENT_END + lane] = end.tangent
+    workspace[SliderAt.TANGENT + lane] = state.tangent if event else end.tangent
     slip = irreversible_slide(state.slide, state.friction, workspace, lane, curve.AT_START)
     slip1 = irreversible_slide(end.slide, end.friction, workspace, lane, curve.PREPARED)
-    workspace[STEP_SLIP * LANES + lane] = side * (slip1 - slip)
+    workspace[SliderAt.STEP_SLIP + lane] = side * (slip1 - slip)
     curve.finish_step(workspace, lane, event)
     return TriedStep(end.slide, end.speed, end.friction, event)
 
@@ -575,7 +534,7 @@ def find_first_event(workspace, lane, start, a0, end, a1, angle):
     -------
     FirstEvent
     """
-    side = workspace[DIRECTION * LANES + lane]
+    side = workspace[SliderAt.DIRECTION + lane]
     x = start.slide
     v = start.speed
     event_slide = next_event_slide(x, workspace, lane)
@@ -631,7 +590,7 @@ def stacked_slide(k, workspace, lane):
     float
         [m]
     """
-    return workspace[(REVERSALS + REVERSAL_SIZE * k) * LANES + lane]
+    return workspace[SliderAt.REVERSALS + REVERSAL_SIZE * k * LANES + lane]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -646,11 +605,11 @@ def restore_reversal(k, workspace, lane):
         See `rigid_kernels.friction_force`.
     """
     for n in range(REVERSAL_SIZE):
-        stacked = workspace[(REVERSALS + REVERSAL_SIZE * k + n) * LANES + lane]
-        workspace[(TURN_SLIDE + n) * LANES + lane] = stacked
-    is_first_loading = k == 0 and workspace[KEEPS_FIRST_LOADING * LANES + lane] > 0.0
-    workspace[N_REVERSALS * LANES + lane] = k
-    workspace[BRANCH_SCALE * LANES + lane] = 1.0 if is_first_loading else 2.0
+        stacked = workspace[SliderAt.REVERSALS + (REVERSAL_SIZE * k + n) * LANES + lane]
+        workspace[SliderAt.TURN_SLIDE + n * LANES + lane] = stacked
+    is_first_loading = k == 0 and workspace[SliderAt.KEEPS_FIRST_LOADING + lane] > 0.0
+    workspace[SliderAt.N_REVERSALS + lane] = k
+    workspace[SliderAt.BRANCH_SCALE + lane] = 1.0 if is_first_loading else 2.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -667,15 +626,15 @@ def drop_smallest_loop(workspace, lane):
             best = k
             smallest_gap = gap
     size = abs(stacked_slide(best, workspace, lane) - stacked_slide(best + 1, workspace, lane))
-    workspace[MAX_DROPPED_GAP * LANES + lane] = max(
-        workspace[MAX_DROPPED_GAP * LANES + lane], smallest_gap / size
+    workspace[SliderAt.MAX_DROPPED_GAP + lane] = max(
+        workspace[SliderAt.MAX_DROPPED_GAP + lane], smallest_gap / size
     )
     for k in range(best, MAX_REVERSALS - 2):
         for n in range(REVERSAL_SIZE):
-            workspace[(REVERSALS + REVERSAL_SIZE * k + n) * LANES + lane] = workspace[
-                (REVERSALS + REVERSAL_SIZE * (k + 2) + n) * LANES + lane
+            workspace[SliderAt.REVERSALS + (REVERSAL_SIZE * k + n) * LANES + lane] = workspace[
+                SliderAt.REVERSALS + (REVERSAL_SIZE * (k + 2) + n) * LANES + lane
             ]
-    workspace[N_REVERSALS * LANES + lane] = MAX_REVERSALS - 2
+    workspace[SliderAt.N_REVERSALS + lane] = MAX_REVERSALS - 2
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -690,26 +649,26 @@ def start_branch(x, friction, slip, workspace, lane):
         See `rigid_kernels.friction_force`.
     """
     energy = slider_energy(x, friction, slip, workspace, lane)
-    if workspace[ALL_SLIP * LANES + lane] > 0.0:
+    if workspace[SliderAt.ALL_SLIP + lane] > 0.0:
         # A slip of all sliders deletes their history.
-        workspace[KEEPS_FIRST_LOADING * LANES + lane] = 0.0
-        workspace[N_REVERSALS * LANES + lane] = 0.0
+        workspace[SliderAt.KEEPS_FIRST_LOADING + lane] = 0.0
+        workspace[SliderAt.N_REVERSALS + lane] = 0.0
     else:
-        if workspace[N_REVERSALS * LANES + lane] >= MAX_REVERSALS:
+        if workspace[SliderAt.N_REVERSALS + lane] >= MAX_REVERSALS:
             drop_smallest_loop(workspace, lane)
-        k = int(workspace[N_REVERSALS * LANES + lane])
+        k = int(workspace[SliderAt.N_REVERSALS + lane])
         for n in range(REVERSAL_SIZE):
-            last = workspace[(TURN_SLIDE + n) * LANES + lane]
-            workspace[(REVERSALS + REVERSAL_SIZE * k + n) * LANES + lane] = last
-        workspace[N_REVERSALS * LANES + lane] = k + 1
-    workspace[TURN_SLIDE * LANES + lane] = x
-    workspace[TURN_FORCE * LANES + lane] = friction
-    workspace[TURN_SLIP * LANES + lane] = slip
-    workspace[TURN_ENERGY * LANES + lane] = energy
-    workspace[REVERSAL_FORCE * LANES + lane] = friction
-    workspace[DIRECTION * LANES + lane] = -workspace[DIRECTION * LANES + lane]
-    workspace[BRANCH_SCALE * LANES + lane] = 2.0
-    workspace[ALL_SLIP * LANES + lane] = 0.0
+            last = workspace[SliderAt.TURN_SLIDE + n * LANES + lane]
+            workspace[SliderAt.REVERSALS + (REVERSAL_SIZE * k + n) * LANES + lane] = last
+        workspace[SliderAt.N_REVERSALS + lane] = k + 1
+    workspace[SliderAt.TURN_SLIDE + lane] = x
+    workspace[SliderAt.TURN_FORCE + lane] = friction
+    workspace[SliderAt.TURN_SLIP + lane] = slip
+    workspace[SliderAt.TURN_ENERGY + lane] = energy
+    workspace[SliderAt.REVERSAL_FORCE + lane] = friction
+    workspace[SliderAt.DIRECTION + lane] = -workspace[SliderAt.DIRECTION + lane]
+    workspace[SliderAt.BRANCH_SCALE + lane] = 2.0
+    workspace[SliderAt.ALL_SLIP + lane] = 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -726,24 +685,24 @@ def close_loop(x, slip, workspace, lane):
     workspace, lane
         See `rigid_kernels.friction_force`.
     """
-    k = int(workspace[N_REVERSALS * LANES + lane])
-    side = workspace[DIRECTION * LANES + lane]
-    length = workspace[YIELD_LENGTH * LANES + lane]
+    k = int(workspace[SliderAt.N_REVERSALS + lane])
+    side = workspace[SliderAt.DIRECTION + lane]
+    length = workspace[At.YIELD_LENGTH + lane]
     if side * (x - closing_slide(workspace, lane)) < 0.0 or k == 0:
         return
-    if k == 1 and workspace[KEEPS_FIRST_LOADING * LANES + lane] == 0.0:
-        limit = workspace[KINETIC * LANES + lane]
-        full_force = workspace[SPRING * LANES + lane] * length
+    if k == 1 and workspace[SliderAt.KEEPS_FIRST_LOADING + lane] == 0.0:
+        limit = workspace[At.KINETIC + lane]
+        full_force = workspace[At.SPRING + lane] * length
         force = limit / full_force
         mean_slip = curve.mean_slip(1.0, force, workspace, lane, curve.IN_TABLE)
         work = curve.loading_work(1.0, force, workspace, lane)
         slip_of_branch = side * 2 * length * full_force / limit * mean_slip
-        workspace[N_REVERSALS * LANES + lane] = 0.0
-        workspace[BRANCH_SCALE * LANES + lane] = 2.0
-        workspace[TURN_SLIDE * LANES + lane] = x - side * 2 * length
-        workspace[TURN_FORCE * LANES + lane] = -side * limit
-        workspace[TURN_SLIP * LANES + lane] = slip - slip_of_branch
-        workspace[TURN_ENERGY * LANES + lane] = full_force * length * (work - mean_slip)
+        workspace[SliderAt.N_REVERSALS + lane] = 0.0
+        workspace[SliderAt.BRANCH_SCALE + lane] = 2.0
+        workspace[SliderAt.TURN_SLIDE + lane] = x - side * 2 * length
+        workspace[SliderAt.TURN_FORCE + lane] = -side * limit
+        workspace[SliderAt.TURN_SLIP + lane] = slip - slip_of_branch
+        workspace[SliderAt.TURN_ENERGY + lane] = full_force * length * (work - mean_slip)
     else:
         restore_reversal(k - 1 if k == 1 else k - 2, workspace, lane)
 
@@ -751,13 +710,13 @@ def close_loop(x, slip, workspace, lane):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def closing_slide(workspace, lane):
     """Return the slide at which the loop closes, or at which all sliders slip."""
-    k = int(workspace[N_REVERSALS * LANES + lane])
-    start = workspace[TURN_SLIDE * LANES + lane]
+    k = int(workspace[SliderAt.N_REVERSALS + lane])
+    start = workspace[SliderAt.TURN_SLIDE + lane]
     if k == 0:
-        length = workspace[BRANCH_SCALE * LANES + lane] * workspace[YIELD_LENGTH * LANES + lane]
-        return start + workspace[DIRECTION * LANES + lane] * length
+        length = workspace[SliderAt.BRANCH_SCALE + lane] * workspace[At.YIELD_LENGTH + lane]
+        return start + workspace[SliderAt.DIRECTION + lane] * length
     before = stacked_slide(k - 1, workspace, lane)
-    if k == 1 and workspace[KEEPS_FIRST_LOADING * LANES + lane] > 0.0:
+    if k == 1 and workspace[SliderAt.KEEPS_FIRST_LOADING + lane] > 0.0:
         return 2 * before - start
     return before
 
@@ -774,20 +733,20 @@ def find_next_event(x, workspace, lane):
         See `rigid_kernels.friction_force`.
     """
     set_derived_state(workspace, lane)
-    side = workspace[DIRECTION * LANES + lane]
-    length = workspace[BRANCH_SCALE * LANES + lane] * workspace[YIELD_LENGTH * LANES + lane]
-    half_length = length * workspace[HALF_SLIP * LANES + lane]
-    distance = side * (x - workspace[TURN_SLIDE * LANES + lane])
+    side = workspace[SliderAt.DIRECTION + lane]
+    length = workspace[SliderAt.BRANCH_SCALE + lane] * workspace[At.YIELD_LENGTH + lane]
+    half_length = length * workspace[At.HALF_SLIP + lane]
+    distance = side * (x - workspace[SliderAt.TURN_SLIDE + lane])
     end = closing_slide(workspace, lane)
     slips = distance >= half_length * (1 - SAME_SLIDE)
-    half = workspace[TURN_SLIDE * LANES + lane] + side * half_length
-    if distance >= length * (1 - SAME_SLIDE) and workspace[N_REVERSALS * LANES + lane] == 0.0:
+    half = workspace[SliderAt.TURN_SLIDE + lane] + side * half_length
+    if distance >= length * (1 - SAME_SLIDE) and workspace[SliderAt.N_REVERSALS + lane] == 0.0:
         end = side * BEYOND_ALL
-        workspace[ALL_SLIP * LANES + lane] = 1.0
-    workspace[NEXT_EVENT * LANES + lane] = end if slips or side * (half - end) > 0.0 else half
-    workspace[SLIP_SIGN * LANES + lane] = side if slips else 0.0
+        workspace[SliderAt.ALL_SLIP + lane] = 1.0
+    workspace[SliderAt.NEXT_EVENT + lane] = end if slips or side * (half - end) > 0.0 else half
+    workspace[At.SLIP_SIGN + lane] = side if slips else 0.0
     if slips:
-        workspace[EVER_SLIPPED * LANES + lane] = 1.0
+        workspace[SliderAt.EVER_SLIPPED + lane] = 1.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -815,8 +774,8 @@ def resolve_step(workspace, lane, step):
     path = 0.0
     stick_angle = 0.0
     slip = irreversible_slide(state.slide, state.friction, workspace, lane)
-    workspace[TANGENT_START * LANES + lane] = state.tangent
-    workspace[STICK_FRACTION * LANES + lane] = 0.0
+    workspace[SliderAt.TANGENT_START + lane] = state.tangent
+    workspace[SliderAt.STICK_FRACTION + lane] = 0.0
     for n_events in range(MAX_EVENTS + 1):
         end = hermite_step(workspace, lane, state, rest)
         a0, _ = acceleration_and_rate(workspace, lane, state, rest.s0, rest.c0)
@@ -827,7 +786,7 @@ def resolve_step(workspace, lane, step):
         t = first.fraction * rest.angle
         se, ce = drive_after(rest.s0, rest.c0, t)
         slip_before = slip
-        sign_before = workspace[SLIP_SIGN * LANES + lane]
+        sign_before = workspace[At.SLIP_SIGN + lane]
         reached = hermite_step(workspace, lane, state, AngleStep(rest.s0, rest.c0, se, ce, t))
         x = reached.slide
         v = 0.0 if first.kind == REVERSAL else reached.speed
@@ -847,29 +806,29 @@ def resolve_step(workspace, lane, step):
         if first.kind == CLOSING:
             slip = irreversible_slide(x, friction, workspace, lane)
         state = BranchState(x, v, friction, tangent)
-        changes_slip = workspace[SLIP_SIGN * LANES + lane] != sign_before
+        changes_slip = workspace[At.SLIP_SIGN + lane] != sign_before
         kind = SLIP_CHANGE if changes_slip else first.kind
         if kind >= event_kind:
             event_kind = kind
             event_fraction = 1 - rest.angle / step.angle
             event = state
-            workspace[TANGENT_BEFORE * LANES + lane] = tangent_before
-            workspace[TANGENT_AFTER * LANES + lane] = tangent
+            workspace[SliderAt.TANGENT_BEFORE + lane] = tangent_before
+            workspace[SliderAt.TANGENT_AFTER + lane] = tangent
             fraction = stick_angle / (step.angle - rest.angle) if changes_slip else 0.0
-            workspace[STICK_FRACTION * LANES + lane] = fraction
+            workspace[SliderAt.STICK_FRACTION + lane] = fraction
     last_slip = irreversible_slide(end.slide, end.friction, workspace, lane)
-    workspace[STEP_SLIP * LANES + lane] = path + abs(last_slip - slip)
-    workspace[TANGENT * LANES + lane] = end.tangent
-    workspace[TANGENT_END * LANES + lane] = end.tangent
+    workspace[SliderAt.STEP_SLIP + lane] = path + abs(last_slip - slip)
+    workspace[SliderAt.TANGENT + lane] = end.tangent
+    workspace[SliderAt.TANGENT_END + lane] = end.tangent
     curve.start_lookup(clamped_place(end.slide, workspace, lane), workspace, lane)
     if event_kind == NO_EVENT:
         event = end
-        workspace[TANGENT_BEFORE * LANES + lane] = end.tangent
-        workspace[TANGENT_AFTER * LANES + lane] = end.tangent
+        workspace[SliderAt.TANGENT_BEFORE + lane] = end.tangent
+        workspace[SliderAt.TANGENT_AFTER + lane] = end.tangent
     return StepOutcome(
         end.slide,
         end.speed,
-        workspace[SLIP_SIGN * LANES + lane],
+        workspace[At.SLIP_SIGN + lane],
         end.friction,
         event_fraction,
         event.slide,

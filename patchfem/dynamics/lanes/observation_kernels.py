@@ -8,55 +8,11 @@ from math import nan
 from typing import NamedTuple
 
 from ...compiled.jit import njit
+from ...friction.flags_kernels import NJIT_INLINE
 from . import lane_kernels as lanes
 from . import rigid_kernels as law
 from .rigid_kernels import AngleStep, LaneState, cubic_peak, drive_after
-from .rows_kernels import (
-    BASE_GAIN,
-    CASE_INDEX,
-    COS_1,
-    COS_3,
-    CURRENT_STICK,
-    CYCLE_START,
-    DAMPING,
-    DRIVE,
-    FIRST_MEAN_FORCE,
-    FIRST_MEAN_SLIDE,
-    FIRST_READING,
-    FORCE_AT_MAX,
-    FORCE_AT_MIN,
-    FORCE_SUM,
-    GROUP_BITS,
-    LANES,
-    LAST_MEAN_FORCE,
-    LAST_MEAN_SLIDE,
-    LONGEST_STICK,
-    LOOP_WORK,
-    LOOP_WORK_SIZE,
-    MAX_ACCELERATION,
-    MAX_FORCE,
-    MAX_SLIDE,
-    MAX_SLIP,
-    MEAN_RANGE,
-    MEMORY,
-    MIN_SLIDE,
-    MIN_SLIP,
-    N_READINGS,
-    N_SECANTS,
-    NJIT_INLINE,
-    OUTPUT_GAIN,
-    SECANT_SUM,
-    SIN_1,
-    SIN_3,
-    SLIDE,
-    SLIDE_SUM,
-    SLIP_SIGN,
-    SLIP_STARTS,
-    START_COS,
-    START_SIN,
-    STICK_ANGLE,
-    STIFFNESS,
-)
+from .rows_kernels import FIRST_READING, GROUP_BITS, LANES, N_READINGS, At
 
 # `friction_rate` of a law is asked for at these instants of a step.
 AT_START = 0
@@ -100,9 +56,9 @@ def make_instant(workspace, lane, sine, cosine, state):
     """
     friction = law.friction_force(state, sine, workspace, lane)
     acceleration = (
-        workspace[DRIVE * LANES + lane] * sine
-        - workspace[DAMPING * LANES + lane] * state.speed
-        - workspace[STIFFNESS * LANES + lane] * state.slide
+        workspace[At.DRIVE + lane] * sine
+        - workspace[At.DAMPING + lane] * state.speed
+        - workspace[At.STIFFNESS + lane] * state.slide
         - friction
     )
     return Instant(sine, cosine, state, friction, acceleration)
@@ -124,8 +80,8 @@ def output_acceleration(workspace, lane, instant):
         [m s-2]
     """
     return (
-        workspace[OUTPUT_GAIN * LANES + lane] * instant.acceleration
-        + workspace[BASE_GAIN * LANES + lane] * instant.sine
+        workspace[At.OUTPUT_GAIN + lane] * instant.acceleration
+        + workspace[At.BASE_GAIN + lane] * instant.sine
     )
 
 
@@ -147,14 +103,14 @@ def output_jerk(workspace, lane, instant, friction_rate):
         [m s-2]
     """
     free_rate = (
-        workspace[DRIVE * LANES + lane] * instant.cosine
-        - workspace[DAMPING * LANES + lane] * instant.acceleration
-        - workspace[STIFFNESS * LANES + lane] * instant.state.speed
+        workspace[At.DRIVE + lane] * instant.cosine
+        - workspace[At.DAMPING + lane] * instant.acceleration
+        - workspace[At.STIFFNESS + lane] * instant.state.speed
     )
     # The output of an interface that sticks rigidly moves with the base alone.
     is_fixed = law.STICK_IS_RIGID and instant.state.slip_sign == 0.0
-    gain = 0.0 if is_fixed else workspace[OUTPUT_GAIN * LANES + lane]
-    base_rate = workspace[BASE_GAIN * LANES + lane] * instant.cosine
+    gain = 0.0 if is_fixed else workspace[At.OUTPUT_GAIN + lane]
+    base_rate = workspace[At.BASE_GAIN + lane] * instant.cosine
     return gain * (free_rate - friction_rate) + base_rate
 
 
@@ -231,34 +187,34 @@ def observe_step(workspace, lane, step):
     slip = law.irreversible_slide(x1, tried.memory, workspace, lane)
     peaks = segment_peaks(workspace, lane, first, last, step.angle, AT_START, AT_END)
     # All rows are read before the first one is written, otherwise a compiler does not take several lanes at once.
-    highest = workspace[MAX_SLIDE * LANES + lane]
-    lowest = workspace[MIN_SLIDE * LANES + lane]
-    current_stick = workspace[CURRENT_STICK * LANES + lane]
-    longest = workspace[LONGEST_STICK * LANES + lane]
-    max_slip = workspace[MAX_SLIP * LANES + lane]
-    min_slip = workspace[MIN_SLIP * LANES + lane]
-    force_at_max = workspace[FORCE_AT_MAX * LANES + lane]
-    force_at_min = workspace[FORCE_AT_MIN * LANES + lane]
-    acceleration = workspace[MAX_ACCELERATION * LANES + lane]
-    friction = workspace[MAX_FORCE * LANES + lane]
+    highest = workspace[At.MAX_SLIDE + lane]
+    lowest = workspace[At.MIN_SLIDE + lane]
+    current_stick = workspace[At.CURRENT_STICK + lane]
+    longest = workspace[At.LONGEST_STICK + lane]
+    max_slip = workspace[At.MAX_SLIP + lane]
+    min_slip = workspace[At.MIN_SLIP + lane]
+    force_at_max = workspace[At.FORCE_AT_MAX + lane]
+    force_at_min = workspace[At.FORCE_AT_MIN + lane]
+    acceleration = workspace[At.MAX_ACCELERATION + lane]
+    friction = workspace[At.MAX_FORCE + lane]
     stick_now = current_stick + step.angle * stick
     moves = lanes.accept_step(workspace, lane, state, step, tried, x1)
     work = moves * 0.5 * (first.friction + last.friction) * (x1 - state.slide)
-    workspace[MAX_ACCELERATION * LANES + lane] = (
+    workspace[At.MAX_ACCELERATION + lane] = (
         acceleration if event else max(acceleration, peaks.acceleration)
     )
-    workspace[MAX_FORCE * LANES + lane] = friction if event else max(friction, peaks.friction)
-    workspace[STICK_ANGLE * LANES + lane] += moves * step.angle * stick
-    workspace[LONGEST_STICK * LANES + lane] = longest if event else max(longest, stick_now)
-    workspace[CURRENT_STICK * LANES + lane] = current_stick if event else stick * stick_now
-    workspace[MAX_SLIP * LANES + lane] = max_slip if event else max(max_slip, slip)
-    workspace[MIN_SLIP * LANES + lane] = min_slip if event else min(min_slip, slip)
-    workspace[LOOP_WORK * LANES + lane] += work
-    workspace[LOOP_WORK_SIZE * LANES + lane] += abs(work)
+    workspace[At.MAX_FORCE + lane] = friction if event else max(friction, peaks.friction)
+    workspace[At.STICK_ANGLE + lane] += moves * step.angle * stick
+    workspace[At.LONGEST_STICK + lane] = longest if event else max(longest, stick_now)
+    workspace[At.CURRENT_STICK + lane] = current_stick if event else stick * stick_now
+    workspace[At.MAX_SLIP + lane] = max_slip if event else max(max_slip, slip)
+    workspace[At.MIN_SLIP + lane] = min_slip if event else min(min_slip, slip)
+    workspace[At.LOOP_WORK + lane] += work
+    workspace[At.LOOP_WORK_SIZE + lane] += abs(work)
     add_sample(workspace, lane, step.s1, step.c1, moves * x1, moves * last.friction)
     # The slide does not reverse at an extreme of a step without an event.
-    workspace[FORCE_AT_MAX * LANES + lane] = force_at_max if event or not x1 > highest else nan
-    workspace[FORCE_AT_MIN * LANES + lane] = force_at_min if event or not x1 < lowest else nan
+    workspace[At.FORCE_AT_MAX + lane] = force_at_max if event or not x1 > highest else nan
+    workspace[At.FORCE_AT_MIN + lane] = force_at_min if event or not x1 < lowest else nan
 
 
 @njit(**NJIT_INLINE)
@@ -274,12 +230,12 @@ def add_sample(workspace, lane, sine, cosine, slide, friction):
     slide, friction : float
         [m]
     """
-    workspace[COS_1 * LANES + lane] += slide * cosine
-    workspace[SIN_1 * LANES + lane] += slide * sine
-    workspace[COS_3 * LANES + lane] += slide * (cosine * (4 * cosine * cosine - 3))
-    workspace[SIN_3 * LANES + lane] += slide * (sine * (3 - 4 * sine * sine))
-    workspace[SLIDE_SUM * LANES + lane] += slide
-    workspace[FORCE_SUM * LANES + lane] += friction
+    workspace[At.COS_1 + lane] += slide * cosine
+    workspace[At.SIN_1 + lane] += slide * sine
+    workspace[At.COS_3 + lane] += slide * (cosine * (4 * cosine * cosine - 3))
+    workspace[At.SIN_3 + lane] += slide * (sine * (3 - 4 * sine * sine))
+    workspace[At.SLIDE_SUM + lane] += slide
+    workspace[At.FORCE_SUM + lane] += friction
 
 
 @njit(**NJIT_INLINE)
@@ -291,8 +247,8 @@ def observe_event_step(workspace, lane, step):
     workspace, lane, step
         See `lane_kernels.resolve_lane_step`.
     """
-    highest = workspace[MAX_SLIDE * LANES + lane]
-    lowest = workspace[MIN_SLIDE * LANES + lane]
+    highest = workspace[At.MAX_SLIDE + lane]
+    lowest = workspace[At.MIN_SLIDE + lane]
     start, outcome = lanes.resolve_lane_step(workspace, lane, step)
     event_angle = outcome.event * step.angle
     se, ce = drive_after(step.s0, step.c0, event_angle)
@@ -324,15 +280,15 @@ def observe_event_step(workspace, lane, step):
             add_peaks(workspace, lane, 0.0, abs(reversal_force))
         work = 0.5 * (first.friction + first_end.friction) * (x - start.slide)
         last_work = 0.5 * (second.friction + last.friction) * (outcome.slide - x)
-        workspace[LOOP_WORK * LANES + lane] += work + last_work
-        workspace[LOOP_WORK_SIZE * LANES + lane] += abs(work) + abs(last_work)
+        workspace[At.LOOP_WORK + lane] += work + last_work
+        workspace[At.LOOP_WORK_SIZE + lane] += abs(work) + abs(last_work)
     add_sample(workspace, lane, step.s1, step.c1, outcome.slide, last.friction)
     is_reversed = start.speed != 0.0 and start.speed * outcome.speed <= 0.0
     force = reversal_force if is_reversed else nan
     if max(outcome.slide, outcome.reversal_slide) > highest:
-        workspace[FORCE_AT_MAX * LANES + lane] = force
+        workspace[At.FORCE_AT_MAX + lane] = force
     if min(outcome.slide, outcome.reversal_slide) < lowest:
-        workspace[FORCE_AT_MIN * LANES + lane] = force
+        workspace[At.FORCE_AT_MIN + lane] = force
 
 
 @njit(**NJIT_INLINE)
@@ -348,10 +304,8 @@ def add_peaks(workspace, lane, acceleration, friction):
     friction : float
         Absolute friction over the mass [m].
     """
-    workspace[MAX_ACCELERATION * LANES + lane] = max(
-        workspace[MAX_ACCELERATION * LANES + lane], acceleration
-    )
-    workspace[MAX_FORCE * LANES + lane] = max(workspace[MAX_FORCE * LANES + lane], friction)
+    workspace[At.MAX_ACCELERATION + lane] = max(workspace[At.MAX_ACCELERATION + lane], acceleration)
+    workspace[At.MAX_FORCE + lane] = max(workspace[At.MAX_FORCE + lane], friction)
 
 
 @njit(**NJIT_INLINE)
@@ -367,12 +321,8 @@ def add_slip_range(workspace, lane, event, end):
     """
     slip = law.irreversible_slide(event.slide, event.memory, workspace, lane)
     last_slip = law.irreversible_slide(end.slide, end.memory, workspace, lane)
-    workspace[MAX_SLIP * LANES + lane] = max(
-        workspace[MAX_SLIP * LANES + lane], max(slip, last_slip)
-    )
-    workspace[MIN_SLIP * LANES + lane] = min(
-        workspace[MIN_SLIP * LANES + lane], min(slip, last_slip)
-    )
+    workspace[At.MAX_SLIP + lane] = max(workspace[At.MAX_SLIP + lane], max(slip, last_slip))
+    workspace[At.MIN_SLIP + lane] = min(workspace[At.MIN_SLIP + lane], min(slip, last_slip))
 
 
 @njit(**NJIT_INLINE)
@@ -397,12 +347,12 @@ def add_sticks(workspace, lane, first, second, event, angle):
     last_stick = law.stick_fractions(second[0], second[1], workspace, lane, angle - event_angle)
     stick_angle = angle * (event * stick.fraction)
     last_angle = angle * ((1 - event) * last_stick.fraction)
-    workspace[STICK_ANGLE * LANES + lane] += stick_angle + last_angle
-    current = workspace[CURRENT_STICK * LANES + lane] + stick_angle
-    workspace[LONGEST_STICK * LANES + lane] = max(workspace[LONGEST_STICK * LANES + lane], current)
+    workspace[At.STICK_ANGLE + lane] += stick_angle + last_angle
+    current = workspace[At.CURRENT_STICK + lane] + stick_angle
+    workspace[At.LONGEST_STICK + lane] = max(workspace[At.LONGEST_STICK + lane], current)
     continues = event >= 1.0 or (law.EVENT_KEEPS_STICK and last_sign == 0.0)
     current = current if stick.fraction > 0.0 and continues else 0.0
-    workspace[CURRENT_STICK * LANES + lane] = current + last_angle
+    workspace[At.CURRENT_STICK + lane] = current + last_angle
     is_released = slip_sign == 0.0 and last_sign != 0.0
     start = event_angle + (angle - event_angle) * last_stick.slip_start
     if stick.slip_start <= 1.0:
@@ -411,14 +361,14 @@ def add_sticks(workspace, lane, first, second, event, angle):
         start = event_angle
     if is_released or stick.slip_start <= 1.0 or last_stick.slip_start <= 1.0:
         sine, cosine = drive_after(first[0].sine, first[0].cosine, start)
-        workspace[SLIP_STARTS * LANES + lane] += 1.0
-        workspace[START_COS * LANES + lane] += 1 - 2 * sine * sine
-        workspace[START_SIN * LANES + lane] += 2 * sine * cosine
-    workspace[MAX_SLIP * LANES + lane] = max(
-        workspace[MAX_SLIP * LANES + lane], max(stick.extreme_slip, last_stick.extreme_slip)
+        workspace[At.SLIP_STARTS + lane] += 1.0
+        workspace[At.START_COS + lane] += 1 - 2 * sine * sine
+        workspace[At.START_SIN + lane] += 2 * sine * cosine
+    workspace[At.MAX_SLIP + lane] = max(
+        workspace[At.MAX_SLIP + lane], max(stick.extreme_slip, last_stick.extreme_slip)
     )
-    workspace[MIN_SLIP * LANES + lane] = min(
-        workspace[MIN_SLIP * LANES + lane], min(stick.extreme_slip, last_stick.extreme_slip)
+    workspace[At.MIN_SLIP + lane] = min(
+        workspace[At.MIN_SLIP + lane], min(stick.extreme_slip, last_stick.extreme_slip)
     )
 
 
@@ -444,12 +394,12 @@ def lane_friction(lane, workspace, sine):
 @njit(**NJIT_INLINE)
 def start_observed_cycle(lane, workspace):
     """Begin the readings of a cycle."""
-    workspace[CYCLE_START * LANES + lane] = workspace[SLIDE * LANES + lane]
-    workspace[SLIDE_SUM * LANES + lane] = 0.0
-    workspace[FORCE_SUM * LANES + lane] = 0.5 * lane_friction(lane, workspace, 0.0)
-    is_fixed = law.STICK_IS_RIGID and workspace[SLIP_SIGN * LANES + lane] == 0.0
-    workspace[FORCE_AT_MAX * LANES + lane] = 0.0 if is_fixed else nan
-    workspace[FORCE_AT_MIN * LANES + lane] = 0.0 if is_fixed else nan
+    workspace[At.CYCLE_START + lane] = workspace[At.SLIDE + lane]
+    workspace[At.SLIDE_SUM + lane] = 0.0
+    workspace[At.FORCE_SUM + lane] = 0.5 * lane_friction(lane, workspace, 0.0)
+    is_fixed = law.STICK_IS_RIGID and workspace[At.SLIP_SIGN + lane] == 0.0
+    workspace[At.FORCE_AT_MAX + lane] = 0.0 if is_fixed else nan
+    workspace[At.FORCE_AT_MIN + lane] = 0.0 if is_fixed else nan
 
 
 @njit(**NJIT_INLINE)
@@ -467,28 +417,26 @@ def finish_observed_cycle(lane, workspace, is_first, n_cycles, angle):
     angle : float
         Angle of a step [rad].
     """
-    size = workspace[MAX_SLIDE * LANES + lane] - workspace[MIN_SLIDE * LANES + lane]
-    drift = workspace[CYCLE_START * LANES + lane] - workspace[SLIDE * LANES + lane]
-    force_at_max = workspace[FORCE_AT_MAX * LANES + lane]
-    force_at_min = workspace[FORCE_AT_MIN * LANES + lane]
+    size = workspace[At.MAX_SLIDE + lane] - workspace[At.MIN_SLIDE + lane]
+    drift = workspace[At.CYCLE_START + lane] - workspace[At.SLIDE + lane]
+    force_at_max = workspace[At.FORCE_AT_MAX + lane]
+    force_at_min = workspace[At.FORCE_AT_MIN + lane]
     # The slide of a rigid stick has an extreme at an end of the cycle without a reversal; its mean friction is 0.
     if law.STICK_IS_RIGID and size > 0.0:
         force_at_max = force_at_max if force_at_max == force_at_max else 0.0
         force_at_min = force_at_min if force_at_min == force_at_min else 0.0
     secant = (force_at_max - force_at_min) / size
-    workspace[MEAN_RANGE * LANES + lane] += size / n_cycles
+    workspace[At.MEAN_RANGE + lane] += size / n_cycles
     if secant == secant and size > 0.0:
-        workspace[N_SECANTS * LANES + lane] += 1.0
-        workspace[SECANT_SUM * LANES + lane] += secant
-    slide = angle * (workspace[SLIDE_SUM * LANES + lane] + 0.5 * drift)
-    friction = angle * (
-        workspace[FORCE_SUM * LANES + lane] - 0.5 * lane_friction(lane, workspace, 0.0)
-    )
+        workspace[At.N_SECANTS + lane] += 1.0
+        workspace[At.SECANT_SUM + lane] += secant
+    slide = angle * (workspace[At.SLIDE_SUM + lane] + 0.5 * drift)
+    friction = angle * (workspace[At.FORCE_SUM + lane] - 0.5 * lane_friction(lane, workspace, 0.0))
     if is_first:
-        workspace[FIRST_MEAN_SLIDE * LANES + lane] = slide
-        workspace[FIRST_MEAN_FORCE * LANES + lane] = friction
-    workspace[LAST_MEAN_SLIDE * LANES + lane] = slide
-    workspace[LAST_MEAN_FORCE * LANES + lane] = friction
+        workspace[At.FIRST_MEAN_SLIDE + lane] = slide
+        workspace[At.FIRST_MEAN_FORCE + lane] = friction
+    workspace[At.LAST_MEAN_SLIDE + lane] = slide
+    workspace[At.LAST_MEAN_FORCE + lane] = friction
 
 
 @njit(**NJIT_INLINE)
@@ -505,7 +453,7 @@ def record_accelerations(workspace, acceleration, step, sine):
         Sine of the drive.
     """
     for lane in range(LANES if acceleration.shape[1] > 0 else 0):
-        case = workspace[CASE_INDEX * LANES + lane]
+        case = workspace[At.CASE_INDEX + lane]
         if case >= 0.0:
             instant = make_instant(workspace, lane, sine, 0.0, lanes.lane_state(workspace, lane))
             acceleration[int(case), step] = output_acceleration(workspace, lane, instant)
@@ -527,12 +475,12 @@ def load_observed_cases(first, cases, order, motion, workspace):
         for n in range(FIRST_READING, FIRST_READING + N_READINGS):
             workspace[n * LANES + lane] = 0.0
         slip = law.irreversible_slide(
-            workspace[SLIDE * LANES + lane], workspace[MEMORY * LANES + lane], workspace, lane
+            workspace[At.SLIDE + lane], workspace[At.MEMORY + lane], workspace, lane
         )
-        workspace[MAX_SLIP * LANES + lane] = slip
-        workspace[MIN_SLIP * LANES + lane] = slip
+        workspace[At.MAX_SLIP + lane] = slip
+        workspace[At.MIN_SLIP + lane] = slip
         if first + lane >= len(order):
-            workspace[CASE_INDEX * LANES + lane] = -1.0
+            workspace[At.CASE_INDEX + lane] = -1.0
 
 
 @njit(**NJIT_INLINE)

@@ -10,12 +10,10 @@ A reference is the engine `dynamics.events` with many elements.
 import numpy as np
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import NJIT_NO_REFCOUNT
-from .rows_kernels import LANES, LAW_NUMBERS, NJIT_INLINE
+from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
+from .rows_kernels import LANES, At
 
-EXPONENT = LAW_NUMBERS  # chi + 1
-FRACTION = LAW_NUMBERS + 1  # q
-N_CURVE_STATE = 0  # number of rows that the curve has in the state of the law
+FRACTION = 1  # position of q in the numbers of the law; the first of them is chi + 1
 # Longest step, over YIELD_LENGTH: the curve bends so little that no step is too long.
 MAX_STEP = 1e300
 LOOKS_AHEAD = False  # whether `prepare_lookup` has something to do
@@ -110,8 +108,8 @@ def force_and_slope(w, workspace, lane, when):
     float
         Slope.
     """
-    exponent = workspace[EXPONENT * LANES + lane]
-    p = workspace[FRACTION * LANES + lane] * power(w, exponent)
+    exponent = workspace[At.LAW_NUMBERS + lane]
+    p = workspace[At.LAW_NUMBERS + FRACTION * LANES + lane] * power(w, exponent)
     return w * (1 - p / (exponent + 1)), 1 - p
 
 
@@ -131,7 +129,7 @@ def mean_slip(w, force, workspace, lane, when):
     -------
     float
     """
-    exponent = workspace[EXPONENT * LANES + lane]
+    exponent = workspace[At.LAW_NUMBERS + lane]
     return exponent / (exponent + 2) * w * (w - force)
 
 
@@ -148,7 +146,7 @@ def loading_work(w, force, workspace, lane):
     -------
     float
     """
-    return w * (w / 2 - (w - force) / (workspace[EXPONENT * LANES + lane] + 2))
+    return w * (w / 2 - (w - force) / (workspace[At.LAW_NUMBERS + lane] + 2))
 
 
 @njit(**NJIT_INLINE)

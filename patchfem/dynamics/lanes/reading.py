@@ -7,31 +7,32 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..events.positions_kernels import INTERFACE, RUN
+from ..events.positions_kernels import InterfaceMeasure, RunMeasure
 from ..events.reading import Reading
 from . import rows_kernels as rows
-from .run import MASING, Cases, Marched, has_one_stretch, law_kernels, law_state
+from .rows_kernels import Row
+from .run import MASING, Cases, Marched, has_one_stretch, law_state
 
-# Readings of the interface of `dynamics.events` and of the lanes, with the power of the energy and of the frequency by
-# which a lane's reading is multiplied.
+# Readings of the interface of `dynamics.events` and of the lanes, and their unit; that of the lanes has m for N, and angles
+# of the drive for times.
 INTERFACE_READINGS = (
-    (INTERFACE.max_slip, "MAX_SLIP", 0, 0),
-    (INTERFACE.min_slip, "MIN_SLIP", 0, 0),
-    (INTERFACE.mean_range, "MEAN_RANGE", 0, 0),
-    (INTERFACE.max_force, "MAX_FORCE", 1, 0),
-    (INTERFACE.end_work, "LOOP_WORK", 1, 0),
-    (INTERFACE.path_work, "LOOP_WORK_SIZE", 1, 0),
-    (INTERFACE.stuck_time, "STICK_ANGLE", 0, -1),
-    (INTERFACE.first_slide, "FIRST_MEAN_SLIDE", 0, -1),
-    (INTERFACE.last_slide, "LAST_MEAN_SLIDE", 0, -1),
-    (INTERFACE.first_force, "FIRST_MEAN_FORCE", 1, -1),
-    (INTERFACE.last_force, "LAST_MEAN_FORCE", 1, -1),
+    (InterfaceMeasure.MAX_SLIP, "MAX_SLIP", "m"),
+    (InterfaceMeasure.MIN_SLIP, "MIN_SLIP", "m"),
+    (InterfaceMeasure.MEAN_RANGE, "MEAN_RANGE", "m"),
+    (InterfaceMeasure.MAX_FORCE, "MAX_FORCE", "N"),
+    (InterfaceMeasure.END_WORK, "LOOP_WORK", "N m"),
+    (InterfaceMeasure.PATH_WORK, "LOOP_WORK_SIZE", "N m"),
+    (InterfaceMeasure.STUCK_TIME, "STICK_ANGLE", "s"),
+    (InterfaceMeasure.FIRST_SLIDE, "FIRST_MEAN_SLIDE", "m s"),
+    (InterfaceMeasure.LAST_SLIDE, "LAST_MEAN_SLIDE", "m s"),
+    (InterfaceMeasure.FIRST_FORCE, "FIRST_MEAN_FORCE", "N s"),
+    (InterfaceMeasure.LAST_FORCE, "LAST_MEAN_FORCE", "N s"),
 )
 RUN_READINGS = (
-    (RUN.max_acceleration, "MAX_ACCELERATION"),
-    (RUN.n_releases, "SLIP_STARTS"),
-    (RUN.release_cos, "START_COS"),
-    (RUN.release_sin, "START_SIN"),
+    (RunMeasure.MAX_ACCELERATION, "MAX_ACCELERATION"),
+    (RunMeasure.N_RELEASES, "SLIP_STARTS"),
+    (RunMeasure.RELEASE_COS, "START_COS"),
+    (RunMeasure.RELEASE_SIN, "START_SIN"),
 )
 
 
@@ -76,10 +77,10 @@ def run_energies(law: str, cases: Cases, marched: Marched, energy) -> dict:
     for row in rows.SUM_ROWS:
         growth = (end[:, row] - observed_start[:, row]) / marched.n_observed
         sums[row] = end[:, row] + n_repeated * growth
-    x0 = marched.start[:, rows.SLIDE]
-    v0 = marched.start[:, rows.SPEED]
-    x1 = end[:, rows.SLIDE]
-    v1 = end[:, rows.SPEED]
+    x0 = marched.start[:, Row.SLIDE]
+    v0 = marched.start[:, Row.SPEED]
+    x1 = end[:, Row.SLIDE]
+    v1 = end[:, Row.SPEED]
     rate0 = v0 * _free_acceleration(law, cases, marched.start)
     rate1 = v1 * _free_acceleration(law, cases, end)
     loss_ends = step / 2 * (v0**2 - v1**2) + step * step / 6 * (rate0 - rate1)
@@ -87,15 +88,15 @@ def run_energies(law: str, cases: Cases, marched: Marched, energy) -> dict:
     largest = np.abs(marched.history[:, :, :2]).max(axis=(1, 2))
     elastic = _elastic_energy(law, cases, end) - _elastic_energy(law, cases, marched.start)
     if has_one_stretch(law):
-        dissipated = sums[rows.SLIP_PATH] - elastic
+        dissipated = sums[Row.SLIP_PATH] - elastic
     else:
-        dissipated = cases.kinetic * sums[rows.SLIP_PATH]
+        dissipated = cases.kinetic * sums[Row.SLIP_PATH]
     stored = v1**2 - v0**2 + cases.stiffness * (x1**2 - x0**2)
     peak_stored = np.maximum(cases.stiffness * largest**2, v0**2 + cases.stiffness * x0**2)
     energies = {
-        "work_in": cases.drive * (step * sums[rows.WORK_SUM] + work_ends),
-        "viscous": cases.damping * (step * sums[rows.LOSS_SUM] + loss_ends),
-        "power": np.abs(cases.drive) * step * sums[rows.POWER_SUM],
+        "work_in": cases.drive * (step * sums[Row.WORK_SUM] + work_ends),
+        "viscous": cases.damping * (step * sums[Row.LOSS_SUM] + loss_ends),
+        "power": np.abs(cases.drive) * step * sums[Row.POWER_SUM],
         "friction": dissipated + elastic,
         "lost": dissipated,
         "stored": 0.5 * stored,
@@ -106,16 +107,16 @@ def run_energies(law: str, cases: Cases, marched: Marched, energy) -> dict:
 
 def _free_acceleration(law: str, cases: Cases, motion) -> np.ndarray:
     """Return the acceleration (n,) of a motion where the drive passes 0."""
-    x = motion[:, rows.SLIDE]
-    v = motion[:, rows.SPEED]
+    x = motion[:, Row.SLIDE]
+    v = motion[:, Row.SPEED]
     return -cases.damping * v - cases.stiffness * x - _friction(law, cases, motion)
 
 
 def _friction(law: str, cases: Cases, motion) -> np.ndarray:
     """Return the friction over the mass (n,) [m] of a motion where the drive passes 0."""
-    x = motion[:, rows.SLIDE]
-    memory = motion[:, rows.MEMORY]
-    slip_sign = motion[:, rows.SLIP_SIGN]
+    x = motion[:, Row.SLIDE]
+    memory = motion[:, Row.MEMORY]
+    slip_sign = motion[:, Row.SLIP_SIGN]
     if law in MASING:
         return memory
     if has_one_stretch(law):
@@ -131,7 +132,7 @@ def _elastic_energy(law: str, cases: Cases, motion) -> np.ndarray:
     if has_one_stretch(law):
         square = law_state(law, motion, "STRETCH_SQUARE")
     else:
-        square = (motion[:, rows.SLIDE] - motion[:, rows.MEMORY]) ** 2
+        square = (motion[:, Row.SLIDE] - motion[:, Row.MEMORY]) ** 2
     return 0.5 * cases.spring * square
 
 
@@ -141,21 +142,20 @@ def _slider_energy(law: str, cases: Cases, motion) -> np.ndarray:
     m = law_state(law, motion, "BRANCH_SCALE")
     turn_force = law_state(law, motion, "TURN_FORCE")
     length = cases.yield_length
-    distance = side * (motion[:, rows.SLIDE] - law_state(law, motion, "TURN_SLIDE")) / m
+    distance = side * (motion[:, Row.SLIDE] - law_state(law, motion, "TURN_SLIDE")) / m
     w = np.minimum(distance / length, 1.0)
-    force = side * (motion[:, rows.MEMORY] - turn_force) / m / (cases.spring * length)
+    force = side * (motion[:, Row.MEMORY] - turn_force) / m / (cases.spring * length)
     if law == "masing":
         exponent = cases.law[:, 0]
         work = w * (w / 2 - (w - force) / (exponent + 2))
         slip = exponent / (exponent + 2) * w * (w - force)
     else:
-        curve = law_kernels(law).curve
-        table = cases.law[:, 3 : 3 + curve.PART_STARTS]
-        table = table.reshape(len(w), curve.N_YIELDS, curve.N_COLUMNS)
-        last = np.sum(table[:, 1:, curve.YIELD] <= w[:, None], axis=1)
+        table = cases.law[:, 3 : 3 + rows.PART_STARTS]
+        table = table.reshape(len(w), rows.N_YIELDS, rows.N_COLUMNS)
+        last = np.sum(table[:, 1:, rows.YieldColumn.YIELD] <= w[:, None], axis=1)
         row = table[np.arange(len(w)), last]
-        work = (w * (force + row[:, curve.FORCE]) - row[:, curve.MOMENT]) / 2
-        slip = row[:, curve.FORCE] * w - row[:, curve.MOMENT]
+        work = (w * (force + row[:, rows.YieldColumn.FORCE]) - row[:, rows.YieldColumn.MOMENT]) / 2
+        slip = row[:, rows.YieldColumn.FORCE] * w - row[:, rows.YieldColumn.MOMENT]
     beyond = cases.kinetic * (distance - w * length)
     work = cases.spring * length**2 * work + beyond
     slip_loss = cases.spring * length**2 * slip + beyond
@@ -182,41 +182,43 @@ def reading_of_runs(law: str, cases: Cases, marched: Marched, energy, omega, ext
     n = len(omega)
     start = marched.observed_start
     end = marched.motion
-    run = np.zeros((n, len(RUN)))
-    face = np.zeros((n, len(INTERFACE)))
+    run = np.zeros((n, len(RunMeasure)))
+    face = np.zeros((n, len(InterfaceMeasure)))
     angle = 2 * np.pi * marched.n_observed
     harmonics = integrate_harmonics(law, cases, marched, angle)
-    run[:, RUN.min_output] = extremes[:, :, 0].min(axis=1)
-    run[:, RUN.max_output] = extremes[:, :, 1].max(axis=1)
-    run[:, RUN.max_coordinate] = np.abs(extremes).max(axis=(1, 2))
+    run[:, RunMeasure.MIN_OUTPUT] = extremes[:, :, 0].min(axis=1)
+    run[:, RunMeasure.MAX_OUTPUT] = extremes[:, :, 1].max(axis=1)
+    run[:, RunMeasure.MAX_COORDINATE] = np.abs(extremes).max(axis=(1, 2))
     accelerations = np.array([*harmonics.acceleration, *harmonics.third_acceleration])
-    run[:, [RUN.cos_1, RUN.sin_1, RUN.cos_3, RUN.sin_3]] = accelerations.T / omega[:, None]
+    run[:, [RunMeasure.COS_1, RunMeasure.SIN_1, RunMeasure.COS_3, RunMeasure.SIN_3]] = (
+        accelerations.T / omega[:, None]
+    )
     for column, name in RUN_READINGS:
         run[:, column] = marched.reading(name)
     last = marched.history[:, -extremes.shape[1] :]
-    face[:, INTERFACE.min_slide] = last[..., 0].min(axis=1)
-    face[:, INTERFACE.max_slide] = last[..., 1].max(axis=1)
-    for column, name, energy_power, frequency_power in INTERFACE_READINGS:
-        unit = energy**energy_power * omega ** float(frequency_power)
-        face[:, column] = unit * marched.reading(name)
-    path = end[:, rows.SLIP_PATH] - start[:, rows.SLIP_PATH]
+    face[:, InterfaceMeasure.MIN_SLIDE] = last[..., 0].min(axis=1)
+    face[:, InterfaceMeasure.MAX_SLIDE] = last[..., 1].max(axis=1)
+    for column, name, unit in INTERFACE_READINGS:
+        scale = energy if "N" in unit else 1.0
+        face[:, column] = (scale / omega if "s" in unit else scale) * marched.reading(name)
+    path = end[:, Row.SLIP_PATH] - start[:, Row.SLIP_PATH]
     if has_one_stretch(law):
         work = path
     else:
         elastic = _elastic_energy(law, cases, end) - _elastic_energy(law, cases, start)
         work = cases.kinetic * path + elastic
-    face[:, INTERFACE.work] = energy * work
-    face[:, [INTERFACE.slide_cos, INTERFACE.slide_sin]] = (
+    face[:, InterfaceMeasure.WORK] = energy * work
+    face[:, [InterfaceMeasure.SLIDE_COS, InterfaceMeasure.SLIDE_SIN]] = (
         np.array(harmonics.slide).T / omega[:, None]
     )
-    face[:, [INTERFACE.force_cos, INTERFACE.force_sin]] = (
+    face[:, [InterfaceMeasure.FORCE_COS, InterfaceMeasure.FORCE_SIN]] = (
         np.array(harmonics.friction).T * (energy / omega)[:, None]
     )
-    face[:, INTERFACE.start_slide] = start[:, rows.SLIDE]
-    face[:, INTERFACE.end_slide] = end[:, rows.SLIDE]
+    face[:, InterfaceMeasure.START_SLIDE] = start[:, Row.SLIDE]
+    face[:, InterfaceMeasure.END_SLIDE] = end[:, Row.SLIDE]
     n_secants = marched.reading("N_SECANTS")
     secant = marched.reading("SECANT_SUM") / np.where(n_secants > 0, n_secants, 1.0)
-    face[:, INTERFACE.secant] = np.where(n_secants > 0, energy * secant, np.nan)
+    face[:, InterfaceMeasure.SECANT] = np.where(n_secants > 0, energy * secant, np.nan)
     return Reading(run, face[:, None], angle / omega, 2 * np.pi / omega)
 
 
@@ -240,8 +242,8 @@ def integrate_harmonics(law: str, cases: Cases, marched: Marched, angle) -> Harm
     step = marched.step
     start = marched.observed_start
     end = marched.motion
-    x = start[:, rows.SLIDE] - end[:, rows.SLIDE]
-    v = start[:, rows.SPEED] - end[:, rows.SPEED]
+    x = start[:, Row.SLIDE] - end[:, Row.SLIDE]
+    v = start[:, Row.SPEED] - end[:, Row.SPEED]
     a, j = _end_differences(law, cases, start, end)
     second = step * step / 12
     fourth = step**4 / 720
@@ -270,8 +272,8 @@ def _end_differences(law: str, cases: Cases, start, end) -> tuple:
 
     The friction of a law of one stretch is taken as constant, because its steps are finer.
     """
-    x = start[:, rows.SLIDE] - end[:, rows.SLIDE]
-    v = start[:, rows.SPEED] - end[:, rows.SPEED]
+    x = start[:, Row.SLIDE] - end[:, Row.SLIDE]
+    v = start[:, Row.SPEED] - end[:, Row.SPEED]
     a = -cases.damping * v - cases.stiffness * x
     if has_one_stretch(law):
         return a, 0 * v
@@ -285,5 +287,5 @@ def _friction_rate(law: str, cases: Cases, motion) -> np.ndarray:
     if law in MASING:
         tangent = law_state(law, motion, "TANGENT")
     else:
-        tangent = cases.spring * (motion[:, rows.SLIP_SIGN] == 0)
-    return motion[:, rows.SPEED] * tangent
+        tangent = cases.spring * (motion[:, Row.SLIP_SIGN] == 0)
+    return motion[:, Row.SPEED] * tangent

@@ -12,29 +12,8 @@ Their meaning is documented here.
 from typing import NamedTuple
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import NJIT_NO_REFCOUNT
-from .rows_kernels import (
-    A11,
-    A12,
-    A21,
-    A22,
-    CV,
-    CX,
-    DAMPING,
-    DRIVE,
-    KINETIC,
-    LANES,
-    NJIT_INLINE,
-    RV,
-    RX,
-    SLIDE,
-    SLIP_SIGN,
-    SPEED,
-    STATIC,
-    STIFFNESS,
-    SV,
-    SX,
-)
+from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
+from .rows_kernels import At
 
 STICK_IS_RIGID = True  # whether nothing moves in a stick
 EVENT_KEEPS_STICK = False  # whether a stick may go on after an event
@@ -221,12 +200,12 @@ def friction_force(state, sine, workspace, lane):
     -------
     float
     """
-    stiffness = workspace[STIFFNESS * LANES + lane]
-    stick_force = workspace[DRIVE * LANES + lane] * sine - stiffness * state.slide
-    limit = workspace[STATIC * LANES + lane]
+    stiffness = workspace[At.STIFFNESS + lane]
+    stick_force = workspace[At.DRIVE + lane] * sine - stiffness * state.slide
+    limit = workspace[At.STATIC + lane]
     if state.slip_sign == 0.0:
         return min(max(stick_force, -limit), limit)
-    return state.slip_sign * workspace[KINETIC * LANES + lane]
+    return state.slip_sign * workspace[At.KINETIC + lane]
 
 
 @njit(**NJIT_INLINE)
@@ -441,22 +420,22 @@ def linear_step(workspace, lane, s0, c0):
     -------
     Motion
     """
-    x = workspace[SLIDE * LANES + lane]
-    v = workspace[SPEED * LANES + lane]
-    friction = workspace[SLIP_SIGN * LANES + lane] * workspace[KINETIC * LANES + lane]
+    x = workspace[At.SLIDE + lane]
+    v = workspace[At.SPEED + lane]
+    friction = workspace[At.SLIP_SIGN + lane] * workspace[At.KINETIC + lane]
     x1 = (
-        workspace[A11 * LANES + lane] * x
-        + workspace[A12 * LANES + lane] * v
-        + workspace[SX * LANES + lane] * s0
-        + workspace[CX * LANES + lane] * c0
-        - friction * workspace[RX * LANES + lane]
+        workspace[At.A11 + lane] * x
+        + workspace[At.A12 + lane] * v
+        + workspace[At.SX + lane] * s0
+        + workspace[At.CX + lane] * c0
+        - friction * workspace[At.RX + lane]
     )
     v1 = (
-        workspace[A21 * LANES + lane] * x
-        + workspace[A22 * LANES + lane] * v
-        + workspace[SV * LANES + lane] * s0
-        + workspace[CV * LANES + lane] * c0
-        - friction * workspace[RV * LANES + lane]
+        workspace[At.A21 + lane] * x
+        + workspace[At.A22 + lane] * v
+        + workspace[At.SV + lane] * s0
+        + workspace[At.CV + lane] * c0
+        - friction * workspace[At.RV + lane]
     )
     return Motion(x1, v1)
 
@@ -477,12 +456,12 @@ def try_step(workspace, lane, step, is_observed):
     -------
     TriedStep
     """
-    x = workspace[SLIDE * LANES + lane]
-    slip_sign = workspace[SLIP_SIGN * LANES + lane]
+    x = workspace[At.SLIDE + lane]
+    slip_sign = workspace[At.SLIP_SIGN + lane]
     end = linear_step(workspace, lane, step.s0, step.c0)
     is_stuck = slip_sign == 0.0
-    force = workspace[DRIVE * LANES + lane] * step.s1 - workspace[STIFFNESS * LANES + lane] * x
-    is_released = abs(force) > workspace[STATIC * LANES + lane]
+    force = workspace[At.DRIVE + lane] * step.s1 - workspace[At.STIFFNESS + lane] * x
+    is_released = abs(force) > workspace[At.STATIC + lane]
     stops = slip_sign * end.speed < 0.0 or (is_observed and end.speed == 0.0)
     x1 = x if is_stuck else end.slide
     return TriedStep(x1, 0.0 if is_stuck else end.speed, x1, is_released if is_stuck else stops)
@@ -504,8 +483,8 @@ def motion_from_rest(workspace, lane, angle, force, force_rate, force_bend):
     -------
     Motion
     """
-    damping = workspace[DAMPING * LANES + lane]
-    stiffness = workspace[STIFFNESS * LANES + lane]
+    damping = workspace[At.DAMPING + lane]
+    stiffness = workspace[At.STIFFNESS + lane]
     t = angle
     t2 = t * t
     e2 = damping * damping - stiffness
@@ -573,7 +552,7 @@ def resolve_step(workspace, lane, step):
     -------
     StepOutcome
     """
-    if workspace[SLIP_SIGN * LANES + lane] == 0.0:
+    if workspace[At.SLIP_SIGN + lane] == 0.0:
         return resolve_release(workspace, lane, step)
     return resolve_stop(workspace, lane, step)
 
@@ -591,10 +570,10 @@ def resolve_release(workspace, lane, step):
     -------
     StepOutcome
     """
-    x = workspace[SLIDE * LANES + lane]
-    stiffness = workspace[STIFFNESS * LANES + lane]
-    drive = workspace[DRIVE * LANES + lane]
-    static = workspace[STATIC * LANES + lane]
+    x = workspace[At.SLIDE + lane]
+    stiffness = workspace[At.STIFFNESS + lane]
+    drive = workspace[At.DRIVE + lane]
+    static = workspace[At.STATIC + lane]
     n0 = drive * step.s0 - stiffness * x
     n1 = drive * step.s1 - stiffness * x
     side = 1.0 if n1 > 0.0 else -1.0
@@ -606,7 +585,7 @@ def resolve_release(workspace, lane, step):
     slope = -step.angle * side * drive * step.c0
     root = cubic_root(reserve, reserve1, slope, -step.angle * side * drive * step.c1, lowest)
     force = side * (static - root.value)
-    net_force = force - side * workspace[KINETIC * LANES + lane]
+    net_force = force - side * workspace[At.KINETIC + lane]
     force_rate = -side * root.slope / step.angle
     force_bend = -(force + stiffness * x)
     rest = step.angle - root.place * step.angle
@@ -628,13 +607,13 @@ def resolve_stop(workspace, lane, step):
     -------
     StepOutcome
     """
-    x = workspace[SLIDE * LANES + lane]
-    v = workspace[SPEED * LANES + lane]
-    sign = workspace[SLIP_SIGN * LANES + lane]
-    damping = workspace[DAMPING * LANES + lane]
-    stiffness = workspace[STIFFNESS * LANES + lane]
-    drive = workspace[DRIVE * LANES + lane]
-    friction = sign * workspace[KINETIC * LANES + lane]
+    x = workspace[At.SLIDE + lane]
+    v = workspace[At.SPEED + lane]
+    sign = workspace[At.SLIP_SIGN + lane]
+    damping = workspace[At.DAMPING + lane]
+    stiffness = workspace[At.STIFFNESS + lane]
+    drive = workspace[At.DRIVE + lane]
+    friction = sign * workspace[At.KINETIC + lane]
     end = linear_step(workspace, lane, step.s0, step.c0)
     if not sign * end.speed < 0.0:
         return StepOutcome(
@@ -654,7 +633,7 @@ def resolve_stop(workspace, lane, step):
     root = cubic_root(sign * v, sign * end.speed, step.angle * rate, step.angle * rate1, 0.0)
     stop_slide = x + sign * step.angle * root.integral
     acceleration = root.slope * sign / step.angle
-    sticks = abs(acceleration + friction) <= workspace[STATIC * LANES + lane]
+    sticks = abs(acceleration + friction) <= workspace[At.STATIC + lane]
     if sticks:
         return StepOutcome(
             stop_slide,

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...compiled import instantiate, load
 from . import rows_kernels as rows
+from .rows_kernels import Row
 
 HERE = "dynamics.lanes"
 MASING = ("masing", "table")  # laws of Masing's rule, named by the curve of their first loading
@@ -23,11 +24,12 @@ class Cases(NamedTuple):
     - `kinetic`, `static` (n,): friction over the mass in a slip, and its maximum in a stick [m].
     - `spring` (n,): slope of the friction over the slide in a stick, 0 for a rigid contact.
     - `yield_length` (n,): elastic slide at which the interface slips [m].
-    - `output_gain`, `base_gain` (n,) [m s-2]: acceleration of the output per x'', and of the base per sine.
+    - `output_gain`, `base_gain` (n,) [m s-2]: acceleration of the output per x'', and of the base
+      per sine.
     - `x`, `v` (n,): slide and speed at the start.
-    - `law` (n, k): further numbers of the law. Laws of one stretch: as their `rate_equation` takes them. Masing's rule: two
-      numbers of the curve (chi + 1 and q of a power), the fraction of `yield_length` at which half of the friction slips,
-      and the table of a curve (`curve_tables`).
+    - `law` (n, k): further numbers of the law. Laws of one stretch: as their `rate_equation` takes
+      them. Masing's rule: two numbers of the curve (chi + 1 and q of a power), the fraction of
+      `yield_length` at which half of the friction slips, and the table of a curve (`curve_tables`).
     """
 
     damping: np.ndarray
@@ -47,8 +49,8 @@ class Cases(NamedTuple):
 class Marched(NamedTuple):
     """Results of n cases that were marched.
 
-    - `start`, `observed_start`, `motion` (n, N_STATE and the state of the law): motion at the start, at the start of the
-      observed cycles, and at the end.
+    - `start`, `observed_start`, `motion` (n, N_STATE and the state of the law): motion at the
+      start, at the start of the observed cycles, and at the end.
     - `history` (n, c, 4): smallest and largest slide and phasor [m] of all cycles.
     - `readings` (n, N_READINGS): readings of the observed cycles.
     - `n_before`, `n_observed` (n,): number of cycles before the observed ones, and of these.
@@ -66,7 +68,7 @@ class Marched(NamedTuple):
 
     def reading(self, name: str) -> np.ndarray:
         """Return a reading (n,) by its name in `rows_kernels`."""
-        return self.readings[:, getattr(rows, name) - rows.FIRST_READING]
+        return self.readings[:, Row[name] - rows.FIRST_READING]
 
 
 def has_one_stretch(law: str) -> bool:
@@ -83,27 +85,27 @@ def load_loop(law: str):
     loop = f"{HERE}.loop_kernels"
     if law == "rigid":
         return load(loop)
-    kernels = f"{HERE}.yielding_kernels" if law == "yielding" else law_kernels(law)
     if has_one_stretch(law):
         kernels = instantiate(f"{HERE}.flowing_kernels", {"friction": law})
+    elif law == "table":
+        curve = f"{HERE}.table_curve_kernels"
+        kernels = instantiate(f"{HERE}.masing_kernels", {"curve": curve})
+    else:
+        kernels = f"{HERE}.{law}_kernels"
     parts = {"law": kernels, "lanes": instantiate(f"{HERE}.lane_kernels", {"law": kernels})}
-    others = {
-        name: instantiate(f"{HERE}.{name}_kernels", parts)
-        for name in ("extrapolation", "observation")
-    }
-    return instantiate(loop, parts | others)
+    extrapolation = instantiate(f"{HERE}.extrapolation_kernels", parts)
+    observation = instantiate(f"{HERE}.observation_kernels", parts)
+    return instantiate(loop, parts | {"extrapolation": extrapolation, "observation": observation})
 
 
-def law_kernels(law: str):
-    """Return the kernels that name the rows of the state of a law.
-
-    The result is None if a law has no state of its own.
-    """
-    if law in ("rigid", "yielding"):
-        return None
-    if law == "table":
-        return instantiate(f"{HERE}.masing_kernels", {"curve": f"{HERE}.table_curve_kernels"})
-    return load(f"{HERE}.{'flowing' if has_one_stretch(law) else law}_kernels")
+def count_law_rows(law: str) -> int:
+    """Return the number of rows of the state of a law in addition to that of every law."""
+    if has_one_stretch(law):
+        return len(rows.StretchRow)
+    if law in MASING:
+        n_table_rows = len(rows.TableRow) if law == "table" else 0
+        return rows.CURVE_STATE - rows.LAW_STATE + n_table_rows
+    return 0
 
 
 def curve_tables(groups) -> np.ndarray:
@@ -113,7 +115,7 @@ def curve_tables(groups) -> np.ndarray:
     ----------
     groups : list of tuple
         Stiffness (t,) [N/m] and increasing yield slides (t,) [m] of each set; t is less than
-        `table_curve_kernels.N_YIELDS`.
+        `rows_kernels.N_YIELDS`.
 
     Returns
     -------
@@ -121,29 +123,31 @@ def curve_tables(groups) -> np.ndarray:
         Two numbers without a meaning, the fraction of the last yield slide at which half of the friction slips, and the
         table of `table_curve_kernels`.
     """
-    curve = load(f"{HERE}.table_curve_kernels")
     heads = np.ones((len(groups), 3))
-    tables = np.zeros((len(groups), curve.TABLE_SIZE))
-    yields = tables[:, : curve.PART_STARTS].reshape(len(groups), curve.N_YIELDS, curve.N_COLUMNS)
-    yields[:, 1:, curve.YIELD] = NO_YIELD
-    yields[:, 0, curve.SLOPE] = 1.0
+    tables = np.zeros((len(groups), rows.TABLE_SIZE))
+    yields = tables[:, : rows.PART_STARTS].reshape(len(groups), rows.N_YIELDS, rows.N_COLUMNS)
+    yields[:, 1:, rows.YieldColumn.YIELD] = NO_YIELD
+    yields[:, 0, rows.YieldColumn.SLOPE] = 1.0
     for head, rows_of_table, table, (stiffness, yield_slide) in zip(heads, yields, tables, groups):
         n = len(stiffness)
         w = yield_slide / yield_slide[-1]
         fraction = stiffness / stiffness.sum()
-        rows_of_table[1 : n + 1, curve.YIELD] = w
-        for column, values in ((curve.FORCE, fraction * w), (curve.MOMENT, fraction * w * w)):
-            after_last = np.zeros(curve.N_YIELDS - 1 - n)
+        rows_of_table[1 : n + 1, rows.YieldColumn.YIELD] = w
+        for column, values in (
+            (rows.YieldColumn.FORCE, fraction * w),
+            (rows.YieldColumn.MOMENT, fraction * w * w),
+        ):
+            after_last = np.zeros(rows.N_YIELDS - 1 - n)
             rows_of_table[1:, column] = np.append(np.cumsum(values), after_last)
         # The slope is the stiffness of the elements that have not yielded; after the last yield it is 0.
-        rows_of_table[1:n, curve.SLOPE] = np.cumsum(fraction[:0:-1])[::-1]
-        half_force = 0.5 * rows_of_table[n, curve.FORCE]
-        head[2] = w[np.searchsorted(rows_of_table[1:n, curve.FORCE], half_force)]
-        edges = np.linspace(w[0], w[-1], curve.N_PARTS + 1)
-        starts = slice(curve.PART_STARTS, curve.PART_STARTS + curve.N_PARTS)
+        rows_of_table[1:n, rows.YieldColumn.SLOPE] = np.cumsum(fraction[:0:-1])[::-1]
+        half_force = 0.5 * rows_of_table[n, rows.YieldColumn.FORCE]
+        head[2] = w[np.searchsorted(rows_of_table[1:n, rows.YieldColumn.FORCE], half_force)]
+        edges = np.linspace(w[0], w[-1], rows.N_PARTS + 1)
+        starts = slice(rows.PART_STARTS, rows.PART_STARTS + rows.N_PARTS)
         table[starts] = np.searchsorted(w, edges[:-1])
-        table[curve.FIRST_YIELD] = w[0]
-        table[curve.PARTS_PER_SLIDE] = curve.N_PARTS / max(w[-1] - w[0], 1e-300)
+        table[rows.FIRST_YIELD] = w[0]
+        table[rows.PARTS_PER_SLIDE] = rows.N_PARTS / max(w[-1] - w[0], 1e-300)
     return np.concatenate([heads, tables], axis=1)
 
 
@@ -228,16 +232,16 @@ def case_numbers(law: str, cases: Cases, steps: int) -> np.ndarray:
     table = cases.law[:, 3:] if law == "table" else np.empty((n, 0))
     numbers = np.concatenate([np.zeros((n, rows.N_NUMBERS)), table], axis=1)
     angle = 2 * np.pi / steps
-    numbers[:, rows.DAMPING - rows.FIRST_NUMBER : rows.N_NUMBERS] = np.array(cases[:9]).T
-    if law_kernels(law):
-        numbers[:, rows.STEP - rows.FIRST_NUMBER] = angle
-        numbers[:, rows.MIDPOINT_FACTOR - rows.FIRST_NUMBER] = 0.5 / np.cos(angle / 2)
-        first = rows.LAW_NUMBERS - rows.FIRST_NUMBER
-        given = cases.law[:, : rows.N_LAW_NUMBERS]
+    numbers[:, Row.DAMPING - rows.FIRST_NUMBER : rows.N_NUMBERS] = np.array(cases[:9]).T
+    if law not in ("rigid", "yielding"):
+        numbers[:, Row.STEP - rows.FIRST_NUMBER] = angle
+        numbers[:, Row.MIDPOINT_FACTOR - rows.FIRST_NUMBER] = 0.5 / np.cos(angle / 2)
+        first = Row.LAW_NUMBERS - rows.FIRST_NUMBER
+        law_numbers = cases.law[:, : rows.N_LAW_NUMBERS]
         numbers[:, first : first + rows.N_LAW_NUMBERS] = 1.0
-        numbers[:, first : first + given.shape[1]] = given
+        numbers[:, first : first + law_numbers.shape[1]] = law_numbers
         return numbers
-    for spring, first in ((0.0, rows.A11), (cases.spring, rows.B11)):
+    for spring, first in ((0.0, Row.A11), (cases.spring, Row.B11)):
         first -= rows.FIRST_NUMBER
         numbers[:, first : first + 10] = step_coefficients(cases, spring, angle)
     return numbers
@@ -287,34 +291,32 @@ def drive_table(steps: int) -> np.ndarray:
 
 def initial_motion(law: str, cases: Cases) -> np.ndarray:
     """Return the motion (n, N_STATE and the state of the law) of cases at their start."""
-    kernels = law_kernels(law)
-    n_law_state = kernels.N_LAW_STATE if kernels else 0
-    motion = np.zeros((len(cases.damping), rows.N_STATE + n_law_state))
-    motion[:, rows.SLIDE] = cases.x
-    motion[:, rows.SPEED] = cases.v
-    motion[:, rows.MEMORY] = cases.x
-    motion[:, rows.SLIP_SIGN] = np.sign(cases.v) * (cases.spring == 0)
+    motion = np.zeros((len(cases.damping), rows.N_STATE + count_law_rows(law)))
+    motion[:, Row.SLIDE] = cases.x
+    motion[:, Row.SPEED] = cases.v
+    motion[:, Row.MEMORY] = cases.x
+    motion[:, Row.SLIP_SIGN] = np.sign(cases.v) * (cases.spring == 0)
     if has_one_stretch(law):
         moving = np.where(cases.v == 0, np.sign(cases.drive), np.sign(cases.v))
-        motion[:, rows.SLIP_SIGN] = moving
-        motion[:, rows.MEMORY] = 0.0
+        motion[:, Row.SLIP_SIGN] = moving
+        motion[:, Row.MEMORY] = 0.0
     if law in MASING:
         moving = np.select([cases.v != 0, cases.x != 0], [cases.v, -cases.x], cases.drive)
         direction = np.sign(moving)
         direction[direction == 0] = 1.0
         half_slip = direction * cases.yield_length * cases.law[:, 2]
         for row, value in (
-            (kernels.DIRECTION, direction),
-            (kernels.BRANCH_SCALE, 1.0),
-            (kernels.KEEPS_FIRST_LOADING, 1.0),
-            (kernels.TURN_SLIDE, cases.x),
-            (kernels.TANGENT, cases.spring),
-            (kernels.NEXT_EVENT, cases.x + half_slip),
+            (rows.SliderRow.DIRECTION, direction),
+            (rows.SliderRow.BRANCH_SCALE, 1.0),
+            (rows.SliderRow.KEEPS_FIRST_LOADING, 1.0),
+            (rows.SliderRow.TURN_SLIDE, cases.x),
+            (rows.SliderRow.TANGENT, cases.spring),
+            (rows.SliderRow.NEXT_EVENT, cases.x + half_slip),
         ):
             motion[:, row - rows.LAW_STATE + rows.N_STATE] = value
-        motion[:, rows.MEMORY] = 0.0
-    motion[:, rows.MAX_SLIDE] = cases.x
-    motion[:, rows.MIN_SLIDE] = cases.x
+        motion[:, Row.MEMORY] = 0.0
+    motion[:, Row.MAX_SLIDE] = cases.x
+    motion[:, Row.MIN_SLIDE] = cases.x
     return motion
 
 
@@ -327,14 +329,14 @@ def law_state(law: str, motion, name: str) -> np.ndarray:
     motion : array
         Motions of the cases, as `loop_kernels.march` writes them.
     name : str
-        Name of the row in the kernels of the law.
+        Name of a row in `rows_kernels.StretchRow` or `rows_kernels.SliderRow`.
 
     Returns
     -------
     (n,) array
     """
-    row = getattr(law_kernels(law), name)
-    return motion[:, rows.N_STATE + row - rows.LAW_STATE]
+    law_rows = rows.StretchRow if has_one_stretch(law) else rows.SliderRow
+    return motion[:, rows.N_STATE + law_rows[name] - rows.LAW_STATE]
 
 
 def continue_march(law: str, cases: Cases, motion, cycles: int, steps: int) -> tuple:

@@ -13,32 +13,23 @@ reference is the engine `dynamics.events` with the elements themselves.
 """
 
 from ...compiled.jit import njit
-from .rows_kernels import CURVE_PLACE, CURVE_STATE, LANES, NJIT_INLINE
+from ...friction.flags_kernels import NJIT_INLINE
+from .rows_kernels import (
+    CURVE_STATE,
+    FIRST_YIELD,
+    LANES,
+    N_COLUMNS,
+    N_PARTS,
+    PART_STARTS,
+    PARTS_PER_SLIDE,
+    TABLE_SIZE,
+    TableAt,
+    TableRow,
+    YieldColumn,
+)
 
-N_YIELDS = 512  # number of yields of a table; the first is at 0 and the last beyond all slides
-# Columns of a yield.
-YIELD = 0
-FORCE = 1
-SLOPE = 2
-MOMENT = 3
-N_COLUMNS = 4
-# Rows of the workspace: number of the yield, F, S and B at CURVE_PLACE, and F and B at the start of the step.
-YIELD_INDEX = CURVE_PLACE + 1
-PREPARED_FORCE = CURVE_PLACE + 2
-PREPARED_SLOPE = CURVE_PLACE + 3
-PREPARED_MOMENT = CURVE_PLACE + 4
-START_FORCE = CURVE_PLACE + 5
-START_MOMENT = CURVE_PLACE + 6
-N_ROWS = CURVE_PLACE + 7
-# After the yields a table has the number of yields before each part of their range, the first yield, and the number of
-# parts per slide.
-N_PARTS = 128
-PART_STARTS = N_COLUMNS * N_YIELDS
-FIRST_YIELD = PART_STARTS + N_PARTS
-PARTS_PER_SLIDE = PART_STARTS + N_PARTS + 1
-TABLE_SIZE = PART_STARTS + N_PARTS + 2
-TABLE_START = N_ROWS * LANES  # index of the first table in the workspace
-N_CURVE_STATE = N_ROWS - CURVE_STATE  # number of rows that the curve has in the state of the law
+# element of the workspace at which the table of the first lane begins
+TABLE_START = (CURVE_STATE + len(TableRow)) * LANES
 # Longest step, over YIELD_LENGTH; Newton's method finds the end of a longer one badly
 MAX_STEP = 0.25
 LOOKS_AHEAD = True  # whether `prepare_lookup` has something to do
@@ -67,7 +58,7 @@ def walk_to(first_guess, w, workspace, lane):
         n += 1
     while w < workspace[table + N_COLUMNS * n]:
         n -= 1
-    workspace[YIELD_INDEX * LANES + lane] = n
+    workspace[TableAt.YIELD_INDEX + lane] = n
 
 
 @njit(**NJIT_INLINE)
@@ -87,7 +78,7 @@ def find_yield(w, workspace, lane):
     -------
     int
     """
-    k = int(workspace[YIELD_INDEX * LANES + lane])
+    k = int(workspace[TableAt.YIELD_INDEX + lane])
     table = TABLE_START + TABLE_SIZE * lane
     if w < workspace[table + N_COLUMNS * k] or w >= workspace[table + N_COLUMNS * (k + 1)]:
         part = (w - workspace[table + FIRST_YIELD]) * workspace[table + PARTS_PER_SLIDE]
@@ -95,18 +86,18 @@ def find_yield(w, workspace, lane):
         if part > 0.0:
             k = int(workspace[table + PART_STARTS + int(min(part, N_PARTS - 1.0))])
         walk_to(k, w, workspace, lane)
-    return table + N_COLUMNS * int(workspace[YIELD_INDEX * LANES + lane])
+    return table + N_COLUMNS * int(workspace[TableAt.YIELD_INDEX + lane])
 
 
 @njit(**NJIT_INLINE)
 def prepare_lookup(workspace, lane):
     """Look up the curve of a lane at CURVE_PLACE."""
-    start = int(workspace[YIELD_INDEX * LANES + lane])
-    walk_to(start, workspace[CURVE_PLACE * LANES + lane], workspace, lane)
-    place = TABLE_START + TABLE_SIZE * lane + N_COLUMNS * int(workspace[YIELD_INDEX * LANES + lane])
-    workspace[PREPARED_FORCE * LANES + lane] = workspace[place + FORCE]
-    workspace[PREPARED_SLOPE * LANES + lane] = workspace[place + SLOPE]
-    workspace[PREPARED_MOMENT * LANES + lane] = workspace[place + MOMENT]
+    start = int(workspace[TableAt.YIELD_INDEX + lane])
+    walk_to(start, workspace[TableAt.CURVE_PLACE + lane], workspace, lane)
+    place = TABLE_START + TABLE_SIZE * lane + N_COLUMNS * int(workspace[TableAt.YIELD_INDEX + lane])
+    workspace[TableAt.PREPARED_FORCE + lane] = workspace[place + YieldColumn.FORCE]
+    workspace[TableAt.PREPARED_SLOPE + lane] = workspace[place + YieldColumn.SLOPE]
+    workspace[TableAt.PREPARED_MOMENT + lane] = workspace[place + YieldColumn.MOMENT]
 
 
 @njit(**NJIT_INLINE)
@@ -120,13 +111,13 @@ def finish_step(workspace, lane, event):
     event : bool
         Whether the step has an event.
     """
-    force = workspace[START_FORCE * LANES + lane]
-    moment = workspace[START_MOMENT * LANES + lane]
-    workspace[START_FORCE * LANES + lane] = (
-        force if event else workspace[PREPARED_FORCE * LANES + lane]
+    force = workspace[TableAt.START_FORCE + lane]
+    moment = workspace[TableAt.START_MOMENT + lane]
+    workspace[TableAt.START_FORCE + lane] = (
+        force if event else workspace[TableAt.PREPARED_FORCE + lane]
     )
-    workspace[START_MOMENT * LANES + lane] = (
-        moment if event else workspace[PREPARED_MOMENT * LANES + lane]
+    workspace[TableAt.START_MOMENT + lane] = (
+        moment if event else workspace[TableAt.PREPARED_MOMENT + lane]
     )
 
 
@@ -142,8 +133,8 @@ def start_lookup(w, workspace, lane):
         See `rigid_kernels.friction_force`.
     """
     place = find_yield(w, workspace, lane)
-    workspace[START_FORCE * LANES + lane] = workspace[place + FORCE]
-    workspace[START_MOMENT * LANES + lane] = workspace[place + MOMENT]
+    workspace[TableAt.START_FORCE + lane] = workspace[place + YieldColumn.FORCE]
+    workspace[TableAt.START_MOMENT + lane] = workspace[place + YieldColumn.MOMENT]
 
 
 @njit(**NJIT_INLINE)
@@ -167,10 +158,12 @@ def force_and_slope(w, workspace, lane, when):
         Slope.
     """
     if when == PREPARED:
-        slope = workspace[PREPARED_SLOPE * LANES + lane]
-        return workspace[PREPARED_FORCE * LANES + lane] + slope * w, slope
+        slope = workspace[TableAt.PREPARED_SLOPE + lane]
+        return workspace[TableAt.PREPARED_FORCE + lane] + slope * w, slope
     place = find_yield(w, workspace, lane)
-    return workspace[place + FORCE] + workspace[place + SLOPE] * w, workspace[place + SLOPE]
+    return workspace[place + YieldColumn.FORCE] + workspace[
+        place + YieldColumn.SLOPE
+    ] * w, workspace[place + YieldColumn.SLOPE]
 
 
 @njit(**NJIT_INLINE)
@@ -191,12 +184,12 @@ def mean_slip(w, force, workspace, lane, when):
     float
     """
     if when == PREPARED:
-        moment = workspace[PREPARED_MOMENT * LANES + lane]
-        return workspace[PREPARED_FORCE * LANES + lane] * w - moment
+        moment = workspace[TableAt.PREPARED_MOMENT + lane]
+        return workspace[TableAt.PREPARED_FORCE + lane] * w - moment
     if when == AT_START:
-        return workspace[START_FORCE * LANES + lane] * w - workspace[START_MOMENT * LANES + lane]
+        return workspace[TableAt.START_FORCE + lane] * w - workspace[TableAt.START_MOMENT + lane]
     place = find_yield(w, workspace, lane)
-    return workspace[place + FORCE] * w - workspace[place + MOMENT]
+    return workspace[place + YieldColumn.FORCE] * w - workspace[place + YieldColumn.MOMENT]
 
 
 @njit(**NJIT_INLINE)
@@ -213,4 +206,6 @@ def loading_work(w, force, workspace, lane):
     float
     """
     place = find_yield(w, workspace, lane)
-    return (w * (force + workspace[place + FORCE]) - workspace[place + MOMENT]) / 2
+    return (
+        w * (force + workspace[place + YieldColumn.FORCE]) - workspace[place + YieldColumn.MOMENT]
+    ) / 2

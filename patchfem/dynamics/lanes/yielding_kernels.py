@@ -10,7 +10,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
 from .rigid_kernels import (
     N_KEPT,
     LaneState,
@@ -29,33 +29,7 @@ from .rigid_kernels import (
     slip_increment,
 )
 from .rigid_kernels import linear_step as linear_slip
-from .rows_kernels import (
-    B11,
-    B12,
-    B21,
-    B22,
-    CYCLE_ENDS,
-    DAMPING,
-    DRIVE,
-    KINETIC,
-    LANES,
-    MEMORY,
-    NJIT_INLINE,
-    QV,
-    QX,
-    SLIDE,
-    SLIP_PATH,
-    SLIP_SIGN,
-    SPEED,
-    SPRING,
-    STATE_ROWS,
-    STIFFNESS,
-    TV,
-    TX,
-    UV,
-    UX,
-    YIELD_LENGTH,
-)
+from .rows_kernels import CYCLE_ENDS, LANES, At, CycleEnd
 
 __all__ = [
     "EVENT_KEEPS_STICK",
@@ -121,10 +95,9 @@ def can_extrapolate(workspace, lane):
     the map of the cycle before gives. Without a slip the error would be kept for ever.
     """
     path = (
-        workspace[SLIP_PATH * LANES + lane]
-        - workspace[(CYCLE_ENDS + len(STATE_ROWS)) * LANES + lane]
+        workspace[At.SLIP_PATH + lane] - workspace[(CYCLE_ENDS + CycleEnd.SLIP_PATH) * LANES + lane]
     )
-    return path > MIN_SLIP * workspace[YIELD_LENGTH * LANES + lane]
+    return path > MIN_SLIP * workspace[At.YIELD_LENGTH + lane]
 
 
 @njit(**NJIT_INLINE)
@@ -141,8 +114,8 @@ def friction_force(state, sine, workspace, lane):
     float
     """
     if state.slip_sign == 0.0:
-        return workspace[SPRING * LANES + lane] * (state.slide - state.memory)
-    return state.slip_sign * workspace[KINETIC * LANES + lane]
+        return workspace[At.SPRING + lane] * (state.slide - state.memory)
+    return state.slip_sign * workspace[At.KINETIC + lane]
 
 
 @njit(**NJIT_INLINE)
@@ -160,7 +133,7 @@ def friction_rate(state, acceleration, workspace, lane, when):
     -------
     float
     """
-    rate = workspace[SPRING * LANES + lane] * state.speed
+    rate = workspace[At.SPRING + lane] * state.speed
     return rate if state.slip_sign == 0.0 and when != AFTER_EVENT else 0.0
 
 
@@ -177,7 +150,7 @@ def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
     -------
     float
     """
-    limit = workspace[KINETIC * LANES + lane]
+    limit = workspace[At.KINETIC + lane]
     friction = friction_force(LaneState(x, 0.0, slip_sign, memory), 0.0, workspace, lane)
     return min(max(friction, -limit), limit)
 
@@ -218,24 +191,24 @@ def linear_step(workspace, lane, s0, c0):
     -------
     Motion
     """
-    x = workspace[SLIDE * LANES + lane]
-    v = workspace[SPEED * LANES + lane]
-    is_stuck = workspace[SLIP_SIGN * LANES + lane] == 0.0
-    spring_force = workspace[SPRING * LANES + lane] * workspace[MEMORY * LANES + lane]
+    x = workspace[At.SLIDE + lane]
+    v = workspace[At.SPEED + lane]
+    is_stuck = workspace[At.SLIP_SIGN + lane] == 0.0
+    spring_force = workspace[At.SPRING + lane] * workspace[At.MEMORY + lane]
     slip = linear_slip(workspace, lane, s0, c0)
     stick_slide = (
-        workspace[B11 * LANES + lane] * x
-        + workspace[B12 * LANES + lane] * v
-        + workspace[TX * LANES + lane] * s0
-        + workspace[UX * LANES + lane] * c0
-        + spring_force * workspace[QX * LANES + lane]
+        workspace[At.B11 + lane] * x
+        + workspace[At.B12 + lane] * v
+        + workspace[At.TX + lane] * s0
+        + workspace[At.UX + lane] * c0
+        + spring_force * workspace[At.QX + lane]
     )
     stick_speed = (
-        workspace[B21 * LANES + lane] * x
-        + workspace[B22 * LANES + lane] * v
-        + workspace[TV * LANES + lane] * s0
-        + workspace[UV * LANES + lane] * c0
-        + spring_force * workspace[QV * LANES + lane]
+        workspace[At.B21 + lane] * x
+        + workspace[At.B22 + lane] * v
+        + workspace[At.TV + lane] * s0
+        + workspace[At.UV + lane] * c0
+        + spring_force * workspace[At.QV + lane]
     )
     return Motion(stick_slide if is_stuck else slip.slide, stick_speed if is_stuck else slip.speed)
 
@@ -253,10 +226,10 @@ def try_step(workspace, lane, step, is_observed):
     -------
     TriedStep
     """
-    v = workspace[SPEED * LANES + lane]
-    slip_sign = workspace[SLIP_SIGN * LANES + lane]
-    memory = workspace[MEMORY * LANES + lane]
-    length = workspace[YIELD_LENGTH * LANES + lane]
+    v = workspace[At.SPEED + lane]
+    slip_sign = workspace[At.SLIP_SIGN + lane]
+    memory = workspace[At.MEMORY + lane]
+    length = workspace[At.YIELD_LENGTH + lane]
     end = linear_step(workspace, lane, step.s0, step.c0)
     is_stuck = slip_sign == 0.0
     yields = is_stuck and abs(end.slide - memory) > length
@@ -451,13 +424,13 @@ def resolve_step(workspace, lane, step):
     -------
     StepOutcome
     """
-    x = workspace[SLIDE * LANES + lane]
-    v = workspace[SPEED * LANES + lane]
-    sign = workspace[SLIP_SIGN * LANES + lane]
-    memory = workspace[MEMORY * LANES + lane]
-    damping = workspace[DAMPING * LANES + lane]
-    stiffness = workspace[STIFFNESS * LANES + lane]
-    drive = workspace[DRIVE * LANES + lane]
+    x = workspace[At.SLIDE + lane]
+    v = workspace[At.SPEED + lane]
+    sign = workspace[At.SLIP_SIGN + lane]
+    memory = workspace[At.MEMORY + lane]
+    damping = workspace[At.DAMPING + lane]
+    stiffness = workspace[At.STIFFNESS + lane]
+    drive = workspace[At.DRIVE + lane]
     end = linear_step(workspace, lane, step.s0, step.c0)
     start_state = LaneState(x, v, sign, memory)
     end_state = LaneState(end.slide, end.speed, sign, memory)
@@ -497,23 +470,23 @@ def resolve_slip(workspace, lane, curve, end, is_reversed, reversal):
     -------
     StepOutcome
     """
-    sign = workspace[SLIP_SIGN * LANES + lane]
-    length = workspace[YIELD_LENGTH * LANES + lane]
+    sign = workspace[At.SLIP_SIGN + lane]
+    length = workspace[At.YIELD_LENGTH + lane]
     if not is_reversed:
         memory = end.slide - sign * length
         return StepOutcome(
             end.slide, end.speed, sign, memory, 1.0, end.slide, end.speed, memory, end.slide, 0.0
         )
-    spring = workspace[SPRING * LANES + lane]
+    spring = workspace[At.SPRING + lane]
     turn = slide_on_curve(curve, reversal)
     memory = turn - sign * length
     x1 = end.slide
     v1 = end.speed
     if reversal < 1.0:
         rest = curve.angle - reversal * curve.angle
-        stiffness = workspace[STIFFNESS * LANES + lane] + spring
+        stiffness = workspace[At.STIFFNESS + lane] + spring
         event = event_on_curve(curve, reversal, 0.0, -spring)
-        change = slip_correction(rest, workspace[DAMPING * LANES + lane], stiffness, event)
+        change = slip_correction(rest, workspace[At.DAMPING + lane], stiffness, event)
         x1 += change.slide
         v1 += change.speed
     return StepOutcome(x1, v1, 0.0, memory, reversal, turn, 0.0, memory, turn, 0.0)
@@ -532,11 +505,11 @@ def resolve_stick(workspace, lane, curve, end, is_reversed, reversal):
     -------
     StepOutcome
     """
-    memory = workspace[MEMORY * LANES + lane]
-    spring = workspace[SPRING * LANES + lane]
-    length = workspace[YIELD_LENGTH * LANES + lane]
-    damping = workspace[DAMPING * LANES + lane]
-    stiffness = workspace[STIFFNESS * LANES + lane]
+    memory = workspace[At.MEMORY + lane]
+    spring = workspace[At.SPRING + lane]
+    length = workspace[At.YIELD_LENGTH + lane]
+    damping = workspace[At.DAMPING + lane]
+    stiffness = workspace[At.STIFFNESS + lane]
     turn = slide_on_curve(curve, reversal) if is_reversed else end.slide
     side = 1.0 if turn > memory else -1.0
     if not is_reversed or abs(turn - memory) <= abs(end.slide - memory):

@@ -12,8 +12,7 @@ step and case on a core with vectors of eight numbers.
 from math import sqrt
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import NJIT_NO_REFCOUNT
-from ..lanes.rows_kernels import NJIT_INLINE
+from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
 
 LANES = 32  # number of cases that march side by side
 N_POINTS = 6  # points of the interface of a case

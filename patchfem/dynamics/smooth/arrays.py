@@ -1,117 +1,117 @@
 """Arrays of the compiled steps, and named positions in them."""
 
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
 
-class ModeRows(NamedTuple):
+class Mode(IntEnum):
     """Rows of `MotionArrays.modes`: omega [rad/s], 2 zeta omega [1/s], participations [1]."""
 
-    omega: int = 0
-    damping: int = 1
-    slide: int = 2
-    base: int = 3
-    output: int = 4
+    OMEGA = 0
+    DAMPING = 1
+    SLIDE = 2
+    BASE = 3
+    OUTPUT = 4
 
 
-class WorkRows(NamedTuple):
+class Work(IntEnum):
     """Rows of `MotionArrays.work` after the slopes of the 16 stages.
 
-    - extension: first of 8 rows, the extension of the step
-    - sizes: sizes of the states of the law, and smallest sizes of the others
-    - trial: state after a step
+    - EXTENSION: first of 8 rows, the extension of the step
+    - SIZES: sizes of the states of the law, and smallest sizes of the others
+    - TRIAL: state after a step
     """
 
-    extension: int = 16
-    sizes: int = 24
-    trial: int = 25
+    EXTENSION = 16
+    SIZES = 24
+    TRIAL = 25
 
 
-class ScalarPositions(NamedTuple):
+class Scalar(IntEnum):
     """Positions in `MotionArrays.scalars`.
 
-    - time, step, first_step: time, length of the next step and of the first one after a reversal
-    [s]
-    - origin, start_loss: relative displacement [m] and friction loss [J] at the start of the motion
-    in this direction
-    - max_coordinate, max_rate: recent maximum of coordinates [m] and rates [m/s]
-    - fastest_rate: rate of the fastest mode or of the drive [1/s]
-    - stage: 0 before the start, 1 after it, 2 where the motion was left at a reversal
-    - slope_segment: segment of the drive to which the first slopes belong
-    - mass, stiffness: modal mass [kg], and stiffness of the law [N/m]
-    - period: of the drive [s]
-    - segment: of the drive
-    - base_moves: 1 where the drive moves the base
+    - TIME, STEP, FIRST_STEP: time, length of the next step and of the first one after a reversal
+      [s]
+    - ORIGIN, START_LOSS: relative displacement [m] and friction loss [J] at the start of the motion
+      in this direction
+    - MAX_COORDINATE, MAX_RATE: recent maximum of coordinates [m] and rates [m/s]
+    - FASTEST_RATE: rate of the fastest mode or of the drive [1/s]
+    - STAGE: 0 before the start, 1 after it, 2 where the motion was left at a reversal
+    - SLOPE_SEGMENT: segment of the drive to which the first slopes belong
+    - MASS, STIFFNESS: modal mass [kg], and stiffness of the law [N/m]
+    - PERIOD: of the drive [s]
+    - SEGMENT: of the drive
+    - BASE_MOVES: 1 where the drive moves the base
     """
 
-    time: int = 0
-    step: int = 1
-    first_step: int = 2
-    origin: int = 3
-    start_loss: int = 4
-    max_coordinate: int = 5
-    max_rate: int = 6
-    fastest_rate: int = 7
-    stage: int = 8
-    slope_segment: int = 9
-    mass: int = 10
-    period: int = 11
-    segment: int = 12
-    base_moves: int = 13
-    stiffness: int = 14
+    TIME = 0
+    STEP = 1
+    FIRST_STEP = 2
+    ORIGIN = 3
+    START_LOSS = 4
+    MAX_COORDINATE = 5
+    MAX_RATE = 6
+    FASTEST_RATE = 7
+    STAGE = 8
+    SLOPE_SEGMENT = 9
+    MASS = 10
+    PERIOD = 11
+    SEGMENT = 12
+    BASE_MOVES = 13
+    STIFFNESS = 14
 
 
-class CounterPositions(NamedTuple):
+class Counter(IntEnum):
     """Positions in `MotionRecord.counters`.
 
-    - drive_power: integral of the magnitude of the power of the drive [J]
-    - max_stored: largest stored energy [J]
-    - friction_loss: energy dissipated by friction [J]
-    - accepted, refused: steps
-    - n_turns, n_parts: rows of turns and parts that are filled
-    - next_sample: number of the next sample
-    - period: of the drive [s]
-    - max_force: largest force in the parts [N]
+    - DRIVE_POWER: integral of the magnitude of the power of the drive [J]
+    - MAX_STORED: largest stored energy [J]
+    - FRICTION_LOSS: energy dissipated by friction [J]
+    - ACCEPTED, REFUSED: steps
+    - N_TURNS, N_PARTS: rows of turns and parts that are filled
+    - NEXT_SAMPLE: number of the next sample
+    - PERIOD: of the drive [s]
+    - MAX_FORCE: largest force in the parts [N]
     """
 
-    drive_power: int = 0
-    max_stored: int = 1
-    friction_loss: int = 2
-    accepted: int = 3
-    refused: int = 4
-    n_turns: int = 5
-    next_sample: int = 6
-    n_parts: int = 7
-    period: int = 8
-    max_force: int = 9
+    DRIVE_POWER = 0
+    MAX_STORED = 1
+    FRICTION_LOSS = 2
+    ACCEPTED = 3
+    REFUSED = 4
+    N_TURNS = 5
+    NEXT_SAMPLE = 6
+    N_PARTS = 7
+    PERIOD = 8
+    MAX_FORCE = 9
 
 
-class TurnPositions(NamedTuple):
+class Turn(IntEnum):
     """Positions in `MotionArrays.turn`, which the integrator and the law share.
 
-    - direction: of the motion, 0 in stick
-    - kink_path: path to the next kink of the law [m], infinite without one
-    - is_above_knee, knee_velocity: whether the speed is above that of a kink, and that speed [m/s],
-    0 without one
-    - free_acceleration, inverse_mass, slide: for a law that holds, the acceleration [m s-2] without
-    its force, the
-      acceleration per newton [1/kg] that its force takes away, and the relative displacement [m]
-    - force, normal_force, release_direction: results of a law that holds, [N], [N], and the
-    direction in which it
-      lets go, 0 where it holds
+    - DIRECTION: of the motion, 0 in stick
+    - KINK_PATH: path to the next kink of the law [m], infinite without one
+    - IS_ABOVE_KNEE, KNEE_VELOCITY: whether the speed is above that of a kink, and that speed [m/s],
+      0 without one
+    - FREE_ACCELERATION, INVERSE_MASS, SLIDE: for a law that holds, the acceleration [m s-2] without
+      its force, the acceleration per newton [1/kg] that its force takes away, and the relative
+      displacement [m]
+    - FORCE, NORMAL_FORCE, RELEASE_DIRECTION: results of a law that holds, [N], [N], and the
+      direction in which it lets go, 0 where it holds
     """
 
-    direction: int = 0
-    kink_path: int = 1
-    is_above_knee: int = 2
-    free_acceleration: int = 3
-    inverse_mass: int = 4
-    slide: int = 5
-    force: int = 6
-    normal_force: int = 7
-    knee_velocity: int = 8
-    release_direction: int = 9
+    DIRECTION = 0
+    KINK_PATH = 1
+    IS_ABOVE_KNEE = 2
+    FREE_ACCELERATION = 3
+    INVERSE_MASS = 4
+    SLIDE = 5
+    FORCE = 6
+    NORMAL_FORCE = 7
+    KNEE_VELOCITY = 8
+    RELEASE_DIRECTION = 9
 
 
 class StepEvents(NamedTuple):
@@ -153,11 +153,6 @@ class CallStatus(NamedTuple):
     lifted: int = 6
 
 
-MODE = ModeRows()
-WORK = WorkRows()
-SCALAR = ScalarPositions()
-COUNT = CounterPositions()
-TURN = TurnPositions()
 EVENT = StepEvents()
 STATUS = CallStatus()
 # points of a part of a step at which its samples are taken
@@ -169,16 +164,15 @@ NODE_FRACTIONS = (1 - np.cos(np.pi * np.arange(N_NODES) / (N_NODES - 1))) / 2
 class MotionArrays(NamedTuple):
     """Modes, drive, law and state of a motion; N = 2 n + l + 3 for n modes and l states of the law.
 
-    - modes: (5, n) see `ModeRows`
+    - modes: (5, n) see `Mode`
     - damping: (n, n) damping matrix where it couples the modes, else (0, 0)
-    - segments: (p, 12) segments of the drive, see `events.positions_kernels.SegmentColumns`
+    - segments: (p, 12) segments of the drive, see `events.positions_kernels.Segment`
     - numbers, memory: numbers of the law (1, k), its memory and a copy to work with (2, m)
-    - turn: (10,) see `TurnPositions`
+    - turn: (10,) see `Turn`
     - state: (N,) coordinates [m], rates [m/s], states of the law, then work of the drive, viscous
-    loss and friction
-      work [J]
-    - work: (26, N) slopes of the 16 stages, then see `WorkRows`
-    - scalars: (15,) see `ScalarPositions`
+      loss and friction work [J]
+    - work: (26, N) slopes of the 16 stages, then see `Work`
+    - scalars: (15,) see `Scalar`
     """
 
     modes: np.ndarray
@@ -199,12 +193,11 @@ class MotionRecord(NamedTuple):
     slip, energy in the interface and friction work [J].
 
     - cycles: (4, c) smallest and largest output of every cycle, and real and imaginary part of the
-    output at the
-      frequency of the cycle [m], NaN where it is not wanted
+      output at the frequency of the cycle [m], NaN where it is not wanted
     - samples: (s, 2 n + 7) at the times in their first column
     - turns: (r, 2 n + 7) at reversals
     - parts: (k, N_NODES, 2 n + 7) at NODE_FRACTIONS of the parts of steps
-    - counters: (10,) see `CounterPositions`
+    - counters: (10,) see `Counter`
     - workspace: (N,)
     """
 

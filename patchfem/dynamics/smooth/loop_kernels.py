@@ -6,6 +6,7 @@ the step is taken anew each time, so the end is as exact as a step and needs no 
 """
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,14 +15,14 @@ from ...friction.flags_kernels import NJIT_INTERNAL, NJIT_NO_REFCOUNT
 from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps
 from . import watch_kernels as watch
-from .arrays import COUNT, EVENT, MODE, SCALAR, STATUS, TURN, WORK
+from .arrays import EVENT, STATUS, Counter, Mode, Scalar, Turn, Work
 
 # bounds of the ratio of a step to the one before
 MIN_STEP_FACTOR = 0.2
 MAX_STEP_FACTOR = 8.0
 # safety factor of the length of the next step
 STEP_SAFETY = 0.9
-# value of scalars[SCALAR.stage] where the motion was left at a reversal
+# value of scalars[Scalar.STAGE] where the motion was left at a reversal
 AT_REVERSAL = 2.0
 # cycles over which a maximum of coordinates and rates fades
 FADING_CYCLES = 3.0
@@ -39,9 +40,17 @@ AT_STOP = 1
 DIRECTION_CHANGED = 2
 
 
+class EventDistance(NamedTuple):
+    """Distance of a state to an event, greater than 0 before it, its rate [1/s] and its round-off."""
+
+    distance: float
+    rate: float
+    round_off: float
+
+
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def distance_to_event(motion, event, y, slopes, travel):
-    """Return the distance of a state to an event, its rate and its round-off.
+    """Return the `EventDistance` of a state.
 
     Parameters
     ----------
@@ -57,36 +66,29 @@ def distance_to_event(motion, event, y, slopes, travel):
 
     Returns
     -------
-    distance : float
-        Greater than 0 before the event.
-    rate : float
-        [1/s].
-    round_off : float
+    EventDistance
     """
-    n = motion.modes.shape[1]
-    direction = motion.turn[TURN.direction]
+    direction = motion.turn[Turn.DIRECTION]
     q, v = steps.find_slide(motion, y)
-    gain = 0.0
-    for i in range(n):
-        gain += motion.modes[MODE.slide, i] * slopes[n + i]
+    acceleration = steps.find_slide(motion, slopes)[1]
     if event == EVENT.stop:
-        return direction * v, direction * gain, speed_round_off(motion)
+        return EventDistance(direction * v, direction * acceleration, speed_round_off(motion))
     if event == EVENT.kink:
-        path = direction * (q - motion.scalars[SCALAR.origin])
-        return (
-            motion.turn[TURN.kink_path] - path,
-            -direction * v,
-            1e-15 * (motion.scalars[SCALAR.max_coordinate] + motion.turn[TURN.kink_path]),
-        )
+        kink_path = motion.turn[Turn.KINK_PATH]
+        path = direction * (q - motion.scalars[Scalar.ORIGIN])
+        round_off = 1e-15 * (motion.scalars[Scalar.MAX_COORDINATE] + kink_path)
+        return EventDistance(kink_path - path, -direction * v, round_off)
     if event == EVENT.knee:
-        side = 1.0 if motion.turn[TURN.is_above_knee] > 0 else -1.0
-        floor = motion.turn[TURN.knee_velocity]
-        return side * (direction * v - floor), side * direction * gain, 1e-12 * floor
+        side = 1.0 if motion.turn[Turn.IS_ABOVE_KNEE] > 0 else -1.0
+        knee = motion.turn[Turn.KNEE_VELOCITY]
+        rate = side * direction * acceleration
+        return EventDistance(side * (direction * v - knee), rate, 1e-12 * knee)
     # the rates of a set-valued law hold, after its loss, the margin of its holding force and its normal force
     if event >= EVENT.release:
-        return slopes[2 * n + event - EVENT.release + 1], 0.0, 0.0
+        first = 2 * motion.modes.shape[1] + 1
+        return EventDistance(slopes[first + event - EVENT.release], 0.0, 0.0)
     x, w = watch.find_output(motion, y)
-    return travel - abs(x), -w if x > 0 else w, 1e-13 * travel
+    return EventDistance(travel - abs(x), -w if x > 0 else w, 1e-13 * travel)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -106,12 +108,12 @@ def can_occur(motion, event, travel):
     bool
     """
     if event == EVENT.kink:
-        return motion.turn[TURN.kink_path] < np.inf
+        return motion.turn[Turn.KINK_PATH] < np.inf
     if event == EVENT.knee:
-        return motion.turn[TURN.knee_velocity] > 0
+        return motion.turn[Turn.KNEE_VELOCITY] > 0
     if event >= EVENT.release:
-        return law.IS_SET_VALUED and (event == EVENT.lift or motion.turn[TURN.direction] == 0)
-    return motion.turn[TURN.direction] != 0 if event == EVENT.stop else travel < np.inf
+        return law.IS_SET_VALUED and (event == EVENT.lift or motion.turn[Turn.DIRECTION] == 0)
+    return motion.turn[Turn.DIRECTION] != 0 if event == EVENT.stop else travel < np.inf
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -137,38 +139,38 @@ def find_first_event(motion, h, travel, skip):
     fraction : float
         Guess of the fraction of the step at which it occurs; 1 without an event.
     """
-    found = EVENT.none
-    where = 1.0
+    first_event = EVENT.none
+    first_fraction = 1.0
     for event in range(EVENT.stop, EVENT.lift + 1 if law.IS_SET_VALUED else EVENT.travel + 1):
         if event == skip or not can_occur(motion, event, travel):
             continue
-        b, rate_b, noise = distance_to_event(
-            motion, event, motion.work[WORK.trial], motion.work[12], travel
+        b, rate_b, round_off = distance_to_event(
+            motion, event, motion.work[Work.TRIAL], motion.work[12], travel
         )
-        if b >= -noise:
+        if b >= -round_off:
             continue
         a, rate_a, _ = distance_to_event(motion, event, motion.state, motion.work[0], travel)
         a = max(a, 0.0)
-        low = 0.0
-        high = 1.0
+        left = 0.0
+        right = 1.0
         p = rate_a * h
         r = rate_b * h
         if a == 0:
-            low = high = find_cubic_return(p, b, r)
+            left = right = find_cubic_return(p, b, r)
         for _ in range(40 if a > 0 else 0):
-            s = 0.5 * (low + high)
+            s = 0.5 * (left + right)
             remainder = 1 - s
             value = remainder * remainder * (a * (1 + 2 * s) + p * s) + s * s * (
                 b * (3 - 2 * s) - r * remainder
             )
             if value > 0:
-                low = s
+                left = s
             else:
-                high = s
-        if found == EVENT.none or high < where:
-            found = event
-            where = high
-    return found, where
+                right = s
+        if first_event == EVENT.none or right < first_fraction:
+            first_event = event
+            first_fraction = right
+    return first_event, first_fraction
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -190,17 +192,17 @@ def find_cubic_return(p, b, r):
     float
         0 where the cubic is nowhere positive.
     """
-    mid = 3 * b - 2 * p - r
-    big = p + r - 2 * b
-    root = mid * mid - 4 * big * p
+    c2 = 3 * b - 2 * p - r
+    c3 = p + r - 2 * b
+    root = c2 * c2 - 4 * c3 * p
     if root < 0:
         return 0.0
     root = sqrt(root)
     s = 0.0
-    if mid > 0:
-        s = -(mid + root) / (2 * big)
-    elif root > mid:
-        s = 2 * p / (root - mid)
+    if c2 > 0:
+        s = -(c2 + root) / (2 * c3)
+    elif root > c2:
+        s = 2 * p / (root - c2)
     return s if 0 < s < 1 else 0.0
 
 
@@ -223,31 +225,31 @@ def locate_event(motion, h, event, fraction, travel):
     Returns
     -------
     float
-        [s]; work[WORK.trial] becomes the state there.
+        [s]; work[Work.TRIAL] becomes the state there.
     """
-    low = 0.0
-    high = h
-    at = max(fraction, 1e-12) * h
+    shortest = 0.0
+    longest = h
+    length = max(fraction, 1e-12) * h
     for turn in range(60):
-        steps.take_step(motion, at)
+        steps.take_step(motion, length)
         value, rate, noise = distance_to_event(
-            motion, event, motion.work[WORK.trial], motion.work[12], travel
+            motion, event, motion.work[Work.TRIAL], motion.work[12], travel
         )
         if value > 0:
-            low = at
+            shortest = length
         else:
-            high = at
-        new = at - value / rate if rate < 0 else 0.5 * (low + high)
+            longest = length
+        new = length - value / rate if rate < 0 else 0.5 * (shortest + longest)
         # a motion that leaves rest is within round-off of it too; it must not end there, or it would rest for ever
-        there = abs(value) <= noise and rate < 0
+        is_at_event = abs(value) <= noise and rate < 0
         if (
-            there
-            or abs(new - at) <= 2e-16 * (motion.scalars[SCALAR.time] + at)
-            or high - low <= 1e-15 * h
+            is_at_event
+            or abs(new - length) <= 2e-16 * (motion.scalars[Scalar.TIME] + length)
+            or longest - shortest <= 1e-15 * h
         ):
             break
-        at = new if low < new < high and turn < 20 else 0.5 * (low + high)
-    return at
+        length = new if shortest < new < longest and turn < 20 else 0.5 * (shortest + longest)
+    return length
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -269,33 +271,47 @@ def locate_release(motion, h, event, travel):
     Returns
     -------
     float
-        [s]; work[WORK.trial] becomes the state there.
+        [s]; work[Work.TRIAL] becomes the state there.
     """
     a = max(distance_to_event(motion, event, motion.state, motion.work[0], travel)[0], 0.0)
-    b = distance_to_event(motion, event, motion.work[WORK.trial], motion.work[12], travel)[0]
-    low = 0.0
-    high = h
+    b = distance_to_event(motion, event, motion.work[Work.TRIAL], motion.work[12], travel)[0]
+    shortest = 0.0
+    longest = h
     for turn in range(80):
-        if high - low <= 1e-15 * (motion.scalars[SCALAR.time] + high) or high - low <= 1e-13 * h:
+        if (
+            longest - shortest <= 1e-15 * (motion.scalars[Scalar.TIME] + longest)
+            or longest - shortest <= 1e-13 * h
+        ):
             break
-        at = low + (high - low) * a / (a - b) if turn < 25 and a > b else 0.5 * (low + high)
-        at = min(max(at, low + 1e-3 * (high - low)), high - 1e-3 * (high - low)) if turn < 4 else at
-        if not low < at < high:
-            at = 0.5 * (low + high)
-        steps.take_step(motion, at)
-        value = distance_to_event(motion, event, motion.work[WORK.trial], motion.work[12], travel)[
+        length = (
+            shortest + (longest - shortest) * a / (a - b)
+            if turn < 25 and a > b
+            else 0.5 * (shortest + longest)
+        )
+        length = (
+            min(
+                max(length, shortest + 1e-3 * (longest - shortest)),
+                longest - 1e-3 * (longest - shortest),
+            )
+            if turn < 4
+            else length
+        )
+        if not shortest < length < longest:
+            length = 0.5 * (shortest + longest)
+        steps.take_step(motion, length)
+        value = distance_to_event(motion, event, motion.work[Work.TRIAL], motion.work[12], travel)[
             0
         ]
         if value < 0:
-            high = at
+            longest = length
             b = value
             a = 0.5 * a
         else:
-            low = at
+            shortest = length
             a = value
             b = 0.5 * b
-    steps.take_step(motion, high)
-    return high
+    steps.take_step(motion, longest)
+    return longest
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
@@ -306,11 +322,11 @@ def find_speed_dip(motion, h):
 
     The speed is positive at both ends.
     """
-    if motion.turn[TURN.direction] == 0:
+    if motion.turn[Turn.DIRECTION] == 0:
         return 0.0
     a, p, _ = distance_to_event(motion, EVENT.stop, motion.state, motion.work[0], np.inf)
     b, r, _ = distance_to_event(
-        motion, EVENT.stop, motion.work[WORK.trial], motion.work[12], np.inf
+        motion, EVENT.stop, motion.work[Work.TRIAL], motion.work[12], np.inf
     )
     return find_cubic_dip(a, p * h, b, r * h)
 
@@ -336,24 +352,24 @@ def find_cubic_dip(a, p, b, r):
     if p >= 0 or r <= 0 or a <= 0 or b <= 0:
         return 0.0
     # a + p s + mid s^2 + big s^3
-    big = 2 * (a - b) + p + r
-    mid = 3 * (b - a) - 2 * p - r
-    root = mid * mid - 3 * big * p
+    c3 = 2 * (a - b) + p + r
+    c2 = 3 * (b - a) - 2 * p - r
+    root = c2 * c2 - 3 * c3 * p
     if root <= 0:
         return 0.0
-    s = -p / (mid + sqrt(root)) if mid + sqrt(root) != 0 else 0.0
+    s = -p / (c2 + sqrt(root)) if c2 + sqrt(root) != 0 else 0.0
     if s <= 0 or s >= 1:
         return 0.0
-    near = (s * (1 - s)) ** 2 * (0.25 * abs(big) + 0.1 * abs(mid))
-    return s if a + s * (p + s * (mid + s * big)) < near else 0.0
+    max_error = (s * (1 - s)) ** 2 * (0.25 * abs(c3) + 0.1 * abs(c2))
+    return s if a + s * (p + s * (c2 + s * c3)) < max_error else 0.0
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def speed_round_off(motion):
     """Return the round-off of the velocity [m/s], below which the interface is at rest."""
     return 4e-16 * (
-        motion.scalars[SCALAR.max_rate]
-        + motion.scalars[SCALAR.fastest_rate] * motion.scalars[SCALAR.max_coordinate]
+        motion.scalars[Scalar.MAX_RATE]
+        + motion.scalars[Scalar.FASTEST_RATE] * motion.scalars[Scalar.MAX_COORDINATE]
     )
 
 
@@ -362,15 +378,15 @@ def start_direction(motion, direction):
     """Start the motion in a direction from the present state: states of the law, and slopes."""
     n = motion.modes.shape[1]
     q, v = steps.find_slide(motion, motion.state)
-    motion.scalars[SCALAR.origin] = q
-    motion.turn[TURN.direction] = direction
+    motion.scalars[Scalar.ORIGIN] = q
+    motion.turn[Turn.DIRECTION] = direction
     states = motion.state[2 * n : motion.state.size - 3]
-    motion.turn[TURN.kink_path], floor = law.start_motion(
+    motion.turn[Turn.KINK_PATH], floor = law.start_motion(
         motion.numbers[0], motion.memory[0], direction, states
     )
-    motion.turn[TURN.is_above_knee] = 1.0 if direction * v > floor else 0.0
-    motion.turn[TURN.knee_velocity] = floor
-    steps.write_slopes(motion, motion.scalars[SCALAR.time], motion.state, motion.work[0])
+    motion.turn[Turn.IS_ABOVE_KNEE] = 1.0 if direction * v > floor else 0.0
+    motion.turn[Turn.KNEE_VELOCITY] = floor
+    steps.write_slopes(motion, motion.scalars[Scalar.TIME], motion.state, motion.work[0])
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -378,51 +394,45 @@ def end_direction(motion, record):
     """End the motion in one direction: update the memory of the law, and add its friction loss."""
     n = motion.modes.shape[1]
     size = motion.state.size
-    q, v, _, before, _ = watch.read_interface(motion, motion.state)
+    interface = watch.read_interface(motion, motion.state)
+    energy = interface.energy
     lost = law.end_motion(
         motion.numbers[0],
         motion.memory[0],
         motion.turn,
-        q - motion.scalars[SCALAR.origin],
-        v,
+        interface.slide - motion.scalars[Scalar.ORIGIN],
+        interface.velocity,
         motion.state[2 * n : size - 3],
     )
     if np.isnan(lost):
-        lost = motion.state[size - 1] - motion.scalars[SCALAR.start_loss] - before
-        motion.scalars[SCALAR.start_loss] = motion.state[size - 1] - before
-    record.counters[COUNT.friction_loss] += lost
+        lost = motion.state[size - 1] - motion.scalars[Scalar.START_LOSS] - energy
+        motion.scalars[Scalar.START_LOSS] = motion.state[size - 1] - energy
+    record.counters[Counter.FRICTION_LOSS] += lost
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def choose_direction(motion):
     """Return the direction in which a motion starts, by its velocity or else its acceleration."""
-    n = motion.modes.shape[1]
-    t = motion.scalars[SCALAR.time]
+    t = motion.scalars[Scalar.TIME]
     v = steps.find_slide(motion, motion.state)[1]
     if v != 0:
         return 1.0 if v > 0 else -1.0
     if law.IS_SET_VALUED:
         return find_release_direction(motion)
-    steps.write_slopes(motion, t, motion.state, motion.work[0])
-    for look in range(2):
-        gain = 0.0
-        for i in range(n):
-            gain += motion.modes[MODE.slide, i] * motion.work[look, n + i]
-        if gain != 0:
-            return 1.0 if gain > 0 else -1.0
-        if look == 0:
-            steps.write_slopes(
-                motion, t + motion.scalars[SCALAR.step], motion.state, motion.work[1]
-            )
+    for time in (t, t + motion.scalars[Scalar.STEP]):
+        steps.write_slopes(motion, time, motion.state, motion.work[0])
+        acceleration = steps.find_slide(motion, motion.work[0])[1]
+        if acceleration != 0:
+            return 1.0 if acceleration > 0 else -1.0
     return 1.0
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_release_direction(motion):
     """Return the direction in which a law lets go of the interface at rest, or 0."""
-    motion.turn[TURN.direction] = 0.0
-    steps.write_slopes(motion, motion.scalars[SCALAR.time], motion.state, motion.work[0])
-    return motion.turn[TURN.release_direction]
+    motion.turn[Turn.DIRECTION] = 0.0
+    steps.write_slopes(motion, motion.scalars[Scalar.TIME], motion.state, motion.work[0])
+    return motion.turn[Turn.RELEASE_DIRECTION]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -432,10 +442,10 @@ def stop_slide(motion):
     v = steps.find_slide(motion, motion.state)[1]
     size = 0.0
     for i in range(n):
-        size += motion.modes[MODE.slide, i] * motion.modes[MODE.slide, i]
+        size += motion.modes[Mode.SLIDE, i] * motion.modes[Mode.SLIDE, i]
     for i in range(n):
         motion.state[n + i] = (
-            0.0 if n == 1 else motion.state[n + i] - motion.modes[MODE.slide, i] * v / size
+            0.0 if n == 1 else motion.state[n + i] - motion.modes[Mode.SLIDE, i] * v / size
         )
 
 
@@ -448,31 +458,39 @@ def reverse_or_continue(motion, period):
     Where velocity and acceleration vanish together the next derivative decides: the motion has the
     direction of its velocity an instant after the stop, v + a t + j t^2/2.
     """
-    n = motion.modes.shape[1]
-    t = motion.scalars[SCALAR.time]
-    direction = -motion.turn[TURN.direction]
+    t = motion.scalars[Scalar.TIME]
+    direction = -motion.turn[Turn.DIRECTION]
     start_direction(motion, direction)
-    ahead = INSTANT_FRACTION * period
-    near = 1e-3 * motion.scalars[SCALAR.step]
-    gain = 0.0
-    later = 0.0
+    instant = INSTANT_FRACTION * period
+    h = 1e-3 * motion.scalars[Scalar.STEP]
     for c in range(motion.state.size):
-        motion.work[WORK.trial, c] = motion.state[c] + near * motion.work[0, c]
-    steps.write_slopes(motion, t + near, motion.work[WORK.trial], motion.work[1])
-    for i in range(n):
-        gain += motion.modes[MODE.slide, i] * motion.work[0, n + i]
-        later += motion.modes[MODE.slide, i] * motion.work[1, n + i]
+        motion.work[Work.TRIAL, c] = motion.state[c] + h * motion.work[0, c]
+    steps.write_slopes(motion, t + h, motion.work[Work.TRIAL], motion.work[1])
+    acceleration = steps.find_slide(motion, motion.work[0])[1]
+    jerk = (steps.find_slide(motion, motion.work[1])[1] - acceleration) / h
     v = steps.find_slide(motion, motion.state)[1]
-    jerk = (later - gain) / near
-    if direction * (v + ahead * (gain + 0.5 * ahead * jerk)) >= 0:
+    if direction * (v + instant * (acceleration + 0.5 * instant * jerk)) >= 0:
         return True
     start_direction(motion, -direction)
     return False
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
+def update_sizes(motion):
+    """Include the present state in the recent maxima of coordinates and rates."""
+    n = motion.modes.shape[1]
+    for i in range(n):
+        motion.scalars[Scalar.MAX_COORDINATE] = max(
+            motion.scalars[Scalar.MAX_COORDINATE], abs(motion.state[i])
+        )
+        motion.scalars[Scalar.MAX_RATE] = max(
+            motion.scalars[Scalar.MAX_RATE], abs(motion.state[n + i])
+        )
+
+
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def accept_step(motion, h, record):
-    """Move the state by the step in work[WORK.trial].
+    """Move the state by the step in work[Work.TRIAL].
 
     Parameters
     ----------
@@ -481,23 +499,26 @@ def accept_step(motion, h, record):
         Length of the step [s].
     record : MotionRecord
     """
-    n = motion.modes.shape[1]
-    fade = 1 - min(h / (FADING_CYCLES * record.counters[COUNT.period]), 1.0)
-    motion.scalars[SCALAR.max_coordinate] *= fade
-    motion.scalars[SCALAR.max_rate] *= fade
+    fade = 1 - min(h / (FADING_CYCLES * record.counters[Counter.PERIOD]), 1.0)
+    motion.scalars[Scalar.MAX_COORDINATE] *= fade
+    motion.scalars[Scalar.MAX_RATE] *= fade
     for c in range(motion.state.size):
-        motion.state[c] = motion.work[WORK.trial, c]
+        motion.state[c] = motion.work[Work.TRIAL, c]
         motion.work[0, c] = motion.work[12, c]
-    if law.IS_SET_VALUED and motion.turn[TURN.direction] == 0:
+    if law.IS_SET_VALUED and motion.turn[Turn.DIRECTION] == 0:
         stop_slide(motion)
-    for i in range(n):
-        motion.scalars[SCALAR.max_coordinate] = max(
-            motion.scalars[SCALAR.max_coordinate], abs(motion.state[i])
-        )
-        motion.scalars[SCALAR.max_rate] = max(
-            motion.scalars[SCALAR.max_rate], abs(motion.state[n + i])
-        )
-    motion.scalars[SCALAR.time] += h
+    update_sizes(motion)
+    motion.scalars[Scalar.TIME] += h
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def step_factor(error):
+    """Return the ratio of the next step to one whose error over the tolerance is known."""
+    if error == 0:
+        return MAX_STEP_FACTOR
+    if not np.isfinite(error):
+        return MIN_STEP_FACTOR
+    return min(max(STEP_SAFETY * error**-0.125, MIN_STEP_FACTOR), MAX_STEP_FACTOR)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
@@ -521,33 +542,28 @@ def try_step(motion, h, tolerance, record):
         Length of the next step [s].
     """
     if law.IS_SET_VALUED:
-        h = min(
-            h,
-            MAX_STUCK_STEP * record.counters[COUNT.period]
-            if motion.turn[TURN.direction] == 0
-            else np.inf,
-        )
+        if motion.turn[Turn.DIRECTION] == 0:
+            h = min(h, MAX_STUCK_STEP * record.counters[Counter.PERIOD])
     for _ in range(60):
         steps.take_step(motion, h)
         error = steps.estimate_error(motion, h, tolerance)
         if error <= 1:
             dip = find_speed_dip(motion, h)
             if dip == 0:
-                grow = (
-                    MAX_STEP_FACTOR
-                    if error == 0
-                    else min(max(STEP_SAFETY * error**-0.125, MIN_STEP_FACTOR), MAX_STEP_FACTOR)
-                )
-                return h, h * grow
+                return h, h * step_factor(error)
             h *= dip
         else:
-            h *= (
-                max(STEP_SAFETY * error**-0.125, MIN_STEP_FACTOR)
-                if np.isfinite(error)
-                else MIN_STEP_FACTOR
-            )
-        record.counters[COUNT.refused] += 1
+            h *= step_factor(error)
+        record.counters[Counter.REFUSED] += 1
     return 0.0, 0.0
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def record_reversal(motion, record):
+    """Write the sample of a reversal at the present time."""
+    row = record.turns[int(record.counters[Counter.N_TURNS])]
+    watch.write_sample(motion, motion.scalars[Scalar.TIME], motion.state, row)
+    record.counters[Counter.N_TURNS] += 1
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
@@ -568,67 +584,48 @@ def pass_event(motion, record, event):
         direction = find_release_direction(motion)
         start_direction(motion, direction)
         if direction != 0 or event == EVENT.stop:
-            watch.write_sample(
-                motion,
-                motion.scalars[SCALAR.time],
-                motion.state,
-                record.turns[int(record.counters[COUNT.n_turns])],
-            )
-            record.counters[COUNT.n_turns] += 1
+            record_reversal(motion, record)
     elif event == EVENT.stop:
         if n == 1:
             motion.state[1] = 0.0  # removes the round-off of the velocity
         end_direction(motion, record)
-        if reverse_or_continue(motion, record.counters[COUNT.period]):
-            watch.write_sample(
-                motion,
-                motion.scalars[SCALAR.time],
-                motion.state,
-                record.turns[int(record.counters[COUNT.n_turns])],
-            )
-            record.counters[COUNT.n_turns] += 1
+        if reverse_or_continue(motion, record.counters[Counter.PERIOD]):
+            record_reversal(motion, record)
     elif event == EVENT.kink:
         end_direction(motion, record)
-        start_direction(motion, motion.turn[TURN.direction])
+        start_direction(motion, motion.turn[Turn.DIRECTION])
     elif event == EVENT.knee:
-        motion.turn[TURN.is_above_knee] = 1 - motion.turn[TURN.is_above_knee]
-        steps.write_slopes(motion, motion.scalars[SCALAR.time], motion.state, motion.work[0])
+        motion.turn[Turn.IS_ABOVE_KNEE] = 1 - motion.turn[Turn.IS_ABOVE_KNEE]
+        steps.write_slopes(motion, motion.scalars[Scalar.TIME], motion.state, motion.work[0])
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def start_from_state(motion, record):
     """Start a motion from the present state."""
-    n = motion.modes.shape[1]
-    for i in range(n):
-        motion.scalars[SCALAR.max_coordinate] = max(
-            motion.scalars[SCALAR.max_coordinate], abs(motion.state[i])
-        )
-        motion.scalars[SCALAR.max_rate] = max(
-            motion.scalars[SCALAR.max_rate], abs(motion.state[n + i])
-        )
+    update_sizes(motion)
     start_direction(motion, choose_direction(motion))
-    record.counters[COUNT.max_stored] = watch.stored_energy(motion, motion.state)
-    motion.scalars[SCALAR.start_loss] = (
-        motion.state[motion.state.size - 1] - watch.read_interface(motion, motion.state)[3]
+    record.counters[Counter.MAX_STORED] = watch.stored_energy(motion, motion.state)
+    motion.scalars[Scalar.START_LOSS] = (
+        motion.state[motion.state.size - 1] - watch.read_interface(motion, motion.state).energy
     )
-    motion.scalars[SCALAR.stage] = 1.0
+    motion.scalars[Scalar.STAGE] = 1.0
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def take_samples(motion, record):
     """Write the samples that are due at the present time."""
-    at = int(record.counters[COUNT.next_sample])
-    while at < record.samples.shape[0] and record.samples[at, 0] <= motion.scalars[SCALAR.time]:
-        watch.write_sample(motion, motion.scalars[SCALAR.time], motion.state, record.samples[at])
+    at = int(record.counters[Counter.NEXT_SAMPLE])
+    while at < record.samples.shape[0] and record.samples[at, 0] <= motion.scalars[Scalar.TIME]:
+        watch.write_sample(motion, motion.scalars[Scalar.TIME], motion.state, record.samples[at])
         at += 1
-    record.counters[COUNT.next_sample] = at
+    record.counters[Counter.NEXT_SAMPLE] = at
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_stop_state(motion):
     """Return AT_STOP where the motion was left at a reversal because no row was free, else NOT_AT_STOP."""
-    stop_state = AT_STOP if motion.scalars[SCALAR.stage] == AT_REVERSAL else NOT_AT_STOP
-    motion.scalars[SCALAR.stage] = 1.0
+    stop_state = AT_STOP if motion.scalars[Scalar.STAGE] == AT_REVERSAL else NOT_AT_STOP
+    motion.scalars[Scalar.STAGE] = 1.0
     return stop_state
 
 
@@ -655,11 +652,10 @@ def locate_first_event(motion, taken, event, fraction, travel):
     event : int
     """
     while event != EVENT.none:
-        taken = (
-            locate_event(motion, taken, event, fraction, travel)
-            if event < EVENT.release
-            else locate_release(motion, taken, event, travel)
-        )
+        if event < EVENT.release:
+            taken = locate_event(motion, taken, event, fraction, travel)
+        else:
+            taken = locate_release(motion, taken, event, travel)
         other, fraction = find_first_event(motion, taken, travel, event)
         if other == EVENT.none:
             break
@@ -688,8 +684,8 @@ def meets_tolerance(motion, taken, tolerance, record):
     """
     error = steps.estimate_error(motion, taken, tolerance)
     if error > 1:
-        motion.scalars[SCALAR.step] = taken * max(STEP_SAFETY * error**-0.125, MIN_STEP_FACTOR)
-        record.counters[COUNT.refused] += 1
+        motion.scalars[Scalar.STEP] = taken * step_factor(error)
+        record.counters[Counter.REFUSED] += 1
         return False
     return True
 
@@ -697,16 +693,16 @@ def meets_tolerance(motion, taken, tolerance, record):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def count_tried_steps(record):
     """Return the number of steps that were accepted or refused."""
-    return record.counters[COUNT.accepted] + record.counters[COUNT.refused]
+    return record.counters[Counter.ACCEPTED] + record.counters[Counter.REFUSED]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def has_free_rows(record):
     """Return whether a step can record its reversal and its parts."""
-    if record.counters[COUNT.n_turns] >= record.turns.shape[0]:
+    if record.counters[Counter.N_TURNS] >= record.turns.shape[0]:
         return False
     n_rows = record.parts.shape[0]
-    return n_rows == 0 or n_rows >= record.counters[COUNT.n_parts] + watch.MAX_PARTS
+    return n_rows == 0 or n_rows >= record.counters[Counter.N_PARTS] + watch.MAX_PARTS
 
 
 @njit(error_model="numpy", cache=True, nogil=True, **NJIT_NO_REFCOUNT)
@@ -730,33 +726,33 @@ def advance_motion(motion, record, until, edge, tolerance, travel):
         A number of `CallStatus`. After `full` and `paused` the next call goes on as if the motion
         had not been left.
     """
-    if motion.scalars[SCALAR.stage] == 0:
+    if motion.scalars[Scalar.STAGE] == 0:
         start_from_state(motion, record)
     end = min(until, edge)
     stop_state = find_stop_state(motion)
-    if motion.scalars[SCALAR.slope_segment] != motion.scalars[SCALAR.segment]:
+    if motion.scalars[Scalar.SLOPE_SEGMENT] != motion.scalars[Scalar.SEGMENT]:
         # the drive has changed
-        steps.write_slopes(motion, motion.scalars[SCALAR.time], motion.state, motion.work[0])
-        motion.scalars[SCALAR.slope_segment] = motion.scalars[SCALAR.segment]
+        steps.write_slopes(motion, motion.scalars[Scalar.TIME], motion.state, motion.work[0])
+        motion.scalars[Scalar.SLOPE_SEGMENT] = motion.scalars[Scalar.SEGMENT]
     take_samples(motion, record)
-    begin = motion.scalars[SCALAR.time]
+    begin = motion.scalars[Scalar.TIME]
     n_before = count_tried_steps(record)
-    while motion.scalars[SCALAR.time] < end:
+    while motion.scalars[Scalar.TIME] < end:
         is_full = not has_free_rows(record)
         is_spent = (
             count_tried_steps(record) - n_before > MAX_TRIED_STEPS
             and stop_state != DIRECTION_CHANGED
         )
-        progress = motion.scalars[SCALAR.time] - begin
-        if is_spent and progress < MIN_PROGRESS / motion.scalars[SCALAR.fastest_rate]:
+        progress = motion.scalars[Scalar.TIME] - begin
+        if is_spent and progress < MIN_PROGRESS / motion.scalars[Scalar.FASTEST_RATE]:
             return STATUS.no_step
         if is_full or is_spent:
-            motion.scalars[SCALAR.stage] = AT_REVERSAL if stop_state > 0 else 1.0
+            motion.scalars[Scalar.STAGE] = AT_REVERSAL if stop_state > 0 else 1.0
             return STATUS.full if is_full else STATUS.paused
-        remaining = end - motion.scalars[SCALAR.time]
-        is_last = motion.scalars[SCALAR.step] >= remaining * (1 - 1e-9)
+        remaining = end - motion.scalars[Scalar.TIME]
+        is_last = motion.scalars[Scalar.STEP] >= remaining * (1 - 1e-9)
         h, next_step = try_step(
-            motion, remaining if is_last else motion.scalars[SCALAR.step], tolerance, record
+            motion, remaining if is_last else motion.scalars[Scalar.STEP], tolerance, record
         )
         if h <= 1e-16 * end:
             return STATUS.no_step
@@ -764,13 +760,13 @@ def advance_motion(motion, record, until, edge, tolerance, travel):
         is_at_stop = (
             event == EVENT.stop
             and stop_state > 0
-            and fraction * h < INSTANT_FRACTION * record.counters[COUNT.period]
+            and fraction * h < INSTANT_FRACTION * record.counters[Counter.PERIOD]
         )
         if is_at_stop:
             # the motion stops in both directions, which a smooth law excludes
             if stop_state == DIRECTION_CHANGED:
                 return STATUS.no_step
-            start_direction(motion, -motion.turn[TURN.direction])
+            start_direction(motion, -motion.turn[Turn.DIRECTION])
             stop_state = DIRECTION_CHANGED
             continue
         taken, event = locate_first_event(motion, h, event, fraction, travel)
@@ -779,13 +775,13 @@ def advance_motion(motion, record, until, edge, tolerance, travel):
         watch.record_step(motion, taken, record)
         accept_step(motion, taken, record)
         if is_last and taken == remaining:
-            motion.scalars[SCALAR.time] = end
+            motion.scalars[Scalar.TIME] = end
         if is_last and h == remaining:
-            motion.scalars[SCALAR.step] = max(next_step, motion.scalars[SCALAR.step])
+            motion.scalars[Scalar.STEP] = max(next_step, motion.scalars[Scalar.STEP])
         else:
-            motion.scalars[SCALAR.step] = next_step
+            motion.scalars[Scalar.STEP] = next_step
         if stop_state == AT_STOP:
-            motion.scalars[SCALAR.first_step] = next_step
+            motion.scalars[Scalar.FIRST_STEP] = next_step
         stop_state = NOT_AT_STOP
         if not np.isfinite(motion.state[0]):
             return STATUS.not_finite
@@ -795,8 +791,8 @@ def advance_motion(motion, record, until, edge, tolerance, travel):
             pass_event(motion, record, event)
             if event == EVENT.stop or event == EVENT.release:
                 stop_state = AT_STOP
-                motion.scalars[SCALAR.step] = min(
-                    motion.scalars[SCALAR.first_step], motion.scalars[SCALAR.step]
+                motion.scalars[Scalar.STEP] = min(
+                    motion.scalars[Scalar.FIRST_STEP], motion.scalars[Scalar.STEP]
                 )
     take_samples(motion, record)
     return STATUS.finished
@@ -821,6 +817,6 @@ def read_state(motion, record, row):
         Energy of modes and interface [J].
     """
     out = watch.stored_energy(motion, motion.state)
-    watch.write_sample(motion, motion.scalars[SCALAR.time], motion.state, row)
+    watch.write_sample(motion, motion.scalars[Scalar.TIME], motion.state, row)
     end_direction(motion, record)
     return out

@@ -100,26 +100,36 @@ class StepParts:
 
         The error is the size of the last two Chebyshev coefficients.
         """
-        top = values.max(axis=1)
-        least = values.min(axis=1)
-        steps = np.flatnonzero(top + MAX_RISE_RATIO * (top - least) >= top.max())
+        maxima = values.max(axis=1)
+        minima = values.min(axis=1)
+        steps = np.flatnonzero(maxima + MAX_RISE_RATIO * (maxima - minima) >= maxima.max())
         if steps.size > MAX_CANDIDATES:
             steps = steps[
                 np.argsort(transform_parts(values[steps], TO_FINE).max(axis=1))[-MAX_CANDIDATES:]
             ]
-        seen = transform_parts(values[steps], TO_FINEST)
-        every = np.arange(len(steps))
-        at = np.clip(np.argmax(seen, axis=1), 1, FINEST_FRACTIONS.size - 2)
-        left, mid, right = (seen[every, at + side] for side in (-1, 0, 1))
-        bend = np.minimum(left - 2 * mid + right, 0.0)
+        fine_values = transform_parts(values[steps], TO_FINEST)
+        rows = np.arange(len(steps))
+        indices = np.clip(np.argmax(fine_values, axis=1), 1, FINEST_FRACTIONS.size - 2)
+        left, middle, right = (fine_values[rows, indices + side] for side in (-1, 0, 1))
+        curvature = np.minimum(left - 2 * middle + right, 0.0)
         rise = np.where(
-            np.abs(right - left) < -2 * bend,
-            -((right - left) ** 2) / (8 * np.minimum(bend, -1e-300)),
+            np.abs(right - left) < -2 * curvature,
+            -((right - left) ** 2) / (8 * np.minimum(curvature, -1e-300)),
             0.0,
         )
-        found = np.maximum(mid + rise, seen.max(axis=1))
-        best = int(np.argmax(found))
-        return float(found[best]), float(np.abs(TO_CHEBYSHEV[-2:] @ values[steps[best]]).sum())
+        peaks = np.maximum(middle + rise, fine_values.max(axis=1))
+        best = int(np.argmax(peaks))
+        return float(peaks[best]), float(np.abs(TO_CHEBYSHEV[-2:] @ values[steps[best]]).sum())
+
+    def find_magnitude(self, name: str) -> tuple:
+        """Return the largest magnitude of a quantity, and its error as `find_maximum`."""
+        values = self.values(name)
+        return max(self.find_maximum(values), self.find_maximum(-values))
+
+    def find_half_range(self, name: str) -> float:
+        """Return half the range of a quantity."""
+        values = self.values(name)
+        return (self.find_maximum(values)[0] + self.find_maximum(-values)[0]) / 2
 
     @cached_property
     def weights(self) -> np.ndarray:
@@ -155,23 +165,26 @@ class StepParts:
         float
         """
         length = np.maximum(self.length, 1e-300)  # a step at an event has the length 0
-        low, high = (np.clip((edge - self.begin) / length, 0.0, 1.0) for edge in (begin, end))
-        part = np.flatnonzero(high > low)
+        starts, ends = (np.clip((edge - self.begin) / length, 0.0, 1.0) for edge in (begin, end))
+        covered = np.flatnonzero(ends > starts)
         total = 0.0
-        cut = part[(low[part] > 0) | (high[part] < 1)]
-        whole = np.setdiff1d(part, cut)
+        partly_covered = covered[(starts[covered] > 0) | (ends[covered] < 1)]
+        wholly_covered = np.setdiff1d(covered, partly_covered)
         total = float(
-            (self.weights[whole] * transform_parts(self.values(name)[whole], TO_GAUSS)).sum()
+            (
+                self.weights[wholly_covered]
+                * transform_parts(self.values(name)[wholly_covered], TO_GAUSS)
+            ).sum()
         )
-        for k in cut:
-            size = high[k] - low[k]
+        for k in partly_covered:
+            size = ends[k] - starts[k]
             total += (
                 size
                 * self.length[k]
                 * float(
                     GAUSS_WEIGHTS
                     @ (
-                        make_interpolation_matrix(low[k] + size * GAUSS_POINTS)
+                        make_interpolation_matrix(starts[k] + size * GAUSS_POINTS)
                         @ self.values(name)[k]
                     )
                 )
@@ -200,42 +213,49 @@ class StepParts:
         place beside it in the part decides. A part that lies in such a place as a whole shows
         nothing.
         """
-        slip, slide = (transform_parts(self.values(name), TO_SLOPES) for name in ("slip", "slide"))
-        moves, slides = (np.abs(transform_parts(rates, TO_FINE)) for rates in (slip, slide))
-        rest = REST_SPEED_RATIO * slides.max(axis=1, keepdims=True) + SLIDE_TOL * np.abs(
+        slip = transform_parts(self.values("slip"), TO_SLOPES)
+        slide = transform_parts(self.values("slide"), TO_SLOPES)
+        moves = np.abs(transform_parts(slip, TO_FINE))
+        slides = np.abs(transform_parts(slide, TO_FINE))
+        rest_rates = REST_SPEED_RATIO * slides.max(axis=1, keepdims=True) + SLIDE_TOL * np.abs(
             self.response.slide
         ).max(initial=0.0)
-        still = slides <= rest
-        shows = ~still.all(axis=1)
-        still, slip, slide, begin, length = (
-            one[shows] for one in (still, slip, slide, self.begin, self.length)
-        )
+        is_at_rest = slides <= rest_rates
+        is_readable = ~is_at_rest.all(axis=1)
+        is_at_rest = is_at_rest[is_readable]
+        begin = self.begin[is_readable]
+        length = self.length[is_readable]
         last_moving = np.maximum.accumulate(
-            np.where(still, 0, np.arange(FINE_FRACTIONS.size)), axis=1
+            np.where(is_at_rest, 0, np.arange(FINE_FRACTIONS.size)), axis=1
         )
-        beside = np.maximum(last_moving, np.argmin(still, axis=1)[:, None])
-        seen = np.take_along_axis((moves - SLIP_FRACTION * slides)[shows], beside, axis=1)
-        before = seen[:, :-1]
-        after = seen[:, 1:]
-        turns = (before < 0) != (after < 0)
-        steps, at = np.nonzero(turns)
-        low = FINE_FRACTIONS[at]
-        high = FINE_FRACTIONS[at + 1]
-        below = before[steps, at] < 0
-        one, other = (transform_parts(rates[steps], TO_POWERS) for rates in (slip, slide))
+        nearest_moving = np.maximum(last_moving, np.argmin(is_at_rest, axis=1)[:, None])
+        slip_margin = np.take_along_axis(
+            (moves - SLIP_FRACTION * slides)[is_readable], nearest_moving, axis=1
+        )
+        before = slip_margin[:, :-1]
+        after = slip_margin[:, 1:]
+        changes = (before < 0) != (after < 0)
+        steps, at = np.nonzero(changes)
+        left_ends = FINE_FRACTIONS[at]
+        right_ends = FINE_FRACTIONS[at + 1]
+        starts_stuck = before[steps, at] < 0
+        slip_terms = transform_parts(slip[is_readable][steps], TO_POWERS)
+        slide_terms = transform_parts(slide[is_readable][steps], TO_POWERS)
         for _ in range(N_BISECTIONS):
-            middle = 0.5 * (low + high)
-            same = (
-                np.abs(evaluate_power_series(one, middle))
-                < SLIP_FRACTION * np.abs(evaluate_power_series(other, middle))
-            ) == below
-            low = np.where(same, middle, low)
-            high = np.where(same, high, middle)
-        part = (before < 0) * np.diff(FINE_FRACTIONS) * ~turns
-        part[steps, at] = np.where(below, low - FINE_FRACTIONS[at], FINE_FRACTIONS[at + 1] - low)
-        times = begin[steps] + low * length[steps]
-        between = np.flatnonzero((seen[:-1, -1] < 0) & (seen[1:, 0] >= 0))
-        return float((part.sum(axis=1) * length).sum()), np.append(times[below], begin[between + 1])
+            middle = 0.5 * (left_ends + right_ends)
+            slip_rate = np.abs(evaluate_power_series(slip_terms, middle))
+            slide_rate = np.abs(evaluate_power_series(slide_terms, middle))
+            is_same = (slip_rate < SLIP_FRACTION * slide_rate) == starts_stuck
+            left_ends = np.where(is_same, middle, left_ends)
+            right_ends = np.where(is_same, right_ends, middle)
+        stick_fractions = (before < 0) * np.diff(FINE_FRACTIONS) * ~changes
+        stick_fractions[steps, at] = np.where(
+            starts_stuck, left_ends - FINE_FRACTIONS[at], FINE_FRACTIONS[at + 1] - left_ends
+        )
+        times = begin[steps] + left_ends * length[steps]
+        between = np.flatnonzero((slip_margin[:-1, -1] < 0) & (slip_margin[1:, 0] >= 0))
+        stuck_time = float((stick_fractions.sum(axis=1) * length).sum())
+        return stuck_time, np.append(times[starts_stuck], begin[between + 1])
 
 
 def measure_parts(response, drive, ends) -> tuple:
@@ -258,27 +278,28 @@ def measure_parts(response, drive, ends) -> tuple:
     period = drive.period
     parts = StepParts(response, period)
     before, after = ends
-    peaks = {
-        name: [parts.find_maximum(way * parts.values(name)) for way in (1, -1)]
-        for name in ("acceleration", "force", "slip", "output")
-    }
-    gain, peak_error = max(peaks["acceleration"])
-    max_force, force_error = max(peaks["force"])
-    slip, swing = ((up + down) / 2 for (up, _), (down, _) in (peaks["slip"], peaks["output"]))
+    acceleration, acceleration_error = parts.find_magnitude("acceleration")
+    max_force, force_error = parts.find_magnitude("force")
     stuck_time, starts = parts.find_sticks()
     loop = InterfaceLoop(
         parts.harmonic("slide"),
         parts.harmonic("force"),
         after[3] - before[3],
-        2 * slip,
+        2 * parts.find_half_range("slip"),
         min(stuck_time, parts.time[-1, -1] - parts.time[0, 0]),
         max_force,
     )
     phases = 2 * np.pi * starts / period % np.pi
-    return IntegratedMeasures(
-        swing, gain, parts.drift(), _acceleration_harmonics(parts, drive, ends), (loop,), phases
-    ), {
-        "absolute_acceleration_peak": peak_error,
+    measures = IntegratedMeasures(
+        parts.find_half_range("output"),
+        acceleration,
+        parts.drift(),
+        _acceleration_harmonics(parts, drive, ends),
+        (loop,),
+        phases,
+    )
+    return measures, {
+        "absolute_acceleration_peak": acceleration_error,
         "friction_force_peak": force_error,
     }
 
@@ -300,9 +321,7 @@ def _acceleration_harmonics(parts: StepParts, drive, ends) -> tuple | None:
             2 / (after[0] - before[0]) * (edge[1] - edge[0]) + turn**2 * parts.harmonic("output", n)
         )
     last = drive.segments[-1]
-    base = (
-        -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start))
-        if drive.moving
-        else 0.0
-    )
+    base = 0.0
+    if drive.moving:
+        base = -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start))
     return abs(gains[0] + base), abs(gains[1])

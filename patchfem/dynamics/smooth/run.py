@@ -4,6 +4,7 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cache
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,11 +14,11 @@ from ...friction.laws.stretch import unpack_bonds
 from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import choose_samples_per_cycle
 from ..events.modal_system import drive_segments
-from ..events.positions_kernels import KIND, SEGMENT
+from ..events.positions_kernels import KIND, Segment
 from ..integrated import make_histories
 from ..march.march import MarchResult
 from ..periodicity import FIRST_CHECK, bound_remaining_change
-from .arrays import COUNT, N_NODES, SCALAR, STATUS, WORK, MotionArrays, MotionRecord
+from .arrays import N_NODES, STATUS, Counter, MotionArrays, MotionRecord, Scalar, Work
 from .reader import measure_parts
 
 # samples of a cycle in the window
@@ -65,7 +66,7 @@ class SmoothResult(MarchResult):
     - peak_errors: errors of peaks [unit of the measure] by measure
     - with_reversals: histories of the last cycles with samples at reversals
     - repeat_change: change that the motion would still make, over its size, where cycles were
-    skipped
+      skipped
     - tolerance: relative tolerance of its steps
     """
 
@@ -97,41 +98,41 @@ def start_arrays(modes: ModalBasis, drive, element, cycles: float, start=None) -
     MotionArrays, MotionRecord
     """
     n = modes.omega.size
-    l = len(element.state_scales)
-    size = 2 * n + l + 3
+    n_law_states = len(element.state_scales)
+    size = 2 * n + n_law_states + 3
     damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
     state = np.zeros(size)
     if start is not None:
         state[:n] = start.z
         state[n : 2 * n] = start.v
-    pace = max(
+    fastest_rate = max(
         float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)),
         2 * np.pi / drive.period,
     )
-    scalars = np.zeros(len(SCALAR))
-    counters = np.zeros(len(COUNT))
+    scalars = np.zeros(len(Scalar))
+    counters = np.zeros(len(Counter))
     work = np.zeros((26, size))
-    scalars[[SCALAR.step, SCALAR.first_step, SCALAR.fastest_rate, SCALAR.mass]] = (
-        FIRST_STEP_RATIO / pace,
-        FIRST_STEP_RATIO / pace,
-        pace,
+    scalars[[Scalar.STEP, Scalar.FIRST_STEP, Scalar.FASTEST_RATE, Scalar.MASS]] = (
+        FIRST_STEP_RATIO / fastest_rate,
+        FIRST_STEP_RATIO / fastest_rate,
+        fastest_rate,
         modes.mass,
     )
-    scalars[SCALAR.stiffness] = element.limit / element.length if element.length else 0.0
-    scalars[[SCALAR.period, SCALAR.base_moves]] = (drive.period, drive.moving)
-    counters[COUNT.period] = drive.period
-    work[WORK.sizes, 2 * n : -3] = element.state_scales
+    scalars[Scalar.STIFFNESS] = element.limit / element.length if element.length else 0.0
+    scalars[[Scalar.PERIOD, Scalar.BASE_MOVES]] = (drive.period, drive.moving)
+    counters[Counter.PERIOD] = drive.period
+    work[Work.SIZES, 2 * n : -3] = element.state_scales
     rows = np.stack(
         [modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output]
     )
     law = element.numbers[None], [element.memory] * 2, [1.0, np.inf, 1.0, *np.zeros(7)]
-    own = (rows, damping, drive_segments(drive), *law, state, work, scalars)
-    moving = MotionArrays(*(np.array(part, float, order="C") for part in own))
+    arrays = (rows, damping, drive_segments(drive), *law, state, work, scalars)
+    motion = MotionArrays(*(np.array(array, float, order="C") for array in arrays))
     cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))
     cycles[0] = np.inf
     cycles[1] = -np.inf
     width = 2 * n + 7
-    return moving, MotionRecord(
+    return motion, MotionRecord(
         cycles,
         np.zeros((0, width)),
         np.zeros((REVERSALS_PER_CALL, width)),
@@ -160,15 +161,15 @@ def make_response(modes, drive, rows, stored: float) -> Response:
     time = rows[:, 0]
     z = rows[:, 1 : 1 + n]
     rate = rows[:, 1 + n : 1 + 2 * n]
-    held, work = rows[:, 5 + 2 * n :].T
-    lost = np.diff(work - held, prepend=0.0)
+    stored_in_interface, work = rows[:, 5 + 2 * n :].T
+    losses = np.diff(work - stored_in_interface, prepend=0.0)
     noise = 1e-8 * max(stored, float(np.abs(work).max(initial=0.0)))
     ledger = np.stack(
         [
             work,
-            held,
-            np.cumsum(np.maximum(lost, 0.0)),
-            np.cumsum(np.where(lost < -noise, -lost, 0.0)),
+            stored_in_interface,
+            np.cumsum(np.maximum(losses, 0.0)),
+            np.cumsum(np.where(losses < -noise, -losses, 0.0)),
         ]
     )
     return make_histories(
@@ -178,8 +179,23 @@ def make_response(modes, drive, rows, stored: float) -> Response:
 
 def select_phasor_cycles(count: int, window: int) -> np.ndarray:
     """Return which of `count` cycles need a phasor: the last one of each of the last windows."""
-    back = np.arange(count)[::-1]
-    return (back % window == 0) & (back < N_PHASOR_WINDOWS * window)
+    cycles_to_end = np.arange(count)[::-1]
+    return (cycles_to_end % window == 0) & (cycles_to_end < N_PHASOR_WINDOWS * window)
+
+
+class MotionState(NamedTuple):
+    """Present state of a motion.
+
+    - sample: (2 n + 7,) see `MotionRecord`
+    - counters: see `Counter`
+    - memory: of the law
+    - stored: energy of modes and interface [J]
+    """
+
+    sample: np.ndarray
+    counters: np.ndarray
+    memory: np.ndarray
+    stored: float
 
 
 class Motion:
@@ -215,8 +231,8 @@ class Motion:
         self.message = ""
         self.progress = None
         self.run_to(0.0)
-        self.first = self.read_state()[0]
-        self.begun = float(self.record.counters[COUNT.max_stored])
+        self.first = self.read_state().sample
+        self.begun = float(self.record.counters[Counter.MAX_STORED])
 
     def fork(self, drive):
         """Return an independent copy of the motion, under another drive."""
@@ -244,14 +260,14 @@ class Motion:
     @property
     def time(self) -> float:
         """Time that is reached [s]."""
-        return float(self.arrays.scalars[SCALAR.time])
+        return float(self.arrays.scalars[Scalar.TIME])
 
     def _segment_starts(self) -> np.ndarray:
         """Return the times (p,) [s] at which the segments of the drive begin."""
-        return self.arrays.segments[:, [SEGMENT.cycle, SEGMENT.offset]] @ [self.drive.period, 1.0]
+        return self.arrays.segments[:, [Segment.CYCLE, Segment.OFFSET]] @ [self.drive.period, 1.0]
 
     def _enter_segment(self, piece: int) -> None:
-        self.arrays.scalars[SCALAR.segment] = piece
+        self.arrays.scalars[Scalar.SEGMENT] = piece
 
     def run_to(self, time: float, times=(), whole: bool = False) -> np.ndarray:
         """Run to a time, with samples at times on the way.
@@ -276,12 +292,12 @@ class Motion:
         parts = np.zeros((PARTS_PER_CALL if whole else 0, N_NODES, width))
         samples[:, 0] = times
         self.record = self.record._replace(samples=samples, parts=parts)
-        self.record.counters[COUNT.next_sample] = 0
+        self.record.counters[Counter.NEXT_SAMPLE] = 0
         ends = np.append(self._segment_starts()[1:], np.inf)
         while self.outcome is None:
-            end = float(ends[int(self.arrays.scalars[SCALAR.segment])])
+            end = float(ends[int(self.arrays.scalars[Scalar.SEGMENT])])
             if self.time >= end:
-                self._enter_segment(int(self.arrays.scalars[SCALAR.segment]) + 1)
+                self._enter_segment(int(self.arrays.scalars[Scalar.SEGMENT]) + 1)
                 continue
             status = self.loops.advance_motion(
                 self.arrays, self.record, float(time), end, self.tolerance, float(self.travel)
@@ -292,7 +308,7 @@ class Motion:
                 self.progress(min(self.time / (self.cycles * self.drive.period), 1.0))
             if status == STATUS.finished and self.time >= time:
                 break
-        return self.record.samples[: int(self.record.counters[COUNT.next_sample])]
+        return self.record.samples[: int(self.record.counters[Counter.NEXT_SAMPLE])]
 
     def run_ahead_to(self, time: float) -> None:
         """Run to a time [s], skipping cycles where the motion repeats under a sine without end.
@@ -302,40 +318,45 @@ class Motion:
         be as small. The last cycle must equal the one before it.
         """
         period = self.drive.period
-        far = 2 * FIRST_CHECK
-        before = None
+        n_cycles = 2 * FIRST_CHECK
+        change_before = None
         first = ceil(max(self.time, self._segment_starts()[-1]) / period - 1e-9)
-        if not self._has_final_sine() or (first + far) * period >= time:
+        if not self._has_final_sine() or (first + n_cycles) * period >= time:
             self.run_to(time)
             return
         self.run_to((first + FIRST_CHECK) * period)
-        last = self.arrays.state.copy()
-        while self.outcome is None and (first + far) * period < time:
+        last_state = self.arrays.state.copy()
+        while self.outcome is None and (first + n_cycles) * period < time:
             # 0 marks the cycle as one whose phasor is requested
-            self.record.cycles[2:, first + far - 1] = 0.0
-            self.run_to((first + far - far // 4) * period)
-            books = self._read_sums()
-            self.run_to((first + far) * period)
-            change = self._measure_change(last)
-            left = int(time / period + 1e-9) - first - far
-            if before is not None and self.outcome is None and left > 0:
-                unlike = bound_remaining_change(change, before, left, far)
-                if unlike <= MAX_REPEAT_CHANGE * self.tolerance and self._has_equal_cycles(
-                    first + far
+            self.record.cycles[2:, first + n_cycles - 1] = 0.0
+            self.run_to((first + n_cycles - n_cycles // 4) * period)
+            sums_before = self._read_sums()
+            self.run_to((first + n_cycles) * period)
+            change = self._measure_change(last_state)
+            n_skipped = int(time / period + 1e-9) - first - n_cycles
+            if change_before is not None and self.outcome is None and n_skipped > 0:
+                remaining_change = bound_remaining_change(
+                    change, change_before, n_skipped, n_cycles
+                )
+                if (
+                    remaining_change <= MAX_REPEAT_CHANGE * self.tolerance
+                    and self._has_equal_cycles(first + n_cycles)
                 ):
-                    self._skip_cycles(left, (self._read_sums() - books) / (far // 4))
-                    self.repeat_change = unlike
+                    self._skip_cycles(
+                        n_skipped, (self._read_sums() - sums_before) / (n_cycles // 4)
+                    )
+                    self.repeat_change = remaining_change
                     break
-            last = self.arrays.state.copy()
-            before = change
-            far = 2 * far
+            last_state = self.arrays.state.copy()
+            change_before = change
+            n_cycles = 2 * n_cycles
         self.run_to(time)
 
     def _has_final_sine(self) -> bool:
         """Return whether the drive ends in a sine of its own period."""
         last = self.arrays.segments[-1]
-        own = abs(last[SEGMENT.omega] * self.drive.period / (2 * np.pi) - 1) < 1e-12
-        return last[SEGMENT.kind] == KIND.sine and last[SEGMENT.amplitude] != 0 and own
+        has_period = abs(last[Segment.OMEGA] * self.drive.period / (2 * np.pi) - 1) < 1e-12
+        return last[Segment.KIND] == KIND.sine and last[Segment.AMPLITUDE] != 0 and has_period
 
     def _measure_change(self, last) -> float:
         """Return the largest relative change since the state `last` (N,), at least the tolerance.
@@ -345,9 +366,9 @@ class Motion:
         """
         scalars = self.arrays.scalars
         n = self.modes.omega.size
-        sizes = self.arrays.work[WORK.sizes]
+        sizes = self.arrays.work[Work.SIZES]
         scale = np.concatenate(
-            [np.repeat(scalars[[SCALAR.max_coordinate, SCALAR.max_rate]], n), sizes[2 * n : -3]]
+            [np.repeat(scalars[[Scalar.MAX_COORDINATE, Scalar.MAX_RATE]], n), sizes[2 * n : -3]]
         )
         return max(
             float(np.max(np.abs(self.arrays.state - last)[:-3] / np.maximum(scale, 1e-300))),
@@ -371,8 +392,8 @@ class Motion:
         magnitude of the work of the drive, and friction loss.
         """
         return np.append(
-            self.arrays.state[-3:] - [self.read_state()[3], 0.0, 0.0],
-            self.record.counters[[COUNT.drive_power, COUNT.friction_loss]],
+            self.arrays.state[-3:] - [self.read_state().stored, 0.0, 0.0],
+            self.record.counters[[Counter.DRIVE_POWER, Counter.FRICTION_LOSS]],
         )
 
     def _skip_cycles(self, count: int, sums) -> None:
@@ -384,8 +405,8 @@ class Motion:
         at = round(self.time / period)
         turns = np.concatenate([self.record.turns[:0], *self.turns[-2:]])
         self.arrays.state[-3:] += count * sums[:3]
-        self.arrays.scalars[SCALAR.start_loss] += count * sums[2]
-        self.record.counters[[COUNT.drive_power, COUNT.friction_loss]] += count * sums[3:]
+        self.arrays.scalars[Scalar.START_LOSS] += count * sums[2]
+        self.record.counters[[Counter.DRIVE_POWER, Counter.FRICTION_LOSS]] += count * sums[3:]
         self.record.cycles[:, at : at + count] = self.record.cycles[:, at - 1 : at]
         turns = turns[turns[:, 0] > self.time - period * (1 - 1e-9)]
         shown = min(
@@ -395,16 +416,18 @@ class Motion:
         later[:, 0, 0] = period * np.arange(1, shown + 1)
         later[:, 0, -1] = sums[2] * np.arange(1, shown + 1)
         self.turns.append((turns + later).reshape(-1, turns.shape[1]))
-        self.arrays.scalars[SCALAR.time] = (at + count) * period
+        self.arrays.scalars[Scalar.TIME] = (at + count) * period
 
     def _collect(self, status: int) -> None:
         """Collect what a call of the loop recorded, and set the outcome that its status means."""
-        count = int(self.record.counters[COUNT.n_turns])
+        count = int(self.record.counters[Counter.N_TURNS])
         if count and sum(map(len, self.turns)) < MAX_KEPT_REVERSALS:
             self.turns.append(self.record.turns[:count].copy())
-        if self.record.counters[COUNT.n_parts]:
-            self.parts.append(self.record.parts[: int(self.record.counters[COUNT.n_parts])].copy())
-        self.record.counters[[COUNT.n_turns, COUNT.n_parts]] = 0
+        if self.record.counters[Counter.N_PARTS]:
+            self.parts.append(
+                self.record.parts[: int(self.record.counters[Counter.N_PARTS])].copy()
+            )
+        self.record.counters[[Counter.N_TURNS, Counter.N_PARTS]] = 0
         if status == STATUS.travel:
             self.outcome = Outcome.EXCEEDS_TRAVEL
         elif status == STATUS.lifted:
@@ -418,29 +441,30 @@ class Motion:
 
     def energy_ledger(self) -> dict:
         """Return the energies [J] up to the present time, and the steps taken."""
-        _, own, _, stored = self.read_state()
+        state = self.read_state()
+        counters = state.counters
         energies = self.arrays.state[-3:]
         return {
             "work_in": float(energies[0]) + self.begun,
             "viscous": float(energies[1]),
-            "power": float(own[COUNT.drive_power]) + self.begun,
-            "friction": float(own[COUNT.friction_loss]),
-            "peak_stored": float(own[COUNT.max_stored]),
-            "stored": stored,
-            "iterations": float(own[COUNT.accepted] + own[COUNT.refused]),
+            "power": float(counters[Counter.DRIVE_POWER]) + self.begun,
+            "friction": float(counters[Counter.FRICTION_LOSS]),
+            "peak_stored": float(counters[Counter.MAX_STORED]),
+            "stored": state.stored,
+            "iterations": float(counters[Counter.ACCEPTED] + counters[Counter.REFUSED]),
             "worst_iterations": 1.0,
-            "steps": float(own[COUNT.accepted]),
+            "steps": float(counters[Counter.ACCEPTED]),
         }
 
-    def read_state(self) -> tuple:
-        """Return the present sample (2 n + 7,), counters, memory of the law, and stored energy [J]."""
-        kept = self.record._replace(counters=self.record.counters.copy())
+    def read_state(self) -> "MotionState":
+        """Return the present MotionState."""
+        record = self.record._replace(counters=self.record.counters.copy())
         twin = self.arrays._replace(
             memory=self.arrays.memory.copy(), scalars=self.arrays.scalars.copy()
         )
-        row = np.zeros(kept.turns.shape[1])
-        stored = float(self.loops.read_state(twin, kept, row))
-        return row, kept.counters, twin.memory[0], stored
+        sample = np.zeros(record.turns.shape[1])
+        stored = float(self.loops.read_state(twin, record, sample))
+        return MotionState(sample, record.counters, twin.memory[0], stored)
 
     def response(self, rows) -> Response:
         """Return histories of sample rows (k, 2 n + 7), with forces clipped to their limit.
@@ -452,7 +476,7 @@ class Motion:
             force = 2 * self.modes.omega.size + 3
             np.clip(rows[:, force], -self.element.limit, self.element.limit, out=rows[:, force])
         return make_response(
-            self.modes, self.drive, rows, float(self.record.counters[COUNT.max_stored])
+            self.modes, self.drive, rows, float(self.record.counters[Counter.MAX_STORED])
         )
 
     def end_state(self) -> np.ndarray:
@@ -463,7 +487,7 @@ class Motion:
         return np.array([self.time, y[:n] @ output, y[n : 2 * n] @ output, y[-1]])
 
     def run_last_cycles(
-        self, end: float, window: float, shots=(), seen: list | None = None
+        self, end: float, window: float, shots=(), snapshots: list | None = None
     ) -> tuple:
         """Run to the time `end` [s] and keep the last `window` [s].
 
@@ -484,41 +508,41 @@ class Motion:
         """
         begin = max(end - window, self.time)
         self.run_ahead_to(begin)
-        since = self.end_state()
+        start_state = self.end_state()
         tolerance = self.tolerance
         self.parts = []
         self.tolerance *= (
             LAST_TOLERANCE_RATIO  # the extension of a step errs more than the step does
         )
-        self.arrays.scalars[SCALAR.step] *= LAST_TOLERANCE_RATIO**0.125
+        self.arrays.scalars[Scalar.STEP] *= LAST_TOLERANCE_RATIO**0.125
         count = max(MIN_SAMPLES, round((end - begin) / self.drive.period * SAMPLES_PER_CYCLE) + 1)
         times = np.linspace(begin, end, count)
         rows = []
-        after = -np.inf
+        last_shot = -np.inf
         for shot in [*[t for t in shots if begin <= t < end], end]:
-            rows.append(self.run_to(shot, times[(times > after) & (times <= shot)], True))
-            after = shot
-            if seen is not None and shot in shots:
-                seen.append(self._snapshot())
+            rows.append(self.run_to(shot, times[(times > last_shot) & (times <= shot)], True))
+            last_shot = shot
+            if snapshots is not None and shot in shots:
+                snapshots.append(self._snapshot())
             if self.outcome is not None:
                 break
         self.tolerance = tolerance
         rows = np.concatenate(rows)
         if not self.parts:
             return rows, (None, {})
-        places = np.concatenate(self.parts)
+        part_rows = np.concatenate(self.parts)
         return rows, measure_parts(
-            self.response(places.reshape(-1, places.shape[2])),
+            self.response(part_rows.reshape(-1, part_rows.shape[2])),
             self.drive,
-            np.array([since, self.end_state()]),
+            np.array([start_state, self.end_state()]),
         )
 
     def _snapshot(self) -> dict:
-        row, _, memory, _ = self.read_state()
-        slide, rate, force, slip = row[-6:-2]
+        state = self.read_state()
+        slide, rate, force, slip = state.sample[-6:-2]
         out = {"time": self.time, "slide": slide, "rate": rate, "force": force, "slip": slip}
         points = self.element.form == "points"
-        return out | ({"bonds": unpack_bonds(self.element, memory).copy()} if points else {})
+        return out | ({"bonds": unpack_bonds(self.element, state.memory).copy()} if points else {})
 
 
 def simulate(

@@ -13,7 +13,7 @@ import numpy as np
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_INTERNAL
 from ...friction.laws import stretch_kernels as law
-from ..events.drive_kernels import drive_value
+from ..events.drive_kernels import Instant, drive_value
 from ..tableau_kernels import (
     EXTENSION_WEIGHTS,
     FIRST_COLUMNS,
@@ -23,7 +23,7 @@ from ..tableau_kernels import (
     RUNGE_KUTTA_MATRIX,
     STAGE_NODES,
 )
-from .arrays import MODE, SCALAR, TURN, WORK
+from .arrays import Mode, Scalar, Turn, Work
 
 # smallest size of a number, by which the error of a state at rest is measured
 MIN_SIZE = 1e-30
@@ -37,20 +37,19 @@ def evaluate_drive(motion, t):
 
     The segment is continued beyond its ends.
     """
-    return drive_value(
-        motion.segments[int(motion.scalars[SCALAR.segment])], 0.0, t, motion.scalars[SCALAR.period]
-    )
+    segment = motion.segments[int(motion.scalars[Scalar.SEGMENT])]
+    return drive_value(segment, Instant(0.0, t, motion.scalars[Scalar.PERIOD]))
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def find_slide(motion, y):
     """Return relative displacement [m] and velocity [m/s] of a state."""
     n = motion.modes.shape[1]
-    q = motion.modes[MODE.slide, 0] * y[0]
-    v = motion.modes[MODE.slide, 0] * y[n]
+    q = motion.modes[Mode.SLIDE, 0] * y[0]
+    v = motion.modes[Mode.SLIDE, 0] * y[n]
     for i in range(1, n):
-        q += motion.modes[MODE.slide, i] * y[i]
-        v += motion.modes[MODE.slide, i] * y[n + i]
+        q += motion.modes[Mode.SLIDE, i] * y[i]
+        v += motion.modes[Mode.SLIDE, i] * y[n + i]
     return q, v
 
 
@@ -79,7 +78,7 @@ def write_mode_slopes(motion, i, y, out, drive, friction_accel):
     """
     n = motion.modes.shape[1]
     rate = y[motion.modes.shape[1] + i]
-    damped = motion.modes[MODE.damping, i] * rate
+    damped = motion.modes[Mode.DAMPING, i] * rate
     if motion.damping.size > 0:
         damped = 0.0
         for j in range(n):
@@ -88,12 +87,12 @@ def write_mode_slopes(motion, i, y, out, drive, friction_accel):
     out[n + i] = (
         -damped
         - (
-            motion.modes[MODE.omega, i] * motion.modes[MODE.omega, i] * y[i]
-            + motion.modes[MODE.slide, i] * friction_accel
+            motion.modes[Mode.OMEGA, i] * motion.modes[Mode.OMEGA, i] * y[i]
+            + motion.modes[Mode.SLIDE, i] * friction_accel
         )
-        - motion.modes[MODE.base, i] * drive
+        - motion.modes[Mode.BASE, i] * drive
     )
-    return -motion.modes[MODE.base, i] * rate, damped * rate
+    return -motion.modes[Mode.BASE, i] * rate, damped * rate
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -111,25 +110,25 @@ def write_free_motion(motion, q, y, drive):
         Drive [m s-2].
     """
     n = motion.modes.shape[1]
-    free = 0.0
-    ease = 0.0
+    acceleration = 0.0
+    inverse_mass = 0.0
     for i in range(n):
-        damped = motion.modes[MODE.damping, i] * y[n + i]
+        damped = motion.modes[Mode.DAMPING, i] * y[n + i]
         if motion.damping.size > 0:
             damped = 0.0
             for j in range(n):
                 damped += motion.damping[i, j] * y[n + j]
-        free -= motion.modes[MODE.slide, i] * (
+        acceleration -= motion.modes[Mode.SLIDE, i] * (
             damped
-            + motion.modes[MODE.omega, i] * motion.modes[MODE.omega, i] * y[i]
-            + motion.modes[MODE.base, i] * drive
+            + motion.modes[Mode.OMEGA, i] * motion.modes[Mode.OMEGA, i] * y[i]
+            + motion.modes[Mode.BASE, i] * drive
         )
-        ease += (
-            motion.modes[MODE.slide, i] * motion.modes[MODE.slide, i] / motion.scalars[SCALAR.mass]
+        inverse_mass += (
+            motion.modes[Mode.SLIDE, i] * motion.modes[Mode.SLIDE, i] / motion.scalars[Scalar.MASS]
         )
-    motion.turn[TURN.free_acceleration] = free
-    motion.turn[TURN.inverse_mass] = ease
-    motion.turn[TURN.slide] = q
+    motion.turn[Turn.FREE_ACCELERATION] = acceleration
+    motion.turn[Turn.INVERSE_MASS] = inverse_mass
+    motion.turn[Turn.SLIDE] = q
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
@@ -152,7 +151,7 @@ def write_slopes(motion, t, y, out):
     n = motion.modes.shape[1]
     energies = y.size - 3
     drive = evaluate_drive(motion, t)
-    mass = motion.scalars[SCALAR.mass]
+    mass = motion.scalars[Scalar.MASS]
     q, v = find_slide(motion, y)
     if law.IS_SET_VALUED:
         write_free_motion(motion, q, y, drive)
@@ -160,24 +159,24 @@ def write_slopes(motion, t, y, out):
         motion.numbers[0],
         motion.memory[0],
         motion.turn,
-        q - motion.scalars[SCALAR.origin],
+        q - motion.scalars[Scalar.ORIGIN],
         v,
         y[2 * n : energies],
         out[2 * n : energies],
     )
-    work, lost = write_mode_slopes(motion, 0, y, out, drive, force / mass)
+    work, loss = write_mode_slopes(motion, 0, y, out, drive, force / mass)
     for i in range(1, n):
-        more, other = write_mode_slopes(motion, i, y, out, drive, force / mass)
-        work = work + more
-        lost = lost + other
+        mode_work, mode_loss = write_mode_slopes(motion, i, y, out, drive, force / mass)
+        work = work + mode_work
+        loss = loss + mode_loss
     out[energies] = mass * drive * work
-    out[energies + 1] = mass * lost
+    out[energies + 1] = mass * loss
     out[energies + 2] = force * v
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_INTERNAL)
 def write_stage(motion, stage, h, size):
-    """Write the state at a stage of a step into work[WORK.trial].
+    """Write the state at a stage of a step into work[Work.TRIAL].
 
     Parameters
     ----------
@@ -192,25 +191,25 @@ def write_stage(motion, stage, h, size):
     first = RUNGE_KUTTA_MATRIX[stage, 0]
     fraction = RUNGE_KUTTA_MATRIX[stage]
     for c in range(size):
-        part = first * motion.work[0, c]
+        slope = first * motion.work[0, c]
         for j in range(FIRST_COLUMNS[stage], stage):
-            part += fraction[j] * motion.work[j, c]
-        motion.work[WORK.trial, c] = motion.state[c] + h * part
+            slope += fraction[j] * motion.work[j, c]
+        motion.work[Work.TRIAL, c] = motion.state[c] + h * slope
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def take_step(motion, h):
-    """Write the state after a step of h [s] into work[WORK.trial], with all slopes.
+    """Write the state after a step of h [s] into work[Work.TRIAL], with all slopes.
 
     work[0] holds the slopes at the start.
     """
-    t = motion.scalars[SCALAR.time]
+    t = motion.scalars[Scalar.TIME]
     size = motion.state.size
     last = motion.work.shape[0] - 14
     for stage in range(1, last + 1):
         write_stage(motion, stage, h, size if stage == last else size - 3)
         write_slopes(
-            motion, t + STAGE_NODES[stage] * h, motion.work[WORK.trial], motion.work[stage]
+            motion, t + STAGE_NODES[stage] * h, motion.work[Work.TRIAL], motion.work[stage]
         )
 
 
@@ -235,70 +234,71 @@ def estimate_error(motion, h, tolerance):
     float
     """
     n = motion.modes.shape[1]
-    size = motion.state.size - 3
-    fifth = 0.0
-    third = 0.0
+    n_states = motion.state.size - 3
+    sum_5 = 0.0
+    sum_3 = 0.0
     friction_accel = (
-        motion.scalars[SCALAR.stiffness]
+        motion.scalars[Scalar.STIFFNESS]
         * abs(find_slide(motion, motion.state)[0])
-        / motion.scalars[SCALAR.mass]
+        / motion.scalars[Scalar.MASS]
     )
-    for c in range(size):
+    for c in range(n_states):
         if c < n:
-            scale = motion.scalars[SCALAR.max_coordinate]
+            scale = motion.scalars[Scalar.MAX_COORDINATE]
         elif c < 2 * n:
-            scale = motion.scalars[SCALAR.max_rate]
+            scale = motion.scalars[Scalar.MAX_RATE]
         else:
-            scale = motion.work[WORK.sizes, c]
-        high = 0.0
-        low = 0.0
+            scale = motion.work[Work.SIZES, c]
+        error_5 = 0.0
+        error_3 = 0.0
         for j in range(12):
-            high += ORDER_5_WEIGHTS[j] * motion.work[j, c]
-            low += ORDER_3_WEIGHTS[j] * motion.work[j, c]
-        top = (
-            max(abs(motion.state[c]), abs(motion.work[WORK.trial, c]), motion.work[WORK.sizes, c])
-            if c < 2 * n
-            else 0.0
-        )
+            error_5 += ORDER_5_WEIGHTS[j] * motion.work[j, c]
+            error_3 += ORDER_3_WEIGHTS[j] * motion.work[j, c]
+        size_floor = 0.0
+        if c < 2 * n:
+            size_floor = max(abs(motion.state[c]), abs(motion.work[Work.TRIAL, c]))
+            size_floor = max(size_floor, motion.work[Work.SIZES, c])
         if n <= c < 2 * n:
             force_size = (
-                abs(motion.state[c - n]) * motion.modes[MODE.omega, c - n] ** 2
-                + abs(motion.modes[MODE.slide, c - n]) * friction_accel
+                abs(motion.state[c - n]) * motion.modes[Mode.OMEGA, c - n] ** 2
+                + abs(motion.modes[Mode.SLIDE, c - n]) * friction_accel
             )
-            top = max(top, ROUND_OFF_RATIO * abs(h) * force_size / tolerance)
-        scale = max(scale, top, MIN_SIZE)
-        fifth += (high / scale) ** 2
-        third += (low / scale) ** 2
-    if not np.isfinite(fifth):
+            size_floor = max(size_floor, ROUND_OFF_RATIO * abs(h) * force_size / tolerance)
+        scale = max(scale, size_floor, MIN_SIZE)
+        sum_5 += (error_5 / scale) ** 2
+        sum_3 += (error_3 / scale) ** 2
+    if not np.isfinite(sum_5):
         return np.inf
-    if fifth == 0 and third == 0:
+    if sum_5 == 0 and sum_3 == 0:
         return 0.0
-    return abs(h) * fifth / sqrt((fifth + 0.01 * third) * size) / tolerance
+    return abs(h) * sum_5 / sqrt((sum_5 + 0.01 * sum_3) * n_states) / tolerance
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_INTERNAL)
 def extend_step(motion, h):
-    """Write the dense output of a step of h [s], after `take_step`, into work[WORK.extension]."""
-    t = motion.scalars[SCALAR.time]
+    """Write the dense output of a step of h [s], after `take_step`, into work[Work.EXTENSION]."""
+    t = motion.scalars[Scalar.TIME]
     size = motion.state.size
     for c in range(size):  # the stages overwrite it
-        motion.work[WORK.extension + 7, c] = motion.work[WORK.trial, c]
+        motion.work[Work.EXTENSION + 7, c] = motion.work[Work.TRIAL, c]
     for stage in range(13, N_STAGES):
         write_stage(motion, stage, h, size - 3)
         write_slopes(
-            motion, t + STAGE_NODES[stage] * h, motion.work[WORK.trial], motion.work[stage]
+            motion, t + STAGE_NODES[stage] * h, motion.work[Work.TRIAL], motion.work[stage]
         )
     for c in range(size):
-        motion.work[WORK.trial, c] = motion.work[WORK.extension + 7, c]
-        rise = motion.work[WORK.trial, c] - motion.state[c]
-        motion.work[WORK.extension, c] = rise
-        motion.work[WORK.extension + 1, c] = h * motion.work[0, c] - rise
-        motion.work[WORK.extension + 2, c] = 2 * rise - h * (motion.work[12, c] + motion.work[0, c])
+        motion.work[Work.TRIAL, c] = motion.work[Work.EXTENSION + 7, c]
+        change = motion.work[Work.TRIAL, c] - motion.state[c]
+        motion.work[Work.EXTENSION, c] = change
+        motion.work[Work.EXTENSION + 1, c] = h * motion.work[0, c] - change
+        motion.work[Work.EXTENSION + 2, c] = 2 * change - h * (
+            motion.work[12, c] + motion.work[0, c]
+        )
         for k in range(4):
-            part = EXTENSION_WEIGHTS[k, 0] * motion.work[0, c]
+            term = EXTENSION_WEIGHTS[k, 0] * motion.work[0, c]
             for j in range(5, N_STAGES):
-                part += EXTENSION_WEIGHTS[k, j] * motion.work[j, c]
-            motion.work[WORK.extension + 3 + k, c] = h * part
+                term += EXTENSION_WEIGHTS[k, j] * motion.work[j, c]
+            motion.work[Work.EXTENSION + 3 + k, c] = h * term
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_INTERNAL)
@@ -316,9 +316,9 @@ def evaluate_inside(motion, fraction, out, size):
         Numbers of the state that are written.
     """
     for c in range(size):
-        value = motion.work[WORK.extension + 6, c] * fraction
+        value = motion.work[Work.EXTENSION + 6, c] * fraction
         for k in range(5, -1, -1):
-            value = (value + motion.work[WORK.extension + k, c]) * (
+            value = (value + motion.work[Work.EXTENSION + k, c]) * (
                 fraction if k % 2 == 0 else 1 - fraction
             )
         out[c] = motion.state[c] + value

@@ -4,6 +4,7 @@ The dense output takes three more slopes, so only a step inside which something 
 """
 
 from math import cos, pi, sin
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INTERNAL
 from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps
-from .arrays import COUNT, MODE, NODE_FRACTIONS, SCALAR, WORK
+from .arrays import NODE_FRACTIONS, Counter, Mode, Scalar, Work
 
 # Gauss rule for the part of a step in a cycle, which the phasor of the cycle sums
 PHASOR_POINTS, PHASOR_WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -30,9 +31,19 @@ MIN_PART_FRACTION = 2.0**-14
 MAX_PARTS = 64
 
 
+class InterfaceState(NamedTuple):
+    """Relative displacement [m] and velocity [m/s], friction force [N], energy [J] and slip [m]."""
+
+    slide: float
+    velocity: float
+    force: float
+    energy: float
+    slip: float
+
+
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def read_interface(motion, y):
-    """Return slide [m], velocity [m/s], force [N], energy [J] and slip [m] of a state."""
+    """Return the `InterfaceState` of a state."""
     n = motion.modes.shape[1]
     q, v = steps.find_slide(motion, y)
     for k in range(motion.memory.shape[1]):
@@ -41,12 +52,12 @@ def read_interface(motion, y):
         motion.numbers[0],
         motion.memory[1],
         motion.turn,
-        q - motion.scalars[SCALAR.origin],
+        q - motion.scalars[Scalar.ORIGIN],
         v,
         y[2 * n : y.size - 3],
     )
     force, energy, slip = law.read_memory(motion.numbers[0], motion.memory[1], q, v)
-    return q, v, force, energy, slip
+    return InterfaceState(q, v, force, energy, slip)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -69,9 +80,12 @@ def write_sample(motion, t, y, row):
     row[0] = t
     for i in range(2 * n):
         row[1 + i] = y[i]
-    row[2 * n + 1], row[2 * n + 2], row[2 * n + 3], row[2 * n + 5], row[2 * n + 4] = read_interface(
-        motion, y
-    )
+    interface = read_interface(motion, y)
+    row[2 * n + 1] = interface.slide
+    row[2 * n + 2] = interface.velocity
+    row[2 * n + 3] = interface.force
+    row[2 * n + 4] = interface.slip
+    row[2 * n + 5] = interface.energy
     row[2 * n + 6] = y[y.size - 1]
 
 
@@ -82,8 +96,8 @@ def find_output(motion, y):
     w = 0.0
     n = motion.modes.shape[1]
     for i in range(n):
-        x += motion.modes[MODE.output, i] * y[i]
-        w += motion.modes[MODE.output, i] * y[n + i]
+        x += motion.modes[Mode.OUTPUT, i] * y[i]
+        w += motion.modes[Mode.OUTPUT, i] * y[n + i]
     return x, w
 
 
@@ -96,7 +110,7 @@ def can_output_turn(motion):
     """
     return (
         motion.modes.shape[1] > 1
-        or find_output(motion, motion.state)[1] * find_output(motion, motion.work[WORK.trial])[1]
+        or find_output(motion, motion.state)[1] * find_output(motion, motion.work[Work.TRIAL])[1]
         < 0
     )
 
@@ -146,27 +160,27 @@ def widen_by_step(motion, h, record, parts):
         Number of parts of the step, at whose ends the sign of the rate is evaluated.
     """
     x, w = find_output(motion, motion.state)
-    low = x
-    high = x
-    for part in range(1, parts + 1):
-        if part < parts:
-            steps.evaluate_inside(motion, part / parts, record.workspace, motion.state.size - 3)
+    minimum = x
+    maximum = x
+    for k in range(1, parts + 1):
+        if k < parts:
+            steps.evaluate_inside(motion, k / parts, record.workspace, motion.state.size - 3)
             x1, w1 = find_output(motion, record.workspace)
         else:
-            x1, w1 = find_output(motion, motion.work[WORK.trial])
-        low = min(low, x1)
-        high = max(high, x1)
+            x1, w1 = find_output(motion, motion.work[Work.TRIAL])
+        minimum = min(minimum, x1)
+        maximum = max(maximum, x1)
         if w * w1 < 0:
-            top = find_output_extreme(motion, record, (part - 1) / parts, part / parts, w)
-            low = min(low, top)
-            high = max(high, top)
+            extreme = find_output_extreme(motion, record, (k - 1) / parts, k / parts, w)
+            minimum = min(minimum, extreme)
+            maximum = max(maximum, extreme)
         w = w1
     widen_extremes(
         record.cycles,
-        record.counters[COUNT.period],
-        motion.scalars[SCALAR.time] + 0.5 * h,
-        low,
-        high,
+        record.counters[Counter.PERIOD],
+        motion.scalars[Scalar.TIME] + 0.5 * h,
+        minimum,
+        maximum,
     )
 
 
@@ -207,29 +221,29 @@ def add_phasor(cycles, period, t, h, begin, end):
     first = int(t / period)
     last = min(int((t + h) / period), cycles.shape[1] - 1)
     for cycle in range(first, last + 1):
-        low = max(t, cycle * period)
-        high = min(t + h, (cycle + 1) * period)
-        if np.isnan(cycles[2, cycle]) or high <= low:
+        start_time = max(t, cycle * period)
+        end_time = min(t + h, (cycle + 1) * period)
+        if np.isnan(cycles[2, cycle]) or end_time <= start_time:
             continue
         p = begin[1] * h
         q = end[1] * h
         a = begin[2] * h * h / 2
         b = end[2] * h * h / 2
         rise = end[0] - begin[0]
-        one = rise - p - a
-        two = q - p - 2 * a
-        three = 2 * (b - a)
-        cube = 10 * one - 4 * two + three / 2
-        fourth = -15 * one + 7 * two - three
-        fifth = 6 * one - 3 * two + three / 2
+        rise_remainder = rise - p - a
+        slope_remainder = q - p - 2 * a
+        curvature_remainder = 2 * (b - a)
+        c3 = 10 * rise_remainder - 4 * slope_remainder + curvature_remainder / 2
+        c4 = -15 * rise_remainder + 7 * slope_remainder - curvature_remainder
+        c5 = 6 * rise_remainder - 3 * slope_remainder + curvature_remainder / 2
         for j in range(PHASOR_POINTS.size):
-            time = low + 0.5 * (1 + PHASOR_POINTS[j]) * (high - low)
-            weight = PHASOR_WEIGHTS[j] * (high - low) / period
+            time = start_time + 0.5 * (1 + PHASOR_POINTS[j]) * (end_time - start_time)
+            weight = PHASOR_WEIGHTS[j] * (end_time - start_time) / period
             s = (time - t) / h
-            turn = 2 * pi * (time / period - cycle)
-            x = begin[0] + s * (p + s * (a + s * (cube + s * (fourth + s * fifth))))
-            cycles[2, cycle] += weight * x * cos(turn)
-            cycles[3, cycle] -= weight * x * sin(turn)
+            angle = 2 * pi * (time / period - cycle)
+            x = begin[0] + s * (p + s * (a + s * (c3 + s * (c4 + s * c5))))
+            cycles[2, cycle] += weight * x * cos(angle)
+            cycles[3, cycle] -= weight * x * sin(angle)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
@@ -243,21 +257,17 @@ def add_step_to_phasors(motion, h, record):
         Length of the step [s].
     record : MotionRecord
     """
-    n = motion.modes.shape[1]
-    gain = 0.0
-    after = 0.0
-    for i in range(n):
-        gain += motion.modes[MODE.output, i] * motion.work[0, n + i]
-        after += motion.modes[MODE.output, i] * motion.work[12, n + i]
     x, w = find_output(motion, motion.state)
-    y, v = find_output(motion, motion.work[WORK.trial])
+    y, v = find_output(motion, motion.work[Work.TRIAL])
+    acceleration = find_output(motion, motion.work[0])[1]
+    end_acceleration = find_output(motion, motion.work[12])[1]
     add_phasor(
         record.cycles,
-        record.counters[COUNT.period],
-        motion.scalars[SCALAR.time],
+        record.counters[Counter.PERIOD],
+        motion.scalars[Scalar.TIME],
         h,
-        (x, w, gain),
-        (y, v, after),
+        (x, w, acceleration),
+        (y, v, end_acceleration),
     )
 
 
@@ -272,18 +282,18 @@ def write_samples(motion, h, record):
         Length of the step [s].
     record : MotionRecord
     """
-    t = motion.scalars[SCALAR.time]
+    t = motion.scalars[Scalar.TIME]
     end = t + h
     while (
-        record.counters[COUNT.next_sample] < record.samples.shape[0]
-        and record.samples[int(record.counters[COUNT.next_sample]), 0] <= end
+        record.counters[Counter.NEXT_SAMPLE] < record.samples.shape[0]
+        and record.samples[int(record.counters[Counter.NEXT_SAMPLE]), 0] <= end
     ):
-        j = int(record.counters[COUNT.next_sample])
+        j = int(record.counters[Counter.NEXT_SAMPLE])
         steps.evaluate_inside(
             motion, (record.samples[j, 0] - t) / h, record.workspace, motion.state.size
         )
         write_sample(motion, record.samples[j, 0], record.workspace, record.samples[j])
-        record.counters[COUNT.next_sample] += 1
+        record.counters[Counter.NEXT_SAMPLE] += 1
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -292,14 +302,14 @@ def estimate_roughness(row, force):
 
     row: samples at NODE_FRACTIONS; force: column.
     """
-    one = 0.0
-    two = 0.0
+    last_term = 0.0
+    penultimate_term = 0.0
     last = NODE_FRACTIONS.size - 1
     for j in range(last + 1):
         weight = (0.5 if j == 0 or j == last else 1.0) * row[j, force]
-        one += weight if j % 2 == 0 else -weight
-        two += weight * PENULTIMATE_TERM[j]
-    return (abs(one) + 2 * abs(two)) / last
+        last_term += weight if j % 2 == 0 else -weight
+        penultimate_term += weight * PENULTIMATE_TERM[j]
+    return (abs(last_term) + 2 * abs(penultimate_term)) / last
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -318,23 +328,23 @@ def write_parts(motion, h, record):
     begin = 0.0
     size = 1.0
     force = 2 * motion.modes.shape[1] + 3
-    while begin < 1 and record.counters[COUNT.n_parts] < record.parts.shape[0]:
-        row = record.parts[int(record.counters[COUNT.n_parts])]
+    while begin < 1 and record.counters[Counter.N_PARTS] < record.parts.shape[0]:
+        row = record.parts[int(record.counters[Counter.N_PARTS])]
         for j in range(NODE_FRACTIONS.size):
             at = min(begin + NODE_FRACTIONS[j] * size, 1.0)
             steps.evaluate_inside(motion, at, record.workspace, motion.state.size)
-            write_sample(motion, motion.scalars[SCALAR.time] + at * h, record.workspace, row[j])
-            record.counters[COUNT.max_force] = max(
-                record.counters[COUNT.max_force], abs(row[j, force])
+            write_sample(motion, motion.scalars[Scalar.TIME] + at * h, record.workspace, row[j])
+            record.counters[Counter.MAX_FORCE] = max(
+                record.counters[Counter.MAX_FORCE], abs(row[j, force])
             )
         if (
             size > MIN_PART_FRACTION
             and estimate_roughness(row, force)
-            > MAX_ROUGHNESS_RATIO * record.counters[COUNT.max_force]
+            > MAX_ROUGHNESS_RATIO * record.counters[Counter.MAX_FORCE]
         ):
             size *= 0.5
             continue
-        record.counters[COUNT.n_parts] += 1
+        record.counters[Counter.N_PARTS] += 1
         begin += size
         size = min(2 * size, 1 - begin)
 
@@ -347,9 +357,9 @@ def stored_energy(motion, y):
     for i in range(n):
         out += (
             y[n + i] * y[n + i]
-            + motion.modes[MODE.omega, i] * motion.modes[MODE.omega, i] * y[i] * y[i]
+            + motion.modes[Mode.OMEGA, i] * motion.modes[Mode.OMEGA, i] * y[i] * y[i]
         )
-    return 0.5 * motion.scalars[SCALAR.mass] * out + read_interface(motion, y)[3]
+    return 0.5 * motion.scalars[Scalar.MASS] * out + read_interface(motion, y).energy
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
@@ -364,15 +374,15 @@ def record_step(motion, h, record):
     record : MotionRecord
     """
     work = motion.state.size - 3
-    at = int(record.counters[COUNT.next_sample])
-    record.counters[COUNT.drive_power] += abs(motion.work[WORK.trial, work] - motion.state[work])
-    record.counters[COUNT.max_stored] = max(
-        record.counters[COUNT.max_stored], stored_energy(motion, motion.work[WORK.trial])
+    at = int(record.counters[Counter.NEXT_SAMPLE])
+    record.counters[Counter.DRIVE_POWER] += abs(motion.work[Work.TRIAL, work] - motion.state[work])
+    record.counters[Counter.MAX_STORED] = max(
+        record.counters[Counter.MAX_STORED], stored_energy(motion, motion.work[Work.TRIAL])
     )
-    record.counters[COUNT.accepted] += 1
+    record.counters[Counter.ACCEPTED] += 1
     add_step_to_phasors(motion, h, record)
     sampled = (
-        at < record.samples.shape[0] and record.samples[at, 0] <= motion.scalars[SCALAR.time] + h
+        at < record.samples.shape[0] and record.samples[at, 0] <= motion.scalars[Scalar.TIME] + h
     )
     whole = record.parts.shape[0] > 0
     if not (whole or sampled or can_output_turn(motion)):

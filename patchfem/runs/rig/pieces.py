@@ -12,7 +12,7 @@ import numpy as np
 from ...core import IntegratedMeasures, InterfaceLoop, NotConverged, SineDrive
 from ...dynamics.events import elements, histories
 from ...dynamics.events import steady as steady_events
-from ...dynamics.events.positions_kernels import INTERFACE
+from ...dynamics.events.positions_kernels import InterfaceMeasure
 from ...dynamics.events.reading import Reading
 from ...effects import law_has_trait
 from ...response import run_events
@@ -536,12 +536,13 @@ def _loop_measures(reading: Reading, stiffness, *, sine: bool) -> dict:
     """Return the measures of the loop of the first interface by name."""
     loop = reading.loop()
     moves = (
-        reading.interface_value(INTERFACE.max_slide) - reading.interface_value(INTERFACE.min_slide)
+        reading.interface_value(InterfaceMeasure.MAX_SLIDE)
+        - reading.interface_value(InterfaceMeasure.MIN_SLIDE)
         > MIN_SLIDE_RANGE
     ) & sine
-    half = np.where(moves, reading.interface_value(INTERFACE.mean_range) / 2, 0.0)[()]
+    half = np.where(moves, reading.interface_value(InterfaceMeasure.MEAN_RANGE) / 2, 0.0)[()]
     work = loop.work * reading.period / reading.span
-    secant = np.where(moves, reading.interface_value(INTERFACE.secant), np.nan)[()]
+    secant = np.where(moves, reading.interface_value(InterfaceMeasure.SECANT), np.nan)[()]
     measures = interface_loops(
         half, loop.displacement_harmonic, loop.force_harmonic, work, stiffness
     )
@@ -553,7 +554,7 @@ def _work_check(reading: Reading, book: dict):
 
     The samples are the ends of the pieces, with the trapezoidal rule.
     """
-    sampled = reading.faces[..., INTERFACE.end_work].sum(axis=-1)
-    booked = reading.faces[..., INTERFACE.work].sum(axis=-1)
-    exchanged = reading.faces[..., INTERFACE.path_work].sum(axis=-1)
+    sampled = reading.faces[..., InterfaceMeasure.END_WORK].sum(axis=-1)
+    booked = reading.faces[..., InterfaceMeasure.WORK].sum(axis=-1)
+    exchanged = reading.faces[..., InterfaceMeasure.PATH_WORK].sum(axis=-1)
     return relative_gap(sampled, booked, exchanged, book["power"] + book["peak_stored"])

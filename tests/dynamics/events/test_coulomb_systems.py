@@ -19,7 +19,7 @@ from patchfem.core import (
     SineDrive,
 )
 from patchfem.dynamics.events.event_list import BORDER, RELEASE, STOP
-from patchfem.dynamics.events.positions_kernels import COLUMN, N_COLUMNS, ROW
+from patchfem.dynamics.events.positions_kernels import N_COLUMNS, Column, Row
 from patchfem.response.measures import energy_balance
 from patchfem.structure import drives
 
@@ -268,7 +268,7 @@ def choice_at_rest(seed, n, faces, ratio):
     )
     accel = rows @ (pull - forces @ rows / modes.mass)
     assert np.all(np.abs(forces) <= static * (1 + 1e-9))
-    ways = first[0, one._column(0, COLUMN.direction) :: N_COLUMNS]
+    ways = first[0, one._column(0, Column.DIRECTION) :: N_COLUMNS]
     for c, sign in enumerate(ways):
         if sign:
             assert sign * accel[c] > 0 and forces[c] == pytest.approx(
@@ -416,12 +416,12 @@ def test_exact_coordinates_stay_on_the_stuck_slide():
     h = sqrt(0.5)
     modes = basis_of([0.0, 1.4], 0.1, [[h, -0.6]], (-h, -0.8))
     one, rows = rows_of(modes, drives.make_levels([4.0, 0.3], 1.14, 3), 1.5, 1.5, 300)
-    rows = rows[rows[:, ROW.cycle] >= 20]
-    held = rows[0, one._column(0, COLUMN.slide)]
-    z = rows[:, ROW.motion : ROW.motion + 2]
+    rows = rows[rows[:, Row.CYCLE] >= 20]
+    held = rows[0, one._column(0, Column.SLIDE)]
+    z = rows[:, Row.MOTION : Row.MOTION + 2]
     assert (
-        not rows[:, one._column(0, COLUMN.direction)].any()
-        and np.all(rows[:, one._column(0, COLUMN.slide)] == held)
+        not rows[:, one._column(0, Column.DIRECTION)].any()
+        and np.all(rows[:, one._column(0, Column.SLIDE)] == held)
         and abs(held) > 0.1
     )
     assert np.abs(z @ modes.interfaces[0] - held).max() < 4e-16 * np.abs(z).max()

@@ -55,18 +55,6 @@ def test_exact_random_rigs_against_dop853(seed, most):
     assert energy_balance(done.ledger) <= 1e-10
 
 
-@pytest.mark.parametrize(
-    ("stiffness", "amplitude"), [(10, 0.249538145), (100, 0.285786312), (1000, 0.288449682)]
-)
-def test_exact_amplitude_at_resonance(stiffness, amplitude):
-    """H13: printed to nine digits, found by DOP853 at 1e-12."""
-    done = simulate(ONE, SineDrive(1.0, 1.0), [make_elements([stiffness], [0.8 / stiffness])], 400)
-    assert done.swing == pytest.approx(amplitude, abs=6e-10)
-    assert energy_balance(done.ledger) <= 1e-11
-    # it slips, so the force is its limit
-    assert done.loops[0].max_force == pytest.approx(0.8, rel=1e-12)
-
-
 def test_exact_two_interfaces_against_dop853():
     faces = np.array([[1.0, 0.4], [0.3, -1.0]])
     modes = basis([1.0, 2.3], [0.01, 0.02], faces[0], [1.0, 0.5], [1.0, 0.2], None, faces)

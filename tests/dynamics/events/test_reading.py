@@ -7,7 +7,7 @@ from patchfem.compiled.no_jit import load_uncompiled
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.elements import make_elements
-from patchfem.dynamics.events.positions_kernels import INTERFACE, RUN
+from patchfem.dynamics.events.positions_kernels import InterfaceMeasure, RunMeasure
 from patchfem.response.loops import find_reversals, mean_half_range, secant_stiffness
 from patchfem.response.run_events import measure_rings
 
@@ -58,7 +58,7 @@ def test_exact_secant_stiffness_where_the_slide_turns_at_the_border_of_a_cycle(o
     turns = find_reversals(
         ends.time, ends.slide, ends.slide_rate, ends.force, drive.period, "slide"
     )
-    assert done.reading.interface_value(INTERFACE.secant, 0) == pytest.approx(
+    assert done.reading.interface_value(InterfaceMeasure.SECANT, 0) == pytest.approx(
         secant_stiffness(turns), rel=1e-9
     )
 
@@ -104,8 +104,8 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
         )
         assert abs(one.displacement_harmonic) == pytest.approx(abs(q), rel=1e-11)
         assert one.work == pytest.approx(np.sum(weight * force * rate), rel=1e-10)
-        assert x.interface_value(INTERFACE.end_work, f) == pytest.approx(one.work, rel=1e-10)
-        assert x.interface_value(INTERFACE.path_work, f) == pytest.approx(
+        assert x.interface_value(InterfaceMeasure.END_WORK, f) == pytest.approx(one.work, rel=1e-10)
+        assert x.interface_value(InterfaceMeasure.PATH_WORK, f) == pytest.approx(
             np.sum(weight * np.abs(force * rate)), rel=0.05
         )
         places, forces = (
@@ -114,15 +114,15 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
         )
         rates = ends.extra["slide_rates"][:, f] if many else ends.slide_rate
         assert (
-            x.interface_value(INTERFACE.min_slide, f),
-            x.interface_value(INTERFACE.max_slide, f),
+            x.interface_value(InterfaceMeasure.MIN_SLIDE, f),
+            x.interface_value(InterfaceMeasure.MAX_SLIDE, f),
         ) == pytest.approx((places.min(), places.max()), rel=1e-12)
         assert one.max_force == pytest.approx(np.abs(forces).max(), rel=1e-12)
         turns = find_reversals(ends.time, places, rates, forces, drive.period, "slide")
-        assert x.interface_value(INTERFACE.mean_range, f) / 2 == pytest.approx(
+        assert x.interface_value(InterfaceMeasure.MEAN_RANGE, f) / 2 == pytest.approx(
             mean_half_range(turns), rel=1e-9
         )
-        assert x.interface_value(INTERFACE.secant, f) == pytest.approx(
+        assert x.interface_value(InterfaceMeasure.SECANT, f) == pytest.approx(
             secant_stiffness(turns), rel=1e-9
         )
     slide = out[:, 2 * n + 1]
@@ -140,7 +140,7 @@ def test_exact_releases_are_those_of_the_log():
     groups = [make_elements([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])]
     _, rows, done = run_of(modes, SineDrive(1.5, 1.3), groups)
     late = (done.log.time > rows[0, 0]) & (np.abs(done.log.kind) == 1)
-    assert late.sum() == done.reading.run[RUN.n_releases] > 4
+    assert late.sum() == done.reading.run[RunMeasure.N_RELEASES] > 4
     wanted = np.angle(np.mean(np.exp(2j * done.log.phase[late]))) / 2 % np.pi
     assert done.reading.start == pytest.approx(wanted, abs=1e-12)
 

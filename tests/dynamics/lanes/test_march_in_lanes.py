@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem.dynamics.lanes import reading, run
-from patchfem.dynamics.lanes import rows_kernels as at
+from patchfem.dynamics.lanes import rows_kernels as rows
+from patchfem.dynamics.lanes.rows_kernels import Row
 from patchfem.friction.laws.iwan import max_yield_displacement
 
 FLOWS = tuple(f"friction.laws.{law}_kernels" for law in ("tanh", "stretch", "bouc_wen", "lugre"))
@@ -130,7 +131,7 @@ def test_exact_a_case_leaps_to_where_it_would_march(law):
     sizes = np.ptp(history[:, -1, :2], axis=1)
     apart = np.abs(history - np.concatenate(parts, axis=1)).max(axis=(1, 2))
     assert np.all(apart < 2e-6 * sizes) and np.mean(apart > 0) > 0.5
-    for place in (at.SLIDE, at.SPEED, at.MEMORY):
+    for place in (Row.SLIDE, Row.SPEED, Row.MEMORY):
         assert np.all(np.abs(motion - step)[:, place] < 2e-6 * sizes)
 
 
@@ -218,7 +219,7 @@ def test_always_a_march_that_ran_away_has_no_numbers_and_prints_nothing(law):
     angle = np.ones((60, 6, 2))
     reading.reading_of_runs(law, some, found, np.ones(60), np.ones(60), angle)
     assert np.isfinite(book["work_in"][1::2]).all() and np.isnan(book["work_in"][::2]).any()
-    assert (np.isnan(book["stored"]) == np.isnan(found.motion[:, at.SLIDE])).all()
+    assert (np.isnan(book["stored"]) == np.isnan(found.motion[:, Row.SLIDE])).all()
 
 
 def test_exact_without_friction_a_march_is_the_closed_form():
@@ -249,7 +250,7 @@ def test_exact_without_friction_a_march_is_the_closed_form():
             values, vectors = np.linalg.eig(matrix)
             turned = vectors @ np.diag(np.exp(values * 14 * np.pi)) @ np.linalg.inv(vectors)
             want = forced + (turned @ (np.array([0, 0.1]) - forced)).real
-            np.testing.assert_allclose(found.motion[k, [at.SLIDE, at.SPEED]], want, atol=1e-12)
+            np.testing.assert_allclose(found.motion[k, [Row.SLIDE, Row.SPEED]], want, atol=1e-12)
 
 
 @pytest.mark.parametrize("law", ["table", "friction.laws.stretch_kernels"])
@@ -277,13 +278,13 @@ def test_exact_accelerations_are_those_of_the_equation(law):
             *workspace,
         )
         sine = table[0, k % steps]
-        pull = run.law_state(law, motion, "FRICTION") if law in FLOWS else motion[:, at.MEMORY]
+        pull = run.law_state(law, motion, "FRICTION") if law in FLOWS else motion[:, Row.MEMORY]
         want = (
             some.output_gain
             * (
                 some.drive * sine
-                - some.damping * motion[:, at.SPEED]
-                - some.stiffness * motion[:, at.SLIDE]
+                - some.damping * motion[:, Row.SPEED]
+                - some.stiffness * motion[:, Row.SLIDE]
                 - pull
             )
             + some.base_gain * sine
@@ -300,12 +301,11 @@ def test_exact_a_set_of_elements_loses_what_masing_says(steps):
     half = np.ptp(found.history[:, -1, :2], axis=1) / 2
     lost = (
         some.kinetic
-        * (found.motion[:, at.SLIP_PATH] - found.observed_start[:, at.SLIP_PATH])
+        * (found.motion[:, Row.SLIP_PATH] - found.observed_start[:, Row.SLIP_PATH])
         / found.n_observed
     )
-    of = run.law_kernels("table").curve
     # of each yield its place, and the force up to it
-    table = some.law[:, 3 : 3 + of.PART_STARTS].reshape(60, -1, of.N_COLUMNS)
+    table = some.law[:, 3 : 3 + rows.PART_STARTS].reshape(60, -1, rows.N_COLUMNS)
     y, force = (
         scale[:, None] * part
         for scale, part in (

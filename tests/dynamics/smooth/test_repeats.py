@@ -6,7 +6,7 @@ from march_paths import OMEGA, one_mode
 from test_smooth import MASS, element
 
 from patchfem.core import SineDrive
-from patchfem.dynamics.smooth.arrays import COUNT
+from patchfem.dynamics.smooth.arrays import Counter
 from patchfem.dynamics.smooth.run import MAX_REPEAT_CHANGE, Motion, simulate
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
@@ -29,7 +29,7 @@ def test_exact_cycles_that_are_left_out_are_as_the_last_one(name):
     size = abs(whole.record.cycles[:2]).max()
     assert (
         0 < left.repeat_change <= MAX_REPEAT_CHANGE * 1e-9
-        and left.record.counters[COUNT.accepted] < 0.5 * whole.record.counters[COUNT.accepted]
+        and left.record.counters[Counter.ACCEPTED] < 0.5 * whole.record.counters[Counter.ACCEPTED]
     )
     assert left.time == pytest.approx(whole.time, rel=1e-14)
     scale = [size, size * OMEGA]

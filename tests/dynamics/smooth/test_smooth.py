@@ -9,7 +9,7 @@ from scipy.integrate import simpson
 from patchfem.core import InitialState, ModalBasis, Outcome, SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
-from patchfem.dynamics.smooth.arrays import COUNT
+from patchfem.dynamics.smooth.arrays import Counter
 from patchfem.dynamics.smooth.run import Motion, simulate
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
@@ -191,7 +191,7 @@ def test_exact_a_fork_goes_on_as_the_run_would():
     twin.run_to(3 * SINE.period)
     assert (
         np.array_equal(run.arrays.state, twin.arrays.state)
-        and twin.record.counters[COUNT.accepted] == run.record.counters[COUNT.accepted]
+        and twin.record.counters[Counter.ACCEPTED] == run.record.counters[Counter.ACCEPTED]
     )
 
 
@@ -243,7 +243,7 @@ def test_exact_slides_far_below_the_bond_length_cost_no_small_steps(drive):
         sway = np.exp(-decay * times) * (np.cos(free * times) + decay / free * np.sin(free * times))
         want = rest + (1e-14 - rest) * sway
         assert rows[:, 1] == pytest.approx(want, abs=1e-7 * 1e-14)
-    assert run.record.counters[COUNT.accepted] < 1500
+    assert run.record.counters[Counter.ACCEPTED] < 1500
 
 
 @pytest.mark.parametrize("share", [0.33, 0.348, 0.385])

@@ -6,7 +6,7 @@ from march_paths import OMEGA, one_mode
 from test_smooth import ONE, element
 
 from patchfem.core import InitialState, Outcome, SineDrive
-from patchfem.dynamics.smooth.arrays import COUNT
+from patchfem.dynamics.smooth.arrays import Counter
 from patchfem.dynamics.smooth.run import Motion
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.stretch import points_element
@@ -66,7 +66,7 @@ def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
         run.run_to(cycle / 162.4)
     z = abs(run.arrays.state[0])
     v = abs(run.arrays.state[1])
-    done = run.record.counters[COUNT.accepted : COUNT.refused + 1].sum()
+    done = run.record.counters[Counter.ACCEPTED : Counter.REFUSED + 1].sum()
     assert run.outcome is None and done < 2000
     assert z < 1e-25 * 4.631e-5 and v < 1e-25 * 4.631e-5 * omega
     # what friction and damping took is the energy of the start
@@ -100,7 +100,7 @@ def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for
     force = run.read_state()[0][5]
     assert (
         run.outcome is None
-        and run.record.counters[COUNT.accepted : COUNT.refused + 1].sum() < 40_000
+        and run.record.counters[Counter.ACCEPTED : Counter.REFUSED + 1].sum() < 40_000
     )
     assert abs(y[1]) < 1e-9 * omega * abs(y[0])
     # the bonds balance the spring

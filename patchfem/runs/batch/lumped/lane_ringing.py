@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....dynamics.lanes import rows_kernels as at
 from ....dynamics.lanes import run as march
+from ....dynamics.lanes.rows_kernels import Row
 from ....response.ringing import (
     MAX_DAMPING_RATIO,
     MIN_SINUSOID,
@@ -150,12 +150,12 @@ def _ring_on_springs(cases, scales: Scales, marched, is_held, ringing: LaneRingi
     with np.errstate(all="ignore"):
         # the motion without that of the sine and without the stretch of the spring
         displacement = (
-            start[:, at.SLIDE]
-            - cases.spring * start[:, at.MEMORY] / stiffness
+            start[:, Row.SLIDE]
+            - cases.spring * start[:, Row.MEMORY] / stiffness
             + cases.drive * cases.damping / squared
         )
         quadrature = (
-            start[:, at.SPEED] - cases.drive * detuning / squared + half_damping * displacement
+            start[:, Row.SPEED] - cases.drive * detuning / squared + half_damping * displacement
         ) / omega
         damping = half_damping / np.sqrt(stiffness)
         is_forced = (

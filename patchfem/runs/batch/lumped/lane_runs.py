@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ....dynamics.lanes import reading
-from ....dynamics.lanes import rows_kernels as at
 from ....dynamics.lanes import run as march
+from ....dynamics.lanes.rows_kernels import Row
 from ....model.model import Model
 from ....model.similar_models import collect_columns
 from ....response.errors import SUM_ROUND_OFF, convergence_error, signed_change
@@ -190,5 +190,5 @@ def collect_runs(
         steady,
         again=False,
     )
-    is_finite = np.isfinite(marched.motion[:, at.SLIDE] + coarser[0]["friction_work"])
+    is_finite = np.isfinite(marched.motion[:, Row.SLIDE] + coarser[0]["friction_work"])
     return LaneRuns(runs, is_exact, ringing.needs_more_steps | ~is_finite)

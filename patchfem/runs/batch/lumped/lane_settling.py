@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....dynamics.lanes import rows_kernels as at
 from ....dynamics.lanes import run as march
+from ....dynamics.lanes.rows_kernels import Row
 from ....response.settling import extrapolate_steady_amplitudes
 from ...rig.pieces import MAX_CHANGE_RATIO
 from .lane_numbers import count_evaluated_cycles, select_rows
@@ -121,8 +121,8 @@ def _bound_free_motion(cases, before, motion, cycles: int) -> np.ndarray:
     omega = np.sqrt(cases.stiffness + cases.spring)
     half_damping = cases.damping / 2
     change = np.hypot(
-        motion[:, at.SLIDE] - before[:, at.SLIDE],
-        (motion[:, at.SPEED] - before[:, at.SPEED]) / omega,
+        motion[:, Row.SLIDE] - before[:, Row.SLIDE],
+        (motion[:, Row.SPEED] - before[:, Row.SPEED]) / omega,
     )
     rate = half_damping - np.sqrt(np.maximum(half_damping**2 - cases.stiffness, 0.0))
     decayed = -np.expm1(-2 * np.pi * cycles * rate)

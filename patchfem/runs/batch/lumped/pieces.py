@@ -11,7 +11,7 @@ import numpy as np
 
 from ....dynamics.events import histories
 from ....dynamics.events.elements import CELL_MERGES, merge_elements
-from ....dynamics.events.positions_kernels import INTERFACE, RUN
+from ....dynamics.events.positions_kernels import InterfaceMeasure, RunMeasure
 from ....dynamics.events.reading import join_readings
 from ....effects import law_has_trait
 from ....friction.record import make_law
@@ -174,7 +174,8 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
     loop = reading.loop()
     is_rigid = cases[0].groups[0].static > 0
     is_stuck = loop.slip_range / 2 <= np.maximum(
-        [case.held for case in cases], COORDINATE_ROUND_OFF * reading.run[:, RUN.max_coordinate]
+        [case.held for case in cases],
+        COORDINATE_ROUND_OFF * reading.run[:, RunMeasure.MAX_COORDINATE],
     )
     is_lost = np.zeros(len(finished), bool)
     rings = {name: np.full(len(finished), np.nan) for name in ("ring_frequency", "ring_damping")}
@@ -215,11 +216,11 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
     errors = {name: np.zeros(len(finished)) for name in values}
     if is_rigid:
         errors["drift_per_cycle"] = DRIFT_ROUND_OFF * np.maximum(
-            np.abs(reading.interface_value(INTERFACE.min_slide)),
-            np.abs(reading.interface_value(INTERFACE.max_slide)),
+            np.abs(reading.interface_value(InterfaceMeasure.MIN_SLIDE)),
+            np.abs(reading.interface_value(InterfaceMeasure.MAX_SLIDE)),
         )
     ends = np.arange(cycles - 1, -1, -window)[::-1][-N_FINAL_WINDOWS:]
-    max_rise = tolerance * reading.interface_value(INTERFACE.max_force)
+    max_rise = tolerance * reading.interface_value(InterfaceMeasure.MAX_FORCE)
     return Runs(
         cycles,
         window,
