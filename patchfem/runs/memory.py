@@ -108,12 +108,11 @@ def free_in_control_group(
         old = "memory" in kinds.split(",")
         if not old and kinds:
             continue
-        base = root / "memory" if old else root
-        names = (
-            ("memory.limit_in_bytes", "memory.usage_in_bytes")
-            if old
-            else ("memory.max", "memory.current")
-        )
+        base = root
+        names = ("memory.max", "memory.current")
+        if old:
+            base = root / "memory"
+            names = ("memory.limit_in_bytes", "memory.usage_in_bytes")
         place = base / path.strip("/")
         for folder in (place, *place.parents):
             free = min(free, _remaining_bytes(folder, *names) + used)

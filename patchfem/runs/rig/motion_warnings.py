@@ -170,14 +170,9 @@ def collect_notes(run) -> list:
     model = run.model
     solution = run.solution
     rig = run.model.rig
-    ended = [
-        *_lateral_motion_sentence(run),
-        *(
-            [solution.message]
-            if solution.message and solution.outcome is Outcome.LEAVES_GROOVES
-            else []
-        ),
-    ]
+    ended = _lateral_motion_sentence(run)
+    if solution.message and solution.outcome is Outcome.LEAVES_GROOVES:
+        ended.append(solution.message)
     if run.patch is not None and run.patch.strips is not None and model.partial_slip:
         return [
             "strips that slip part by part have no common shear stress, so the fields contain only the pressure",
