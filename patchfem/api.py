@@ -578,22 +578,22 @@ def sweep(
         raise SceneError(mistakes)
     if empty := [key for key, values in values_by_key.items() if _is_empty(values)]:
         raise SceneError([f"{key}: the sweep has no value for this key" for key in empty])
-    asked = case_models.SweepScene(*_read_scene_text(scene), of=of)
+    sweep_scene = _read_sweep_scene(scene, of)
     ranges = [f"{key}={_format_range(key, values)}" for key, values in values_by_key.items()]
     request = parse_request.Request(ranges, None, draw, sobol, seed, of)
-    cases = parse_request.read_cases(asked, request)
+    cases = parse_request.read_cases(sweep_scene, request)
     pool = executors.make_executor(executor, jobs)
     if out is None:
-        results = sweep_run.compute_in_memory(asked, cases, pool, _print_to_stderr)
+        results = sweep_run.compute_in_memory(sweep_scene, cases, pool, _print_to_stderr)
         names = []
     else:
         place = sweep_run.SweepTarget(Path(out), resume)
-        results = sweep_run.sweep_into(asked, cases, place, pool, _print_to_stderr)
-        names = [] if place.kept_files(len(cases)) == "none" else cases.names(asked)
+        results = sweep_run.sweep_into(sweep_scene, cases, place, pool, _print_to_stderr)
+        names = [] if place.kept_files(len(cases)) == "none" else cases.names(sweep_scene)
     keys = [folder.case_folder_name(name) for name in names]
-    table = page.sweep_table(asked, cases, results, (), Path(out or ""))
+    table = page.sweep_table(sweep_scene, cases, results, (), Path(out or ""))
     answer = headline.summarise_sweep(table).answer()
-    return tables.table_contents(asked, cases, results, keys, answer).to_xarray()
+    return tables.table_contents(sweep_scene, cases, results, keys, answer).to_xarray()
 
 
 def _is_empty(values: Any) -> bool:
@@ -639,9 +639,8 @@ class SweepPlots:
         >>> axes = pf.plot.sweep(found, "loop_area")
         >>> axes.figure.savefig("loop_area.png")
         """
-        if not hasattr(dataset, "coords") or not any(
-            str(name).endswith("_error") for name in dataset
-        ):
+        is_dataset = hasattr(dataset, "coords")
+        if not is_dataset or not any(str(name).endswith("_error") for name in dataset):
             raise PatchfemError(
                 "plot.sweep: a Dataset returned by pf.sweep is needed, with measures and their errors"
             )
@@ -1216,15 +1215,23 @@ def compare(
     return pairs_data.pairs_data(pairs_data.compare_pairs(table, direction, **settings))
 
 
-def _read_scene_text(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
-    """Return path, text and --set strings of a scene that `load` takes, valid or not."""
+def _read_sweep_scene(scene: str | Path | Scene, measure: str) -> case_models.SweepScene:
+    """Return a scene that `load` takes, valid or not, for a sweep that is asked for a measure."""
+    sets: tuple = ()
     if isinstance(scene, Mapping):
-        return Path(DICT_NAME), format_scene(dict(scene)), ()
-    if isinstance(scene, Scene):
-        return scene.path, scene.text, scene.sets
-    if _is_scene_text(scene):
-        return Path(TEXT_NAME), scene, ()
-    return _require_path(scene, "a scene"), read_text(scene), ()
+        path = Path(DICT_NAME)
+        text = format_scene(dict(scene))
+    elif isinstance(scene, Scene):
+        path = scene.path
+        text = scene.text
+        sets = scene.sets
+    elif _is_scene_text(scene):
+        path = Path(TEXT_NAME)
+        text = scene
+    else:
+        path = _require_path(scene, "a scene")
+        text = read_text(scene)
+    return case_models.SweepScene(path, text, sets, measure)
 
 
 def _require_path(value: Any, name: str) -> Path:
@@ -1326,14 +1333,9 @@ class Measures(Mapping):
         return list(self._measures)
 
     def __repr__(self) -> str:
-        return "\n".join(
-            sentences.format_measures(
-                {
-                    name: summaries.measure_object(measure)
-                    for name, measure in self._measures.items()
-                }
-            )
-        )
+        measures = self._measures.items()
+        objects = {name: summaries.measure_object(measure) for name, measure in measures}
+        return "\n".join(sentences.format_measures(objects))
 
 
 class Plots:
@@ -1461,15 +1463,10 @@ class Result(run_result.Result):
         pandas.DataFrame or list of dict
             A DataFrame if pandas is installed.
         """
-        rows = [
-            {
-                "measure": name,
-                "value": measure.value,
-                "error": measure.error,
-                "unit": measure.unit,
-            }
-            for name, measure in self.measures.items()
-        ]
+        rows = []
+        for name, measure in self.measures.items():
+            columns = ("value", "error", "unit")
+            rows.append({"measure": name} | {key: getattr(measure, key) for key in columns})
         try:
             from pandas import DataFrame
         except ImportError:

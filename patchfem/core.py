@@ -447,11 +447,8 @@ class Response:
 
     def select(self, samples) -> "Response":
         """Return the samples that a slice, indices or booleans (k,) select, without extras of other lengths."""
-        columns = {
-            name: getattr(self, name)[samples]
-            for name in self.__dataclass_fields__
-            if name != "extra"
-        }
+        names = [name for name in self.__dataclass_fields__ if name != "extra"]
+        columns = {name: getattr(self, name)[samples] for name in names}
         extra = {}
         for name, history in self.extra.items():
             n_samples = history.shape[-1] if name == "ledger" else len(history)
