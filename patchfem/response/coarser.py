@@ -20,7 +20,7 @@ class CoarserRuns(NamedTuple):
     - runs: variants (hashable arguments of `solve`), from fine to coarse.
     - rule: function (values of the reference run, *values of the coarse runs) -> error by measure
       name.
-    - beside: variant of the reference run; None: the run itself.
+    - beside: variant of the reference run with which they are compared; None: the run itself.
     - of: what is coarser: "steps", "mesh", "modes", "bonds" or "cells"; "own" for anything that no
       key of a scene sets.
     """
@@ -43,20 +43,25 @@ def estimate_errors(solve: Callable, fine: dict, ladder, made: dict | None = Non
     ladder : sequence of CoarserRuns
     made : dict, optional
         Runs by variant that are solved already; the new ones are added.
+
+    Returns
+    -------
+    errors : list of dict
+    seconds : float
     """
     begin = perf_counter()
     made = {} if made is None else made
 
-    def values(variant) -> dict:
+    def solve_values(variant) -> dict:
         """Return the measures of a variant, solved on the first call."""
         if variant not in made:
             made[variant] = solve(variant)
         return made[variant].values
 
-    errors = [
-        way.rule(fine if way.beside is None else values(way.beside), *map(values, way.runs))
-        for way in ladder
-    ]
+    errors = []
+    for coarser in ladder:
+        reference = fine if coarser.beside is None else solve_values(coarser.beside)
+        errors.append(coarser.rule(reference, *map(solve_values, coarser.runs)))
     return errors, perf_counter() - begin
 
 
@@ -79,17 +84,26 @@ def find_open_kinds(kinds, errors, runs) -> dict:
     dict
         "parts": errors by kind and name; "orders": observed orders by name.
     """
-    out: dict = {}
-    for kind, part in zip(kinds, errors, strict=True):
-        mine = out.setdefault(kind, {})
-        for name, error in part.items():
-            mine[name] = mine.get(name, 0.0) + error
-    return {"parts": out, "orders": observed_orders(*runs) if len(runs) == 3 else {}}
+    parts: dict = {}
+    for kind, errors_by_name in zip(kinds, errors, strict=True):
+        sums = parts.setdefault(kind, {})
+        for name, error in errors_by_name.items():
+            sums[name] = sums.get(name, 0.0) + error
+    return {"parts": parts, "orders": observed_orders(*runs) if len(runs) == 3 else {}}
 
 
 def make_coarser_space(coarser, beside=None, of: str = "mesh") -> CoarserRuns:
     """Return a `CoarserRuns` of second order with one run that has wider cells or fewer modes.
 
-    The parameters are fields of `CoarserRuns`.
+    Parameters
+    ----------
+    coarser : hashable
+        Variant of that run.
+    beside, of
+        Fields of `CoarserRuns`.
+
+    Returns
+    -------
+    CoarserRuns
     """
     return CoarserRuns((coarser,), partial(coarser_errors, order=2.0), beside, of)

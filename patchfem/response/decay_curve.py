@@ -89,7 +89,7 @@ class DecayCurve(NamedTuple):
         """Return the points of the curve that indices, a slice or booleans select."""
         return DecayCurve(*(part[pick] for part in self))
 
-    def over(self, amplitudes) -> "DecayCurve":
+    def interpolate(self, amplitudes) -> "DecayCurve":
         """Return the curve at other amplitudes (k,) [m]; NaN outside its range.
 
         Monotone cubics over the logarithm of the amplitude are used. Their difference from linear
@@ -99,15 +99,15 @@ class DecayCurve(NamedTuple):
             return DecayCurve(*np.full((6, len(amplitudes)), np.nan))._replace(
                 amplitude=np.asarray(amplitudes)
             )
-        own, first = np.unique(np.log(self.amplitude), return_index=True)
+        knots, first = np.unique(np.log(self.amplitude), return_index=True)
         x = np.log(amplitudes)
-        found = self.at(first)
-        inside = (x > own[0] - RANGE_TOL) & (x < own[-1] + RANGE_TOL)
-        out = {name: np.interp(x, own, getattr(found, name)) for name in DecayCurve._fields}
+        curve = self.at(first)
+        inside = (x > knots[0] - RANGE_TOL) & (x < knots[-1] + RANGE_TOL)
+        out = {name: np.interp(x, knots, getattr(curve, name)) for name in DecayCurve._fields}
         for name in ("frequency", "damping"):
-            straight = out[name]
-            out[name] = _interpolate_monotone(x, own, getattr(found, name))
-            out[f"{name}_error"] = out[f"{name}_error"] + np.abs(out[name] - straight)
+            linear = out[name]
+            out[name] = _interpolate_monotone(x, knots, getattr(curve, name))
+            out[f"{name}_error"] = out[f"{name}_error"] + np.abs(out[name] - linear)
         return DecayCurve(
             **{name: np.where(inside, part, np.nan) for name, part in out.items()}
         )._replace(amplitude=np.asarray(amplitudes))
@@ -118,17 +118,15 @@ class DecayCurve(NamedTuple):
         The error is the largest difference from the curve of `find_turning_points_outside` at the points
         around.
         """
-        beside = other.over(self.amplitude)
+        if not self.amplitude.size:
+            return self
+        outside = other.interpolate(self.amplitude)
         out = {}
         for name in ("frequency", "damping"):
-            change = np.nan_to_num(np.abs(getattr(self, name) - getattr(beside, name)))
-            out[f"{name}_error"] = getattr(self, f"{name}_error") + (
-                sliding_window_view(
-                    np.pad(change, SAMPLING_HALF_WIDTH), 2 * SAMPLING_HALF_WIDTH + 1
-                ).max(axis=1)
-                if change.size
-                else 0.0
-            )
+            change = np.nan_to_num(np.abs(getattr(self, name) - getattr(outside, name)))
+            padded = np.pad(change, SAMPLING_HALF_WIDTH)
+            around = sliding_window_view(padded, 2 * SAMPLING_HALF_WIDTH + 1)
+            out[f"{name}_error"] = getattr(self, f"{name}_error") + around.max(axis=1)
         return self._replace(**out)
 
     def add_difference(self, one: "DecayCurve", other: "DecayCurve") -> "DecayCurve":
@@ -231,7 +229,7 @@ def find_turning_points_outside(time, place, speed) -> tuple:
     k = np.flatnonzero(speed[1:-2] * speed[2:-1] < 0) + 1
     share = speed[k] / (speed[k] - speed[k + 1])
 
-    def found(step, near):
+    def find_zero(step, near):
         """Find the time [s] of zero speed on the continued cubic of a step by Newton's method.
 
         near: initial guess as a fraction of the step, outside 0 to 1.
@@ -247,7 +245,7 @@ def find_turning_points_outside(time, place, speed) -> tuple:
             near = near - (c + near * (two + near * three)) / (two + 2 * near * three)
         return time[step] + near * span
 
-    at = (found(k - 1, 1 + share) + found(k + 1, share - 1)) / 2
+    at = (find_zero(k - 1, 1 + share) + find_zero(k + 1, share - 1)) / 2
     # round-off may move a turning point to the sample before it
     between = (at >= time[k]) & (at <= time[k + 1])
     times[np.searchsorted(times, time[k])[between]] = at[between]
@@ -402,28 +400,22 @@ def fit_slopes(values, noise) -> Slopes:
     )
 
 
-def _add_sampling_error(found: DecayCurve) -> DecayCurve:
+def _add_sampling_error(curve: DecayCurve) -> DecayCurve:
     """Add the errors that follow from amplitudes that are too large by the fraction delta^2/8.
 
     Half of a half swing is cosh(delta/2) times the amplitude at its middle, where delta is the
     decrement of half a cycle. The errors are the changes of the curve over this fraction of the
     amplitude.
     """
-    delta = np.pi * found.damping / np.sqrt(np.maximum(1 - found.damping**2, VALUE_ROUND_OFF))
-    share = (
-        delta**2
-        / 8
-        / np.maximum(
-            np.abs(np.gradient(np.log(found.amplitude))), np.maximum(np.abs(delta), VALUE_ROUND_OFF)
-        )
-    )
-    return found._replace(
-        **{
-            f"{name}_error": getattr(found, f"{name}_error")
-            + share * np.abs(np.gradient(getattr(found, name)))
-            for name in ("frequency", "damping")
-        }
-    )
+    delta = np.pi * curve.damping / np.sqrt(np.maximum(1 - curve.damping**2, VALUE_ROUND_OFF))
+    decrement = np.abs(np.gradient(np.log(curve.amplitude)))
+    min_decrement = np.maximum(np.abs(delta), VALUE_ROUND_OFF)
+    fraction = delta**2 / 8 / np.maximum(decrement, min_decrement)
+    out = {}
+    for name in ("frequency", "damping"):
+        change = fraction * np.abs(np.gradient(getattr(curve, name)))
+        out[f"{name}_error"] = getattr(curve, f"{name}_error") + change
+    return curve._replace(**out)
 
 
 def smooth_slopes(values, noise) -> np.ndarray:
@@ -440,25 +432,21 @@ def _limit_noise(noise, values) -> np.ndarray:
     """
     if not noise.any() or values.size < 4:
         return noise
-    seen = np.diff(values, 3) ** 2 / 20
-    low, high = (
-        np.clip(np.arange(values.size) - 1 + side, 0, seen.size)
-        for side in (-NOISE_HALF_WIDTH, NOISE_HALF_WIDTH)
-    )
-    whole = np.concatenate([[0.0], np.cumsum(seen)])
-    return np.sqrt(np.maximum(noise**2, (whole[high] - whole[low]) / np.maximum(high - low, 1)))
+    variance = np.diff(values, 3) ** 2 / 20
+    middle = np.arange(values.size) - 1
+    low = np.clip(middle - NOISE_HALF_WIDTH, 0, variance.size)
+    high = np.clip(middle + NOISE_HALF_WIDTH, 0, variance.size)
+    sums = np.concatenate([[0.0], np.cumsum(variance)])
+    return np.sqrt(np.maximum(noise**2, (sums[high] - sums[low]) / np.maximum(high - low, 1)))
 
 
 def _parabola_weights(m: int) -> np.ndarray:
     """Return the weights (2 m + 1,) for the midpoint value of a least-squares parabola."""
     x = np.arange(-m, m + 1)
+    if m <= 1:
+        return (x == 0) * 1.0
     x2 = x**2
-    n = x.size
-    return (
-        (np.sum(x2**2) - np.sum(x2) * x2) / (n * np.sum(x2**2) - np.sum(x2) ** 2)
-        if m > 1
-        else (x == 0) * 1.0
-    )
+    return (np.sum(x2**2) - np.sum(x2) * x2) / (x.size * np.sum(x2**2) - np.sum(x2) ** 2)
 
 
 def _interpolate_monotone(x, own, values) -> np.ndarray:

@@ -58,14 +58,12 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
 
 def _change_of_end_maximum(values) -> float:
     """Return the change of the largest value (k,) over one step if it lies at an end; else 0."""
-    top = int(np.argmax(values))
-    return (
-        abs(float(values[0] - values[1]))
-        if top == 0
-        else abs(float(values[-1] - values[-2]))
-        if top == len(values) - 1
-        else 0.0
-    )
+    largest = int(np.argmax(values))
+    if largest == 0:
+        return abs(float(values[0] - values[1]))
+    if largest == len(values) - 1:
+        return abs(float(values[-1] - values[-2]))
+    return 0.0
 
 
 def _change_of_drift(slide, cycles: float) -> float:

@@ -17,15 +17,13 @@ import numpy as np
 from ..core import Measure
 from .rows import error_floor, find_row
 
-SAFETY_FACTOR = (
-    3.0  # Roache's factor for two runs; it covers runs that are too coarse to show the order
-)
+# Roache's factor for two runs; it covers runs that are too coarse to show the order
+SAFETY_FACTOR = 3.0
 MIN_ORDER = 1.0  # smallest order that an estimate assumes
 MAX_ORDER = 2.0  # largest order that an estimate assumes, that of the methods
 MAX_CHANGE_RATIO = 16.0  # ratio of two changes, of order 4; above it the last is small by chance
-MIN_OBSERVED_ORDER = (
-    0.5  # lowest observed order at which an error counts as decreasing with the step
-)
+# lowest observed order at which an error counts as decreasing with the step
+MIN_OBSERVED_ORDER = 0.5
 SUM_ROUND_OFF = 1e-12  # relative round-off of a long sum
 MEAN_ROUND_OFF = 1e-13  # round-off of a mean over the motion, relative to the amplitude
 ERROR_MEASURES = ("energy_balance", "work_check")  # measures that are errors themselves
@@ -47,7 +45,17 @@ def absolute_change(fine: dict, coarse: dict) -> dict:
 def error_of_change(difference, ratio: float = 2.0, order: float = MIN_ORDER):
     """Return the error of a value that a run `ratio` times as coarse changes by `difference`.
 
-    A ratio below 1 is that of a finer run: of 1/2, a run that is twice as fine.
+    Parameters
+    ----------
+    difference : float or (n,)
+    ratio : float
+        How many times as coarse the other run is; below 1 it is a finer run.
+    order : float
+        Order at which the error falls.
+
+    Returns
+    -------
+    float or (n,)
     """
     return SAFETY_FACTOR * np.abs(difference) / abs(ratio**order - 1)
 
@@ -62,15 +70,15 @@ def convergence_error(last, before=None):
     before : float or (n,) or None
         Change from the third finest run to the second finest; None or nan if it is not known.
     """
-    larger = np.abs(last)
+    change = np.abs(last)
     growth = 2.0**MIN_ORDER
     if before is not None:
         with np.errstate(divide="ignore", invalid="ignore"):
-            fall = np.divide(before, last)
-        shown = (fall > growth) & (fall <= MAX_CHANGE_RATIO)
-        growth = np.where(shown, np.minimum(fall, 2.0**MAX_ORDER), growth)
-        larger = np.fmax(larger, np.abs(before) / 2.0**MAX_ORDER)
-    return (SAFETY_FACTOR * larger / (growth - 1))[()]
+            ratio = np.divide(before, last)
+        shows_order = (ratio > growth) & (ratio <= MAX_CHANGE_RATIO)
+        growth = np.where(shows_order, np.minimum(ratio, 2.0**MAX_ORDER), growth)
+        change = np.fmax(change, np.abs(before) / 2.0**MAX_ORDER)
+    return (SAFETY_FACTOR * change / (growth - 1))[()]
 
 
 def convergence_errors(*values: dict) -> dict:
@@ -85,9 +93,10 @@ def convergence_errors(*values: dict) -> dict:
         Measures by name of each run, fine to coarse; two runs or more.
     """
     changes = [signed_change(fine, coarse) for fine, coarse in pairwise(values)]
-    return {
-        name: _ladder_error([gaps[name] for gaps in changes if name in gaps]) for name in changes[0]
-    }
+    out = {}
+    for name in changes[0]:
+        out[name] = _ladder_error([change[name] for change in changes if name in change])
+    return out
 
 
 def _ladder_error(changes: list) -> float:
@@ -96,9 +105,10 @@ def _ladder_error(changes: list) -> float:
         return convergence_error(changes[0])
     error = convergence_error(*changes[-2:])
     for last, before in reversed(list(pairwise(changes[:-1]))):
-        found = convergence_error(last, before)
-        holds = abs(last) <= error
-        error = max(min(found, error) if holds else found, error / 2**MAX_ORDER)
+        next_error = convergence_error(last, before)
+        if abs(last) <= error:  # the interval of the coarser run contains the value
+            next_error = min(next_error, error)
+        error = max(next_error, error / 2**MAX_ORDER)
     return error
 
 
@@ -114,10 +124,9 @@ def step_errors(*values: dict, steps: int) -> dict:
     steps : int
         Steps per cycle of the finest run.
     """
-    out = {
-        name: error + find_row(name).sample_error / steps
-        for name, error in convergence_errors(*values).items()
-    }
+    out = convergence_errors(*values)
+    for name in out:
+        out[name] += find_row(name).sample_error / steps
     load = values[0].get("normal_load_least", 0.0)
     if values[0].get("open_fraction") == 0 and load > out.get("normal_load_least", np.inf):
         out["open_fraction"] = 0.0  # the load stays above 0 between the samples as well
@@ -136,10 +145,13 @@ def coarser_errors(fine: dict, *coarse: dict, ratio: float = 2.0, order: float =
     ratio, order : float
         How much coarser these runs are, and the order at which their error falls.
     """
-    changes = [absolute_change(fine, one) for one in coarse]
-    shared = [name for name in fine if all(name in gaps for gaps in changes)]
-    largest = {name: np.maximum.reduce([gaps[name] for gaps in changes]) for name in shared}
-    return {name: error_of_change(gap, ratio, order) for name, gap in largest.items()}
+    changes = [absolute_change(fine, values) for values in coarse]
+    out = {}
+    for name in fine:
+        if all(name in change for change in changes):
+            largest = np.maximum.reduce([change[name] for change in changes])
+            out[name] = error_of_change(largest, ratio, order)
+    return out
 
 
 def finer_errors(values: dict, finer: dict) -> dict:
@@ -243,14 +255,13 @@ def observed_orders(fine: dict, half: dict, quarter: dict) -> dict:
     """
     last = absolute_change(fine, half)
     before = absolute_change(half, quarter)
-    found = {
-        name: float(np.log2(before[name] / last[name]))
-        for name in last
-        if last[name] > 0 and before.get(name, 0.0) > 0
-    }
-    return {
-        name: min(order, MAX_ORDER) for name, order in found.items() if order >= MIN_OBSERVED_ORDER
-    }
+    orders = {}
+    for name in last:
+        if last[name] > 0 and before.get(name, 0.0) > 0:
+            order = float(np.log2(before[name] / last[name]))
+            if order >= MIN_OBSERVED_ORDER:
+                orders[name] = min(order, MAX_ORDER)
+    return orders
 
 
 def add_errors(
@@ -274,7 +285,7 @@ def add_errors(
     out = {}
     amplitude = values.get("relative_displacement_amplitude", 0.0)
     for name, value in values.items():
-        parts = [part.get(name, abs(value)) for part in errors]
+        parts = [errors_by_name.get(name, abs(value)) for errors_by_name in errors]
         error = total_error(name, value, parts, min_relative_error, amplitude)
         out[name] = Measure(
             float(value), find_row(name).unit, float(error), float(error_floor(name, size))

@@ -11,7 +11,13 @@ import numpy as np
 
 from ..core import STICK_SPEED_RATIO
 
-STOP, RELEASE_UP, RELEASE_DOWN, REVERSAL_UP, REVERSAL_DOWN, BORDER = range(6)
+# kinds of events, as indices of KIND_NAMES
+STOP = 0
+RELEASE_UP = 1
+RELEASE_DOWN = 2
+REVERSAL_UP = 3
+REVERSAL_DOWN = 4
+BORDER = 5
 KIND_NAMES = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")
 MAX_EVENTS = 100_000
 

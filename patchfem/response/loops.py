@@ -75,19 +75,17 @@ def find_reversals(time, slide, rate, force, period: float, by: str = "rate") ->
     for begin, end in cycle_spans(time, period):
         part = slice(*np.searchsorted(time, [begin - near, end + near]))
         pair = []
-        for way in (-1, 1):
-            at, value, share = _find_largest(time[part], way * slide[part], way * rate[part], near)
-            at += part.start
-            if by != "jumps" and share == 0.0 and at in (part.start, part.stop - 1):
-                at, share = _find_rate_zero(way * rate, at, at == part.start)
-            pair.append(
-                Reversal(
-                    way * value,
-                    None
-                    if at is None
-                    else _force_at_reversal(way * slide, force, at, share, value, by),
-                )
+        for sign in (-1, 1):
+            sample, value, share = _find_largest(
+                time[part], sign * slide[part], sign * rate[part], near
             )
+            sample += part.start
+            if by != "jumps" and share == 0.0 and sample in (part.start, part.stop - 1):
+                sample, share = _find_rate_zero(sign * rate, sample, first=sample == part.start)
+            force_there = None
+            if sample is not None:
+                force_there = _force_at_reversal(sign * slide, force, sample, share, value, by)
+            pair.append(Reversal(sign * value, force_there))
         out.append(tuple(pair))
     return out
 
@@ -118,7 +116,7 @@ def _find_largest(time, y, v, near: float) -> tuple:
     return best
 
 
-def _find_rate_zero(v, at: int, first: bool) -> tuple:
+def _find_rate_zero(v, at: int, *, first: bool) -> tuple:
     """Find where the rate v (k,) decreases through 0 next to a sample.
 
     The step before the sample `at` is used if `first`, else the step after it.
@@ -146,11 +144,9 @@ def _force_at_reversal(slide, force, at: int, share: float, value: float, by: st
     if by == "jumps":
         return _force_beside_rest(slide, force, top, value)
     rise = slide[top] - slide[at - 1] if share > 0 and at > 0 else 0.0
-    return float(
-        force[top] + (force[top] - force[at - 1]) * (value - slide[top]) / rise
-        if rise > 0
-        else force[top]
-    )
+    if rise <= 0:
+        return float(force[top])
+    return float(force[top] + (force[top] - force[at - 1]) * (value - slide[top]) / rise)
 
 
 def _force_beside_rest(slide, force, at: int, value: float) -> float | None:
@@ -162,11 +158,9 @@ def _force_beside_rest(slide, force, at: int, value: float) -> float | None:
     ) > COORDINATE_ROUND_OFF * np.abs(slide).max(initial=0.0)
     before = np.flatnonzero(moves[:at])
     after = np.flatnonzero(moves[at:])
-    return (
-        float(force[before[-1]] + force[at + after[0] + 1]) / 2
-        if before.size and after.size
-        else None
-    )
+    if not before.size or not after.size:
+        return None
+    return float(force[before[-1]] + force[at + after[0] + 1]) / 2
 
 
 def mean_half_range(turns) -> float:
@@ -179,12 +173,11 @@ def secant_stiffness(turns) -> float | None:
 
     None if the slide changes in no cycle, or if no cycle has both forces.
     """
-    found = [
-        (high.force - low.force) / (high.slide - low.slide)
-        for low, high in turns
-        if high.slide > low.slide and None not in (low.force, high.force)
-    ]
-    return float(np.mean(found)) if found else None
+    stiffnesses = []
+    for low, high in turns:
+        if high.slide > low.slide and None not in (low.force, high.force):
+            stiffnesses.append((high.force - low.force) / (high.slide - low.slide))
+    return float(np.mean(stiffnesses)) if stiffnesses else None
 
 
 def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffness: float) -> dict:
@@ -220,12 +213,13 @@ def interface_loops(amplitude, q, f, work, stiffness) -> dict:
     The parameters are those of `interface_loop`, numbers or (n,).
     """
     moves = (np.asarray(amplitude) > 0) & (np.abs(q) > 0)
-    whole = 2 * np.pi * stiffness * np.square(amplitude)
-    held = moves & (np.asarray(stiffness) > 0)
+    energy = 2 * np.pi * stiffness * np.square(amplitude)
+    has_damping = moves & (np.asarray(stiffness) > 0)
+    damping = np.where(has_damping, work / np.where(has_damping, energy, 1.0), np.nan)
     return {
         "loop_area": work,
         "equivalent_stiffness": np.where(moves, (f / np.where(moves, q, 1.0)).real, np.nan),
-        "equivalent_damping": np.where(held, work / np.where(held, whole, 1.0), np.nan),
+        "equivalent_damping": damping,
     }
 
 

@@ -266,7 +266,7 @@ def compute_acceleration_peak(window: Response) -> float:
     """
     size = np.abs(window.acceleration)
     top = int(np.argmax(size))
-    if not 0 < top < len(size) - 1 or not _is_smooth_at(size, top):
+    if not 0 < top < len(size) - 1 or not _is_smooth(size, top):
         return float(size[top])
     left, mid, right = size[top - 1 : top + 2]
     bend = left - 2 * mid + right
@@ -275,7 +275,7 @@ def compute_acceleration_peak(window: Response) -> float:
     return float(mid + (gain if gain < 0.01 * mid else 0.0))
 
 
-def _is_smooth_at(size, top: int) -> bool:
+def _is_smooth(size, top: int) -> bool:
     """Return whether samples (k,) are smooth at the largest one.
 
     The second difference there is at most MAX_SMOOTH_RATIO times that at the samples on both sides. Next to a
@@ -304,7 +304,7 @@ def peak_sampling_errors(window: Response, climbs: bool = False) -> dict:
     out = {}
     top = int(np.argmax(size))
     if 0 < top < len(size) - 1:
-        if not _is_smooth_at(size, top):
+        if not _is_smooth(size, top):
             out["absolute_acceleration_peak"] = float(size[top] - max(size[top - 1], size[top + 1]))
     if climbs and len(window.force) > 2:
         force = np.abs(window.force)

@@ -79,44 +79,31 @@ def judge_outcome(
     if raw.outcome is not None:
         return raw.outcome, measures
     if hasattr(drive, "band"):
-        return Outcome.DONE if stationary.is_steady(
-            raw.window, drive
-        ) else Outcome.TRANSIENT, measures
+        is_stationary = stationary.is_steady(raw.window, drive)
+        return Outcome.DONE if is_stationary else Outcome.TRANSIENT, measures
     if not drive.segments and drive_sizes.count_repeat_cycles(drive) is None:
         return Outcome.TRANSIENT, measures
     # several tones, of which each window contains whole beats
-    if not drive.segments and not drive_sizes.is_periodic(drive):
-        found = classify(
-            raw.amplitudes,
-            tolerance,
-            AMPLITUDE_ROUND_OFF
-            * drive_sizes.find_max_acceleration(drive)
-            / drive_sizes.find_drive_omega(drive) ** 2,
-        )
-        return found, remove_errors(measures) if found is Outcome.GROWS else measures
-    amplitudes = raw.amplitudes
-    extremes = raw.extremes
-    window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
     floor = (
         AMPLITUDE_ROUND_OFF
         * drive_sizes.find_max_acceleration(drive)
         / drive_sizes.find_drive_omega(drive) ** 2
     )
+    if not drive.segments and not drive_sizes.is_periodic(drive):
+        outcome = classify(raw.amplitudes, tolerance, floor)
+        return outcome, remove_errors(measures) if outcome is Outcome.GROWS else measures
+    amplitudes = raw.amplitudes
+    extremes = raw.extremes
+    window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
     if level_cycles:
         amplitudes = amplitudes[-max(1, int(level_cycles / window)) :]
         extremes = None if extremes is None else extremes[-int(level_cycles) :]
     if not drive_sizes.is_periodic(drive):
-        rests = amplitudes[-1] <= max(floor, measures["relative_displacement_amplitude"].floor)
-        outcome = (
-            Outcome.STEADY
-            if rests
-            else _reject_drifting(
-                classify(amplitudes, tolerance, floor),
-                measures,
-                tolerance,
-                _midpoint_drift(extremes, window),
-            )
-        )
+        outcome = Outcome.STEADY
+        if amplitudes[-1] > max(floor, measures["relative_displacement_amplitude"].floor):
+            outcome = classify(amplitudes, tolerance, floor)
+            drift = _midpoint_drift(extremes, window)
+            outcome = _reject_drifting(outcome, measures, tolerance, drift)
         if outcome is Outcome.GROWS and not drive.segments[-1].constant and slowest >= 0:
             outcome = Outcome.TRANSIENT
         return outcome, remove_errors(measures) if outcome is Outcome.GROWS else measures
@@ -232,34 +219,41 @@ def classify_periodic(
     tuple
         Indices of CLASSES, steady amplitudes [m] and their errors [m], (n,) each.
     """
-    (tolerance, floor, decay), (value, error) = limits, steady
-    found = classify_motions(amplitudes, tolerance, floor)
-    found = np.where((found == GROWS_CLASS) & bounded, 0, found)
-    away = np.abs(np.where(np.isnan(value), amplitudes[:, -1], value) - amplitudes[:, -1])
-    found = np.where(
-        (found == STEADY_CLASS) & (away > tolerance * amplitudes[:, -1] + floor), 0, found
-    )
+    tolerance, floor, decay = limits
+    value, error = steady
+    last = amplitudes[:, -1]
+    allowed = tolerance * last + floor
+    classes = classify_motions(amplitudes, tolerance, floor)
+    classes = np.where((classes == GROWS_CLASS) & bounded, 0, classes)
+    change = np.abs(np.where(np.isnan(value), last, value) - last)
+    classes = np.where((classes == STEADY_CLASS) & (change > allowed), 0, classes)
     if extremes is not None:
-        left = remaining_free_motion(extremes, window, decay)
-        found = np.where(
-            (found != GROWS_CLASS) & (left > tolerance * amplitudes[:, -1] + floor), 0, found
-        )
-        none, (mean, about) = np.isnan(value), beat_mean_amplitudes(extremes, window)
-        value = np.where(none, mean, value)
-        error = np.where(none, about, error)
+        free_motion = remaining_free_motion(extremes, window, decay)
+        classes = np.where((classes != GROWS_CLASS) & (free_motion > allowed), 0, classes)
+        is_unknown = np.isnan(value)
+        mean, mean_error = beat_mean_amplitudes(extremes, window)
+        value = np.where(is_unknown, mean, value)
+        error = np.where(is_unknown, mean_error, error)
         # without a visible tail, the steady amplitude is the mean over the cycles of the last
         # window
-        none = np.isnan(value) & (found == STEADY_CLASS)
-        value = np.where(none, window_amplitude_means(extremes, window)[1][:, -1], value)
-        error = np.where(none, left + np.abs(amplitudes[:, -1] - value), error)
-    return found, value, error
+        is_unknown = np.isnan(value) & (classes == STEADY_CLASS)
+        value = np.where(is_unknown, window_amplitude_means(extremes, window)[1][:, -1], value)
+        error = np.where(is_unknown, free_motion + np.abs(last - value), error)
+    return classes, value, error
 
 
 def is_still_changing(steady, error, amplitude, tolerance) -> np.ndarray:
     """Return whether a motion that is steady to the tolerance will still change noticeably.
 
-    The limit is the fraction ESTIMATE_TOL of the tolerance, against the steady estimate [m] and its error
-    [m]; numbers or (n,).
+    The limit is the fraction ESTIMATE_TOL of the tolerance.
+
+    Parameters
+    ----------
+    steady, error : float or (n,)
+        Steady estimate and its error [m].
+    amplitude : float or (n,)
+        Amplitude of the last cycles [m].
+    tolerance : float
     """
     return np.abs(steady - amplitude) + error > ESTIMATE_TOL * tolerance * np.abs(amplitude)
 
@@ -329,11 +323,9 @@ def check_piece_length(outcome: Outcome | None, reach: float, length: float) -> 
     length : float
         Length of the piece [m].
     """
-    return (
-        Outcome.LEAVES_CONTACT
-        if reach > length and outcome is not Outcome.NOT_CONVERGED
-        else outcome
-    )
+    if reach > length and outcome is not Outcome.NOT_CONVERGED:
+        return Outcome.LEAVES_CONTACT
+    return outcome
 
 
 def warn_if_ringing(raw, measures: dict, limits: tuple, drive, cycles: float) -> list:
@@ -352,18 +344,17 @@ def warn_if_ringing(raw, measures: dict, limits: tuple, drive, cycles: float) ->
     cycles : float
         Cycles of the run.
     """
-    (tolerance, slowest), main = limits, measures["relative_displacement_amplitude"]
-    if (
-        raw.outcome is not Outcome.STUCK
-        or not drive_sizes.is_periodic(drive)
-        or raw.extremes is None
-        or not main.value
-    ):
+    tolerance, slowest = limits
+    amplitude = measures["relative_displacement_amplitude"]
+    if raw.outcome is not Outcome.STUCK or raw.extremes is None:
+        return []
+    if not drive_sizes.is_periodic(drive) or not amplitude.value:
         return []
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
     decay = slowest * drive.period
-    left = float(remaining_ringing(np.asarray(raw.extremes), window, decay))
-    return warn_of_ringing(left, (main.value, main.floor), (tolerance, decay), cycles)
+    free_vibration = float(remaining_ringing(np.asarray(raw.extremes), window, decay))
+    sizes = (amplitude.value, amplitude.floor)
+    return warn_of_ringing(free_vibration, sizes, (tolerance, decay), cycles)
 
 
 def remaining_ringing(extremes, window: int, decay):
@@ -381,16 +372,18 @@ def remaining_ringing(extremes, window: int, decay):
         Decay of the slowest mode over a cycle [1].
     """
     ends = window_amplitude_means(extremes, window)[0]
-    left = remaining_free_motion(extremes, window, np.maximum(decay, 0.0) * window)
-    return np.maximum(left, np.abs(ends[..., -1] - ends[..., -2])) if ends.shape[-1] > 1 else left
+    free_motion = remaining_free_motion(extremes, window, np.maximum(decay, 0.0) * window)
+    if ends.shape[-1] < 2:
+        return free_motion
+    return np.maximum(free_motion, np.abs(ends[..., -1] - ends[..., -2]))
 
 
-def warn_of_ringing(left: float, sizes: tuple, limits: tuple, cycles: float) -> list:
+def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: float) -> list:
     """Return the warning of `warn_if_ringing`, as a list, for a known amount of free vibration.
 
     Parameters
     ----------
-    left : float
+    free_vibration : float
         Free vibration in the amplitude [m] (see `remaining_ringing`).
     sizes : tuple
         Amplitude and its floor [m].
@@ -399,17 +392,18 @@ def warn_of_ringing(left: float, sizes: tuple, limits: tuple, cycles: float) -> 
     cycles : float
         Cycles of the run.
     """
-    (amplitude, floor), (tolerance, decay) = sizes, limits
-    if not left > tolerance * amplitude + floor:
+    amplitude, floor = sizes
+    tolerance, decay = limits
+    if not free_vibration > tolerance * amplitude + floor:
         return []
-    more = np.log(left / amplitude / tolerance) / decay if decay > 0 else np.inf
-    remedy = (
-        f"set drive.cycles = {float(f'{cycles + CYCLES_SAFETY_FACTOR * more:.2g}'):g}"
-        if more < MAX_PROPOSED_CYCLES
-        else 'set accuracy.method = "harmonic" for the steady motion'
-    )
+    ratio = free_vibration / amplitude
+    more_cycles = np.log(ratio / tolerance) / decay if decay > 0 else np.inf
+    remedy = 'set accuracy.method = "harmonic" for the steady motion'
+    if more_cycles < MAX_PROPOSED_CYCLES:
+        proposed = float(f"{cycles + CYCLES_SAFETY_FACTOR * more_cycles:.2g}")
+        remedy = f"set drive.cycles = {proposed:g}"
     return [
-        f"{UNSETTLED}: by up to {100 * left / amplitude:.2g} % (limit {100 * tolerance:g} %) it is free vibration "
+        f"{UNSETTLED}: by up to {100 * free_vibration / amplitude:.2g} % (limit {100 * tolerance:g} %) it is free vibration "
         f"that will decay, so relative_displacement_amplitude is that of a transient; {remedy}"
     ]
 
@@ -437,6 +431,14 @@ def estimate_steady(drive, amplitudes, phasors) -> tuple:
     A released or struck rig comes to rest, so its amplitudes are not extrapolated. Under a drive
     that is not a sine the motion may have no first harmonic, so the amplitudes are extrapolated
     instead of the phasors.
+
+    Parameters
+    ----------
+    drive
+    amplitudes : (w,)
+        Amplitudes of successive windows [m].
+    phasors : (w,)
+        First harmonics of the output in these windows [m].
     """
     if not drive_sizes.is_periodic(drive):
         return None, None

@@ -57,11 +57,9 @@ def find_missing(values, window, drive, rubs: bool, beside: float = 0.0) -> dict
     beside : float
         Fraction of the slide that modes other than the first carry [1].
     """
-    lacking = {
-        name: _why_no_cycle_value(name, values, window, drive, beside)
-        for name in CYCLE_MEASURES
-        if rubs or name in ACCELERATIONS
-    }
+    lacking = {}
+    for name in CYCLE_MEASURES if rubs else ACCELERATIONS:
+        lacking[name] = _why_no_cycle_value(name, values, window, drive, beside)
     if hasattr(drive, "band"):
         lacking |= dict.fromkeys(
             ("response_frequency", "response_damping"),
@@ -69,11 +67,8 @@ def find_missing(values, window, drive, rubs: bool, beside: float = 0.0) -> dict
         )
     if rubs:
         lacking["slip_start_phase"] = _why_no_phase(values, drive)
-    return {
-        name: Measure(None, TABLE[name].unit, None, TABLE[name].floor, reason=reason)
-        for name, reason in lacking.items()
-        if name not in values
-    }
+    names = [name for name in lacking if name not in values]
+    return {name: _make_missing_measure(name, lacking[name]) for name in names}
 
 
 def find_missing_secant(values) -> dict:
@@ -82,39 +77,40 @@ def find_missing_secant(values) -> dict:
     The force of rigid friction takes many values if the interface sticks at the largest slide.
     values: Measure by name. The result is a dict by name; {} if the value remains.
     """
-    one = values.get("secant_stiffness")
-    stuck = values.get("stick_fraction")
-    holds = (
-        one is not None
-        and stuck is not None
-        and stuck.value is not None
-        and stuck.value > TABLE["stick_fraction"].floor + (stuck.error or 0.0)
-    )
-    return (
-        {"secant_stiffness": replace(one, value=None, error=None, reason=STICKS_AT_REVERSAL)}
-        if holds
-        else {}
-    )
+    secant = values.get("secant_stiffness")
+    stick_fraction = values.get("stick_fraction")
+    if secant is None or stick_fraction is None or stick_fraction.value is None:
+        return {}
+    if stick_fraction.value <= TABLE["stick_fraction"].floor + (stick_fraction.error or 0.0):
+        return {}
+    return {"secant_stiffness": replace(secant, value=None, error=None, reason=STICKS_AT_REVERSAL)}
 
 
 def find_missing_steady(values, outcome: Outcome, drive) -> dict:
     """Return the steady amplitude with a reason in place of a value, if a transient hides it.
 
-    The result is a dict by name; {} for a drive that is not periodic.
+    Parameters
+    ----------
+    values : dict
+        Measure by name.
+    outcome : Outcome
+    drive
+
+    Returns
+    -------
+    dict
+        Measure by name; {} for a drive that is not periodic.
     """
-    return (
-        {
-            STEADY_AMPLITUDE: Measure(
-                None,
-                TABLE[STEADY_AMPLITUDE].unit,
-                None,
-                TABLE[STEADY_AMPLITUDE].floor,
-                reason=CHANGE_NOT_RESOLVED,
-            )
-        }
-        if outcome is Outcome.TRANSIENT and is_periodic(drive) and STEADY_AMPLITUDE not in values
-        else {}
-    )
+    is_known = STEADY_AMPLITUDE in values
+    if is_known or outcome is not Outcome.TRANSIENT or not is_periodic(drive):
+        return {}
+    return {STEADY_AMPLITUDE: _make_missing_measure(STEADY_AMPLITUDE, CHANGE_NOT_RESOLVED)}
+
+
+def _make_missing_measure(name: str, reason: str) -> Measure:
+    """Return a measure without a value."""
+    row = TABLE[name]
+    return Measure(None, row.unit, None, row.floor, reason=reason)
 
 
 def find_missing_drift(values, drive) -> dict:
@@ -123,28 +119,21 @@ def find_missing_drift(values, drive) -> dict:
     Means over time spans other than a period differ without any drift. values: Measure by name.
     The result is a dict by name; {} if the value remains.
     """
-    one = values.get("drift_per_cycle")
-    return (
-        {}
-        if one is None or is_periodic(drive)
-        else {
-            "drift_per_cycle": replace(
-                one, value=None, error=None, reason=BEATS if hasattr(drive, "beat") else APERIODIC
-            )
-        }
-    )
+    drift = values.get("drift_per_cycle")
+    if drift is None or is_periodic(drive):
+        return {}
+    reason = BEATS if hasattr(drive, "beat") else APERIODIC
+    return {"drift_per_cycle": replace(drift, value=None, error=None, reason=reason)}
 
 
 def find_missing_unbounded(values) -> dict:
     """Replace the values of all measures except the load by a reason: no bounded motion exists."""
-    return {
-        name: replace(
-            one,
-            error=None,
-            **({} if name == "normal_load" else {"value": None, "reason": UNBOUNDED}),
-        )
-        for name, one in values.items()
-    }
+    out = {}
+    for name, measure in values.items():
+        out[name] = replace(measure, error=None)
+        if name != "normal_load":
+            out[name] = replace(out[name], value=None, reason=UNBOUNDED)
+    return out
 
 
 def find_missing_loops(values, window, drive) -> dict:
@@ -168,16 +157,20 @@ def find_missing_loops(values, window, drive) -> dict:
     if ledger is None or loop is None or is_periodic(drive):
         return {}
     _, stored, lost, created = np.abs(ledger[:, -1] - ledger[:, 0])
-    loops = {name: one for name, one in values.items() if name.startswith("loop_area")}
-    if len(loops) == 1:
+    names = [name for name in values if name.startswith("loop_area")]
+    open_names = []
+    if len(names) == 1:
         cycles = (window.time[-1] - window.time[0]) / drive.period
-        opened = ["loop_area"] if stored > max(lost, loop.floor * cycles) else []
-    else:
-        opened = [
-            name for name, one in loops.items() if one.value < -max(one.error or 0.0, one.floor)
-        ]
-        opened = opened if created <= 1e-9 * (stored + lost) else []
-    return {name: replace(loops[name], value=None, error=None, reason=UNCLOSED) for name in opened}
+        if stored > max(lost, loop.floor * cycles):
+            open_names = names
+    elif created <= 1e-9 * (stored + lost):
+        for name in names:
+            area = values[name]
+            if area.value < -max(area.error or 0.0, area.floor):
+                open_names.append(name)
+    return {
+        name: replace(values[name], value=None, error=None, reason=UNCLOSED) for name in open_names
+    }
 
 
 def _why_no_phase(values, drive) -> str:
@@ -207,9 +200,10 @@ def _why_no_cycle_value(name: str, values, window, drive, beside: float) -> str:
     if "equivalent_stiffness" not in values:
         return f"{ALWAYS_STICKS}, so the slide does not change and the loop has no width"
     if name == "equivalent_damping":
+        if beside <= MAX_OTHER_MODES_FRACTION:
+            return "mode 1 is a rigid-body mode, or does not move the interface"
+        percent = format_number(100 * beside, 2)
         return (
-            f"this measure is that of mode 1, but another mode contributes {format_number(100 * beside, 2)} % of the slide"
-            if beside > MAX_OTHER_MODES_FRACTION
-            else "mode 1 is a rigid-body mode, or does not move the interface"
+            f"this measure is that of mode 1, but another mode contributes {percent} % of the slide"
         )
     return "none of the last cycles contains samples of the force both just before and just after the largest slide"

@@ -18,7 +18,9 @@ from .. import compiled
 # periods of the ringing in a stick interval; with fewer, frequency and decay are not independent
 MIN_PERIODS = 1.5
 MIN_SAMPLES = 16
-MAX_SAMPLES, MAX_STICKS, MAX_SINUSOIDS = 600, 20, 3
+MAX_SAMPLES = 600  # samples of a fit; more take longer and change nothing
+MAX_STICKS = 20  # stick intervals that are fitted, the longest ones
+MAX_SINUSOIDS = 3  # decaying sinusoids of a fit
 SAMPLES_PER_PERIOD = 24  # samples per period of the ringing that are sufficient
 MIN_SINUSOID = 1e-6  # relative to the largest value of the signal; a smaller sinusoid is no ringing
 MAX_RESIDUAL = 0.1  # largest root mean square of the residual over that of the ringing [1]

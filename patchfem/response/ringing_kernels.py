@@ -15,15 +15,28 @@ from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 EPS = 2.0**-52
 # norm of a column after projection over its norm; below it the column depends on the others
 MIN_INDEPENDENT_NORM = 1e-12
-# Levenberg-Marquardt damping at the start (times 10), and above which a fit ends
-INITIAL_DAMPING, MAX_DAMPING = 1e-3, 1e9
-# steps over the scales of the poles that end a fit after a success and after a failure
-SUCCESS_STEP_TOL, FAILURE_STEP_TOL = 1e-13, 1e-15
+INITIAL_DAMPING = 1e-3  # tenth of the Levenberg-Marquardt damping with which a fit starts
+MAX_DAMPING = 1e9  # Levenberg-Marquardt damping above which a fit ends
+# step over the scale of the poles that ends a fit, if the step lowered the residual
+SUCCESS_STEP_TOL = 1e-13
+FAILURE_STEP_TOL = 1e-15  # the same, if the step did not lower the residual
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def fill_sinusoids(time, poles, columns, first):
-    """Fill `columns` (c, k) from row `first` with the sinusoids of `poles` (2 r,) at times (k,)."""
+    """Fill rows of columns with decaying sinusoids, a cosine and a sine for each pole.
+
+    Parameters
+    ----------
+    time : (k,)
+        Times [s].
+    poles : (2 r,)
+        Angular frequency [rad/s] and rate of decay [1/s] of each sinusoid.
+    columns : (c, k)
+        Array that is filled.
+    first : int
+        Its first row.
+    """
     for r in range(poles.size // 2):
         own = poles[2 * r]
         rate = poles[2 * r + 1]
@@ -47,7 +60,16 @@ def dot(a, b):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def subtract_multiple(a, share, b):
-    """Subtract the multiple `share` of `b` (k,) from `a` (k,) in place."""
+    """Subtract a multiple of an array from another one in place.
+
+    Parameters
+    ----------
+    a : (k,)
+        Array that is changed.
+    share : float
+        Factor of `b`.
+    b : (k,)
+    """
     for j in range(a.size):
         a[j] -= share * b[j]
 
@@ -58,6 +80,16 @@ def factor_qr(columns, count, basis, corner):
 
     Fills the rows of `basis` and the upper triangle `corner` (count, count) with column j = sum
     corner[i, j] basis[i]. A dependent column has zeros as its basis vector.
+
+    Parameters
+    ----------
+    columns : (c, k)
+    count : int
+        Number of columns.
+    basis : (c, k)
+        Orthonormal rows that are filled.
+    corner : (c, c)
+        Upper triangle that is filled.
     """
     for j in range(count):
         own = basis[j]
@@ -82,6 +114,19 @@ def project(value, count, basis, inside, left):
     """Project a signal (k,) onto a basis of `count` rows.
 
     Fills `left` (k,) with the residual and `inside` (count,) with the coefficients.
+
+    Parameters
+    ----------
+    value : (k,)
+        Signal.
+    count : int
+        Number of rows of the basis.
+    basis : (c, k)
+        Orthonormal rows.
+    inside : (count,)
+        Coefficients that are filled.
+    left : (k,)
+        Residual that is filled.
     """
     for at in range(value.size):
         left[at] = value[at]
@@ -96,7 +141,19 @@ def project(value, count, basis, inside, left):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_upper_triangle(count, corner, inside, numbers):
-    """Solve for the coefficients (count,) of the columns by back substitution."""
+    """Solve for the coefficients of the columns by back substitution.
+
+    Parameters
+    ----------
+    count : int
+        Number of columns.
+    corner : (c, c)
+        Upper triangle of `factor_qr`.
+    inside : (count,)
+        Coefficients in the basis.
+    numbers : (count,)
+        Coefficients of the columns that are filled.
+    """
     for i in range(count - 1, -1, -1):
         part = inside[i]
         for j in range(i + 1, count):
@@ -109,6 +166,17 @@ def compute_residual(time, value, poles, columns, few):
     """Compute the residual of the sinusoids of poles for a signal (k,) at times (k,) [s].
 
     Fills the workspace and returns the sum of squares of the residual.
+
+    Parameters
+    ----------
+    time, value : (k,)
+        Times [s] and signal.
+    poles : (2 r,)
+        As in `fill_sinusoids`.
+    columns : (3, c, k)
+        Workspace: columns, basis and residual.
+    few : (c + 2, c)
+        Workspace: upper triangle and coefficients.
     """
     count = few.shape[1]
     fill_sinusoids(time, poles, columns[0], count - poles.size)
@@ -124,6 +192,17 @@ def compute_jacobian(time, poles, scale, columns, few, slopes, normal):
 
     Fills `slopes` (2 r, k) with the Jacobian, and `normal` (2 r, 2 r + 1) with the normal matrix
     and, in the last column, the gradient.
+
+    Parameters
+    ----------
+    time : (k,)
+        Times [s].
+    poles, scale : (2 r,)
+        Poles, and the units in which their steps are measured.
+    columns, few
+        Workspace that `compute_residual` filled.
+    slopes : (2 r, k)
+    normal : (2 r, 2 r + 1)
     """
     many = poles.size
     count = few.shape[1]
@@ -151,10 +230,20 @@ def compute_jacobian(time, poles, scale, columns, few, slopes, normal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(normal, damping, step, lower):
-    """Fill `step` (m,) with the Levenberg-Marquardt step of the normal equations (m, m + 1).
+    """Fill an array with the Levenberg-Marquardt step, and return its product with the gradient.
 
     The step is -(N + damping diag N)^-1 g, by Cholesky factorization; a dependent direction is left
-    out. lower: workspace (m, m). Returns the product of gradient g and step.
+    out.
+
+    Parameters
+    ----------
+    normal : (m, m + 1)
+        Normal matrix N and, in the last column, the gradient g.
+    damping : float
+    step : (m,)
+        Step that is filled.
+    lower : (m, m)
+        Workspace.
     """
     many = step.size
     for i in range(many):

@@ -35,9 +35,8 @@ from .measures import (
 )
 from .spectrum import MIN_HARMONIC, odd_harmonics, wave_measures
 
-NO_INTEGRATED_MEASURES = (
-    IntegratedMeasures()
-)  # for an engine that computes measures from samples only
+# for an engine that computes measures from samples only
+NO_INTEGRATED_MEASURES = IntegratedMeasures()
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +97,7 @@ class LastCycles:
         return self.window if self.inside is None else self.inside(self.window, self.number)
 
     @cached_property
-    def whole(self) -> bool:
+    def has_full_cycle(self) -> bool:
         """Whether the window contains whole cycles of the drive."""
         return drive_sizes.has_full_cycle(self.span, self.drive)
 
@@ -136,7 +135,7 @@ class LastCycles:
     @cached_property
     def harmonics(self) -> tuple | None:
         """First harmonics of slide and force, and work per cycle [J]; None without a whole cycle."""
-        if self.loop is not None or not self.integrated.loops or not self.whole:
+        if self.loop is not None or not self.integrated.loops or not self.has_full_cycle:
             return self.loop
         first = self.integrated.loops[0]
         return (
@@ -159,10 +158,10 @@ class LastCycles:
             and self.lateral("slides") is None
             and np.ptp(self.window.slide) > max(2 * self.still, MIN_SLIDE_RANGE)
         )
-        found = interface_loop(
-            mean_half_range(self.turns) if moves else 0.0, *self.harmonics, self.stiffness
-        )
-        return found | {"secant_stiffness": secant_stiffness(self.turns)} if moves else found
+        if not moves:
+            return interface_loop(0.0, *self.harmonics, self.stiffness)
+        found = interface_loop(mean_half_range(self.turns), *self.harmonics, self.stiffness)
+        return found | {"secant_stiffness": secant_stiffness(self.turns)}
 
     @cached_property
     def waves(self) -> dict:
@@ -171,7 +170,7 @@ class LastCycles:
         absolute_acceleration_fundamental [m s-2] and, if there is an acceleration,
         acceleration_distortion [1].
         """
-        if not (self.sine and self.whole):
+        if not (self.sine and self.has_full_cycle):
             return {}
         if self.integrated.acceleration_harmonics is None:
             return wave_measures(*odd_harmonics(self.window, self.drive))
@@ -187,20 +186,14 @@ class LastCycles:
     @cached_property
     def random_measures(self) -> dict:
         """Measures of a stationary random drive by name (`stationary.random_measures`); {} under others."""
-        found = (
-            stationary.random_measures(self.window, self.drive)
-            if hasattr(self.drive, "band")
-            else {}
-        )
-        return (
-            found
-            if self.load is not None
-            else {
-                name: value
-                for name, value in found.items()
-                if not name.startswith("friction_power")
-            }
-        )
+        if not hasattr(self.drive, "band"):
+            return {}
+        found = stationary.random_measures(self.window, self.drive)
+        if self.load is None:
+            names = [name for name in found if name.startswith("friction_power")]
+            for name in names:
+                del found[name]
+        return found
 
     @property
     def work_check(self) -> float | None:
@@ -211,7 +204,7 @@ class LastCycles:
             *self.integrated.friction_works, self.book["power"] + self.book["peak_stored"]
         )
 
-    def others(self) -> list:
+    def further_interfaces(self) -> list:
         """Return the LastCycles of each interface after the first one.
 
         The work of an interface comes from `integrated.loops` or, without them, from the samples.
@@ -684,9 +677,8 @@ DISPLACEMENT_MEASURES = (
     "slip_amplitude",
     "drift_per_cycle",
 )
-MAX_DISPLACEMENT_FLOOR = (
-    1e-5  # largest floor of a displacement relative to the displacement of the drive
-)
+# largest floor of a displacement relative to the displacement of the drive
+MAX_DISPLACEMENT_FLOOR = 1e-5
 
 
 def compute_measures(seen: LastCycles) -> dict:
@@ -697,11 +689,9 @@ def compute_measures(seen: LastCycles) -> dict:
     samples.
     """
     out = {row.name: _compute_value(row, seen) for row in ROWS}
-    for number, other in enumerate(seen.others(), 1):
-        out |= {
-            add_interface_number(name, number): TABLE[name].function(other)
-            for name in INTERFACE_MEASURES
-        }
+    for number, interface in enumerate(seen.further_interfaces(), 1):
+        for name in INTERFACE_MEASURES:
+            out[add_interface_number(name, number)] = TABLE[name].function(interface)
     return {name: value for name, value in (out | seen.known).items() if value is not None}
 
 
@@ -770,29 +760,23 @@ def larger_term(name: str, values: dict):
     number = name[len(remove_interface_number(name)) :]
     if row.larger_term is None:
         return 0.0
-    return row.larger_term[1](
-        {
-            remove_interface_number(value): values.get(
-                remove_interface_number(value) + number, values[value]
-            )
-            for value in values
-        }
-    )
+    own_values = {}
+    for other_name, value in values.items():
+        base_name = remove_interface_number(other_name)
+        own_values[base_name] = values.get(base_name + number, value)
+    return row.larger_term[1](own_values)
 
 
 def set_final_floors(found: dict, tolerance: float) -> dict:
     """Return measures with their final floors: tolerance times the larger term for differences."""
-    values = {name: one.value for name, one in found.items() if one.value is not None}
-    raised = {
-        name: tolerance * float(larger_term(name, values))
-        for name in values
-        if remove_interface_number(name) in TABLE
-    }
-    return found | {
-        name: replace(found[name], floor=floor)
-        for name, floor in raised.items()
-        if floor > found[name].floor
-    }
+    values = {name: measure.value for name, measure in found.items() if measure.value is not None}
+    out = dict(found)
+    for name in values:
+        if remove_interface_number(name) in TABLE:
+            floor = tolerance * float(larger_term(name, values))
+            if floor > found[name].floor:
+                out[name] = replace(found[name], floor=floor)
+    return out
 
 
 def find_row(name: str) -> MeasureDefinition:

@@ -102,20 +102,38 @@ def list_events(window, drive, log=None, held: float = 0.0) -> Events:
 def find_slipping(window, drive, log=None, held: float = 0.0) -> list:
     """Return whether each interface slips at some time in the window, as a list of bool (i).
 
-    Parameters as in `list_events`.
+    Parameters
+    ----------
+    window : Response
+    drive
+    log : array, optional
+        Events that the engine recorded, as in `list_events`.
+    held : float
+        Change of slip up to which an interface sticks [m].
     """
-    slips = slips_and_slides(window)[0]
     held = max(held, slip_round_off(window))
-    if log is not None:
-        return [bool(np.ptp(column) > 0) for column in slips.T]
-    return [
-        bool(compute_slip_states(window.time, column, drive.period, held)[1].any())
-        for column in slips.T
-    ]
+    out = []
+    for slip in slips_and_slides(window)[0].T:
+        if log is None:
+            is_slipping = compute_slip_states(window.time, slip, drive.period, held)[1].any()
+        else:
+            is_slipping = np.ptp(slip) > 0
+        out.append(bool(is_slipping))
+    return out
 
 
 def find_stick_intervals(window, drive, log=None, held: float = 0.0) -> list:
-    """Return the stick intervals [(start, end)] [s] of a window; parameters as in `list_events`."""
+    """Return the stick intervals [(start, end)] [s] of a window.
+
+    Parameters
+    ----------
+    window : Response
+    drive
+    log : array, optional
+        Events that the engine recorded, as in `list_events`.
+    held : float
+        Change of slip up to which an interface sticks [m].
+    """
     return find_sticks(
         list_events(window, drive, log, held),
         window.time[0],
@@ -128,6 +146,15 @@ def select_last_cycle(spans, end: float, period: float) -> list:
     """Return the stick intervals that begin in the last cycle but one, and end before `end`.
 
     These are all stick intervals of a periodic motion; none if the interface always sticks.
+
+    Parameters
+    ----------
+    spans : list of (float, float)
+        Stick intervals [s].
+    end : float
+        End of the window [s].
+    period : float
+        Period of the drive [s].
     """
     return [(a, b) for a, b in spans if end - 2 * period <= a < end - period and b < end]
 

@@ -22,7 +22,20 @@ PERIODIC_TOL = 0.1
 
 
 def classify(amplitudes, tolerance: float, floor: float = 0.0) -> Outcome:
-    """Return the class of a motion by the amplitudes (w,) of successive windows (see `classify_motions`)."""
+    """Return the class of a motion by the amplitudes of successive windows (`classify_motions`).
+
+    Parameters
+    ----------
+    amplitudes : (w,)
+        [m].
+    tolerance : float
+    floor : float
+        Amplitude up to which a motion is round-off [m].
+
+    Returns
+    -------
+    Outcome
+    """
     return CLASSES[classify_motions(np.asarray(amplitudes, float)[None], tolerance, floor)[0]]
 
 

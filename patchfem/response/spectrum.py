@@ -12,11 +12,9 @@ MIN_HARMONIC = 1e-4  # smallest first harmonic [m s-2]; below it the output is a
 READINGS = ("peak", "fundamental", "rms", "lowpass")
 N_FILTER_HARMONICS = 64  # number of harmonics that pass through the low-pass filter
 N_FILTER_SAMPLES = 1024  # number of samples of a cycle after the filter
-GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
-GAUSS_POINTS, GAUSS_WEIGHTS = (
-    (1 + GAUSS_POINTS) / 2,
-    GAUSS_WEIGHTS / 2,
-)  # Gauss points and weights of a step of length 1
+_GAUSS_RULE = np.polynomial.legendre.leggauss(4)
+GAUSS_POINTS = (1 + _GAUSS_RULE[0]) / 2  # Gauss points of a step of length 1
+GAUSS_WEIGHTS = _GAUSS_RULE[1] / 2  # their weights
 
 
 def harmonic_weights(time, omega: float) -> list:
@@ -80,7 +78,14 @@ def acceleration_harmonic(time, value, rate, omega: float) -> complex:
     """Return the Fourier coefficient of y'' [m s-2] from y and y', by integration by parts.
 
     The acceleration of a rig with friction jumps, but its motion does not, so that a jump causes no
-    error. Parameters as in `motion_harmonic`, over whole cycles.
+    error.
+
+    Parameters
+    ----------
+    time, value, rate : (k,)
+        Samples over whole cycles [s], [m], [m/s].
+    omega : float
+        Angular frequency [rad/s].
     """
     return _integrate_by_parts(time, value, rate, omega, motion_harmonic(time, value, rate, omega))
 

@@ -273,23 +273,18 @@ def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
     """
     size = np.abs(gain).max()
 
-    def left(theta):
+    def compute_residual(theta):
         """Return the residual of H1 after a linear fit of the columns, over its largest value."""
-        column = expected_response(f, *np.exp(theta), span)
-        design = np.stack(
-            [
-                np.concatenate([one.real, one.imag])
-                for one in (column, np.ones(f.size, complex), 1j * np.ones(f.size))
-            ],
-            axis=1,
-        )
+        response = expected_response(f, *np.exp(theta), span)
+        columns = np.stack([response, np.ones(f.size, complex), 1j * np.ones(f.size)], axis=1)
+        design = np.concatenate([columns.real, columns.imag])
         norms = np.linalg.norm(design, axis=0)
         target = np.concatenate([gain.real, gain.imag]) / size
         return design / norms @ np.linalg.lstsq(design / norms, target, rcond=1e-12)[0] - target
 
     reach = np.array([0.5, 7.0])
     return least_squares(
-        left, theta, bounds=(theta - reach, theta + reach), xtol=1e-10, ftol=1e-10
+        compute_residual, theta, bounds=(theta - reach, theta + reach), xtol=1e-10, ftol=1e-10
     ).x
 
 

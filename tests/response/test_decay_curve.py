@@ -71,16 +71,16 @@ def test_order_turns_lie_between_samples_to_the_fourth():
 
 def test_exact_at_its_points_a_curve_is_itself_and_outside_there_is_none():
     found = compute_swing_curve(half_swings_between(np.pi * np.arange(9), (-0.9) ** np.arange(9.0)))
-    there = found.over(found.amplitude[2:5])
+    there = found.interpolate(found.amplitude[2:5])
     assert there.damping == pytest.approx(found.damping[2:5], rel=1e-12)
-    assert np.isnan(found.over([2.0, 1e-3]).frequency).all()
+    assert np.isnan(found.interpolate([2.0, 1e-3]).frequency).all()
     wider = there.add_difference(
         there, there._replace(damping=there.damping + np.array([1.0, np.nan, 0.0]))
     )
     assert wider.damping_error == pytest.approx(there.damping_error + np.array([1.0, np.inf, 0.0]))
     assert np.isnan(
         compute_swing_curve(half_swings_between(np.arange(3.0), np.array([1.0, -0.5, 0.2])))
-        .over([0.3])
+        .interpolate([0.3])
         .damping
     ).all()
 

@@ -182,7 +182,7 @@ class _ReleaseVariants:
         if settings not in self.computed:
             patch = self.joint.coarse if settings.coarse_patch else self.joint.patch
             solution = solve.solve(self.release.model, replace(settings, whole=True), patch)
-            decay = read_decay(self.joint, solution.response).over(self.amplitudes)
+            decay = read_decay(self.joint, solution.response).interpolate(self.amplitudes)
             self.computed[settings] = np.array([decay.frequency, decay.damping])
         return self.computed[settings]
 
@@ -200,7 +200,7 @@ def _read_with_errors(joint: Joint, release: Release, amplitudes) -> DecayReadin
     if choice.engine == SMOOTH.name:
         other = read_decay(joint, solution.response, find_turning_points_outside)
         decay = decay.add_sampling_error(other)
-    decay = decay.over(amplitudes)
+    decay = decay.interpolate(amplitudes)
     value = np.array([decay.frequency, decay.damping])
     reading_error = np.array([decay.frequency_error, decay.damping_error])
     error = ROUND_OFF_ERROR * np.abs(value)

@@ -255,8 +255,6 @@ def in_scene(model, text: str) -> str:
 
     If the model has no patch of its own, these keys belong to [structure.interface.contact].
     """
-    return (
-        text
-        if model.patch is not None
-        else re.sub(r"(?<![\w.])contact\.(?=[a-z])", "structure.interface.contact.", text)
-    )
+    if model.patch is not None:
+        return text
+    return re.sub(r"(?<![\w.])contact\.(?=[a-z])", "structure.interface.contact.", text)

@@ -81,7 +81,7 @@ class ContactExtent:
     slip_zones: tuple = ()
 
     @property
-    def wide(self) -> float:
+    def width(self) -> float:
         """Length of the loaded part [m]."""
         return self.span[1] - self.span[0]
 
@@ -141,20 +141,19 @@ def _search_grids(patch_model) -> BaseGrids:
     contact = None
     # without a load there is no contact to search for
     for search in range(MAX_SEARCHES if patch_model.nominal_load > 0 else 0):
-        pair = (
-            condense(patch_model, *make_grids(patch_model, layout))
-            if search
-            else search_pair(patch_model)
-        )
+        if search == 0:
+            pair = search_pair(patch_model)
+        else:
+            pair = condense(patch_model, *make_grids(patch_model, layout))
         x = pair.grid.x
-        seen = [
-            contact_extent(press_patch(each, pair), patch_model.mesh.slip)
-            for each in (patch_model, *sweep)
-        ]
-        contact = seen[0]
+        extents = []
+        for loaded_model in (patch_model, *sweep):
+            patch = press_patch(loaded_model, pair)
+            extents.append(contact_extent(patch, patch_model.mesh.slip))
+        contact = extents[0]
         last = layout
-        layout = find_layout(patch_model, seen)
-        cells = max(one.cell / one.wide for one in seen)
+        layout = find_layout(patch_model, extents)
+        cells = max(extent.cell / extent.width for extent in extents)
         shows = _shows_crests(patch_model, x, layout) and _shows_slip(contact.slip_zones, x, layout)
         if cells <= 1 / (EDGE_CELLS[patch_model.mesh.is_static] - 1) and shows:
             break
@@ -212,31 +211,31 @@ def search_layout(patch_model) -> Layout:
     return Layout(-half, half, (), (-half, half), cell, cell, 0.0)
 
 
-def find_layout(patch_model, seen: list) -> Layout:
+def find_layout(patch_model, extents: list) -> Layout:
     """Return the columns of the coarsest mesh, graded towards the ends of some contacts.
 
-    seen: ContactExtents, of one patch under several loads or of several patches.
+    extents: ContactExtents, of one patch under several loads or of several patches.
     """
     length = patch_model.pieces.length
     half = length / 2
-    span = (min(one.span[0] for one in seen), max(one.span[1] for one in seen))
-    wide = min(one.wide for one in seen)
+    span = (min(extent.span[0] for extent in extents), max(extent.span[1] for extent in extents))
+    width = min(extent.width for extent in extents)
     thick = _coating(patch_model)
     # the third mesh, whose cells are a quarter as long, has to resolve the waves
     most = min(length / 12, 4 * _longest(patch_model))
-    if max(len(one.places) for one in seen) > MAX_PLACES:
+    if max(len(extent.places) for extent in extents) > MAX_PLACES:
         return Layout(-half, half, (), span, *(2 * [min(length / 64, most)]), 0.0)
     if patch_model.mesh.edge_motion == "wear":
         most = min(most, length * WEAR_CELL)
-    inside = min(wide / 6, length / 24, most)
+    inside = min(width / 6, length / 24, most)
     # a contact of one or two nodes is searched again with shorter cells
     along = NODE_CELLS
-    if np.isfinite(max(one.cell for one in seen)):
+    if np.isfinite(max(extent.cell for extent in extents)):
         along = EDGE_CELLS[patch_model.mesh.is_static]
     # a band that an edge sweeps would have many cells, and each is a different contact set
     fine = thick / 4 if thick and patch_model.mesh.edge_motion != "load" else np.inf
-    least = max(min(wide / along, fine), MIN_CELL * length)
-    bands = _bands([one.places for one in seen], least)
+    least = max(min(width / along, fine), MIN_CELL * length)
+    bands = _bands([extent.places for extent in extents], least)
     # a jump of the gap is a node; quantities that depend on it converge with the first power of its
     # cell
     bands += tuple((place, place, least / STEP_CELLS) for place in patch_model.gap.jumps)
@@ -245,20 +244,22 @@ def find_layout(patch_model, seen: list) -> Layout:
     bands += tuple((place, place, min(least, fall / 4)) for place in near)
     sharp = STEP_CELLS if patch_model.has_singular_ends else 1
     if _longest(patch_model) < np.inf:
-        crests = [crest for contact in seen for crest in contact.crests]
+        crests = [crest for extent in extents for crest in extent.crests]
         bands += tuple(
             (place, place, max(half / CREST_CELLS, least / STEP_CELLS)) for place, half in crests
         )
     bands += tuple(
         (low, high, max((high - low) / SLIP_CELLS, MIN_CELL * length))
-        for one in seen
-        for low, high in one.slip_zones
+        for extent in extents
+        for low, high in extent.slip_zones
     )
     corner = max(
-        min(thick / 16 if thick else np.inf, wide / EDGE_CELLS[patch_model.mesh.is_static] / sharp),
+        min(
+            thick / 16 if thick else np.inf, width / EDGE_CELLS[patch_model.mesh.is_static] / sharp
+        ),
         MIN_CELL * length,
     )
-    ends = {place for one in seen for place in one.corners}
+    ends = {place for extent in extents for place in extent.corners}
     bands += tuple((place, place, corner) for place in sorted(ends))
     # the far corners, where a free side meets the holder, have singular stresses
     bands += tuple(

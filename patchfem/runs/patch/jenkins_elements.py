@@ -56,13 +56,20 @@ def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripEle
     """Return the parallel elements of every strip of a patch in strips.
 
     The strips are not coupled: each one has its own part of the compliance of the pieces and its
-    own pressure. An open strip has one element that yields at once. The parameters are those of
-    `elements`.
+    own pressure. An open strip has one element that yields at once.
+
+    Parameters
+    ----------
+    patch : Patch
+    static : float
+        Coefficient of friction [1].
+    length : float
+        Length of a bond [m].
     """
     # the compliance of a strip is that of its part of the width
     giving = patch.giving * len(patch.strips.offsets)
 
-    def elements_under(force) -> StripElements:
+    def make_strip_elements(force) -> StripElements:
         """Return the elements of a strip under nodal forces (m,) [N]."""
         if not (static > 0 and force.any()):
             return StripElements(np.array([1 / giving.mean()]), np.zeros(1))
@@ -71,5 +78,5 @@ def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripEle
 
     return store.reuse(
         ("strip elements", patch, static, length),
-        lambda: tuple(elements_under(force) for force in patch.strips.force),
+        lambda: tuple(make_strip_elements(force) for force in patch.strips.force),
     )

@@ -19,7 +19,7 @@ from .press import press_patch, solve
 # tolerance [1] down to which a patch that slips may take as many CPU seconds as a moving mesh; at a tenth of this
 # tolerance it may take 3.2 times as many
 TOL_OF_SECONDS = 1e-3
-MAX_COLUMNS_WITHOUT_COARSER = 8  # a mesh with no more columns has no coarser one
+MAX_COLUMNS_WITHOUT_COARSER = 8  # columns of a mesh up to which it has no coarser one
 MAX_DECADES = 6  # decades of the tolerance that are searched for one that needs a finer mesh
 
 

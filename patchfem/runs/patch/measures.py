@@ -65,14 +65,15 @@ class Estimate(NamedTuple):
     def to_measure(self, name: str, floor: float | None = None) -> Measure:
         """Return the Measure of a single patch; None as floor for that of the table."""
         row = TABLE[name]
+        engine = patch_rows.ON_FINEST_MESH
+        if self.is_extrapolated:
+            engine = patch_rows.EXTRAPOLATED_SOURCE
         return Measure(
             float(self.value),
             row.unit,
             None if self.error is None else float(self.error),
             row.floor if floor is None else floor,
-            engine=patch_rows.EXTRAPOLATED_SOURCE
-            if self.is_extrapolated
-            else patch_rows.ON_FINEST_MESH,
+            engine=engine,
         )
 
 
@@ -234,6 +235,12 @@ def contain_peak_error(fraction, error, relative_peak_error):
     """Return errors of loaded fractions that contain the relative error of the peak.
 
     The peak is the divisor of the fraction.
+
+    Parameters
+    ----------
+    fraction, error : float or (q,)
+        Loaded fraction and its own error.
+    relative_peak_error : float or (q,)
     """
     return np.maximum(
         error, fraction * relative_peak_error / (1 - np.minimum(relative_peak_error, 0.5))

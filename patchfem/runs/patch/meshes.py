@@ -8,7 +8,7 @@ prescribed elements, or from a file, have the same meshes in every case anyway.
 
 from dataclasses import replace
 from hashlib import sha256
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -127,21 +127,14 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
 def with_digest(levels) -> SharedMeshes:
     """Return the SharedMeshes of some levels, named by the hash of their content."""
     digest = sha256()
-    for body in (body for level in levels for body in level):
-        arrays = (
-            ()
-            if body is None
-            else (body.x, body.depth)
-            if isinstance(body, TensorGrid)
-            else (
-                body.points,
-                body.triangles,
-                body.quads,
-                body.is_coating,
-                body.interface,
-                body.far,
-            )
-        )
+    for body in chain.from_iterable(levels):
+        if body is None:
+            arrays = ()
+        elif isinstance(body, TensorGrid):
+            arrays = (body.x, body.depth)
+        else:
+            mesh = (body.points, body.triangles, body.quads, body.is_coating)
+            arrays = (*mesh, body.interface, body.far)
         for array in arrays:
             digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
         digest.update(repr(getattr(body, "coating_rows", None)).encode())
@@ -230,32 +223,26 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
         first level.
     """
     first = cases[0]
-    along = grids.EDGE_CELLS[cases[0].mesh.is_static]
+    max_cell_ratio = 1 / (grids.EDGE_CELLS[first.mesh.is_static] - 1)
     layout = None
     for _ in range(MAX_SEARCHES):
-        pair = (
-            condense(first, *grids.make_grids(first, layout))
-            if layout
-            else grids.search_pair(first)
-        )
-        known = patches_on(cases, pair)
-        seen = [
-            (one, found)
-            for one, patch in zip(cases, known)
-            if (found := _contact_of_case(one, pair, patch)) is not None
-        ]
-        if not seen:
+        if layout is None:
+            pair = grids.search_pair(first)
+        else:
+            pair = condense(first, *grids.make_grids(first, layout))
+        layouts = []
+        largest_ratio = 0.0
+        for case, patch in zip(cases, patches_on(cases, pair)):
+            extent = _contact_of_case(case, pair, patch)
+            if extent is not None:
+                n_halvings = halvings.get(_contact_numbers(case), 0)
+                case_layout = grids.find_layout(case, [extent])
+                layouts.append(case_layout.scale_cells(0.5**n_halvings))
+                largest_ratio = max(largest_ratio, extent.cell / extent.width)
+        if not layouts:
             return None
-        layout = _merge_layouts(
-            [
-                grids.find_layout(one, [found]).scale_cells(
-                    0.5 ** halvings.get(_contact_numbers(one), 0)
-                )
-                for one, found in seen
-            ],
-            between,
-        )
-        if max(found.cell / found.wide for _, found in seen) <= 1 / (along - 1):
+        layout = _merge_layouts(layouts, between)
+        if largest_ratio <= max_cell_ratio:
             break
     return layout
 

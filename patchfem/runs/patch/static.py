@@ -157,11 +157,10 @@ def not_together(patch_model) -> str:
         return "the meshes of the pieces are not plain grids"
     if patch_model.gap.profile is not None:
         return "a profile has its own averaging length"
-    return _not_of_one_stretch(patch_model) or (
-        ""
-        if len(patch_model.mesh.shared.levels) > 2
-        else "the mesh of the case cannot be made coarser"
-    )
+    if reason := _not_of_one_stretch(patch_model):
+        return reason
+    has_levels = len(patch_model.mesh.shared.levels) > 2
+    return "" if has_levels else "the mesh of the case cannot be made coarser"
 
 
 def _not_of_one_stretch(patch_model) -> str:

@@ -121,7 +121,7 @@ def static_values(length: float, area: float, state, peak, edge_values: edges.Ed
     """
     is_loaded = np.greater(state.load, 0)
 
-    def divide_by(divisor, numerator):
+    def quotient(divisor, numerator):
         """Return a quotient; 0 without a load."""
         zero = np.zeros(np.shape(peak))
         return np.divide(numerator, divisor, out=zero, where=is_loaded)[()]
@@ -134,8 +134,8 @@ def static_values(length: float, area: float, state, peak, edge_values: edges.Ed
         "rotation": state.rotation,
         "approach": state.approach,
         "contact_half_width": edge_values.width / 2,
-        "pressure_centre": divide_by(state.load, state.moment),
-        "loaded_fraction": divide_by(area * peak, state.load),
+        "pressure_centre": quotient(state.load, state.moment),
+        "loaded_fraction": quotient(area * peak, state.load),
         "normal_stiffness": edge_values.normal,
         "tangential_stiffness": edge_values.tangential,
         "rotational_stiffness": edge_values.rotational,

@@ -59,8 +59,8 @@ def compute_decay(raw: Solution) -> DecayCurve | None:
 def _add_coarse_changes(curve: DecayCurve, raw: Solution) -> DecayCurve:
     """Return the curve of a run with its differences from coarse runs added to the errors."""
     for run, beside in raw.coarser:
-        coarse = _read(run).over(curve.amplitude)
-        reference = curve if beside is None else _read(beside).over(curve.amplitude)
+        coarse = _read(run).interpolate(curve.amplitude)
+        reference = curve if beside is None else _read(beside).interpolate(curve.amplitude)
         curve = curve.add_difference(coarse, reference)
     return curve
 

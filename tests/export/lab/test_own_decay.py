@@ -103,7 +103,7 @@ def test_exact_export_and_import_give_back_the_decay_of_a_run(ran, tmp_path, nam
     _, amplitude, frequency, frequency_error, damping, damping_error = columns(
         tmp_path / "decay.csv"
     )
-    own = own_curve(folder).over(amplitude)
+    own = own_curve(folder).interpolate(amplitude)
     there = np.isfinite(own.frequency)
     assert there.sum() > 10 and amplitude[there].max() > 0.7 * 300e-6
     for off in (
@@ -124,7 +124,7 @@ def test_exact_a_march_gives_the_decay_of_the_exact_method(tmp_path):
         for method in ("auto", "march")
     )
     assert march.amplitude[0] == pytest.approx(exact.amplitude[0], rel=0.02)
-    beside = exact.over(march.amplitude)
+    beside = exact.interpolate(march.amplitude)
     there = np.isfinite(beside.frequency)
     assert there.sum() > 30 and march.time.size > 0.7 * exact.time.size
     assert (
