@@ -81,8 +81,11 @@ class MotionObserver:
         self.windowed = windowed
         self.numerics = choose(model)
         steady = ENGINES[self.numerics.engine].finds_periodic_motion
-        line = model.kind == "linear" and not model.rig.springs.is_nonlinear
-        self.by = "" if not steady else "line" if line else choose_steady_method(model).name
+        self.by = ""
+        if steady and model.kind == "linear" and not model.rig.springs.is_nonlinear:
+            self.by = "line"
+        elif steady:
+            self.by = choose_steady_method(model).name
         self.made = {}
         self.before = before.made if before is not None else {}
 
@@ -171,12 +174,10 @@ class MotionObserver:
         """Return the event map, in the workspace of an earlier MotionObserver if it fits."""
         modes = self.model.rig.modes
         groups = pieces.YieldingElements(self.model, self.numerics, self.patch).groups
-        found = self.before.pop("yields", None)
-        return (
-            found
-            if found is not None and found.replace_system(modes, groups)
-            else event_orbits.PeriodicMotionFinder(modes, groups)
-        )
+        finder = self.before.pop("yields", None)
+        if finder is not None and finder.replace_system(modes, groups):
+            return finder
+        return event_orbits.PeriodicMotionFinder(modes, groups)
 
     def _balance(self, drive, near) -> ObservedMotion:
         """Return the motion by harmonic balance."""

@@ -22,11 +22,10 @@ from ...response.measures import (
     compute_step_harmonic,
     work_difference,
 )
+from . import rigid, shear
 from .closed import closed_form
 from .engine import BenchEngine, Method, bench_engine
 from .ledger import DEFAULT_OPTIONS, PassOptions, Slide, SlideHistories
-from .rigid import slide_rigidly
-from .shear import slide_in_shear
 from .stepped import slide_in_plane, slide_step_by_step
 
 
@@ -118,12 +117,12 @@ def _solve(task: Slide) -> tuple[SlideHistories, dict]:
     if task.model.slide.across is not None:
         return slide_in_plane(task)
     if task.model.partial_slip:
-        return slide_in_shear(task), {}
+        return shear.slide_in_shear(task), {}
     if task.engine.method is Method.STEPPED:
         return slide_step_by_step(task), {}
     if task.engine.method is Method.CLOSED:
         return closed_form(task), {}
-    return slide_rigidly(task), {}
+    return rigid.slide_rigidly(task), {}
 
 
 def _measure(model, time, slide, histories: SlideHistories, first: int) -> dict:
