@@ -51,10 +51,10 @@ def breakaway_cost(amplitudes=ladder.AMPLITUDES, shares=SHARES) -> dict:
     """{(b, A/eps_0): (area error over 4 A mu_s N, rms force error)} of the elastic range against Dahl's law."""
     out = {}
     for amplitude in amplitudes:
-        dahl = ladder.followed(ladder.points(ladder.bonds()), amplitude)
+        dahl = ladder.last_cycle(ladder.points(ladder.bonds()), amplitude)
         for b in shares:
             out[b, amplitude] = ladder.error(
-                ladder.followed(ladder.points(ladder.bonds(breakaway=b)), amplitude), dahl
+                ladder.last_cycle(ladder.points(ladder.bonds(breakaway=b)), amplitude), dahl
             )
     return out
 

@@ -111,7 +111,7 @@ def test_order_of_the_first_slide(needs_force, order):
     errors = []
     for steps in (200, 400):
         found = solve_newmark(
-            problems.UNDAMPED_MASS_MASS,
+            problems.UNDAMPED_MASS,
             make_release(2 * np.pi),
             coulomb(1.0, 1e-3),
             (3.0, steps),
@@ -206,7 +206,7 @@ def test_exact_a_block_at_resonance_by_newmark(speed, steps, needs_force, peak, 
 def test_exact_newmark_in_free_decay(steps, error):
     start = InitialState(np.array([11.5]), np.zeros(1))
     found = solve_newmark(
-        problems.UNDAMPED_MASS_MASS,
+        problems.UNDAMPED_MASS,
         make_release(2 * np.pi),
         coulomb(1.0, 1e-2),
         (100.0, steps),
