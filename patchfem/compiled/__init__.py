@@ -45,11 +45,17 @@ from . import cache_limit, machine, prebuilt
 from .no_jit import load_uncompiled
 
 PACKAGE_FOLDER = Path(__file__).parents[1]  # folder of the package
-# Modules of tuples that kernels take. They belong to the hash because the machine code depends on the field order.
+# Modules of tuples that kernels take and of row numbers. They belong to the hash because the machine code depends on
+# the order of the fields and on the numbers.
 TUPLE_MODULES = (
     "contact/batch/arrays.py",
     "contact/set_arrays.py",
+    "dynamics/grooves/arrays.py",
     "dynamics/interfaces/arrays.py",
+    "dynamics/ledger.py",
+    "dynamics/march/element_arrays.py",
+    "dynamics/march/folded_arrays.py",
+    "dynamics/march/lane_rows.py",
     "dynamics/smooth/arrays.py",
     "dynamics/events/modal_system.py",
     "dynamics/events/elements.py",

@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,6 +62,19 @@ def store_checkpoints(files: CheckpointFiles | None) -> Iterator[None]:
         yield
     finally:
         _FILES.reset(token)
+
+
+class MarchedCycle(NamedTuple):
+    """A cycle of a march, or a part of one.
+
+    - first_step: number of the step with which it begins
+    - rows: (steps + 1, width) samples
+    - work: friction work [J]
+    """
+
+    first_step: int
+    rows: np.ndarray
+    work: float
 
 
 class MarchSamples:
@@ -129,10 +143,10 @@ class MarchSamples:
 
 
 def _cycles_to_arrays(name: str, cycles, extremes) -> dict:
-    """Return cycles (first step, rows, work) and their extremes as arrays by name."""
-    return {f"{name}.{k}": rows for k, (_, rows, _) in enumerate(cycles)} | {
-        f"{name}.first": np.array([first for first, _, _ in cycles], np.int64),
-        f"{name}.work": np.array([work for _, _, work in cycles], float),
+    """Return marched cycles and their extremes as arrays by name."""
+    return {f"{name}.{k}": cycle.rows for k, cycle in enumerate(cycles)} | {
+        f"{name}.first": np.array([cycle.first_step for cycle in cycles], np.int64),
+        f"{name}.work": np.array([cycle.work for cycle in cycles], float),
         f"{name}.extremes": np.array(extremes, float).reshape(-1, 2),
     }
 
@@ -141,9 +155,9 @@ def _cycles_from_arrays(name: str, arrays: dict) -> tuple:
     """Return the cycles and extremes that `_cycles_to_arrays` stored."""
     firsts = arrays[f"{name}.first"].tolist()
     works = arrays[f"{name}.work"].tolist()
-    cycles = [
-        (first, arrays[f"{name}.{k}"], work) for k, (first, work) in enumerate(zip(firsts, works))
-    ]
+    cycles = []
+    for k, (first_step, work) in enumerate(zip(firsts, works)):
+        cycles.append(MarchedCycle(first_step, arrays[f"{name}.{k}"], work))
     return cycles, [tuple(pair) for pair in arrays[f"{name}.extremes"].tolist()]
 
 

@@ -6,19 +6,58 @@ Parameters that the functions share:
 - modal_system: `interfaces.arrays.ModalArrays`
 - table, i: table[i] is the row of `propagator.Propagator.tables` of the step
 - accel: (n,) modal accelerations [m s-2] due to interface forces, which are constant over the step
-- ledger: sums over a march, see `ledger.LedgerPositions`
+- ledger: sums over a march, see `ledger.Ledger`
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ..compiled.jit import njit
 from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .ledger import LEDGER
+from .ledger import Ledger, SampleColumn
 
 # values that `write_interface` returns
 WITHIN_TRAVEL = 0
 EXCEEDS_TRAVEL = 1
 NOT_FINITE = 3
+
+
+class Bracket(NamedTuple):
+    """Interval with a root, infinite where no bound is known, and the point at which the function is next evaluated."""
+
+    low: float
+    high: float
+    point: float
+
+
+class ModalSample(NamedTuple):
+    """Slide [m] and its speed [m/s] of the first interface, and displacement of the output [m]."""
+
+    slide: float
+    speed: float
+    output: float
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def project_modes(row, values):
+    """Return the sum of row (n,) times values (n,): the slide or speed of a port.
+
+    Parameters
+    ----------
+    row : (n,) array
+        Slide of the port per coordinate.
+    values : (n,) array
+        Coordinates or rates of the modes.
+
+    Returns
+    -------
+    float
+    """
+    total = 0.0
+    for k in range(row.size):
+        total += row[k] * values[k]
+    return total
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -93,15 +132,13 @@ def write_friction_accelerations(force, slide_row, mass, accel):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def move_modes(motion, modal_system, table, i, accel, scratch, ledger):
+def move_modes(motion, modal_system, table, i, accel, ledger):
     """Move the modes by one step, and add its energies to the ledger.
 
     Parameters
     ----------
     motion, modal_system, table, i, accel, ledger
         See the top of the module; motion and ledger are changed.
-    scratch : ndarray
-        (2, n) workspace.
     """
     n = motion.shape[1]
     free = modal_system.free
@@ -128,14 +165,14 @@ def move_modes(motion, modal_system, table, i, accel, scratch, ledger):
             motion[0, k] = free[0, k] * z + free[1, k] * v + push[0, k] * f + table[i, k]
             motion[1, k] = free[2, k] * z + free[3, k] * v + push[1, k] * f + table[i, n + k]
     else:
-        lost += _move_coupled_modes(motion, modal_system, table, i, accel, scratch)
-    ledger[LEDGER.drive_work] += work
-    ledger[LEDGER.viscous_loss] += lost
-    ledger[LEDGER.drive_power] += abs(work)
+        lost += _move_coupled_modes(motion, modal_system, table, i, accel)
+    ledger[Ledger.DRIVE_WORK] += work
+    ledger[Ledger.VISCOUS_LOSS] += lost
+    ledger[Ledger.DRIVE_POWER] += abs(work)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _move_coupled_modes(motion, modal_system, table, row_index, accel, scratch):
+def _move_coupled_modes(motion, modal_system, table, row_index, accel):
     """Move modes whose damping couples the coordinates, as `move_modes` does.
 
     Returns the quadratic part of the viscous loss [J].
@@ -143,6 +180,7 @@ def _move_coupled_modes(motion, modal_system, table, row_index, accel, scratch):
     n = motion.shape[1]
     dense = modal_system.dense
     loss = modal_system.dense_loss
+    end = modal_system.workspace[1:]
     lost = 0.0
     for i in range(3 * n):
         x = accel[i - 2 * n] if i >= 2 * n else motion[i // n, i % n]
@@ -160,10 +198,10 @@ def _move_coupled_modes(motion, modal_system, table, row_index, accel, scratch):
                 part += dense[i, j * n + k] * motion[j, k]
         for k in range(n):
             part += dense[i, 2 * n + k] * accel[k]
-        scratch[i // n, i % n] = part
+        end[i // n, i % n] = part
     for i in range(n):
-        motion[0, i] = scratch[0, i]
-        motion[1, i] = scratch[1, i]
+        motion[0, i] = end[0, i]
+        motion[1, i] = end[1, i]
     return lost
 
 
@@ -221,15 +259,13 @@ def safe_point(low, high, guess):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def narrow_bracket(low, high, here, residual, slope, n_late):
+def narrow_bracket(bracket, residual, slope, n_late):
     """Take a bracketed Newton step towards the root of an increasing function.
 
     Parameters
     ----------
-    low, high : float
-        Bracket, infinite where there is no bound yet.
-    here : float
-        The point at which the function was evaluated.
+    bracket : Bracket
+        Its point is the one at which the function was evaluated.
     residual, slope : float
         Value of the function there, and its slope or an approximation of it.
     n_late : int
@@ -238,23 +274,23 @@ def narrow_bracket(low, high, here, residual, slope, n_late):
 
     Returns
     -------
-    low, high : float
-        The bracket with one end moved to `here`.
-    new : float
-        The next point; a step that leaves the bracket is replaced by the midpoint.
+    Bracket
+        One end is moved to the point. The next point is the midpoint if Newton's step leaves the bracket.
     """
+    low = bracket.low
+    high = bracket.high
     if residual > 0:
-        high = here
+        high = bracket.point
     else:
-        low = here
-    new = here - residual / slope
+        low = bracket.point
+    following = bracket.point - residual / slope
     if low > -np.inf and high < np.inf:
-        new = safe_point(low, high, new)
+        following = safe_point(low, high, following)
         if n_late > 0 and n_late % 2:
-            new = 0.5 * (low + high)
+            following = 0.5 * (low + high)
     elif n_late > 0:
-        new = here - residual * 2.0 ** min(n_late, 60)
-    return low, high, new
+        following = bracket.point - residual * 2.0 ** min(n_late, 60)
+    return Bracket(low, high, following)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -263,10 +299,7 @@ def write_modes(row, motion, modal_system):
 
     Returns
     -------
-    slide, speed : float
-        Of the first interface [m], [m/s].
-    output : float
-        [m].
+    ModalSample
     """
     n = motion.shape[1]
     slide_row = modal_system.slide
@@ -279,21 +312,21 @@ def write_modes(row, motion, modal_system):
         slide += slide_row[k] * motion[0, k]
         speed += slide_row[k] * motion[1, k]
         output += modal_system.output[k] * motion[0, k]
-    row[2 * n] = slide
-    row[2 * n + 1] = speed
-    return slide, speed, output
+    row[2 * n + SampleColumn.SLIDE] = slide
+    row[2 * n + SampleColumn.SPEED] = speed
+    return ModalSample(slide, speed, output)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def write_interface(row, force, energy, slip, output, travel, stored, ledger):
+def write_interface(row, reading, output, travel, stored, ledger):
     """Write force, slip and energy of the interface into a row, and the stored energy into the ledger.
 
     Parameters
     ----------
     row : ndarray
         (2 n + 6,) row of `loop_kernels.march`.
-    force, energy, slip : float
-        Of the interface [N], [J], [m].
+    reading : friction.protocol_kernels.Reading
+        Force [N], energy [J] and slip [m] of the interface.
     output, travel : float
         Displacement of the output, and its largest permitted magnitude [m].
     stored : float
@@ -305,13 +338,13 @@ def write_interface(row, force, energy, slip, output, travel, stored, ledger):
     int
         WITHIN_TRAVEL, EXCEEDS_TRAVEL or NOT_FINITE.
     """
-    n = row.size - 4
-    row[n] = force
-    row[n + 1] = slip
-    row[n + 2] = force
-    row[n + 3] = energy
-    ledger[LEDGER.max_stored] = max(ledger[LEDGER.max_stored], stored)
-    if not np.isfinite(row[n - 2] + row[n - 1] + force):
+    n = row.size - SampleColumn.STEP_WORK
+    row[n + SampleColumn.FORCE] = reading.force
+    row[n + SampleColumn.SLIP] = reading.slip
+    row[n + SampleColumn.MEAN_FORCE] = reading.force
+    row[n + SampleColumn.ENERGY] = reading.stored_energy
+    ledger[Ledger.MAX_STORED] = max(ledger[Ledger.MAX_STORED], stored)
+    if not np.isfinite(row[n + SampleColumn.SLIDE] + row[n + SampleColumn.SPEED] + reading.force):
         return NOT_FINITE
     return EXCEEDS_TRAVEL if abs(output) > travel else WITHIN_TRAVEL
 
@@ -327,12 +360,12 @@ def count_iterations(n_iterations, work, ledger):
     work : float
         Friction work of the step [J].
     ledger : ndarray
-        See `ledger.LedgerPositions`; it is changed.
+        See `ledger.Ledger`; it is changed.
     """
-    ledger[LEDGER.n_iterations] += abs(n_iterations)
-    ledger[LEDGER.max_iterations] = max(ledger[LEDGER.max_iterations], abs(n_iterations))
-    ledger[LEDGER.n_unconverged] += 1.0 if n_iterations < 0 else 0.0
-    ledger[LEDGER.friction_work] += work
+    ledger[Ledger.N_ITERATIONS] += abs(n_iterations)
+    ledger[Ledger.MAX_ITERATIONS] = max(ledger[Ledger.MAX_ITERATIONS], abs(n_iterations))
+    ledger[Ledger.N_UNCONVERGED] += 1.0 if n_iterations < 0 else 0.0
+    ledger[Ledger.FRICTION_WORK] += work
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

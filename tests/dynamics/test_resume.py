@@ -193,7 +193,7 @@ def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):
     scene.write_text(RIGS["one slide"].replace("cycles = 16.3", "cycles = 4000"), "utf-8")
     code = (
         "from patchfem.dynamics import checkpoint as c; c.MIN_WRITE_INTERVAL = 0.05; c.MAX_WRITE_FRACTION = 1.0; "
-        "from patchfem.dynamics.march import march; march.PERIODIC_TOL = -1.0; "
+        "from patchfem.dynamics.march import run; run.PERIODIC_TOL = -1.0; "
         "from patchfem.__main__ import main; main()"
     )
     words = [sys.executable, "-c", code, "run", scene, "--no-page", "-q", "-o", out]

@@ -10,15 +10,15 @@ from ...friction.grooves import Grooves
 from ...slip.shear_modes import N_SHEAR_MODES, enough_modes, shear_modes
 from ..integrated import find_accelerations
 from ..interfaces.arrays import ClimbingPoints
-from ..ledger import LEDGER
-from ..march.march import Run
+from ..ledger import Ledger
+from ..march.run import Run
 from ..march.varying_load import (
     PLASTIC,
     VaryingLoadLaw,
     make_elastic_plastic_law,
     make_pressed_fields,
 )
-from .arrays import CLIMB
+from .arrays import ClimbPlace
 
 CONTACT_MODULE = "dynamics.grooves.contact_kernels"
 # bond length of points of Coulomb's law over the tolerance times the slide at which pieces slip as a whole; the force is
@@ -209,8 +209,8 @@ class ClimbingModel(FlankModel):
             [self.load, g.wave_number, g.amplitude, g.phase, g.lifted_mass, self.law.kind]
         )
         normal = self.load * np.hypot(1.0, float(g.slope(0.0)))
-        climb = np.zeros(len(CLIMB))
-        climb[[CLIMB.vertical_force, CLIMB.start_normal, CLIMB.end_normal]] = (
+        climb = np.zeros(len(ClimbPlace))
+        climb[[ClimbPlace.VERTICAL_FORCE, ClimbPlace.START_NORMAL, ClimbPlace.END_NORMAL]] = (
             self.load,
             normal,
             normal,
@@ -245,7 +245,7 @@ class ClimbingModel(FlankModel):
                 [
                     force,
                     over + contact.b @ contact.modes,
-                    contact.share * contact.climb[CLIMB.vertical_force],
+                    contact.share * contact.climb[ClimbPlace.VERTICAL_FORCE],
                 ]
             )
         }
@@ -293,19 +293,23 @@ class ClimbingRun(GroovesRun):
         contact = self.contact
         climb = self.contact.climb
         normal = model.load * np.hypot(1.0, slope)
-        contact.memory[:] *= normal / climb[CLIMB.end_normal]
-        contact.pressed[:] *= normal / climb[CLIMB.end_normal]
-        climb[[CLIMB.rise_speed, CLIMB.start_normal, CLIMB.end_normal]] = slope * v, normal, normal
-        self.ledger[LEDGER.drive_work] += self.find_interface_energy()
+        contact.memory[:] *= normal / climb[ClimbPlace.END_NORMAL]
+        contact.pressed[:] *= normal / climb[ClimbPlace.END_NORMAL]
+        climb[[ClimbPlace.RISE_SPEED, ClimbPlace.START_NORMAL, ClimbPlace.END_NORMAL]] = (
+            slope * v,
+            normal,
+            normal,
+        )
+        self.ledger[Ledger.DRIVE_WORK] += self.find_interface_energy()
 
     def move_to(self, place, rate) -> None:
         """Set the state, like `Run.move_to`; the lifted mass has the velocity of the flank there."""
         super().move_to(place, rate)
-        self.contact.climb[CLIMB.rise_speed] = (
+        self.contact.climb[ClimbPlace.RISE_SPEED] = (
             float(self.model.grooves.slope(self.modes.slide @ place)) * self.modes.slide @ rate
         )
 
-    def _set_outcome(self, status: int) -> None:
-        super()._set_outcome(status)
-        if self.contact.climb[CLIMB.has_lifted] and self.outcome is None:
+    def set_outcome(self, status: int) -> None:
+        super().set_outcome(status)
+        if self.contact.climb[ClimbPlace.HAS_LIFTED] and self.outcome is None:
             self._leaves()

@@ -11,14 +11,17 @@ of the law.
 """
 
 from math import cos, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
-from ..modal_kernels import narrow_bracket
+from ...friction.protocol_kernels import Reading
+from ..interfaces.arrays import SolvedStep, StepStart
+from ..modal_kernels import Bracket, narrow_bracket
 from . import points_kernels as points
-from .arrays import CLIMB, FLANK
+from .arrays import ClimbPlace, FlankPlace
 
 # outer points of Gauss's rule of three on [-1, 1]
 GAUSS_POINT = sqrt(0.6)
@@ -29,15 +32,25 @@ GOAL_FRACTION = 0.01
 # iterations of a step before bisection helps Newton's method, and iterations at most
 MAX_NEWTON_STEPS = 40
 MAX_ITERATIONS = 200
+ROUND_OFF = 4e-16  # round-off error of a sum over its largest term
+
+
+class FlankStep(NamedTuple):
+    """Path along a flank [m], normal force at its end without friction [N], and slope at its end."""
+
+    path: float
+    normal: float
+    slope: float
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_slope(flank, q):
     """Return the slope t [1] of the flank at q [m]."""
+    wave_number = flank[FlankPlace.WAVE_NUMBER]
     return (
-        flank[FLANK.amplitude]
-        * flank[FLANK.wave_number]
-        * np.sin(flank[FLANK.wave_number] * q - flank[FLANK.phase])
+        flank[FlankPlace.AMPLITUDE]
+        * wave_number
+        * np.sin(wave_number * q - flank[FlankPlace.PHASE])
     )
 
 
@@ -48,7 +61,7 @@ def mean_path_ratio(flank, q, dq):
     Parameters
     ----------
     flank : ndarray
-        (6,) see `arrays.FlankNumbers`.
+        (6,) see `arrays.FlankPlace`.
     q : float
         Relative displacement [m].
     dq : float
@@ -72,7 +85,7 @@ def mean_slope_and_path(flank, q, dq):
     Parameters
     ----------
     flank : ndarray
-        (6,) see `arrays.FlankNumbers`.
+        (6,) see `arrays.FlankPlace`.
     q : float
         Relative displacement [m].
     dq : float
@@ -84,38 +97,48 @@ def mean_slope_and_path(flank, q, dq):
     path_ratio : float
         Mean of sqrt(1 + t^2).
     """
-    half = 0.5 * flank[FLANK.wave_number] * dq
-    middle = flank[FLANK.wave_number] * (q + 0.5 * dq) - flank[FLANK.phase]
+    wave_number = flank[FlankPlace.WAVE_NUMBER]
+    half = 0.5 * wave_number * dq
+    middle = wave_number * (q + 0.5 * dq) - flank[FlankPlace.PHASE]
     share = sin(half) / half if abs(half) > MIN_PHASE else 1 - half * half / 6
-    return flank[FLANK.amplitude] * flank[FLANK.wave_number] * sin(middle) * share, mean_path_ratio(
+    return flank[FlankPlace.AMPLITUDE] * wave_number * sin(middle) * share, mean_path_ratio(
         flank, q, dq
     )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def climb_flank(dq, q, dt, flank, at):
-    """Climb a flank by dq [m] in dt [s]; slope, path and force go into `at`.
+def climb_flank(dq, start, flank, at):
+    """Climb a flank; slope, path and force go into `at`.
+
+    Parameters
+    ----------
+    dq : float
+        Increment of the relative displacement [m].
+    start : interfaces.arrays.StepStart
+    flank : (6,) array
+        See `arrays.FlankPlace`.
+    at : (14,) array
+        See `arrays.ClimbPlace`; it is written.
 
     Returns
     -------
-    path : float
-        Along the flank [m].
-    normal : float
-        Normal force at the end without friction [N].
-    slope : float
-        At the end [1].
+    FlankStep
     """
-    at[CLIMB.mean_slope], at[CLIMB.path_ratio] = mean_slope_and_path(flank, q, dq)
-    at[CLIMB.trial_vertical] = flank[FLANK.load]
-    if flank[FLANK.lifted_mass] > 0.0:
-        at[CLIMB.trial_vertical] += (
-            flank[FLANK.lifted_mass]
+    lifted_mass = flank[FlankPlace.LIFTED_MASS]
+    at[ClimbPlace.MEAN_SLOPE], at[ClimbPlace.PATH_RATIO] = mean_slope_and_path(
+        flank, start.rel_disp, dq
+    )
+    at[ClimbPlace.TRIAL_VERTICAL] = flank[FlankPlace.LOAD]
+    if lifted_mass > 0.0:
+        at[ClimbPlace.TRIAL_VERTICAL] += (
+            lifted_mass
             * 2
-            * (at[CLIMB.mean_slope] * dq / dt - at[CLIMB.rise_speed])
-            / dt
+            * (at[ClimbPlace.MEAN_SLOPE] * dq / start.dt - at[ClimbPlace.RISE_SPEED])
+            / start.dt
         )
-    end = find_slope(flank, q + dq)
-    return at[CLIMB.path_ratio] * dq, max(at[CLIMB.trial_vertical], 0.0) * sqrt(1 + end * end), end
+    end = find_slope(flank, start.rel_disp + dq)
+    normal = max(at[ClimbPlace.TRIAL_VERTICAL], 0.0) * sqrt(1 + end * end)
+    return FlankStep(at[ClimbPlace.PATH_RATIO] * dq, normal, end)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -130,94 +153,92 @@ def write_resistance(pulled, gain, middle, dt, flank, at):
         Relative displacement in the middle of the step [m].
     dt, flank, at
     """
-    slope = at[CLIMB.mean_slope]
-    path = at[CLIMB.path_ratio]
-    at[CLIMB.mean_force] = at[CLIMB.trial_vertical] * slope + pulled * path
-    at[CLIMB.along_force] = pulled
+    wave_number = flank[FlankPlace.WAVE_NUMBER]
+    slope = at[ClimbPlace.MEAN_SLOPE]
+    path = at[ClimbPlace.PATH_RATIO]
+    at[ClimbPlace.MEAN_FORCE] = at[ClimbPlace.TRIAL_VERTICAL] * slope + pulled * path
+    at[ClimbPlace.ALONG_FORCE] = pulled
     bend = (
         0.5
-        * flank[FLANK.amplitude]
-        * flank[FLANK.wave_number]
-        * flank[FLANK.wave_number]
-        * cos(flank[FLANK.wave_number] * middle - flank[FLANK.phase])
+        * flank[FlankPlace.AMPLITUDE]
+        * wave_number
+        * wave_number
+        * cos(wave_number * middle - flank[FlankPlace.PHASE])
     )
-    at[CLIMB.stiffness] = (
+    at[ClimbPlace.STIFFNESS] = (
         gain * path * path
-        + at[CLIMB.trial_vertical] * bend
-        + 2 * flank[FLANK.lifted_mass] * slope * slope / (dt * dt)
+        + at[ClimbPlace.TRIAL_VERTICAL] * bend
+        + 2 * flank[FlankPlace.LIFTED_MASS] * slope * slope / (dt * dt)
     )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def write_mean_force(dq, q, dt, contact):
+def write_mean_force(dq, start, contact):
     """Write the mean force over an increment and its derivative [N/m] into contact.climb.
 
     Parameters
     ----------
     dq : float
         Increment of the relative displacement [m].
-    q : float
-        Relative displacement [m].
-    dt : float
-        Duration of the step [s].
+    start : interfaces.arrays.StepStart
     contact : ClimbingPoints
     """
-    ds, flat, end = climb_flank(dq, q, dt, contact.flank, contact.climb)
-    pulled, gain = points.solve_friction(ds, flat, end, dt, contact)
-    write_resistance(pulled, gain, q + 0.5 * dq, dt, contact.flank, contact.climb)
+    step = climb_flank(dq, start, contact.flank, contact.climb)
+    pulled, gain = points.solve_friction(step.path, step.normal, step.slope, start.dt, contact)
+    middle = start.rel_disp + 0.5 * dq
+    write_resistance(pulled, gain, middle, start.dt, contact.flank, contact.climb)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_step(free, beta, q, v, dt, contact, goal):
+def solve_step(free, beta, start, contact, goal):
     """Solve a step with dq = free - beta force, like `interfaces.element_kernels.solve_step`.
 
     Returns
     -------
-    dq : float
-        [m].
-    force : float
-        Path mean [N].
-    iterations : int
-        Below 0 where it failed.
+    arrays.SolvedStep
     """
     at = contact.climb
-    low = -np.inf
-    high = np.inf
-    t = find_slope(contact.flank, q)
-    points.start_step(contact, v * sqrt(1 + t * t), dt)
-    dq = 2 * at[CLIMB.last_slide] - at[CLIMB.earlier_slide]
+    start_friction(start, contact)
+    guess = 2 * at[ClimbPlace.LAST_SLIDE] - at[ClimbPlace.EARLIER_SLIDE]
+    bracket = Bracket(-np.inf, np.inf, guess)
     for count in range(1, MAX_ITERATIONS):
-        write_mean_force(dq, q, dt, contact)
-        miss = dq - free + beta * at[CLIMB.mean_force]
-        digit = 4e-16 * (abs(free) + abs(dq) + beta * abs(at[CLIMB.mean_force]))
-        if abs(miss) <= GOAL_FRACTION * goal * beta + digit:
-            return dq, at[CLIMB.mean_force], count
-        gain = max(1 + beta * at[CLIMB.stiffness], 0.1)
-        here = dq
-        low, high, dq = narrow_bracket(low, high, dq, miss, gain, count - MAX_NEWTON_STEPS)
-        if high - low <= digit:
-            return (
-                here,
-                at[CLIMB.mean_force],
-                count if abs(miss) <= goal * beta + 8 * gain * digit else -count,
-            )
-    return dq, at[CLIMB.mean_force], -MAX_ITERATIONS
+        dq = bracket.point
+        write_mean_force(dq, start, contact)
+        force = at[ClimbPlace.MEAN_FORCE]
+        residual = dq - free + beta * force
+        noise = ROUND_OFF * (abs(free) + abs(dq) + beta * abs(force))
+        if abs(residual) <= GOAL_FRACTION * goal * beta + noise:
+            return SolvedStep(dq, force, count)
+        gain = max(1 + beta * at[ClimbPlace.STIFFNESS], 0.1)
+        bracket = narrow_bracket(bracket, residual, gain, count - MAX_NEWTON_STEPS)
+        if bracket.high - bracket.low <= noise:
+            is_solved = abs(residual) <= goal * beta + 8 * gain * noise
+            return SolvedStep(dq, force, count if is_solved else -count)
+    return SolvedStep(bracket.point, at[ClimbPlace.MEAN_FORCE], -MAX_ITERATIONS)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def apply_increment(dq, q, v, dt, contact, goal):
+def start_friction(start, contact):
+    """Start the step of the law along the flank.
+
+    Parameters
+    ----------
+    start : interfaces.arrays.StepStart
+    contact : ClimbingPoints
+    """
+    slope = find_slope(contact.flank, start.rel_disp)
+    points.start_step(contact, start.velocity * sqrt(1 + slope * slope), start.dt)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def apply_increment(dq, start, contact, goal):
     """Return the mean force over a prescribed increment; the memory stays as it is.
 
     Parameters
     ----------
     dq : float
         Increment of the relative displacement [m].
-    q : float
-        Relative displacement [m].
-    v : float
-        Relative velocity at the start of the step [m/s].
-    dt : float
-        Duration of the step [s].
+    start : arrays.StepStart
     contact : ClimbingPoints
     goal : float
         Tolerance of the residual [N].
@@ -229,14 +250,13 @@ def apply_increment(dq, q, v, dt, contact, goal):
     is_solved : bool
         Always true.
     """
-    t = find_slope(contact.flank, q)
-    points.start_step(contact, v * sqrt(1 + t * t), dt)
-    write_mean_force(dq, q, dt, contact)
-    return contact.climb[CLIMB.mean_force], True
+    start_friction(start, contact)
+    write_mean_force(dq, start, contact)
+    return contact.climb[ClimbPlace.MEAN_FORCE], True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit_step(dq, force, q, v0, v1, dt, contact):
+def commit_step(dq, force, start, end_velocity, contact):
     """Keep a solved step of mean force [N].
 
     Returns
@@ -246,45 +266,56 @@ def commit_step(dq, force, q, v0, v1, dt, contact):
     is_solved : bool
     """
     at = contact.climb
-    t0 = find_slope(contact.flank, q)
-    t1 = find_slope(contact.flank, q + dq)
-    v0 = v0 * sqrt(1 + t0 * t0)
-    v1 = v1 * sqrt(1 + t1 * t1)
-    along = (force - at[CLIMB.trial_vertical] * at[CLIMB.mean_slope]) / at[CLIMB.path_ratio]
-    lost, fine = points.commit_friction(at[CLIMB.path_ratio] * dq, along, v0, v1, dt, contact)
-    if contact.flank[FLANK.lifted_mass] > 0.0:
-        at[CLIMB.rise_speed] = 2 * at[CLIMB.mean_slope] * dq / dt - at[CLIMB.rise_speed]
-        at[CLIMB.has_lifted] = max(
-            at[CLIMB.has_lifted], 0.0 if at[CLIMB.trial_vertical] > 0.0 else 1.0
+    slope = find_slope(contact.flank, start.rel_disp)
+    end_slope = find_slope(contact.flank, start.rel_disp + dq)
+    climb = at[ClimbPlace.TRIAL_VERTICAL] * at[ClimbPlace.MEAN_SLOPE]
+    lost, is_solved = points.commit_friction(
+        at[ClimbPlace.PATH_RATIO] * dq,
+        (force - climb) / at[ClimbPlace.PATH_RATIO],
+        StepStart(start.rel_disp, start.velocity * sqrt(1 + slope * slope), start.dt),
+        end_velocity * sqrt(1 + end_slope * end_slope),
+        contact,
+    )
+    if contact.flank[FlankPlace.LIFTED_MASS] > 0.0:
+        at[ClimbPlace.RISE_SPEED] = (
+            2 * at[ClimbPlace.MEAN_SLOPE] * dq / start.dt - at[ClimbPlace.RISE_SPEED]
         )
-    at[CLIMB.vertical_force] = at[CLIMB.trial_vertical]
-    at[CLIMB.earlier_slide] = at[CLIMB.last_slide]
-    at[CLIMB.last_slide] = dq
-    at[CLIMB.start_normal] = at[CLIMB.end_normal]
-    at[CLIMB.start_force] = points.read_friction(contact, 0.0)[0]
-    return lost, fine
+        at[ClimbPlace.HAS_LIFTED] = max(
+            at[ClimbPlace.HAS_LIFTED], 0.0 if at[ClimbPlace.TRIAL_VERTICAL] > 0.0 else 1.0
+        )
+    at[ClimbPlace.VERTICAL_FORCE] = at[ClimbPlace.TRIAL_VERTICAL]
+    at[ClimbPlace.EARLIER_SLIDE] = at[ClimbPlace.LAST_SLIDE]
+    at[ClimbPlace.LAST_SLIDE] = dq
+    at[ClimbPlace.START_NORMAL] = at[ClimbPlace.END_NORMAL]
+    at[ClimbPlace.START_FORCE] = points.read_friction(contact, 0.0).force
+    return lost, is_solved
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_state(contact, q, v):
-    """Return the state of the contact at q [m] and v [m/s].
+def read_state(contact, rel_disp, velocity):
+    """Return force against the relative displacement, energy of height, lifted mass and law, and slip.
+
+    Parameters
+    ----------
+    contact : ClimbingPoints
+    rel_disp : float
+        Relative displacement [m].
+    velocity : float
+        Relative velocity [m/s].
 
     Returns
     -------
-    force : float
-        Against the relative displacement [N].
-    energy : float
-        Of height, lifted mass and law [J].
-    slip : float
-        [m].
+    friction.protocol_kernels.Reading
     """
-    at = contact.climb
-    t = find_slope(contact.flank, q)
-    length = sqrt(1 + t * t)
-    half = sin(0.5 * (contact.flank[FLANK.wave_number] * q - contact.flank[FLANK.phase]))
-    along, energy, kept = points.read_friction(contact, q)
-    energy += (
-        2 * contact.flank[FLANK.load] * contact.flank[FLANK.amplitude] * half * half
-        + 0.5 * contact.flank[FLANK.lifted_mass] * at[CLIMB.rise_speed] * at[CLIMB.rise_speed]
+    flank = contact.flank
+    slope = find_slope(flank, rel_disp)
+    length = sqrt(1 + slope * slope)
+    half = sin(0.5 * (flank[FlankPlace.WAVE_NUMBER] * rel_disp - flank[FlankPlace.PHASE]))
+    rise_speed = contact.climb[ClimbPlace.RISE_SPEED]
+    friction = points.read_friction(contact, rel_disp)
+    energy = friction.stored_energy + (
+        2 * flank[FlankPlace.LOAD] * flank[FlankPlace.AMPLITUDE] * half * half
+        + 0.5 * flank[FlankPlace.LIFTED_MASS] * rise_speed * rise_speed
     )
-    return at[CLIMB.vertical_force] * t + along * length, energy, q - (q - kept) / length
+    force = contact.climb[ClimbPlace.VERTICAL_FORCE] * slope + friction.force * length
+    return Reading(force, energy, rel_disp - (rel_disp - friction.slip) / length)

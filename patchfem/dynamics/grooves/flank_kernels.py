@@ -66,13 +66,12 @@ def release_direction(numbers, turn):
     A force that follows the speed never holds.
     """
     if numbers[LAW.speed] > 0:
-        return (
-            1.0
-            if turn[Turn.FREE_ACCELERATION] >= turn[Turn.INVERSE_MASS] * turn[Turn.FORCE]
-            else -1.0
-        )
+        is_pushed = turn[Turn.FREE_ACCELERATION] >= turn[Turn.INVERSE_MASS] * turn[Turn.FORCE]
+        return 1.0 if is_pushed else -1.0
     low, high = find_hold_range(numbers, turn)
-    return 1.0 if turn[Turn.FORCE] > high else -1.0 if turn[Turn.FORCE] < low else 0.0
+    if turn[Turn.FORCE] > high:
+        return 1.0
+    return -1.0 if turn[Turn.FORCE] < low else 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

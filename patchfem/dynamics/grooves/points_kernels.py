@@ -7,6 +7,7 @@ behind shear modes as in `interfaces.shear_solve_kernels`.
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ..dense_kernels import factorise, solve_factorised
+from ..interfaces.arrays import PointRow, PressedPlace, StepProblem, WorkRow
 from ..interfaces.pressed_points_kernels import (
     commit_points,
     find_friction_force,
@@ -14,16 +15,13 @@ from ..interfaces.pressed_points_kernels import (
     read_points,
     relax_pieces,
 )
-from ..interfaces.shear_points_kernels import SLOPE
 from ..interfaces.shear_solve_kernels import (
-    GRADIENT,
-    STEP,
     minimise,
     project_onto_modes,
     set_middle_length,
     write_hessian,
 )
-from .arrays import CLIMB, FLANK
+from .arrays import ClimbPlace, FlankPlace
 
 # residual over the friction limit, to which pieces that deform in shear are solved
 SHEAR_GOAL = 1e-13
@@ -66,31 +64,25 @@ def solve_friction(ds, flat, end, dt, contact):
     stiffness : float
         Its derivative [N/m].
     """
-    kind = int(contact.flank[FLANK.kind])
+    kind = int(contact.flank[FlankPlace.KIND])
     force = 0.0
     gain = 0.0
     at = contact.climb
     gives = contact.kappa.size > 0
-    close = (1e-12 if gives else 1e-14) * contact.flank[FLANK.load]
+    close = (1e-12 if gives else 1e-14) * contact.flank[FlankPlace.LOAD]
+    goal = SHEAR_GOAL * contact.force[PressedPlace.MU_STATIC] * contact.flank[FlankPlace.LOAD]
     tried = 0.0
     missed = 0.0
     for count in range(60):
-        before = at[CLIMB.end_normal]
+        before = at[ClimbPlace.END_NORMAL]
         press_points(kind, contact)
         if gives:
             contact.y[0, 0] = ds
-            force = minimise(
-                ds,
-                0.0,
-                kind,
-                False,
-                contact,
-                SHEAR_GOAL * contact.force[0] * contact.flank[FLANK.load],
-            )[0]
+            force, _ = minimise(StepProblem(ds, 0.0, kind, False), contact, goal)
         else:
             force, gain = find_friction_force(ds, kind, contact)
-        bound = contact.force[0] * before
-        after = min(max(2 * force - at[CLIMB.start_force], -bound), bound)
+        bound = contact.force[PressedPlace.MU_STATIC] * before
+        after = min(max(2 * force - at[ClimbPlace.START_FORCE], -bound), bound)
         now = max(flat + after * end, 0.0)
         miss = now - before
         if (
@@ -113,7 +105,7 @@ def solve_friction(ds, flat, end, dt, contact):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def set_normal_force(contact, normal):
     """Distribute a normal force [N] over the points."""
-    contact.climb[CLIMB.end_normal] = normal
+    contact.climb[ClimbPlace.END_NORMAL] = normal
     for j in range(contact.pressed.shape[1]):
         contact.pressed[1, j] = contact.share[j] * normal
 
@@ -122,18 +114,20 @@ def set_normal_force(contact, normal):
 def find_stiffness(contact):
     """Return the derivative [N/m] of the force over the slide of the holder."""
     hess = contact.hess[0]
-    p = contact.workspace[STEP]
+    p = contact.workspace[WorkRow.STEP]
     total = 0.0
     for j in range(int(contact.count[0])):
-        total += contact.points[SLOPE, j]
+        total += contact.points[PointRow.SLOPE, j]
     if contact.ready[0] == 0.0:
-        write_hessian(0.0, False, contact, hess)
+        write_hessian(StepProblem(0.0, 0.0, 0, False), contact, hess)
         if not factorise(hess):
             return total
         contact.ready[0] = 1.0
-    project_onto_modes(SLOPE, contact.psi, contact.points, int(contact.count[0]), p)
+    project_onto_modes(PointRow.SLOPE, contact.psi, contact.points, int(contact.count[0]), p)
     p[0] = 0.0
-    return max(total - find_inverse_form(hess, p, contact.workspace[GRADIENT]), 0.01 * total)
+    return max(
+        total - find_inverse_form(hess, p, contact.workspace[WorkRow.GRADIENT]), 0.01 * total
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -159,10 +153,20 @@ def find_inverse_form(hess, p, workspace):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit_friction(ds, along, v0, v1, dt, contact):
-    """Keep a step over the path ds [m] under a mean force [N].
+def commit_friction(ds, along, start, end_velocity, contact):
+    """Keep a step over a path along the flank.
 
-    v0, v1: velocities along the flank [m/s].
+    Parameters
+    ----------
+    ds : float
+        Path [m].
+    along : float
+        Mean force over it [N].
+    start : interfaces.arrays.StepStart
+        With the velocity along the flank.
+    end_velocity : float
+        Velocity along the flank at the end [m/s].
+    contact : ClimbingPoints
 
     Returns
     -------
@@ -171,12 +175,14 @@ def commit_friction(ds, along, v0, v1, dt, contact):
     is_solved : bool
         Whether points and pieces agree.
     """
-    kind = int(contact.flank[FLANK.kind])
+    kind = int(contact.flank[FlankPlace.KIND])
     fine = True
-    lost = commit_points(ds, along, v0, v1, dt, kind, contact)
+    lost = commit_points(ds, along, start, end_velocity, kind, contact)
     if contact.kappa.size:
         more, count = relax_pieces(
-            kind, contact, contact.force[0] * contact.flank[FLANK.load] * 1e-11
+            kind,
+            contact,
+            contact.force[PressedPlace.MU_STATIC] * contact.flank[FlankPlace.LOAD] * 1e-11,
         )
         lost = lost + more
         fine = count > 0
@@ -188,4 +194,4 @@ def commit_friction(ds, along, v0, v1, dt, contact):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_friction(contact, q):
     """Return force along the flank [N], energy of the law [J] and slip [m] at q [m]."""
-    return read_points(int(contact.flank[FLANK.kind]), contact, q)
+    return read_points(int(contact.flank[FlankPlace.KIND]), contact, q)

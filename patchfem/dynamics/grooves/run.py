@@ -13,7 +13,7 @@ from ...core import InitialState, Outcome
 from ...friction.grooves import Grooves
 from ...friction.path_work import sampled_work
 from ...friction.protocol import Element
-from ..ledger import LEDGER
+from ..ledger import Ledger
 from ..march.models import coulomb_model
 from ..smooth import run as smooth
 from ..smooth.arrays import Counter, Scalar, Work
@@ -26,12 +26,12 @@ REST_RATIO = 1e-6
 LAW_MODULE = "dynamics.grooves.flank_kernels"
 # positions in the ledger of a march of the sums that `SampledRun._read_sums` returns
 LEDGER_SUMS = [
-    LEDGER.drive_work,
-    LEDGER.viscous_loss,
-    LEDGER.drive_power,
-    LEDGER.friction_loss,
-    LEDGER.n_iterations,
-    LEDGER.friction_work,
+    Ledger.DRIVE_WORK,
+    Ledger.VISCOUS_LOSS,
+    Ledger.DRIVE_POWER,
+    Ledger.FRICTION_LOSS,
+    Ledger.N_ITERATIONS,
+    Ledger.FRICTION_WORK,
 ]
 # status of a march by the outcome of the motion
 STATUS_OF_OUTCOME = {Outcome.LEAVES_GROOVES: 5, Outcome.NOT_CONVERGED: 3}
@@ -108,7 +108,7 @@ class SampledRun(GroovesRun):
         super().__init__(modes, drive, model, steps_per_cycle, travel, loops, start)
         self.width += 1
         self._begin()
-        self.ledger[LEDGER.drive_work] += self.find_interface_energy()
+        self.ledger[Ledger.DRIVE_WORK] += self.find_interface_energy()
 
     def _begin(self) -> None:
         """Start the motion from the present state, at the start of the drive."""
@@ -208,8 +208,8 @@ class SampledRun(GroovesRun):
         self.state[:] = motion.arrays.state[: 2 * n].reshape(2, n)
         sums = self._read_sums()
         self.ledger[LEDGER_SUMS] += sums - self.booked
-        self.ledger[LEDGER.max_stored] = max(
-            self.ledger[LEDGER.max_stored], motion.record.counters[Counter.MAX_STORED]
+        self.ledger[Ledger.MAX_STORED] = max(
+            self.ledger[Ledger.MAX_STORED], motion.record.counters[Counter.MAX_STORED]
         )
         self.booked = sums
         return last, status
@@ -227,17 +227,17 @@ class SampledRun(GroovesRun):
         n = 2 * self.modes.omega.size
         return np.stack([self._step_works(rows), rows[:-1, n + 7], np.zeros(len(rows) - 1)])
 
-    def _set_outcome(self, status: int) -> None:
-        super()._set_outcome(status)
+    def set_outcome(self, status: int) -> None:
+        super().set_outcome(status)
         if status == 5:
             self._leaves()
 
     def check_steps(self) -> None:
         """Set the outcome not_converged where steps did not meet their error."""
-        if self.ledger[LEDGER.n_unconverged]:
+        if self.ledger[Ledger.N_UNCONVERGED]:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
-                f"{int(self.ledger[LEDGER.n_unconverged])} of {self.done} time steps on the grooves did not converge; raise "
+                f"{int(self.ledger[Ledger.N_UNCONVERGED])} of {self.done} time steps on the grooves did not converge; raise "
                 "accuracy.steps_per_cycle"
             )
 

@@ -5,10 +5,20 @@ harmonics and not samples. So the memory is that of the continuous motion; a sam
 for any number of elements.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+
+
+class SlideValues(NamedTuple):
+    """Slide and its first and second derivative by the angle [m]."""
+
+    value: float
+    rate: float
+    bend: float
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -24,8 +34,7 @@ def evaluate_slide(re, im, angle):
 
     Returns
     -------
-    tuple of float
-        [m].
+    SlideValues
     """
     c = np.cos(angle)
     s = np.sin(angle)
@@ -35,13 +44,15 @@ def evaluate_slide(re, im, angle):
     a = 1.0
     b = 0.0
     for k in range(1, re.size):
-        a, b = a * c - b * s, a * s + b * c
+        next_a = a * c - b * s
+        b = a * s + b * c
+        a = next_a
         even = re[k] * a - im[k] * b
         odd = re[k] * b + im[k] * a
         value += even
         rate -= k * odd
         bend -= k * k * even
-    return value, rate, bend
+    return SlideValues(value, rate, bend)
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
@@ -93,12 +104,12 @@ def find_turning_points(re, im, rate, angle, place, cell):
         a = rate[i]
         at = low + width * (a / (a - b) if a * b < 0 else 0.0)
         for _ in range(60):
-            _, v, bend = evaluate_slide(re, im, at)
-            if v * sign > 0:
+            slide = evaluate_slide(re, im, at)
+            if slide.rate * sign > 0:
                 low = at
             else:
                 high = at
-            new = at - v / bend if bend != 0 else low - 1.0
+            new = at - slide.rate / slide.bend if slide.bend != 0 else low - 1.0
             if not low <= new <= high:
                 new = 0.5 * (low + high)
             if abs(new - at) <= 1e-15 * n * width:
@@ -106,7 +117,7 @@ def find_turning_points(re, im, rate, angle, place, cell):
                 break
             at = new
         angle[count] = at
-        place[count] = evaluate_slide(re, im, at)[0]
+        place[count] = evaluate_slide(re, im, at).value
         cell[count] = i
         count += 1
         sign = after

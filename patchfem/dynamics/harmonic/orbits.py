@@ -9,7 +9,7 @@ extrapolation that did not help, the next one waits.
 
 import numpy as np
 
-from ..march.march import make_mark, read_output_extremes
+from ..march.recording import make_mark, read_output_extremes
 
 # cycles from the start to the first extrapolation
 FIRST_CYCLES = 6

@@ -1,6 +1,7 @@
 """Arrays of the contacts that a march can have."""
 
 from collections import namedtuple
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,175 @@ class Element(NamedTuple):
     bound: np.ndarray
 
 
+class StepStart(NamedTuple):
+    """Motion of an interface at the start of a step.
+
+    - rel_disp: relative displacement [m]
+    - velocity: relative velocity [m/s]
+    - dt: duration of the step [s]
+    """
+
+    rel_disp: float
+    velocity: float
+    dt: float
+
+
+class SolvedStep(NamedTuple):
+    """Solution of a step of a contact.
+
+    - increment: of the relative displacement [m]
+    - mean_force: path mean of the friction force [N]
+    - iterations: number of iterations, below 0 if the solution failed
+    """
+
+    increment: float
+    mean_force: float
+    iterations: int
+
+
+class StepProblem(NamedTuple):
+    """Step of points behind shear modes, dq = free - compliance times friction force.
+
+    - free: increment of the holder without friction [m]
+    - compliance: of the modes in the step [m/N]; at 0 the increment of the holder is prescribed
+    - law_kind: kind of the law of the points, PLASTIC or POINTS of `shear_points_kernels`
+    - relaxes: whether the pieces spring back while the holder stands
+    """
+
+    free: float
+    compliance: float
+    law_kind: int
+    relaxes: bool
+
+
+class LawStep(NamedTuple):
+    """One law in a step.
+
+    - numbers, memory: of the law
+    - rel_disp: relative displacement at the start [m]
+    - bond_length: of the step [m]
+    - dt: duration of the step [s]
+    """
+
+    numbers: np.ndarray
+    memory: np.ndarray
+    rel_disp: float
+    bond_length: float
+    dt: float
+
+
+class BondSums(NamedTuple):
+    """Sums over points of bonds: force [N], energy [J], stretch times load [N m] and load [N]."""
+
+    force: float
+    energy: float
+    stretch: float
+    load: float
+
+
+class PointRow(IntEnum):
+    """Rows of `ShearedPoints.points`.
+
+    - DENSITY, STRETCH, SQUARED_STRETCH: of bonds; of an elastic-plastic law DENSITY is the traction over mu and
+      STRETCH the springs
+    - PLAY: play of bonds with an elastic range [m]
+    - LOAD: load, or friction limit of a list of bonds
+    - SLIDE, FORCE, SLOPE: slide [m], force [N] and slope [N/m] in the step
+    """
+
+    DENSITY = 0
+    STRETCH = 1
+    SQUARED_STRETCH = 2
+    PLAY = 3
+    LOAD = 4
+    SLIDE = 5
+    FORCE = 6
+    SLOPE = 7
+
+
+class ListPointRow(IntEnum):
+    """First rows of `ShearedLists.points`, in place of those of `PointRow`.
+
+    - GROWTH_SPEED: speed at which bonds grow in the step [m/s]
+    - LAST_SPEED: mean speed of the last step [m/s]
+    - TRIAL_SLIDE, TRIAL_FORCE: slide [m] and force of the last trial
+    """
+
+    GROWTH_SPEED = 0
+    LAST_SPEED = 1
+    TRIAL_SLIDE = 2
+    TRIAL_FORCE = 3
+
+
+class DragRow(IntEnum):
+    """Rows of `ShearedPoints.drag`, for the slide of the holder and for each shear mode.
+
+    - FORCE: force while all points slip in the positive direction [N]
+    - MAX_SLIDE: largest slide of a point per coordinate
+    - MEAN_SLIDE: mean slide of the points per coordinate
+    """
+
+    FORCE = 0
+    MAX_SLIDE = 1
+    MEAN_SLIDE = 2
+
+
+class FlowPlace(IntEnum):
+    """Places in `ShearedPoints.flow`.
+
+    - DRAG_DIRECTION: sign of the slide while all points slip in one direction, else 0
+    - TOTAL_SLIDE: slide of the holder [m]
+    - IS_FULL: of `ShearedLists`, in place of the direction: 1 once a list is full
+    """
+
+    DRAG_DIRECTION = 0
+    TOTAL_SLIDE = 1
+    IS_FULL = 0
+
+
+class WorkRow(IntEnum):
+    """Rows of `ShearedPoints.workspace`: gradient, Newton step and trial solution."""
+
+    GRADIENT = 0
+    STEP = 1
+    TRIAL = 2
+
+
+class PressedPlace(IntEnum):
+    """Places in `PressedPoints.force`.
+
+    - MU_STATIC, MU_KINETIC: coefficients of friction
+    - BOND_LENGTH: [m]
+    - INITIAL_DENSITY: of the bonds
+    - LAW_KIND: PLASTIC or POINTS of `shear_points_kernels`
+    - RESIDUAL_GOAL: [N]
+    """
+
+    MU_STATIC = 0
+    MU_KINETIC = 1
+    BOND_LENGTH = 2
+    INITIAL_DENSITY = 3
+    LAW_KIND = 4
+    RESIDUAL_GOAL = 5
+
+
+class LoadPlace(IntEnum):
+    """Places in `VaryingLoad.few`.
+
+    - LOAD: present load [N]
+    - MEAN_PRESS: mean forces of the step on heave [N] and pitch [N m]
+    - GUESS: increments of heave and pitch of the last step, the guess of this one
+    - OUT: nine results of `contact.press_path_kernels.path_mean`
+    - START: heave, pitch, energy and forces at the start of the step
+    """
+
+    LOAD = 0
+    MEAN_PRESS = 3
+    GUESS = 6
+    OUT = 8
+    START = 17
+
+
 class ShearedPoints(NamedTuple):
     """Points (m,) of a law with memory behind r shear modes of the pieces.
 
@@ -30,13 +200,13 @@ class ShearedPoints(NamedTuple):
     - eps: (2,) bond length at the start and in the middle of the step [m]
     - growth: (6,) of eq. 2.10 and of the breakaway fraction
     - psi, kappa, b: shear modes (r, m), their stiffness [N/m] and coordinates [m] (r,)
-    - points: (8, m) rows named in `shear_points_kernels`
+    - points: (8, m), see `PointRow`
     - count: (1,) columns of points and psi that are under load
-    - drag, flow: (3, 1 + r), (2,) of points that all drag under a constant load, see
-      `shear_kernels`
+    - drag, flow: (3, 1 + r), (2,) of points that all drag under a constant load, see `DragRow` and
+      `FlowPlace`
     - y: (2, 1 + r) solution (dq, db) of the step, and of the pieces that spring back
     - last: (2, 1 + r) those of the two steps before
-    - scale, workspace: (1 + r,), (3, 1 + r)
+    - scale, workspace: (1 + r,), (3, 1 + r), see `WorkRow`
     - hess, ready: (2, 1 + r, 1 + r), and (2,): 1 where `hess` holds the factorised Hessian
     """
 
@@ -85,10 +255,10 @@ def make_sheared_fields(
     m, r = psi.shape
     size = 1 + len(kappa)
     more = -m % lanes
-    points = np.zeros((8, m + -m % lanes))
-    drag = np.zeros((3, size))
+    points = np.zeros((len(PointRow), m + -m % lanes))
+    drag = np.zeros((len(DragRow), size))
     if load is not None:
-        points[4, :m] = load
+        points[PointRow.LOAD, :m] = load
         pull = length * weight * load
         drag[:] = (
             np.append(pull.sum(), psi.T @ pull),
@@ -122,7 +292,7 @@ class PressedPoints(
 ):
     """Points of a law under a load that changes, see `pressed_points_kernels`.
 
-    - force: (6,) positions named there
+    - force: (6,), see `PressedPlace`
     - memory: (3, m) elastic-plastic traction/mu and springs [N], or m, z, s2 of bonds [N, N m, N
       m2]
     - pressed: (2, m) nodal forces at both ends of the step [N]
@@ -140,7 +310,7 @@ class ClimbingPoints(
 ):
     """A law with memory along flanks, see `dynamics.grooves`.
 
-    - flank, climb: (6,), (14,) positions named in `grooves.arrays`
+    - flank, climb: (6,), (14,) see `FlankPlace` and `ClimbPlace` of `grooves.arrays`
     - share: (m,) fractions of the normal force that the points carry
 
     The other fields are those of `PressedPoints`, with fractions of the normal force for the loads.
@@ -202,69 +372,10 @@ class ShearedLists(
     - places: (m,) of the points at rest [m]
 
     The other fields are those of `ShearedPoints`: weight (m,) has the friction limits [N], the
-    first four rows of points are named in `shear_lists_kernels`.
+    first four rows of points are those of `ListPointRow`.
     """
 
     __slots__ = ()
-
-
-class SingleContact(NamedTuple):
-    """A contact on port 0 alone; goal: (1,) of its residual [N]."""
-
-    goal: np.ndarray
-
-
-class SetValuedElements(NamedTuple):
-    """The m set-valued interfaces of a march, see `march.stops_kernels`.
-
-    - element, names: (m,) their numbers, and workspace for numbers
-    - limit: (4, m) static and kinetic friction at the start and at the end of the step [N]
-    - gives: (3, m, m) what their forces take from relative displacements [m/N], velocities [m/(s
-      N)] and accelerations [1/kg]
-    - rows: (m, n) relative displacement per coordinate
-    - system, field: (m, m), (18, m) workspace
-    """
-
-    element: np.ndarray
-    names: np.ndarray
-    limit: np.ndarray
-    gives: np.ndarray
-    rows: np.ndarray
-    system: np.ndarray
-    field: np.ndarray
-
-
-class PortElements(NamedTuple):
-    """Elements (e,) on ports (p,), in addition to a contact on port 0 or in its place.
-
-    Rows are named in `march.stops_kernels`.
-
-    - rows: (p, n) displacement of every port per coordinate
-    - gives: (2, p, p) what port forces take from displacements [m/N] and velocities [m/(s N)] of
-      the ports
-    - of: (3, e) port; 1 for friction, 0 for springs; element of the other direction of a plane,
-      else its own number
-    - num, mem: (e, ...) numbers and memory of the laws; num[e, 0] tells the law
-    - each: (10, e) numbers of each element in the step
-    - own: (5,) force, last increment, force at the sample and goal of the contact, and 1 where the
-      stops are known
-    - port: (2, p) displacement [m] and velocity [m/s] without forces
-    - modal: (5, n), system: (e, e), hess: (n, n) workspace
-    - stops: the set-valued elements
-    """
-
-    rows: np.ndarray
-    gives: np.ndarray
-    of: np.ndarray
-    num: np.ndarray
-    mem: np.ndarray
-    each: np.ndarray
-    own: np.ndarray
-    port: np.ndarray
-    modal: np.ndarray
-    system: np.ndarray
-    hess: np.ndarray
-    stops: SetValuedElements
 
 
 class VaryingLoad(NamedTuple):
@@ -279,7 +390,7 @@ class VaryingLoad(NamedTuple):
       determines it
     - slot: (1,) number of the contact set, below 0 where none fits
     - mean, goal: (1,) friction force of the step before, and goal of the residuals [N]
-    - few: (22,) workspace
+    - few: (22,) workspace, see `LoadPlace`
     """
 
     sets: tuple
@@ -309,7 +420,12 @@ def split_memory(contact, element=None) -> list | None:
     if isinstance(contact, Element):
         return split_element_memory(element, contact.mem[0])
     if isinstance(contact, ShearedPoints):
-        return [contact.eps, contact.b, contact.flow[1:], *contact.points[:5]]
+        return [
+            contact.eps,
+            contact.b,
+            contact.flow[FlowPlace.TOTAL_SLIDE :],
+            *contact.points[: PointRow.SLIDE],
+        ]
     return (
         [contact.eps, contact.b, contact.pressed[1], *contact.memory]
         if isinstance(contact, PressedPoints)
@@ -356,50 +472,4 @@ class ModalArrays(NamedTuple):
     dt: float
     beta: float
     mass: float
-    workspace: np.ndarray
-
-
-class StepBounds(NamedTuple):
-    """Bounds of a march of folded cycles.
-
-    - goal: tolerance of the friction force of a step [N]
-    - force: friction limit [N]
-    - travel: displacement of the output beyond which the march ends [m]
-    """
-
-    goal: float
-    force: float
-    travel: float
-
-
-class LargestSlide(NamedTuple):
-    """Sample of the largest slide, in a system of n modes.
-
-    - row: (2 n + 7,) the present sample
-    - kept: (2 n + 10,) sample of the largest slide so far, with the sums there
-    - number: (1,) its number, counted from the first step
-    """
-
-    row: np.ndarray
-    kept: np.ndarray
-    number: np.ndarray
-
-
-class FoldedCycles(NamedTuple):
-    """Sums and output that `march.passing_kernels` records of cycles without samples.
-
-    - bounds, largest: as above
-    - ledger: (9,) of `march.loop_kernels.march`
-    - sums: (5,) sums over these cycles [J], named in `passing_kernels`
-    - totals: (3,) the first three sums before these cycles [J]
-    - trace: (4, s + 1) samples of the output and waves of the drive, named in `passing_kernels`
-    - workspace: (14, k) space for a block of k steps
-    """
-
-    bounds: StepBounds
-    largest: LargestSlide
-    ledger: np.ndarray
-    sums: np.ndarray
-    totals: np.ndarray
-    trace: np.ndarray
     workspace: np.ndarray

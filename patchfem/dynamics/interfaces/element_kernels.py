@@ -8,63 +8,41 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws import elastic_plastic_kernels as law
 from . import element_solve_kernels as solver
+from .arrays import LawStep
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_step(free, beta, q, v, dt, contact, goal):
+def solve_step(free, beta, start, contact, goal):
     """Solve a step with dq = free - beta force; the memory stays as it is.
 
     Parameters
     ----------
     free, beta : float
         Increment without friction [m], and what a newton takes of it [m/N].
-    q, v : float
-        Relative displacement [m] and velocity [m/s] at the start.
-    dt : float
-        [s].
+    start : arrays.StepStart
     contact : arrays.Element
     goal : float
         Of the residual [N].
 
     Returns
     -------
-    dq : float
-        [m].
-    force : float
-        Path mean [N].
-    iterations : int
-        Below 0 where it failed.
+    arrays.SolvedStep
     """
-    contact.eps[0] = law.step_bond_length(contact.num[0], contact.mem[0], v, dt)
+    contact.eps[0] = law.step_bond_length(contact.num[0], contact.mem[0], start.velocity, start.dt)
     guess = 2 * contact.last[0] - contact.last[1]
-    return solver.solve_element(
-        free,
-        beta,
-        contact.num[0],
-        contact.mem[0],
-        q,
-        contact.eps[0],
-        dt,
-        guess,
-        contact.bound[0],
-        goal,
-    )
+    step = LawStep(contact.num[0], contact.mem[0], start.rel_disp, contact.eps[0], start.dt)
+    return solver.solve_element(free, beta, step, guess, contact.bound[0], goal)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def apply_increment(dq, q, v, dt, contact, goal):
+def apply_increment(dq, start, contact, goal):
     """Return the mean force over a prescribed increment; the memory stays as it is.
 
     Parameters
     ----------
     dq : float
         Increment of the relative displacement [m].
-    q : float
-        Relative displacement [m].
-    v : float
-        Relative velocity at the start of the step [m/s].
-    dt : float
-        Duration of the step [s].
+    start : arrays.StepStart
     contact : arrays.Element
     goal : float
         Tolerance of the residual [N].
@@ -76,12 +54,15 @@ def apply_increment(dq, q, v, dt, contact, goal):
     is_solved : bool
         Always true.
     """
-    contact.eps[0] = law.step_bond_length(contact.num[0], contact.mem[0], v, dt)
-    return law.mean_force(contact.num[0], contact.mem[0], q, dq, contact.eps[0], dt)[0], True
+    contact.eps[0] = law.step_bond_length(contact.num[0], contact.mem[0], start.velocity, start.dt)
+    force, _ = law.mean_force(
+        contact.num[0], contact.mem[0], start.rel_disp, dq, contact.eps[0], start.dt
+    )
+    return force, True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit_step(dq, force, q, v0, v1, dt, contact):
+def commit_step(dq, force, start, end_velocity, contact):
     """Move the memory by a solved step.
 
     Parameters
@@ -90,14 +71,9 @@ def commit_step(dq, force, q, v0, v1, dt, contact):
         Increment of the relative displacement [m].
     force : float
         Path mean over dq [N].
-    q : float
-        Relative displacement [m].
-    v0 : float
-        Velocity at the start of the step [m/s].
-    v1 : float
-        Velocity at the end of the step [m/s].
-    dt : float
-        Duration of the step [s].
+    start : arrays.StepStart
+    end_velocity : float
+        Relative velocity at the end of the step [m/s].
     contact : arrays.Element
 
     Returns
@@ -109,30 +85,33 @@ def commit_step(dq, force, q, v0, v1, dt, contact):
     """
     contact.last[1] = contact.last[0]
     contact.last[0] = dq
-    return law.update_memory(
-        contact.num[0], contact.mem[0], dq, force, v0, v1, dt, contact.eps[0]
-    ), True
+    loss = law.update_memory(
+        contact.num[0],
+        contact.mem[0],
+        dq,
+        force,
+        start.velocity,
+        end_velocity,
+        start.dt,
+        contact.eps[0],
+    )
+    return loss, True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_state(contact, q, v):
+def read_state(contact, rel_disp, velocity):
     """Return force, stored energy and slip of the element.
 
     Parameters
     ----------
     contact : arrays.Element
-    q : float
+    rel_disp : float
         Relative displacement [m].
-    v : float
-        Relative velocity at the start of the step [m/s].
+    velocity : float
+        Relative velocity [m/s].
 
     Returns
     -------
-    force : float
-        [N].
-    energy : float
-        Stored energy [J].
-    slip : float
-        [m].
+    friction.protocol_kernels.Reading
     """
-    return law.read_memory(contact.num[0], contact.mem[0], q, v)
+    return law.read_memory(contact.num[0], contact.mem[0], rel_disp, velocity)

@@ -3,54 +3,55 @@
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws import elastic_plastic_kernels as law
-from ..modal_kernels import narrow_bracket
+from ..modal_kernels import Bracket, narrow_bracket
+from .arrays import SolvedStep
+
+MAX_ITERATIONS = 200
+N_NEWTON_STEPS = 40  # iterations before bisection helps Newton's method
+BOUND_MARGIN = 1.001  # keeps a contact in full slip inside the bracket, not on its edge
+ROUND_OFF = 4e-16  # round-off error of a sum over its largest term
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_element(free, beta, numbers, memory, q, eps, dt, guess, bound, goal):
+def solve_element(free, beta, step, guess, bound, goal):
     """Solve dq = free - beta F(dq) for one element.
 
     Parameters
     ----------
     free, beta : float
         See `element_kernels.solve_step`.
-    numbers, memory : ndarray
-        Of the law.
-    q, eps, dt : float
-        Relative displacement [m], bond length [m], step [s].
+    step : arrays.LawStep
     guess : float
-        Of dq [m].
+        Guess of dq [m].
     bound : float
         Largest |F| [N], infinite where there is none.
     goal : float
-        Of the residual over beta [N].
+        Tolerance of the residual over beta [N].
 
     Returns
     -------
-    dq : float
-    force : float
-    iterations : int
-        Below 0 where it failed.
+    arrays.SolvedStep
     """
-    closed = law.solve_step(numbers, memory, free, beta)
+    closed = law.solve_step(step.numbers, step.memory, free, beta)
     if closed.is_solved:
-        return closed.increment, closed.mean_force, 1
-    # the margin keeps a contact in full slip inside the bracket, not on its edge
-    reach = 1.001 * beta * bound
-    low = free - reach
-    high = free + reach
-    dq = min(max(guess, low), high)
+        return SolvedStep(closed.increment, closed.mean_force, 1)
+    reach = BOUND_MARGIN * beta * bound
+    bracket = Bracket(free - reach, free + reach, min(max(guess, free - reach), free + reach))
     force = 0.0
-    for count in range(1, 200):
-        force, slope = law.mean_force(numbers, memory, q, dq, eps, dt)
-        miss = dq - free + beta * force
-        digit = 4e-16 * (abs(free) + abs(dq) + beta * abs(force))
-        if abs(miss) <= goal * beta + digit:
-            return dq, force, count
+    for count in range(1, MAX_ITERATIONS):
+        dq = bracket.point
+        force, slope = law.mean_force(
+            step.numbers, step.memory, step.rel_disp, dq, step.bond_length, step.dt
+        )
+        residual = dq - free + beta * force
+        noise = ROUND_OFF * (abs(free) + abs(dq) + beta * abs(force))
+        if abs(residual) <= goal * beta + noise:
+            return SolvedStep(dq, force, count)
         # a force that decreases with the slide must not reverse the step
         gain = max(1 + beta * slope, 0.1)
-        low, high, dq = narrow_bracket(low, high, dq, miss, gain, count - 40)
+        bracket = narrow_bracket(bracket, residual, gain, count - N_NEWTON_STEPS)
         # the force jumps at this slide if round-off of the slide does not explain the residual
-        if high - low <= digit:
-            return dq, force, count if abs(miss) <= goal * beta + 8 * gain * digit else -count
-    return dq, force, -200
+        if bracket.high - bracket.low <= noise:
+            is_solved = abs(residual) <= goal * beta + 8 * gain * noise
+            return SolvedStep(bracket.point, force, count if is_solved else -count)
+    return SolvedStep(bracket.point, force, -MAX_ITERATIONS)

@@ -10,13 +10,18 @@ from ...friction.bonds.list_forms_kernels import FORM_MOMENTS, FORM_POWER
 from ...friction.bonds.list_kernels import list_force, list_mean, list_slope, list_step
 from ...friction.bonds.list_rows_kernels import LAW, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
-from ..modal_kernels import narrow_bracket
+from ...friction.protocol_kernels import Reading
+from ..modal_kernels import Bracket, narrow_bracket
+from .arrays import SolvedStep
 
 # increment over the bond length, below which the slope of the force is the mean of the slopes in both directions
 SLOPE_STEP = 1e-9
 # largest energy that a list may gain in short steps and repay by its next dissipation (see `commit_step`), over the
 # energy of one bond length at the friction limit
 MAX_OWED_RATIO = 1e-4
+MAX_ITERATIONS = 300
+N_SECANT_STEPS = 8  # iterations before bisection helps the secant method
+ROUND_OFF = 4e-16  # round-off error of a sum over its largest term
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -55,8 +60,8 @@ def find_mean_and_slope(dq, contact, v0, dt):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find_force_and_slope(dq, contact, v0, dt):
-    """Return the path-mean force of a list and its slope.
+def find_mean_force(dq, contact, v0, dt):
+    """Return the path-mean force of a list [N].
 
     Parameters
     ----------
@@ -70,63 +75,50 @@ def find_force_and_slope(dq, contact, v0, dt):
 
     Returns
     -------
-    force : float
-        [N].
-    slope : float
-        [N/m]; 0 where it is unknown.
+    float
     """
-    scale = contact.force[0]
     if contact.law[LAW.form] == FORM_MOMENTS:
-        force, slope = list_slope(dq, contact, v0, dt)
-        return scale * force, scale * slope
-    return scale * list_mean(dq, contact, v0, dt), 0.0
+        return contact.force[0] * list_slope(dq, contact, v0, dt)[0]
+    return contact.force[0] * list_mean(dq, contact, v0, dt)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_step(free, beta, q, v, dt, contact, goal):
+def solve_step(free, beta, start, contact, goal):
     """Solve a step with dq = free - beta force by secants, like `element_kernels.solve_step`.
 
     Returns
     -------
-    dq : float
-    force : float
-    iterations : int
-        Below 0 where it failed.
+    arrays.SolvedStep
     """
-    here = 2 * contact.last[0] - contact.last[1]
     gain = 1 + beta * contact.force[0] / contact.law[LAW.length]
-    low = -np.inf
-    high = np.inf
-    last = here
-    last_miss = 0.0
-    for count in range(1, 300):
-        force = find_force_and_slope(here, contact, v, dt)[0]
-        miss = here - free + beta * force
-        if abs(miss) <= goal * beta or high - low <= 4e-16 * (abs(free) + beta * contact.bound[0]):
-            return here, force, count
+    bracket = Bracket(-np.inf, np.inf, 2 * contact.last[0] - contact.last[1])
+    noise = ROUND_OFF * (abs(free) + beta * contact.bound[0])
+    last = bracket.point
+    last_residual = 0.0
+    for count in range(1, MAX_ITERATIONS):
+        point = bracket.point
+        force = find_mean_force(point, contact, start.velocity, start.dt)
+        residual = point - free + beta * force
+        if abs(residual) <= goal * beta or bracket.high - bracket.low <= noise:
+            return SolvedStep(point, force, count)
         if count > 1:
-            gain = (miss - last_miss) / (here - last) if here != last else 1.0
+            gain = (residual - last_residual) / (point - last) if point != last else 1.0
             gain = gain if gain > 0.1 else 1.0
-        last = here
-        last_miss = miss
-        low, high, here = narrow_bracket(low, high, here, miss, gain, count - 8)
-    return last, force, -300
+        last = point
+        last_residual = residual
+        bracket = narrow_bracket(bracket, residual, gain, count - N_SECANT_STEPS)
+    return SolvedStep(last, force, -MAX_ITERATIONS)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def apply_increment(dq, q, v, dt, contact, goal):
+def apply_increment(dq, start, contact, goal):
     """Return the mean force over a prescribed increment; the memory stays as it is.
 
     Parameters
     ----------
     dq : float
         Increment of the relative displacement [m].
-    q : float
-        Relative displacement [m].
-    v : float
-        Relative velocity at the start of the step [m/s].
-    dt : float
-        Duration of the step [s].
+    start : arrays.StepStart
     contact : arrays.BondList
     goal : float
         Tolerance of the residual [N].
@@ -138,11 +130,11 @@ def apply_increment(dq, q, v, dt, contact, goal):
     is_solved : bool
         Always true.
     """
-    return find_force_and_slope(dq, contact, v, dt)[0], True
+    return find_mean_force(dq, contact, start.velocity, start.dt), True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit_step(dq, force, q, v0, v1, dt, contact):
+def commit_step(dq, force, start, end_velocity, contact):
     """Move the list by a solved step.
 
     The work that is not stored is dissipated where positive; the law as printed also creates
@@ -160,7 +152,7 @@ def commit_step(dq, force, q, v0, v1, dt, contact):
     contact.last[1] = contact.last[0]
     contact.last[0] = dq
     before = contact.status[STATUS.energy]
-    ok = list_step(dq, contact, v0, v1, dt)
+    ok = list_step(dq, contact, start.velocity, end_velocity, start.dt)
     return add_list_energies(force * dq, before, contact.force[0], contact), ok
 
 
@@ -194,29 +186,25 @@ def add_list_energies(work, before, limit, contact):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_state(contact, q, v):
+def read_state(contact, rel_disp, velocity):
     """Return force, stored energy and slip of the list.
 
     Parameters
     ----------
     contact : arrays.BondList
-    q : float
+    rel_disp : float
         Relative displacement [m].
-    v : float
-        Relative velocity at the start of the step [m/s].
+    velocity : float
+        Relative velocity [m/s].
 
     Returns
     -------
-    force : float
-        [N].
-    energy : float
-        Stored energy [J].
-    slip : float
-        [m].
+    friction.protocol_kernels.Reading
     """
-    force = contact.force[0] * contact.status[STATUS.force]
-    return (
-        force,
-        contact.force[0] * (contact.status[STATUS.energy] - contact.status[STATUS.owed]),
-        q - force * contact.law[LAW.length] / contact.force[0] if contact.force[0] > 0 else q,
-    )
+    limit = contact.force[0]
+    force = limit * contact.status[STATUS.force]
+    energy = limit * (contact.status[STATUS.energy] - contact.status[STATUS.owed])
+    slip = rel_disp
+    if limit > 0:
+        slip -= force * contact.law[LAW.length] / limit
+    return Reading(force, energy, slip)

@@ -14,26 +14,11 @@ from ...compiled.jit import njit
 from ...friction.bonds.point_kernels import bond_step, grow, press_point
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws.elastic_plastic_kernels import press_springs, spring_step
-from .shear_points_kernels import (
-    DENSITY,
-    LOAD,
-    PLASTIC,
-    POINTS,
-    SLIDE,
-    SLOPE,
-    SQUARED_STRETCH,
-    STRETCH,
-    write_forces,
-)
+from ...friction.protocol_kernels import Reading
+from .arrays import PointRow, PressedPlace, SolvedStep, StepProblem
+from .shear_points_kernels import PLASTIC, POINTS, write_forces
 from .shear_solve_kernels import accept_step, minimise, set_middle_length, set_slides
 
-# positions in `PressedPoints.force`: coefficients of friction, bond length [m], initial density, kind of the law, goal [N]
-MU_STATIC = 0
-MU_KINETIC = 1
-BOND_LENGTH = 2
-INITIAL_DENSITY = 3
-LAW_KIND = 4
-RESIDUAL_GOAL = 5
 # residual over the goal, to which pieces that deform in shear are solved; their loss is a small difference
 GOAL_FRACTION = 0.01
 
@@ -49,7 +34,7 @@ def gather_loaded_points(part, contact):
         if load > 0.0:
             same = same and under[count] == j
             under[count] = j
-            contact.points[LOAD, count] = load
+            contact.points[PointRow.LOAD, count] = load
             count += 1
     if not same or contact.count[0] < count:
         for k in range(contact.kappa.size):
@@ -67,16 +52,20 @@ def press_points(kind, contact):
     for i in range(contact.count[0]):
         j = contact.under[i]
         if kind == PLASTIC:
-            points[DENSITY, i], points[STRETCH, i] = press_springs(
-                memory[0, j], memory[1, j], points[LOAD, i]
+            points[PointRow.DENSITY, i], points[PointRow.STRETCH, i] = press_springs(
+                memory[0, j], memory[1, j], points[PointRow.LOAD, i]
             )
         else:
-            points[DENSITY, i], points[STRETCH, i], points[SQUARED_STRETCH, i] = press_point(
+            (
+                points[PointRow.DENSITY, i],
+                points[PointRow.STRETCH, i],
+                points[PointRow.SQUARED_STRETCH, i],
+            ) = press_point(
                 (memory[0, j], memory[1, j], memory[2, j]),
                 contact.pressed[0, j],
-                points[LOAD, i],
-                contact.force[INITIAL_DENSITY],
-                contact.force[BOND_LENGTH],
+                points[PointRow.LOAD, i],
+                contact.force[PressedPlace.INITIAL_DENSITY],
+                contact.force[PressedPlace.BOND_LENGTH],
             )
 
 
@@ -103,45 +92,39 @@ def find_friction_force(dq, kind, contact):
     force = write_forces(kind, False, contact)
     slope = 0.0
     for i in range(contact.count[0]):
-        slope += contact.points[SLOPE, i]
+        slope += contact.points[PointRow.SLOPE, i]
     return force, slope
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_step(free, beta, q, v, dt, contact, goal):
+def solve_step(free, beta, start, contact, goal):
     """Solve a step with dq = free - beta force under the mean load; dq = free for beta = 0.
 
     Returns
     -------
-    dq : float
-    force : float
-    iterations : int
-        Below 0 where it failed.
+    arrays.SolvedStep
     """
-    kind = int(contact.force[LAW_KIND])
+    kind = int(contact.force[PressedPlace.LAW_KIND])
     if kind == POINTS:
-        set_middle_length(v, dt, contact)
+        set_middle_length(start.velocity, start.dt, contact)
     press_points(kind, contact)
     if beta == 0.0:
         contact.y[0, 0] = free
-    force, count = minimise(free, beta, kind, False, contact, GOAL_FRACTION * goal)
-    return contact.y[0, 0], (free - contact.y[0, 0]) / beta if beta > 0.0 else force, count
+    force, count = minimise(StepProblem(free, beta, kind, False), contact, GOAL_FRACTION * goal)
+    if beta > 0.0:
+        force = (free - contact.y[0, 0]) / beta
+    return SolvedStep(contact.y[0, 0], force, count)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def apply_increment(dq, q, v, dt, contact, goal):
+def apply_increment(dq, start, contact, goal):
     """Return the mean force over a prescribed increment; the memory stays as it is.
 
     Parameters
     ----------
     dq : float
         Increment of the relative displacement [m].
-    q : float
-        Relative displacement [m].
-    v : float
-        Relative velocity at the start of the step [m/s].
-    dt : float
-        Duration of the step [s].
+    start : arrays.StepStart
     contact : arrays.PressedPoints
     goal : float
         Tolerance of the residual [N].
@@ -153,12 +136,12 @@ def apply_increment(dq, q, v, dt, contact, goal):
     is_solved : bool
         Whether it was found.
     """
-    _, force, count = solve_step(dq, 0.0, q, v, dt, contact, goal)
-    return force, count >= 0
+    solution = solve_step(dq, 0.0, start, contact, goal)
+    return solution.mean_force, solution.iterations >= 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit_step(dq, force, q, v0, v1, dt, contact):
+def commit_step(dq, force, start, end_velocity, contact):
     """Move points and pieces by a solved step.
 
     Returns
@@ -168,54 +151,46 @@ def commit_step(dq, force, q, v0, v1, dt, contact):
     is_solved : bool
         Whether the pieces came to balance.
     """
-    kind = int(contact.force[LAW_KIND])
-    lost = commit_points(dq, force, v0, v1, dt, kind, contact)
+    kind = int(contact.force[PressedPlace.LAW_KIND])
+    lost = commit_points(dq, force, start, end_velocity, kind, contact)
     if contact.b.size == 0:
         return lost, True
-    more, count = relax_pieces(kind, contact, contact.force[RESIDUAL_GOAL])
+    more, count = relax_pieces(kind, contact, contact.force[PressedPlace.RESIDUAL_GOAL])
     return lost + more, count >= 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_state(contact, q, v):
+def read_state(contact, rel_disp, velocity):
     """Return force, stored energy and slip of points and pieces.
 
     Parameters
     ----------
     contact : arrays.PressedPoints
-    q : float
+    rel_disp : float
         Relative displacement [m].
-    v : float
-        Relative velocity at the start of the step [m/s].
+    velocity : float
+        Relative velocity [m/s].
 
     Returns
     -------
-    force : float
-        [N].
-    energy : float
-        Stored energy [J].
-    slip : float
-        [m].
+    friction.protocol_kernels.Reading
     """
-    return read_points(int(contact.force[LAW_KIND]), contact, q)
+    return read_points(int(contact.force[PressedPlace.LAW_KIND]), contact, rel_disp)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit_points(dq, used, v0, v1, dt, kind, contact):
+def commit_points(dq, force, start, end_velocity, kind, contact):
     """Move the memory of the points by a solved step.
 
     Parameters
     ----------
     dq : float
         Increment of the relative displacement [m].
-    used : float
+    force : float
         Path-mean force over dq [N].
-    v0 : float
-        Velocity at the start of the step [m/s].
-    v1 : float
-        Velocity at the end of the step [m/s].
-    dt : float
-        Duration of the step [s].
+    start : arrays.StepStart
+    end_velocity : float
+        Relative velocity at the end of the step [m/s].
     kind : int
         Kind of the law of the points, PLASTIC or POINTS.
     contact : arrays.PressedPoints
@@ -225,23 +200,25 @@ def commit_points(dq, used, v0, v1, dt, kind, contact):
     float
         Energy dissipated [J], that of the changing load included.
     """
-    length = contact.force[BOND_LENGTH]
+    length = contact.force[PressedPlace.BOND_LENGTH]
     memory = contact.memory
     points = contact.points
-    lost = used * dq + elastic_energy(kind, contact) if kind == PLASTIC else 0.0
+    lost = force * dq + elastic_energy(kind, contact) if kind == PLASTIC else 0.0
     for i in range(contact.count[0]):
         j = contact.under[i]
-        load = points[LOAD, i]
-        xi = points[SLIDE, i]
+        load = points[PointRow.LOAD, i]
+        xi = points[PointRow.SLIDE, i]
         if kind == PLASTIC:
-            y, springs = spring_step(points[DENSITY, i], points[STRETCH, i], load, xi, length)
+            y, springs = spring_step(
+                points[PointRow.DENSITY, i], points[PointRow.STRETCH, i], load, xi, length
+            )
             memory[0, j], memory[1, j] = press_springs(y, springs, contact.pressed[1, j])
         else:
-            lost += 0.5 * contact.weight[i] * (memory[2, j] - points[SQUARED_STRETCH, i])
+            lost += 0.5 * contact.weight[i] * (memory[2, j] - points[PointRow.SQUARED_STRETCH, i])
             m, z, s2, part = bond_step(
-                points[DENSITY, i],
-                points[STRETCH, i],
-                points[SQUARED_STRETCH, i],
+                points[PointRow.DENSITY, i],
+                points[PointRow.STRETCH, i],
+                points[PointRow.SQUARED_STRETCH, i],
                 xi,
                 load,
                 contact.eps[1],
@@ -250,14 +227,16 @@ def commit_points(dq, used, v0, v1, dt, kind, contact):
                 (m, z, s2),
                 load,
                 contact.pressed[1, j],
-                contact.force[INITIAL_DENSITY],
+                contact.force[PressedPlace.INITIAL_DENSITY],
                 length,
             )
             lost += 0.5 * contact.weight[i] * (part + s2 - memory[2, j])
     accept_step(contact)
     if kind == PLASTIC:
         return lost - elastic_energy(kind, contact)
-    contact.eps[0] = grow(contact.eps[0], v0, v1, abs(dq), dt, contact.growth)[0]
+    contact.eps[0] = grow(
+        contact.eps[0], start.velocity, end_velocity, abs(dq), start.dt, contact.growth
+    )[0]
     return lost
 
 
@@ -280,16 +259,19 @@ def relax_pieces(kind, contact, goal):
     gather_loaded_points(1.0, contact)
     before = elastic_energy(kind, contact)
     for i in range(contact.count[0]):
-        points[DENSITY, i] = memory[0, contact.under[i]]
-        points[STRETCH, i] = memory[1, contact.under[i]]
+        points[PointRow.DENSITY, i] = memory[0, contact.under[i]]
+        points[PointRow.STRETCH, i] = memory[1, contact.under[i]]
     y[:] = 0.0
-    count = minimise(0.0, 0.0, kind, True, contact, GOAL_FRACTION * goal)[1]
+    problem = StepProblem(0.0, 0.0, kind, True)
+    _, count = minimise(problem, contact, GOAL_FRACTION * goal)
     for i in range(contact.count[0]):
         j = contact.under[i]
-        load = points[LOAD, i]
-        xi = points[SLIDE, i]
+        load = points[PointRow.LOAD, i]
+        xi = points[PointRow.SLIDE, i]
         if kind == PLASTIC:
-            a, b = spring_step(memory[0, j], memory[1, j], load, xi, contact.force[BOND_LENGTH])
+            a, b = spring_step(
+                memory[0, j], memory[1, j], load, xi, contact.force[PressedPlace.BOND_LENGTH]
+            )
             memory[0, j], memory[1, j] = press_springs(a, b, load)
         else:
             memory[0, j], memory[1, j], memory[2, j], _ = bond_step(
@@ -304,8 +286,8 @@ def relax_pieces(kind, contact, goal):
 def elastic_energy(kind, contact):
     """Return the elastic energy of memory and pieces [J]."""
     out = 0.0
-    mu = contact.force[MU_STATIC]
-    length = contact.force[BOND_LENGTH]
+    mu = contact.force[PressedPlace.MU_STATIC]
+    length = contact.force[PressedPlace.BOND_LENGTH]
     memory = contact.memory
     for k in range(contact.b.size):
         out += 0.5 * contact.kappa[k] * contact.b[k] * contact.b[k]
@@ -320,7 +302,7 @@ def elastic_energy(kind, contact):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_points(kind, contact, q):
+def read_points(kind, contact, rel_disp):
     """Return friction force, stored energy and slip of points and pieces.
 
     Parameters
@@ -328,27 +310,22 @@ def read_points(kind, contact, q):
     kind : int
         Kind of the law of the points, PLASTIC or POINTS.
     contact : arrays.PressedPoints
-    q : float
+    rel_disp : float
         Relative displacement [m].
 
     Returns
     -------
-    force : float
-        [N].
-    energy : float
-        Stored energy [J].
-    slip : float
-        [m].
+    friction.protocol_kernels.Reading
     """
-    mu = contact.force[MU_STATIC]
-    length = contact.force[BOND_LENGTH]
+    mu = contact.force[PressedPlace.MU_STATIC]
+    length = contact.force[PressedPlace.BOND_LENGTH]
     memory = contact.memory
     points = contact.points
     force = 0.0
     slip = 0.0
     total = 0.0
     gather_loaded_points(1.0, contact)
-    set_slides(q, contact.b, contact)
+    set_slides(rel_disp, contact.b, contact)
     for i in range(contact.count[0]):
         j = contact.under[i]
         if kind == PLASTIC:
@@ -357,6 +334,7 @@ def read_points(kind, contact, q):
         else:
             force += mu / length * memory[1, j]
             stretch = memory[1, j] / memory[0, j] if memory[0, j] > 0 else 0.0
-        slip += points[LOAD, i] * (points[SLIDE, i] - stretch)
-        total += points[LOAD, i]
-    return force, elastic_energy(kind, contact), slip / total if total > 0 else q
+        slip += points[PointRow.LOAD, i] * (points[PointRow.SLIDE, i] - stretch)
+        total += points[PointRow.LOAD, i]
+    slip = slip / total if total > 0 else rel_disp
+    return Reading(force, elastic_energy(kind, contact), slip)

@@ -9,56 +9,45 @@ from ...compiled.jit import njit
 from ...friction.bonds.list_kernels import list_step
 from ...friction.bonds.list_rows_kernels import CLOCK, LAW, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+from ...friction.protocol_kernels import Reading
 from . import shear_solve_kernels as solver
+from .arrays import DragRow, FlowPlace, ListPointRow, PointRow, SolvedStep, StepProblem
 from .list_kernels import add_list_energies
-from .shear_kernels import MEAN_SLIDE, TOTAL_SLIDE
 from .shear_lists_kernels import (
-    GROWTH_SPEED,
-    LAST_SPEED,
     find_pressure,
     has_changing_pressure,
     load_list,
     start_step,
     store_list,
 )
-from .shear_points_kernels import FORCE, SLIDE
-
-# position in `ShearedLists.flow`: 1 once a list is full
-IS_FULL = 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_step(free, beta, q, v, dt, contact, goal):
+def solve_step(free, beta, start, contact, goal):
     """Solve a step with dq = free - beta force, like `element_kernels.solve_step`.
 
     Returns
     -------
-    dq : float
-    force : float
-    iterations : int
-        Below 0 where it failed.
+    arrays.SolvedStep
     """
-    start_step(dt, contact)
+    start_step(start.dt, contact)
     if beta == 0.0:
         contact.y[0, 0] = free
-    force, count = solver.minimise(free, beta, 0, False, contact, goal)
-    return contact.y[0, 0], (free - contact.y[0, 0]) / beta if beta > 0.0 else force, count
+    force, count = solver.minimise(StepProblem(free, beta, 0, False), contact, goal)
+    if beta > 0.0:
+        force = (free - contact.y[0, 0]) / beta
+    return SolvedStep(contact.y[0, 0], force, count)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def apply_increment(dq, q, v, dt, contact, goal):
+def apply_increment(dq, start, contact, goal):
     """Return the mean force over a prescribed increment; the memory stays as it is.
 
     Parameters
     ----------
     dq : float
         Increment of the relative displacement [m].
-    q : float
-        Relative displacement [m].
-    v : float
-        Relative velocity at the start of the step [m/s].
-    dt : float
-        Duration of the step [s].
+    start : arrays.StepStart
     contact : arrays.ShearedLists
     goal : float
         Tolerance of the residual [N].
@@ -70,14 +59,12 @@ def apply_increment(dq, q, v, dt, contact, goal):
     is_solved : bool
         Whether it was found.
     """
-    start_step(dt, contact)
-    contact.y[0, 0] = dq
-    force, count = solver.minimise(dq, 0.0, 0, False, contact, goal)
-    return force, count >= 0
+    solution = solve_step(dq, 0.0, start, contact, goal)
+    return solution.mean_force, solution.iterations >= 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit_step(dq, force, q, v0, v1, dt, contact):
+def commit_step(dq, force, start, end_velocity, contact):
     """Move lists and pieces by a solved step; the lists sum up what they dissipate and create.
 
     Returns
@@ -91,23 +78,25 @@ def commit_step(dq, force, q, v0, v1, dt, contact):
     before = stored_energy(contact)
     fine = True
     changes = has_changing_pressure(contact)
-    contact.flow[TOTAL_SLIDE] += dq
+    contact.flow[FlowPlace.TOTAL_SLIDE] += dq
     for j in range(int(contact.count[0])):
         load_list(j, contact)
-        xi = points[SLIDE, j]
+        xi = points[PointRow.SLIDE, j]
         energy = contact.status[STATUS.energy]
-        speed = abs(xi) / dt
-        fine = list_step(xi, contact, speed, speed, dt) and fine
+        speed = abs(xi) / start.dt
+        fine = list_step(xi, contact, speed, speed, start.dt) and fine
         if changes:
             contact.nows[j, CLOCK.displacement] = contact.now[CLOCK.displacement]
             if find_pressure(j, contact) <= 0.0:
                 break_bonds(contact.status)
-        add_list_energies(points[FORCE, j] * xi, energy, contact.weight[j], contact)
+        add_list_energies(points[PointRow.FORCE, j] * xi, energy, contact.weight[j], contact)
         store_list(j, contact)
-        points[GROWTH_SPEED, j] = max(1.5 * speed - 0.5 * points[LAST_SPEED, j], 0.0)
-        points[LAST_SPEED, j] = speed
+        points[ListPointRow.GROWTH_SPEED, j] = max(
+            1.5 * speed - 0.5 * points[ListPointRow.LAST_SPEED, j], 0.0
+        )
+        points[ListPointRow.LAST_SPEED, j] = speed
     solver.accept_step(contact)
-    contact.flow[IS_FULL] = 0.0 if fine else 1.0
+    contact.flow[FlowPlace.IS_FULL] = 0.0 if fine else 1.0
     return force * dq - (stored_energy(contact) - before), fine
 
 
@@ -133,48 +122,37 @@ def stored_energy(contact):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_state(contact, q, v):
+def read_state(contact, rel_disp, velocity):
     """Return force, stored energy and slip of lists and pieces.
 
     Parameters
     ----------
     contact : arrays.ShearedLists
-    q : float
+    rel_disp : float
         Relative displacement [m].
-    v : float
-        Relative velocity at the start of the step [m/s].
+    velocity : float
+        Relative velocity [m/s].
 
     Returns
     -------
-    force : float
-        [N].
-    energy : float
-        Stored energy [J].
-    slip : float
-        [m].
+    friction.protocol_kernels.Reading
     """
     force = 0.0
     total = 0.0
-    slip = contact.flow[TOTAL_SLIDE]
+    slip = 0.0
     if has_changing_pressure(contact):
-        slip = 0.0
         for j in range(int(contact.count[0])):
-            here = contact.weight[j] * find_pressure(j, contact)
+            load = contact.weight[j] * find_pressure(j, contact)
             force += contact.weight[j] * contact.statuses[j, STATUS.force]
-            slip += here * contact.nows[j, CLOCK.displacement]
-            total += here
-        return (
-            force,
-            stored_energy(contact),
-            (slip - contact.law[LAW.length] * force) / total if total > 0 else q,
-        )
+            slip += load * contact.nows[j, CLOCK.displacement]
+            total += load
+        slip = (slip - contact.law[LAW.length] * force) / total if total > 0 else rel_disp
+        return Reading(force, stored_energy(contact), slip)
+    slip = contact.flow[FlowPlace.TOTAL_SLIDE]
     for k in range(contact.b.size):
-        slip -= contact.drag[MEAN_SLIDE, k + 1] * contact.b[k]
+        slip -= contact.drag[DragRow.MEAN_SLIDE, k + 1] * contact.b[k]
     for j in range(int(contact.count[0])):
         force += contact.weight[j] * contact.statuses[j, STATUS.force]
         total += contact.weight[j]
-    return (
-        force,
-        stored_energy(contact),
-        slip - contact.law[LAW.length] * force / total if total > 0 else q,
-    )
+    slip = slip - contact.law[LAW.length] * force / total if total > 0 else rel_disp
+    return Reading(force, stored_energy(contact), slip)

@@ -12,8 +12,8 @@ import numpy as np
 from ...compiled.jit import njit
 from ...friction.bonds.list_rows_kernels import CLOCK, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+from .arrays import ListPointRow, PointRow
 from .list_kernels import find_mean_and_slope
-from .shear_points_kernels import FORCE, LOAD, SLIDE, SLOPE
 
 # residual over the goal that is accepted where it does not decrease further, because sums over bonds jump by up to 1e-8
 GOAL_SLACK = 1e4
@@ -21,21 +21,6 @@ GOAL_SLACK = 1e4
 FORCE_MAY_FALL = True
 # damping of a Newton step over the stiffness of the modes, needed because the forces jump
 STEP_DAMPING = 1 / 16
-# rows of `points`: speed at which bonds grow in the step, mean speed of the last step, slide and force of the last trial
-GROWTH_SPEED = 0
-LAST_SPEED = 1
-TRIAL_SLIDE = 2
-TRIAL_FORCE = 3
-
-__all__ = [
-    "FORCE",
-    "FORCE_MAY_FALL",
-    "GOAL_SLACK",
-    "SLIDE",
-    "SLOPE",
-    "STEP_DAMPING",
-    "write_forces",
-]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -87,7 +72,9 @@ def find_pressure(j, contact):
         return interpolate_pressure(
             contact.places[j] + contact.nows[j, CLOCK.displacement], contact.pattern
         )
-    return contact.pressed[1, j] / contact.points[LOAD, j] if contact.pressed.shape[1] > 0 else 1.0
+    if contact.pressed.shape[1] > 0:
+        return contact.pressed[1, j] / contact.points[PointRow.LOAD, j]
+    return 1.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -98,19 +85,21 @@ def start_step(dt, contact):
     """
     contact.time[0] = dt
     for j in range(contact.points.shape[1]):
-        contact.points[TRIAL_SLIDE, j] = np.nan
+        contact.points[ListPointRow.TRIAL_SLIDE, j] = np.nan
     if contact.pattern.shape[1] > 0:
         for j in range(int(contact.count[0])):
             contact.statuses[j, STATUS.pressure] = interpolate_pressure(
                 contact.places[j]
                 + contact.nows[j, CLOCK.displacement]
-                + 0.5 * contact.points[SLIDE, j],
+                + 0.5 * contact.points[PointRow.SLIDE, j],
                 contact.pattern,
             )
     elif contact.pressed.shape[1] > 0:
         for j in range(int(contact.count[0])):
             contact.statuses[j, STATUS.pressure] = (
-                0.5 * (contact.pressed[0, j] + contact.pressed[1, j]) / contact.points[LOAD, j]
+                0.5
+                * (contact.pressed[0, j] + contact.pressed[1, j])
+                / contact.points[PointRow.LOAD, j]
             )
 
 
@@ -137,22 +126,24 @@ def write_forces(kind, ending, contact):
     dt = contact.time[0]
     force = 0.0
     for j in range(int(contact.count[0])):
-        xi = points[SLIDE, j]
+        xi = points[PointRow.SLIDE, j]
         status = contact.statuses[j]
         is_empty = status[STATUS.head] == status[STATUS.end]
         is_unpressed = status[STATUS.pressure] == 0.0 and status[STATUS.initial_pressure] == 0.0
         if is_empty and is_unpressed:
-            points[FORCE, j] = points[SLOPE, j] = 0.0
+            points[PointRow.FORCE, j] = points[PointRow.SLOPE, j] = 0.0
             continue
         load_list(j, contact)
-        f, s = find_mean_and_slope(xi, contact, points[GROWTH_SPEED, j], dt)
+        f, s = find_mean_and_slope(xi, contact, points[ListPointRow.GROWTH_SPEED, j], dt)
         # where many bonds have the same stretch, the mean force is steeper than its slope s, so the secant is used
-        if xi != points[TRIAL_SLIDE, j]:
-            steep = (f - points[TRIAL_FORCE, j]) / (xi - points[TRIAL_SLIDE, j])
+        if xi != points[ListPointRow.TRIAL_SLIDE, j]:
+            steep = (f - points[ListPointRow.TRIAL_FORCE, j]) / (
+                xi - points[ListPointRow.TRIAL_SLIDE, j]
+            )
             s = steep if steep > s else s
-        points[TRIAL_SLIDE, j] = xi
-        points[TRIAL_FORCE, j] = f
-        points[FORCE, j] = contact.weight[j] * f
-        points[SLOPE, j] = contact.weight[j] * s
-        force += points[FORCE, j]
+        points[ListPointRow.TRIAL_SLIDE, j] = xi
+        points[ListPointRow.TRIAL_FORCE, j] = f
+        points[PointRow.FORCE, j] = contact.weight[j] * f
+        points[PointRow.SLOPE, j] = contact.weight[j] * s
+        force += points[PointRow.FORCE, j]
     return force

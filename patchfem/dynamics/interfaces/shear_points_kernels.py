@@ -14,6 +14,7 @@ from ...friction.bonds.point_kernels import (
 )
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...friction.laws.elastic_plastic_kernels import spring_end, spring_mean
+from .arrays import PointRow
 
 # kinds of the law of the points: elastic-plastic, or bonds
 PLASTIC = 1
@@ -22,16 +23,6 @@ POINTS = 2
 GOAL_SLACK = 100.0
 FORCE_MAY_FALL = False
 STEP_DAMPING = 0.0
-# rows of `ShearedPoints.points`: density, stretch and squared stretch of bonds, or traction/mu and
-# springs of an elastic-plastic law; play and load; slide, force and slope in the step
-DENSITY = 0
-STRETCH = 1
-SQUARED_STRETCH = 2
-PLAY = 3
-LOAD = 4
-SLIDE = 5
-FORCE = 6
-SLOPE = 7
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
@@ -41,7 +32,7 @@ def are_slides_short(contact, length):
     near = 0.0
     for j in range(int(contact.count[0])):
         # a sum, which unlike a maximum is vectorised
-        near += 1.0 if abs(points[SLIDE, j]) <= MAX_SHORT_PATH * length else 0.0
+        near += 1.0 if abs(points[PointRow.SLIDE, j]) <= MAX_SHORT_PATH * length else 0.0
     return near == contact.count[0]
 
 
@@ -74,10 +65,14 @@ def write_forces(kind, ending, contact):
     ):
         for j in range(int(contact.count[0])):
             f, s = short_bond_mean(
-                points[DENSITY, j], points[STRETCH, j], points[SLIDE, j], points[LOAD, j], length
+                points[PointRow.DENSITY, j],
+                points[PointRow.STRETCH, j],
+                points[PointRow.SLIDE, j],
+                points[PointRow.LOAD, j],
+                length,
             )
-            points[FORCE, j] = weight[j] * f
-            points[SLOPE, j] = weight[j] * max(s, 0.0)
+            points[PointRow.FORCE, j] = weight[j] * f
+            points[PointRow.SLOPE, j] = weight[j] * max(s, 0.0)
             force += weight[j] * f
         return force
     return write_general_forces(kind, ending, contact, length)
@@ -107,10 +102,10 @@ def write_general_forces(kind, ending, contact, length):
     loose = contact.growth[5] * length
     force = 0.0
     for j in range(int(contact.count[0])):
-        m = points[DENSITY, j]
-        z = points[STRETCH, j]
-        load = points[LOAD, j]
-        xi = points[SLIDE, j]
+        m = points[PointRow.DENSITY, j]
+        z = points[PointRow.STRETCH, j]
+        load = points[PointRow.LOAD, j]
+        xi = points[PointRow.SLIDE, j]
         if kind == PLASTIC:
             f, s = (
                 spring_end(m, z, load, xi, length)
@@ -120,11 +115,11 @@ def write_general_forces(kind, ending, contact, length):
         elif ending:
             f, s = bond_end_stretch(m, z, xi, load, length)
         elif loose > 0.0:
-            f, s = elastic_bond_mean(m, z, points[PLAY, j], loose, xi, load, length)
+            f, s = elastic_bond_mean(m, z, points[PointRow.PLAY, j], loose, xi, load, length)
         else:
             f, s = bond_mean(m, z, xi, load, length)
         f *= weight[j]
-        points[FORCE, j] = f
-        points[SLOPE, j] = weight[j] * max(s, 0.0)
+        points[PointRow.FORCE, j] = f
+        points[PointRow.SLOPE, j] = weight[j] * max(s, 0.0)
         force += f
     return force

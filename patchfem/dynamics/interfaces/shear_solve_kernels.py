@@ -23,16 +23,11 @@ from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..dense_kernels import factorise, solve_factorised
 from ..modal_kernels import safe_point
 from . import shear_points_kernels as law
+from .arrays import DragRow, PointRow, WorkRow
 
-FORCE = law.FORCE
-SLIDE = law.SLIDE
-SLOPE = law.SLOPE
-# rows of `ShearedPoints.workspace`
-GRADIENT = 0
-STEP = 1
-TRIAL = 2
 # step over the bond length, below which Newton's method ends: half its square is below the goal of a march, 1e-11
 LAST_STEP_RATIO = 4e-6
+ROUND_OFF = 4e-16  # round-off error of a sum over its largest term
 GOAL_SLACK = law.GOAL_SLACK
 FORCE_MAY_FALL = law.FORCE_MAY_FALL
 STEP_DAMPING = law.STEP_DAMPING
@@ -72,20 +67,23 @@ def set_slides(q, moved, contact):
     count = int(contact.count[0])
     r = moved.size
     for j in range(count):
-        points[SLIDE, j] = q
+        points[PointRow.SLIDE, j] = q
     for k in range(0, r - 3, 4):  # four modes in one pass: a pass reads and writes every point
-        one = moved[k]
-        two = moved[k + 1]
-        three = moved[k + 2]
-        four = moved[k + 3]
+        first = moved[k]
+        second = moved[k + 1]
+        third = moved[k + 2]
+        fourth = moved[k + 3]
         for j in range(count):
-            points[SLIDE, j] -= (
-                psi[k, j] * one + psi[k + 1, j] * two + psi[k + 2, j] * three + psi[k + 3, j] * four
+            points[PointRow.SLIDE, j] -= (
+                psi[k, j] * first
+                + psi[k + 1, j] * second
+                + psi[k + 2, j] * third
+                + psi[k + 3, j] * fourth
             )
     for k in range(r - r % 4, r):
         part = moved[k]
         for j in range(count):
-            points[SLIDE, j] -= psi[k, j] * part
+            points[PointRow.SLIDE, j] -= psi[k, j] * part
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -107,20 +105,20 @@ def project_onto_modes(row, psi, points, count, out):
     """
     r = psi.shape[0]
     for k in range(0, r - 3, 4):
-        one = 0.0
-        two = 0.0
-        three = 0.0
-        four = 0.0
+        first = 0.0
+        second = 0.0
+        third = 0.0
+        fourth = 0.0
         for j in range(count):
             value = points[row, j]
-            one += psi[k, j] * value
-            two += psi[k + 1, j] * value
-            three += psi[k + 2, j] * value
-            four += psi[k + 3, j] * value
-        out[k + 1] = one
-        out[k + 2] = two
-        out[k + 3] = three
-        out[k + 4] = four
+            first += psi[k, j] * value
+            second += psi[k + 1, j] * value
+            third += psi[k + 2, j] * value
+            fourth += psi[k + 3, j] * value
+        out[k + 1] = first
+        out[k + 2] = second
+        out[k + 3] = third
+        out[k + 4] = fourth
     for k in range(r - r % 4, r):
         total = 0.0
         for j in range(count):
@@ -128,24 +126,23 @@ def project_onto_modes(row, psi, points, count, out):
         out[k + 1] = total
 
 
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
+def is_prescribed(problem):
+    """Return whether the increment of the holder is prescribed."""
+    return problem.relaxes or problem.compliance == 0.0
+
+
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def write_gradient(y, free, beta, kind, ending, contact, out):
+def write_gradient(y, problem, contact, out):
     """Write the gradient of the function that a step minimises: the residual of the step.
 
-    With beta = 0 or `ending` the slide of the holder is prescribed.
+    The slide of the holder may be prescribed.
 
     Parameters
     ----------
     y : ndarray
         (1 + r,) trial solution (dq, db) [m].
-    free : float
-        Increment without friction [m].
-    beta : float
-        Compliance of the modes in the step [m/N].
-    kind : int
-        Kind of the law of the points, PLASTIC or POINTS.
-    ending : bool
-        Whether the pieces spring back while the holder stands.
+    problem : arrays.StepProblem
     contact : arrays.ShearedPoints
     out : ndarray
         (1 + r,) residual [N], which is written.
@@ -155,33 +152,36 @@ def write_gradient(y, free, beta, kind, ending, contact, out):
     float
         Friction force [N].
     """
-    part = 1.0 if ending else 0.5
-    calm = 0.0 if ending else STEP_DAMPING
+    end_fraction = 1.0 if problem.relaxes else 0.5
+    damping = 0.0 if problem.relaxes else STEP_DAMPING
     set_slides(y[0], y[1:], contact)
-    force = law.write_forces(kind, ending, contact)
-    project_onto_modes(FORCE, contact.psi, contact.points, int(contact.count[0]), out)
+    force = law.write_forces(problem.law_kind, problem.relaxes, contact)
+    project_onto_modes(PointRow.FORCE, contact.psi, contact.points, int(contact.count[0]), out)
     for k in range(contact.kappa.size):
         out[k + 1] = (
             contact.kappa[k]
-            * (contact.b[k] + part * y[k + 1] + calm * (y[k + 1] - contact.last[0, k + 1]))
+            * (
+                contact.b[k]
+                + end_fraction * y[k + 1]
+                + damping * (y[k + 1] - contact.last[0, k + 1])
+            )
             - out[k + 1]
         )
-    out[0] = 0.0 if ending or beta == 0.0 else (y[0] - free) / beta + force
+    out[0] = 0.0
+    if not is_prescribed(problem):
+        out[0] = (y[0] - problem.free) / problem.compliance + force
     return force
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def write_hessian(beta, ending, contact, hess):
+def write_hessian(problem, contact, hess):
     """Write the Hessian of a step from the slopes of the points.
 
     It overwrites the forces of the points.
 
     Parameters
     ----------
-    beta : float
-        Compliance of the modes in the step [m/N].
-    ending : bool
-        Whether the pieces spring back while the holder stands.
+    problem : arrays.StepProblem
     contact : arrays.ShearedPoints
     hess : ndarray
         (1 + r, 1 + r), of which the lower triangle is written.
@@ -189,38 +189,38 @@ def write_hessian(beta, ending, contact, hess):
     psi = contact.psi
     points = contact.points
     count = int(contact.count[0])
-    given = ending or beta == 0.0
+    is_given = is_prescribed(problem)
     total = 0.0
     for j in range(count):
-        total += points[SLOPE, j]
-    project_onto_modes(SLOPE, psi, points, count, hess[0])
+        total += points[PointRow.SLOPE, j]
+    project_onto_modes(PointRow.SLOPE, psi, points, count, hess[0])
     for k in range(contact.kappa.size):
-        hess[k + 1, 0] = 0.0 if given else -hess[0, k + 1]
+        hess[k + 1, 0] = 0.0 if is_given else -hess[0, k + 1]
         for j in range(count):
-            points[FORCE, j] = points[SLOPE, j] * psi[k, j]
+            points[PointRow.FORCE, j] = points[PointRow.SLOPE, j] * psi[k, j]
         last = (k + 1) % 4
         for l in range(0, k + 1 - last, 4):
-            one = 0.0
-            two = 0.0
-            three = 0.0
-            four = 0.0
+            first = 0.0
+            second = 0.0
+            third = 0.0
+            fourth = 0.0
             for j in range(count):
-                value = points[FORCE, j]
-                one += value * psi[l, j]
-                two += value * psi[l + 1, j]
-                three += value * psi[l + 2, j]
-                four += value * psi[l + 3, j]
-            hess[k + 1, l + 1] = one
-            hess[k + 1, l + 2] = two
-            hess[k + 1, l + 3] = three
-            hess[k + 1, l + 4] = four
+                value = points[PointRow.FORCE, j]
+                first += value * psi[l, j]
+                second += value * psi[l + 1, j]
+                third += value * psi[l + 2, j]
+                fourth += value * psi[l + 3, j]
+            hess[k + 1, l + 1] = first
+            hess[k + 1, l + 2] = second
+            hess[k + 1, l + 3] = third
+            hess[k + 1, l + 4] = fourth
         for l in range(k + 1 - last, k + 1):
             dot = 0.0
             for j in range(count):
-                dot += points[FORCE, j] * psi[l, j]
+                dot += points[PointRow.FORCE, j] * psi[l, j]
             hess[k + 1, l + 1] = dot
-        hess[k + 1, k + 1] += contact.kappa[k] * (1.0 if ending else 0.5 + STEP_DAMPING)
-    hess[0, 0] = 1.0 if given else 1 / beta + total
+        hess[k + 1, k + 1] += contact.kappa[k] * (1.0 if problem.relaxes else 0.5 + STEP_DAMPING)
+    hess[0, 0] = 1.0 if is_given else 1 / problem.compliance + total
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
@@ -246,13 +246,13 @@ def is_last_step(p, contact):
     """
     way = abs(p[0])
     for k in range(1, p.size):
-        way += contact.drag[1, k] * abs(p[k])
-    return way <= LAST_STEP_RATIO * contact.eps[1] and contact.drag[0, 0] > 0.0
+        way += contact.drag[DragRow.MAX_SLIDE, k] * abs(p[k])
+    return way <= LAST_STEP_RATIO * contact.eps[1] and contact.drag[DragRow.FORCE, 0] > 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def minimise(free, beta, kind, ending, contact, goal):
-    """Minimise over contact.y[ending] = (dq, db) in place, from the guess in it.
+def minimise(problem, contact, goal):
+    """Minimise over contact.y = (dq, db) in place, from the guess in it.
 
     The factor of a Hessian serves all solves of a step of the march, until an iteration with it
     gains less than a factor of ten. No residual is computed after a Newton step that is short
@@ -260,12 +260,8 @@ def minimise(free, beta, kind, ending, contact, goal):
 
     Parameters
     ----------
-    free, beta : float
-        dq = free - beta force; dq = free for beta = 0.
-    kind : int
-        Of the law of the points.
-    ending : bool
-        Whether the pieces spring back while the holder stands.
+    problem : arrays.StepProblem
+        The row 1 of contact.y has the solution while the pieces spring back, else the row 0.
     contact : arrays.ShearedPoints
     goal : float
         Of the residual [N].
@@ -277,73 +273,77 @@ def minimise(free, beta, kind, ending, contact, goal):
     iterations : int
         Below 0 where it failed.
     """
-    which = 1 if ending else 0
+    which = 1 if problem.relaxes else 0
+    compliance = problem.compliance
     y = contact.y[which]
     hess = contact.hess[which]
-    g = contact.workspace[GRADIENT]
-    p = contact.workspace[STEP]
-    trial = contact.workspace[TRIAL]
-    noise = 4e-16 * abs(free) / beta if beta > 0.0 else 0.0
-    size = np.inf
-    least = np.inf
-    fall = 0.0
+    gradient = contact.workspace[WorkRow.GRADIENT]
+    step = contact.workspace[WorkRow.STEP]
+    trial = contact.workspace[WorkRow.TRIAL]
+    noise = ROUND_OFF * abs(problem.free) / compliance if compliance > 0.0 else 0.0
+    last_residual = np.inf
+    smallest = np.inf
+    descent = 0.0
     force = 0.0
-    stale = True
-    stall = 0
+    is_stale = True
+    n_stalled = 0
     for i in range(y.size):
-        p[i] = 0.0
+        step[i] = 0.0
     for count in range(
         MAX_ITERATIONS
     ):  # the first pass evaluates the guess, so that the code contains the gradient once
         if count > 0:
             if contact.ready[which] == 0.0:
-                write_hessian(beta, ending, contact, hess)
+                write_hessian(problem, contact, hess)
                 if not factorise(hess):
                     if not FORCE_MAY_FALL:
                         return force, -count
                     for j in range(int(contact.count[0])):
-                        contact.points[SLOPE, j] = max(contact.points[SLOPE, j], 0.0)
-                    write_hessian(beta, ending, contact, hess)
+                        contact.points[PointRow.SLOPE, j] = max(
+                            contact.points[PointRow.SLOPE, j], 0.0
+                        )
+                    write_hessian(problem, contact, hess)
                     if not factorise(hess):
                         return force, -count
                 contact.ready[which] = 1.0
-                stale = False
+                is_stale = False
             for i in range(y.size):
-                p[i] = -g[i]
-            fall = -solve_factorised(hess, p)
-            if not stale and not ending and beta > 0.0 and is_last_step(p, contact):
+                step[i] = -gradient[i]
+            descent = -solve_factorised(hess, step)
+            if not is_stale and not is_prescribed(problem) and is_last_step(step, contact):
                 for i in range(y.size):
-                    y[i] += p[i]
+                    y[i] += step[i]
                 set_slides(y[0], y[1:], contact)
-                return (free - y[0]) / beta, count
-        part = 1.0
+                return (problem.free - y[0]) / compliance, count
+        fraction = 1.0
         low = 0.0
         high = np.inf
         for _ in range(40):
             for i in range(y.size):
-                trial[i] = y[i] + part * p[i]
-            force = write_gradient(trial, free, beta, kind, ending, contact, g)
-            rise = 0.0
+                trial[i] = y[i] + fraction * step[i]
+            force = write_gradient(trial, problem, contact, gradient)
+            slope = 0.0
             for i in range(y.size):
-                rise += g[i] * p[i]
-            if count == 0 or rise <= -0.5 * fall:
+                slope += gradient[i] * step[i]
+            if count == 0 or slope <= -0.5 * descent:
                 break
-            high = part
-            part = safe_point(low, high, max(0.1, -fall / (rise - fall)) * part)
+            high = fraction
+            fraction = safe_point(low, high, max(0.1, -descent / (slope - descent)) * fraction)
         for i in range(y.size):
             y[i] = trial[i]
-        new = find_largest_residual(g, contact.scale)
-        if new <= max(goal, noise + 4e-16 * abs(force)):
+        residual = find_largest_residual(gradient, contact.scale)
+        if residual <= max(goal, noise + ROUND_OFF * abs(force)):
             return force, count + 1
         if count > 0:
-            if new > 0.1 * size or part < 1.0:
+            if residual > 0.1 * last_residual or fraction < 1.0:
                 contact.ready[which] = 0.0
-            stall = stall + 1 if new >= 0.5 * least and not stale else 0
-            stale = contact.ready[which] == 1.0
-            if stall >= 4 and new <= GOAL_SLACK * goal:
+            has_stalled = residual >= 0.5 * smallest and not is_stale
+            n_stalled = n_stalled + 1 if has_stalled else 0
+            is_stale = contact.ready[which] == 1.0
+            if n_stalled >= 4 and residual <= GOAL_SLACK * goal:
                 return force, count
-        size = new
-        least = min(least, new)
+        last_residual = residual
+        smallest = min(smallest, residual)
     return force, -MAX_ITERATIONS
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core import Missing
 from ...friction.bonds.list_rows_kernels import N_ROWS, STATUS
+from ..interfaces.arrays import FlowPlace
 
 MAX_ENTRIES = 2_000_000  # number of entries of a list of bonds beyond which a run is refused
 ENTRY_BYTES = 8 * N_ROWS
@@ -54,7 +55,9 @@ def is_full(contact) -> bool:
 
     For a contact with a single list a full list is the only cause of a failed step.
     """
-    return hasattr(contact, "bondlist") and (not hasattr(contact, "flow") or contact.flow[0] == 1.0)
+    return hasattr(contact, "bondlist") and (
+        not hasattr(contact, "flow") or contact.flow[FlowPlace.IS_FULL] == 1.0
+    )
 
 
 def enlarge_list(contact, kept: SavedState, place: str, *others):

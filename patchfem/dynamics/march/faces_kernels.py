@@ -17,46 +17,27 @@ from ...friction.flags_kernels import NJIT_INTERNAL
 from ...friction.laws import elastic_plastic_kernels as law
 from ...friction.laws import plane_kernels as plane
 from ...friction.laws.coulomb_kernels import solve_coulomb_step
+from ...friction.protocol_kernels import Reading
 from ..interfaces import element_kernels as contact
 from ..interfaces import element_solve_kernels as solver
-from ..modal_kernels import free_increment, free_rate, write_end_state
+from ..interfaces.arrays import LawStep, SolvedStep
+from ..ledger import N_SAMPLE_COLUMNS, SampleColumn
+from ..modal_kernels import free_increment, free_rate, project_modes, write_end_state
 from . import parts_kernels as parts
 from . import stops_kernels as stop_kernels
 from . import together_kernels as together
-from .stops_kernels import (
-    AT_END,
-    BETA,
-    BLOW,
-    BOND_LENGTH,
-    CONTACT_FORCE,
-    CONTACT_INCREMENT,
-    CONTACT_SAMPLE,
-    CONTACT_TOL,
-    ELEMENT_FORCE,
-    ELEMENT_SLIDE,
-    ELEMENT_SPEED,
-    FACE_INCREMENT,
-    FORCE_TOL,
-    FREE_SLIDE,
-    FREE_SPEED,
-    GAMMA,
-    INCREMENT,
-    INCREMENT_BEFORE,
-    IS_FRICTION,
-    LAST_INCREMENT,
-    MATE,
-    MAX_FORCE,
-    MEAN_FORCE,
-    MODAL_SCRATCH,
-    OTHER_ACCELERATION,
-    PORT,
-    SET_VALUED,
-    SLIP_STATE,
-    SOLUTION,
-    START_SPEED,
-    STATIC,
-    STOPS_KNOWN,
+from .element_arrays import (
+    N_ELEMENT_COLUMNS,
+    ComplianceRow,
+    ContactPlace,
+    ElementRow,
+    FaceRow,
+    LimitRow,
+    LinkRow,
+    ModalRow,
+    PortRow,
 )
+from .stops_kernels import SET_VALUED
 
 # Numba leaves out the branches of flags that are False.
 HAS_STOPS = parts.HAS_STOPS
@@ -67,11 +48,13 @@ HAS_PLANES = parts.HAS_PLANES
 MAX_TURNS = 1000  # block descent has failed after this number of turns over all elements
 # Largest number of turns if stops and releases lie inside the step; the first half of the turns decides which.
 MAX_EVENT_TURNS = 60
+FORCE_GOAL_FRACTION = (
+    0.1  # tolerance of the force of an element that is solved alone, over its tolerance
+)
+SLOW_RATIO = 0.2  # ratio of the changes of two turns above which the turns converge slowly
 FIRST_NEWTON_TURN = 5  # turn after which a Newton step on all forces is worth its cost
 # Round-off limits the residual to this fraction of a force and of a free slide over its compliance.
 ROUND_OFF = 4e-15
-# A row has these columns of an element: slide, speed, force, slip, and mean force of the step that follows.
-ELEMENT_COLUMNS = 5
 
 
 class NewtonPace(NamedTuple):
@@ -85,175 +68,202 @@ class NewtonPace(NamedTuple):
     worst: float
 
 
+class ContactTurn(NamedTuple):
+    """Solution of the contact in a turn of the block descent.
+
+    - increment: of its slide [m]
+    - change: of its force over the tolerance, infinite if the solution fails
+    - iterations: number of iterations
+    """
+
+    increment: float
+    change: float
+    iterations: int
+
+
+class EventStep(NamedTuple):
+    """Step with stops and releases inside it.
+
+    - increment: of the slide of the contact [m]
+    - iterations: number of iterations
+    - is_solved: false if no such step is found, or if it would create energy
+    """
+
+    increment: float
+    iterations: int
+    is_solved: bool
+
+
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def sample_elements(q, v, motion, row, interface, faces):
+def sample_elements(modal, system, row):
     """Write the state of all elements into the row, and return that of the interface.
 
     Force and slip are those of the contact, or without a contact those of the first element.
 
     Parameters
     ----------
-    q : float
-        Slide of the contact at the start of the step [m].
-    v : float
-        Its speed [m/s].
-    motion : (2, n) array
-        Coordinates and rates of the modes.
+    modal : modal_kernels.ModalSample
+    system : element_arrays.MarchArrays
     row : (k,) array
         Row of samples of `loop_kernels.march`; it is written.
-    interface : tuple
-        Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.PortElements
 
     Returns
     -------
-    tuple
-        Force [N], friction energy [J], slip [m] and energy of the springs [J].
+    friction.protocol_kernels.Reading
+        Force, friction energy and slip.
+    float
+        Energy of the springs [J].
     """
-    n = motion.shape[1]
-    m = 2 * motion.shape[1] + 7
-    first = 0.0
-    slip = q
-    energy = 0.0
-    springs = 0.0
-    for e in range(faces.of.shape[1]):
-        here = 0.0
-        rate = 0.0
-        for k in range(n):
-            here += faces.rows[faces.of[PORT, e], k] * motion[0, k]
-            rate += faces.rows[faces.of[PORT, e], k] * motion[1, k]
-        force, stock, moved = law.read_memory(faces.num[e], faces.mem[e], here, rate)
-        faces.each[ELEMENT_SLIDE, e] = here
-        faces.each[ELEMENT_SPEED, e] = rate
-        at = m + ELEMENT_COLUMNS * e
-        row[at] = here
-        row[at + 1] = rate
-        row[at + 2] = force
-        row[at + 3] = moved
-        if faces.of[IS_FRICTION, e]:
-            energy += stock
+    elements = system.elements
+    first_column = find_element_columns(system.motion)
+    force = 0.0
+    slip = modal.slide
+    friction_energy = 0.0
+    spring_energy = 0.0
+    for e in range(elements.links.shape[1]):
+        port = elements.links[LinkRow.PORT, e]
+        slide = project_modes(elements.rows[port], system.motion[0])
+        speed = project_modes(elements.rows[port], system.motion[1])
+        reading = law.read_memory(elements.num[e], elements.mem[e], slide, speed)
+        elements.state[ElementRow.SLIDE, e] = slide
+        elements.state[ElementRow.SPEED, e] = speed
+        column = first_column + N_ELEMENT_COLUMNS * e
+        row[column + SampleColumn.SLIDE] = slide
+        row[column + SampleColumn.SPEED] = speed
+        row[column + SampleColumn.FORCE] = reading.force
+        row[column + SampleColumn.SLIP] = reading.slip
+        if elements.links[LinkRow.IS_FRICTION, e]:
+            friction_energy += reading.stored_energy
         else:
-            springs += stock
-        if e == 0 and faces.of[IS_FRICTION, 0]:
-            first = force
-            slip = moved
+            spring_energy += reading.stored_energy
+        if e == 0 and elements.links[LinkRow.IS_FRICTION, 0]:
+            force = reading.force
+            slip = reading.slip
     if HAS_CONTACT:
-        first, stock, slip = contact.read_state(interface, q, v)
-        energy += stock
-        faces.own[CONTACT_SAMPLE] = first
-    return first, energy, slip, springs
+        reading = contact.read_state(system.interface, modal.slide, modal.speed)
+        force = reading.force
+        slip = reading.slip
+        friction_energy += reading.stored_energy
+        elements.contact[ContactPlace.SAMPLE_FORCE] = force
+    return Reading(force, friction_energy, slip), spring_energy
+
+
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
+def find_element_columns(motion):
+    """Return the first column of the first element in a row of samples."""
+    return 2 * motion.shape[1] + N_SAMPLE_COLUMNS
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def sample_set_valued(motion, modal_system, drive, force, row, faces):
+def sample_set_valued(drive, force, system, row):
     """Write the forces of the set-valued elements at a sample into their memory and the row.
 
     Elements that slide have their kinetic friction, those that rest the force that leaves them no acceleration.
 
     Parameters
     ----------
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
     drive : float
         Acceleration of the base [m s-2].
     force : float
         Force of the contact [N].
+    system : element_arrays.MarchArrays
     row : (k,) array
         Row of samples of `loop_kernels.march`; it is written.
-    faces : interfaces.arrays.PortElements
 
     Returns
     -------
     float
         Force of the first element if it is set-valued and there is no contact, otherwise `force`.
     """
-    stops = faces.stops
-    m = 2 * motion.shape[1] + 7
+    elements = system.elements
+    modal_system = system.modal_system
+    stops = elements.stops
+    force_column = find_element_columns(system.motion) + SampleColumn.FORCE
     accel = modal_system.workspace[0]
-    count = faces.of.shape[1]
     for i in range(stops.names.size):
         e = stops.element[i]
-        way = stops.field[SLIP_STATE, i]
-        limit = faces.num[e, 1] if abs(way) == 2.0 else faces.num[e, 2]
-        faces.mem[e, 0] = np.sign(way) * limit
-        row[m + ELEMENT_COLUMNS * e + 2] = faces.mem[e, 0]
+        slip_state = stops.field[FaceRow.SLIP_STATE, i]
+        limit = elements.num[e, 1] if abs(slip_state) == 2.0 else elements.num[e, 2]
+        elements.mem[e, 0] = np.sign(slip_state) * limit
+        row[force_column + N_ELEMENT_COLUMNS * e] = elements.mem[e, 0]
+    contact_force = elements.contact[ContactPlace.SAMPLE_FORCE]
     for k in range(accel.size):
         accel[k] = (
-            faces.modal[OTHER_ACCELERATION, k]
-            - modal_system.slide[k] * faces.own[CONTACT_SAMPLE] / modal_system.mass
+            elements.modal[ModalRow.OTHER_ACCELERATION, k]
+            - modal_system.slide[k] * contact_force / modal_system.mass
         )
-        for e in range(count):
+        for e in range(elements.links.shape[1]):
             accel[k] -= (
-                faces.rows[faces.of[PORT, e], k]
-                * row[m + ELEMENT_COLUMNS * e + 2]
+                elements.rows[elements.links[LinkRow.PORT, e], k]
+                * row[force_column + N_ELEMENT_COLUMNS * e]
                 / modal_system.mass
             )
-    for i in range(
-        stop_kernels.find_reactions(
-            motion, modal_system, drive, accel, modal_system.workspace[1:], stops
-        )
-    ):
+    n_reactions = stop_kernels.find_reactions(system.motion, modal_system, drive, accel, stops)
+    for i in range(n_reactions):
         e = stops.element[stops.names[i]]
-        faces.mem[e, 0] = min(max(stops.field[SOLUTION, i], -faces.num[e, 1]), faces.num[e, 1])
-        row[m + ELEMENT_COLUMNS * e + 2] = faces.mem[e, 0]
+        limit = elements.num[e, 1]
+        elements.mem[e, 0] = min(max(stops.field[FaceRow.SOLUTION, i], -limit), limit)
+        row[force_column + N_ELEMENT_COLUMNS * e] = elements.mem[e, 0]
     if HAS_CONTACT:
         return force
     else:
-        return row[m + 2] if faces.num[0, 0] == SET_VALUED else force
+        return row[force_column] if elements.num[0, 0] == SET_VALUED else force
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def prepare_step(motion, modal_system, table, at, dt, faces):
+def prepare_step(at, system):
     """Write the free slides and speeds of all ports and the bond lengths of the step.
 
     Parameters
     ----------
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
-    table : (s, k) array
-        Table of `propagator.Propagator`.
     at : int
         Row of the table for this step.
-    dt : float
-        Length of the step [s].
-    faces : interfaces.arrays.PortElements
+    system : element_arrays.MarchArrays
     """
-    for p in range(faces.port.shape[1]):
-        faces.port[FREE_SLIDE, p] = free_increment(motion, modal_system, p, table, at)
+    elements = system.elements
+    motion = system.motion
+    modal_system = system.modal_system
+    table = system.table
+    for p in range(elements.port.shape[1]):
+        elements.port[PortRow.FREE_SLIDE, p] = free_increment(motion, modal_system, p, table, at)
         if HAS_STOPS:
-            faces.port[FREE_SPEED, p] = free_rate(motion, faces.rows[p], modal_system, table, at)
-    for e in range(faces.of.shape[1]):
-        faces.each[BOND_LENGTH, e] = law.step_bond_length(
-            faces.num[e], faces.mem[e], faces.each[ELEMENT_SPEED, e], dt
+            elements.port[PortRow.FREE_SPEED, p] = free_rate(
+                motion, elements.rows[p], modal_system, table, at
+            )
+    for e in range(elements.links.shape[1]):
+        elements.state[ElementRow.BOND_LENGTH, e] = law.step_bond_length(
+            elements.num[e], elements.mem[e], elements.state[ElementRow.SPEED, e], modal_system.dt
         )
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def slide_by_others(mine, port, faces):
+def find_slide_by_others(element, port, elements):
     """Return the reduction [m] of the slide of a port due to the forces of all other elements.
 
     Parameters
     ----------
-    mine : int
+    element : int
         Number of the element, -1 for the contact.
     port : int
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
 
     Returns
     -------
     float
     """
-    out = 0.0
-    for k in range(faces.of.shape[1]):
-        if k != mine:
-            out += faces.gives[BETA, port, faces.of[PORT, k]] * faces.each[ELEMENT_FORCE, k]
-    return out + faces.gives[BETA, port, 0] * faces.own[CONTACT_FORCE] if mine >= 0 else out
+    compliances = elements.compliances[ComplianceRow.SLIDE, port]
+    reduction = 0.0
+    for k in range(elements.links.shape[1]):
+        if k != element:
+            other_port = elements.links[LinkRow.PORT, k]
+            reduction += compliances[other_port] * elements.state[ElementRow.FORCE, k]
+    if element >= 0:
+        reduction += compliances[0] * elements.contact[ContactPlace.FORCE]
+    return reduction
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_one_element(e, turn, faces, dt):
+def solve_element(e, turn, elements, dt):
     """Solve an element under the forces of all others.
 
     The first direction of an element in a plane is solved together with its second one.
@@ -264,7 +274,7 @@ def solve_one_element(e, turn, faces, dt):
         Number of the element.
     turn : int
         Number of the turn, from 0.
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
     dt : float
         Length of the step [s].
 
@@ -276,48 +286,76 @@ def solve_one_element(e, turn, faces, dt):
         Number of iterations.
     """
     if HAS_PLANES:
-        if faces.of[MATE, e] != e:
-            return solve_plane_element(e, turn, faces) if faces.of[MATE, e] > e else (0.0, 0)
-    p = faces.of[PORT, e]
-    beta = faces.gives[BETA, p, p]
-    dq = faces.each[INCREMENT, e]
-    tries = 1
-    mine = faces.port[FREE_SLIDE, p] - slide_by_others(e, p, faces)
+        mate = elements.links[LinkRow.MATE, e]
+        if mate > e:
+            return solve_plane_element(e, turn, elements)
+        if mate < e:
+            return 0.0, 0
+    p = elements.links[LinkRow.PORT, e]
+    beta = elements.compliances[ComplianceRow.SLIDE, p, p]
+    state = elements.state
+    increment = state[ElementRow.INCREMENT, e]
+    iterations = 1
+    free = elements.port[PortRow.FREE_SLIDE, p] - find_slide_by_others(e, p, elements)
     if HAS_STOPS:
-        if faces.num[e, 0] == SET_VALUED:
-            limit = faces.each[MAX_FORCE, e]
-            dq = solve_coulomb_step(mine, beta, limit, limit)[0]
+        if elements.num[e, 0] == SET_VALUED:
+            limit = state[ElementRow.MAX_FORCE, e]
+            increment = solve_coulomb_step(free, beta, limit, limit)[0]
     if HAS_SLOPES:
-        if faces.num[e, 0] != SET_VALUED:
-            guess = (
-                2 * faces.each[LAST_INCREMENT, e] - faces.each[INCREMENT_BEFORE, e]
-                if turn == 0
-                else dq
-            )
-            dq, _, tries = solver.solve_element(
-                mine,
-                beta,
-                faces.num[e],
-                faces.mem[e],
-                faces.each[ELEMENT_SLIDE, e],
-                faces.each[BOND_LENGTH, e],
+        if elements.num[e, 0] != SET_VALUED:
+            if turn == 0:
+                increment = extrapolate_increment(e, elements)
+            step = LawStep(
+                elements.num[e],
+                elements.mem[e],
+                state[ElementRow.SLIDE, e],
+                state[ElementRow.BOND_LENGTH, e],
                 dt,
-                guess,
-                faces.each[MAX_FORCE, e],
-                0.1 * faces.each[FORCE_TOL, e],
             )
-    used = (mine - dq) / beta
-    change = abs(used - faces.each[ELEMENT_FORCE, e]) / (
-        faces.each[FORCE_TOL, e] + ROUND_OFF * (abs(mine) / beta + abs(used))
-    )
-    faces.each[INCREMENT, e] = dq
-    faces.each[ELEMENT_FORCE, e] = used
-    return change if tries >= 0 else np.inf, abs(tries)
+            goal = FORCE_GOAL_FRACTION * state[ElementRow.FORCE_TOL, e]
+            limit = state[ElementRow.MAX_FORCE, e]
+            solution = solver.solve_element(free, beta, step, increment, limit, goal)
+            increment = solution.increment
+            iterations = solution.iterations
+    force = (free - increment) / beta
+    change = find_force_change(force, state[ElementRow.FORCE, e], abs(free) / beta, e, elements)
+    state[ElementRow.INCREMENT, e] = increment
+    state[ElementRow.FORCE, e] = force
+    return change if iterations >= 0 else np.inf, abs(iterations)
+
+
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
+def extrapolate_increment(e, elements):
+    """Return the increment of an element that its last two steps suggest."""
+    last = elements.state[ElementRow.LAST_INCREMENT, e]
+    return 2 * last - elements.state[ElementRow.INCREMENT_BEFORE, e]
+
+
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
+def find_force_change(force, last_force, free_force, e, elements):
+    """Return the change of a force over its tolerance.
+
+    Parameters
+    ----------
+    force, last_force : float
+        Force in this turn and in the last one [N].
+    free_force : float
+        Force that would hold the element [N].
+    e : int
+        Number of the element whose tolerance holds.
+    elements : element_arrays.PortElements
+
+    Returns
+    -------
+    float
+    """
+    tolerance = elements.state[ElementRow.FORCE_TOL, e] + ROUND_OFF * (free_force + abs(force))
+    return abs(force - last_force) / tolerance
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_plane_element(e, turn, faces):
-    """Solve both directions of an element in a plane, like `solve_one_element`.
+def solve_plane_element(e, turn, elements):
+    """Solve both directions of an element in a plane, like `solve_element`.
 
     Parameters
     ----------
@@ -325,88 +363,86 @@ def solve_plane_element(e, turn, faces):
         Number of the element.
     turn : int
         Number of the turn, from 0.
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
 
     Returns
     -------
     float
     int
     """
-    f = faces.of[MATE, e]
-    p = faces.of[PORT, e]
-    r = faces.of[PORT, f]
-    xx = faces.gives[BETA, p, p]
-    xy = faces.gives[BETA, p, r]
-    yy = faces.gives[BETA, r, r]
-    x = faces.port[FREE_SLIDE, p] - slide_by_others(e, p, faces) + xy * faces.each[ELEMENT_FORCE, f]
-    y = faces.port[FREE_SLIDE, r] - slide_by_others(f, r, faces) + xy * faces.each[ELEMENT_FORCE, e]
-    dx = faces.each[INCREMENT, e]
-    dy = faces.each[INCREMENT, f]
+    f = elements.links[LinkRow.MATE, e]
+    p = elements.links[LinkRow.PORT, e]
+    r = elements.links[LinkRow.PORT, f]
+    xx = elements.compliances[ComplianceRow.SLIDE, p, p]
+    xy = elements.compliances[ComplianceRow.SLIDE, p, r]
+    yy = elements.compliances[ComplianceRow.SLIDE, r, r]
+    x = (
+        elements.port[PortRow.FREE_SLIDE, p]
+        - find_slide_by_others(e, p, elements)
+        + xy * elements.state[ElementRow.FORCE, f]
+    )
+    y = (
+        elements.port[PortRow.FREE_SLIDE, r]
+        - find_slide_by_others(f, r, elements)
+        + xy * elements.state[ElementRow.FORCE, e]
+    )
+    dx = elements.state[ElementRow.INCREMENT, e]
+    dy = elements.state[ElementRow.INCREMENT, f]
     if turn == 0:
-        dx = 2 * faces.each[LAST_INCREMENT, e] - faces.each[INCREMENT_BEFORE, e]
-        dy = 2 * faces.each[LAST_INCREMENT, f] - faces.each[INCREMENT_BEFORE, f]
-    dx, dy, pull, across, tries = plane.solve_plane_step(
+        dx = extrapolate_increment(e, elements)
+        dy = extrapolate_increment(f, elements)
+    dx, dy, force_x, force_y, iterations = plane.solve_plane_step(
         (x, y),
         (xx, xy, yy),
-        (faces.num[e, 2], faces.num[e, 3]),
-        (faces.mem[e, 3], faces.mem[f, 3]),
+        (elements.num[e, 2], elements.num[e, 3]),
+        (elements.mem[e, 3], elements.mem[f, 3]),
         (dx, dy),
-        0.1 * faces.each[FORCE_TOL, e],
+        FORCE_GOAL_FRACTION * elements.state[ElementRow.FORCE_TOL, e],
     )
     change = max(
-        abs(pull - faces.each[ELEMENT_FORCE, e])
-        / (faces.each[FORCE_TOL, e] + ROUND_OFF * (abs(x) / xx + abs(pull))),
-        abs(across - faces.each[ELEMENT_FORCE, f])
-        / (faces.each[FORCE_TOL, e] + ROUND_OFF * (abs(y) / yy + abs(across))),
+        find_force_change(force_x, elements.state[ElementRow.FORCE, e], abs(x) / xx, e, elements),
+        find_force_change(force_y, elements.state[ElementRow.FORCE, f], abs(y) / yy, e, elements),
     )
-    faces.each[INCREMENT, e] = dx
-    faces.each[INCREMENT, f] = dy
-    faces.each[ELEMENT_FORCE, e] = pull
-    faces.each[ELEMENT_FORCE, f] = across
-    return change if tries >= 0 else np.inf, abs(tries)
+    elements.state[ElementRow.INCREMENT, e] = dx
+    elements.state[ElementRow.INCREMENT, f] = dy
+    elements.state[ElementRow.FORCE, e] = force_x
+    elements.state[ElementRow.FORCE, f] = force_y
+    return change if iterations >= 0 else np.inf, abs(iterations)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_contact(q, v, dt, interface, faces):
+def solve_contact(start, system):
     """Solve the contact on port 0 under the forces of all elements.
 
     Parameters
     ----------
-    q : float
-        Slide of the contact at the start of the step [m].
-    v : float
-        Its speed [m/s].
-    dt : float
-        Length of the step [s].
-    interface : tuple
-        Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.PortElements
+    start : interfaces.arrays.StepStart
+    system : element_arrays.MarchArrays
 
     Returns
     -------
-    float
-        Increment of its slide [m].
-    float
-        Change of its force over the tolerance.
-    int
-        Number of iterations.
+    ContactTurn
     """
-    free = faces.port[FREE_SLIDE, 0] - slide_by_others(-1, 0, faces)
-    beta = faces.gives[BETA, 0, 0]
-    dq, _, tries = contact.solve_step(free, beta, q, v, dt, interface, faces.own[CONTACT_TOL])
-    used = (free - dq) / beta
-    change = abs(used - faces.own[CONTACT_FORCE]) / (
-        faces.own[CONTACT_TOL] + ROUND_OFF * (abs(faces.port[FREE_SLIDE, 0]) / beta + abs(used))
+    elements = system.elements
+    free_slide = elements.port[PortRow.FREE_SLIDE, 0]
+    free = free_slide - find_slide_by_others(-1, 0, elements)
+    beta = elements.compliances[ComplianceRow.SLIDE, 0, 0]
+    tolerance = elements.contact[ContactPlace.FORCE_TOL]
+    step = contact.solve_step(free, beta, start, system.interface, tolerance)
+    force = (free - step.increment) / beta
+    change = abs(force - elements.contact[ContactPlace.FORCE]) / (
+        tolerance + ROUND_OFF * (abs(free_slide) / beta + abs(force))
     )
-    faces.own[CONTACT_FORCE] = used
-    return dq, change if tries >= 0 else np.inf, abs(tries)
+    elements.contact[ContactPlace.FORCE] = force
+    change = change if step.iterations >= 0 else np.inf
+    return ContactTurn(step.increment, change, abs(step.iterations))
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_coupled_forces(q, v, modal_system, interface, faces):
+def solve_coupled_forces(start, system):
     """Solve contact and elements over a step by block descent, with mean forces alone.
 
-    Each is solved in turn under the forces of the others, into faces.own and faces.each. A Newton step on all
+    Each is solved in turn under the forces of the others, into elements.contact and elements.state. A Newton step on all
     forces speeds up turns that converge slowly.
 
     With one friction limit per set-valued element the problem is convex, and block descent converges. So each of
@@ -416,14 +452,8 @@ def solve_coupled_forces(q, v, modal_system, interface, faces):
 
     Parameters
     ----------
-    q : float
-        Slide of the contact at the start of the step [m].
-    v : float
-        Its speed [m/s].
-    modal_system : interfaces.arrays.ModalArrays
-    interface : tuple
-        Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.PortElements
+    start : interfaces.arrays.StepStart
+    system : element_arrays.MarchArrays
 
     Returns
     -------
@@ -432,64 +462,71 @@ def solve_coupled_forces(q, v, modal_system, interface, faces):
     int
         Number of iterations, negative if the forces do not converge.
     """
-    dt = modal_system.dt
-    iterations = 0
+    elements = system.elements
+    n_iterations = 0
     last_worst = np.inf
     pace = NewtonPace(FIRST_NEWTON_TURN, 1, np.inf)
-    dq = 0.0
+    increment = 0.0
     if HAS_STOPS:
-        set_static_limits(faces)
+        set_static_limits(elements)
     for turn in range(MAX_TURNS):
         worst = 0.0
         if HAS_CONTACT:
-            dq, worst, tries = solve_contact(q, v, dt, interface, faces)
-            iterations += tries
-        for e in range(faces.of.shape[1]):
-            change, tries = solve_one_element(e, turn, faces, dt)
+            solution = solve_contact(start, system)
+            increment = solution.increment
+            worst = solution.change
+            n_iterations += solution.iterations
+        for e in range(elements.links.shape[1]):
+            change, count = solve_element(e, turn, elements, start.dt)
             worst = max(worst, change)
-            iterations += tries
+            n_iterations += count
         if not IS_COUPLED:
             if worst == np.inf:
-                return dq, -iterations
+                return increment, -n_iterations
             worst = 0.0
         if worst <= 1.0:
             if HAS_STOPS:
-                if release_slipping(faces):
+                if release_slipping(elements):
                     last_worst = np.inf
                     continue
-            return dq, iterations
+            return increment, n_iterations
         if turn > 1:
-            pace, tries = speed_up_turns(turn, worst, last_worst, pace, modal_system, faces)
-            iterations += tries
+            pace, count = speed_up_turns(
+                turn, worst, last_worst, pace, system.modal_system, elements
+            )
+            n_iterations += count
         last_worst = worst
-    return dq, -iterations
+    return increment, -n_iterations
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def set_static_limits(faces):
+def set_static_limits(elements):
     """Let every set-valued element carry up to its static friction."""
-    for i in range(faces.stops.names.size):
-        e = faces.stops.element[i]
-        faces.each[MAX_FORCE, e] = faces.num[e, 1]
+    for i in range(elements.stops.names.size):
+        e = elements.stops.element[i]
+        elements.state[ElementRow.MAX_FORCE, e] = elements.num[e, 1]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def release_slipping(faces):
+def release_slipping(elements):
     """Limit the forces of set-valued elements that slip to their kinetic friction.
 
     Returns whether one of them had a higher limit.
     """
     is_released = False
-    for i in range(faces.stops.names.size):
-        e = faces.stops.element[i]
-        if faces.each[INCREMENT, e] != 0.0 and faces.each[MAX_FORCE, e] > faces.num[e, 2]:
-            faces.each[MAX_FORCE, e] = faces.num[e, 2]
+    for i in range(elements.stops.names.size):
+        e = elements.stops.element[i]
+        if (
+            elements.state[ElementRow.INCREMENT, e] != 0.0
+            and elements.state[ElementRow.MAX_FORCE, e] > elements.num[e, 2]
+        ):
+            elements.state[ElementRow.MAX_FORCE, e] = elements.num[e, 2]
             is_released = True
     return is_released
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def speed_up_turns(turn, worst, last_worst, pace, modal_system, faces):
+def speed_up_turns(turn, worst, last_worst, pace, modal_system, elements):
     """Take a Newton step on the forces of all elements at once.
 
     This is done only without a contact. Laws with a slope are solved to the minimum of their potential; others
@@ -507,7 +544,7 @@ def speed_up_turns(turn, worst, last_worst, pace, modal_system, faces):
         The same of the turn before.
     pace : NewtonPace
     modal_system : interfaces.arrays.ModalArrays
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
 
     Returns
     -------
@@ -520,108 +557,108 @@ def speed_up_turns(turn, worst, last_worst, pace, modal_system, faces):
     elif HAS_SLOPES:
         if HAS_PLANES:  # the force of an element in a plane has no potential
             pass
-        elif faces.stops.names.size == 0 and modal_system.dense.size == 0:
-            return pace, abs(together.solve_smooth(faces, modal_system.dt))
-    if turn >= pace.next_turn and worst > 0.2 * last_worst:
-        together.newton_step(faces, modal_system.dt, False)
+        elif elements.stops.names.size == 0 and modal_system.dense.size == 0:
+            return pace, abs(together.solve_smooth(elements, modal_system.dt))
+    if turn >= pace.next_turn and worst > SLOW_RATIO * last_worst:
+        together.newton_step(elements, modal_system.dt, False)
         pause = pace.pause if worst < pace.worst else 2 * pace.pause
         return NewtonPace(turn + pause, pause, worst), 0
     return pace, 0
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def set_free_motion(faces):
+def set_free_motion(elements):
     """Write the slides and speeds of set-valued elements without their forces into the field.
 
     The forces of the contact and of all other elements act.
     """
-    stops = faces.stops
+    stops = elements.stops
     for i in range(stops.names.size):
-        p = faces.of[PORT, stops.element[i]]
-        slide = faces.port[FREE_SLIDE, p] - faces.gives[BETA, p, 0] * faces.own[CONTACT_FORCE]
-        speed = faces.port[FREE_SPEED, p] - faces.gives[GAMMA, p, 0] * faces.own[CONTACT_FORCE]
-        for e in range(faces.of.shape[1]):
-            if faces.num[e, 0] != SET_VALUED:
-                slide -= faces.gives[BETA, p, faces.of[PORT, e]] * faces.each[ELEMENT_FORCE, e]
-                speed -= faces.gives[GAMMA, p, faces.of[PORT, e]] * faces.each[ELEMENT_FORCE, e]
-        stops.field[FREE_SLIDE, i] = slide
-        stops.field[FREE_SPEED, i] = speed
+        p = elements.links[LinkRow.PORT, stops.element[i]]
+        slide = (
+            elements.port[PortRow.FREE_SLIDE, p]
+            - elements.compliances[ComplianceRow.SLIDE, p, 0] * elements.contact[ContactPlace.FORCE]
+        )
+        speed = (
+            elements.port[PortRow.FREE_SPEED, p]
+            - elements.compliances[ComplianceRow.SPEED, p, 0] * elements.contact[ContactPlace.FORCE]
+        )
+        for e in range(elements.links.shape[1]):
+            if elements.num[e, 0] != SET_VALUED:
+                slide -= (
+                    elements.compliances[ComplianceRow.SLIDE, p, elements.links[LinkRow.PORT, e]]
+                    * elements.state[ElementRow.FORCE, e]
+                )
+                speed -= (
+                    elements.compliances[ComplianceRow.SPEED, p, elements.links[LinkRow.PORT, e]]
+                    * elements.state[ElementRow.FORCE, e]
+                )
+        stops.field[FaceRow.FREE_SLIDE, i] = slide
+        stops.field[FaceRow.FREE_SPEED, i] = speed
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def take_stop_forces(faces):
-    """Copy the mean forces of the set-valued elements into faces.each.
+def take_stop_forces(elements):
+    """Copy the mean forces of the set-valued elements into elements.state.
 
     Returns their largest change over the tolerance.
     """
-    stops = faces.stops
+    stops = elements.stops
     worst = 0.0
     for i in range(stops.names.size):
         e = stops.element[i]
-        force = stops.field[MEAN_FORCE, i]
+        force = stops.field[FaceRow.MEAN_FORCE, i]
         worst = max(
             worst,
-            abs(force - faces.each[ELEMENT_FORCE, e])
-            / (faces.each[FORCE_TOL, e] + ROUND_OFF * abs(force)),
+            abs(force - elements.state[ElementRow.FORCE, e])
+            / (elements.state[ElementRow.FORCE_TOL, e] + ROUND_OFF * abs(force)),
         )
-        faces.each[ELEMENT_FORCE, e] = force
-        faces.each[INCREMENT, e] = stops.field[FACE_INCREMENT, i]
+        elements.state[ElementRow.FORCE, e] = force
+        elements.state[ElementRow.INCREMENT, e] = stops.field[FaceRow.INCREMENT, i]
     return worst
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def rests_in_step(motion, modal_system, table, at, faces):
+def rests_in_step(at, system):
     """Return whether static friction holds all set-valued elements through the step and at its end.
 
     Parameters
     ----------
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
-    table : (s, k) array
-        Table of `propagator.Propagator`.
     at : int
         Row of the table for this step.
-    faces : interfaces.arrays.PortElements
+    system : element_arrays.MarchArrays
 
     Returns
     -------
     bool
     """
-    if not stop_kernels.rests_through_step(faces.stops):
+    elements = system.elements
+    modal_system = system.modal_system
+    stops = elements.stops
+    if not stop_kernels.rests_through_step(stops):
         return False
-    end = faces.modal[MODAL_SCRATCH : MODAL_SCRATCH + 2]
+    end = elements.modal[ModalRow.SCRATCH : ModalRow.SCRATCH + 2]
     accel = modal_system.workspace[0]
-    set_accelerations(modal_system, faces, accel)
-    for i in range(faces.stops.names.size):
-        e = faces.stops.element[i]
+    set_accelerations(modal_system, elements, accel)
+    for i in range(stops.names.size):
+        e = stops.element[i]
+        change = stops.field[FaceRow.MEAN_FORCE, i] - elements.state[ElementRow.FORCE, e]
         for k in range(accel.size):
-            accel[k] -= (
-                faces.rows[faces.of[PORT, e], k]
-                * (faces.stops.field[MEAN_FORCE, i] - faces.each[ELEMENT_FORCE, e])
-                / modal_system.mass
-            )
-    write_end_state(motion, modal_system, table, at, accel, end)
-    for i in range(faces.stops.names.size):
-        e = faces.stops.element[i]
+            row_entry = elements.rows[elements.links[LinkRow.PORT, e], k]
+            accel[k] -= row_entry * change / modal_system.mass
+    write_end_state(system.motion, modal_system, system.table, at, accel, end)
+    for i in range(stops.names.size):
+        e = stops.element[i]
+        force = stops.field[FaceRow.MEAN_FORCE, i]
         for k in range(accel.size):
-            accel[k] += (
-                faces.rows[faces.of[PORT, e], k]
-                * faces.stops.field[MEAN_FORCE, i]
-                / modal_system.mass
-            )
-    return stop_kernels.rests_at_end(
-        end,
-        modal_system,
-        table[at, 8 * accel.size + 2],
-        accel,
-        modal_system.workspace[1:],
-        faces.stops,
-    )
+            row_entry = elements.rows[elements.links[LinkRow.PORT, e], k]
+            accel[k] += row_entry * force / modal_system.mass
+    drive = system.table[at, 8 * accel.size + 2]
+    return stop_kernels.rests_at_end(end, modal_system, drive, accel, stops)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_with_events(q, v, motion, modal_system, table, at, interface, faces):
+def solve_with_events(start, at, system):
     """Solve the step with the stops and releases of the set-valued elements inside it, and their blows.
 
     The first half of the turns decides which elements stop and slip. The other half keeps their slides and finds
@@ -629,78 +666,64 @@ def solve_with_events(q, v, motion, modal_system, table, at, interface, faces):
 
     Parameters
     ----------
-    q : float
-        Slide of the contact at the start of the step [m].
-    v : float
-        Its speed [m/s].
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
-    table : (s, k) array
-        Table of `propagator.Propagator`.
+    start : interfaces.arrays.StepStart
     at : int
         Row of the table for this step.
-    interface : tuple
-        Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.PortElements
+    system : element_arrays.MarchArrays
 
     Returns
     -------
-    float
-        Increment of the slide of the contact [m].
-    int
-        Number of iterations.
-    bool
-        False if no such step is found, or if it would create energy.
+    EventStep
     """
-    stops = faces.stops
-    iterations = 0
+    elements = system.elements
+    stops = elements.stops
+    n_iterations = 0
     last_worst = np.inf
-    dq = 0.0
-    dt = modal_system.dt
+    increment = 0.0
     for i in range(stops.names.size):
-        stops.field[START_SPEED, i] = faces.each[ELEMENT_SPEED, stops.element[i]]
+        stops.field[FaceRow.START_SPEED, i] = elements.state[ElementRow.SPEED, stops.element[i]]
     for turn in range(MAX_EVENT_TURNS):
         worst = 0.0
         if HAS_CONTACT:
-            dq, worst, tries = solve_contact(q, v, dt, interface, faces)
-            iterations += tries
+            solution = solve_contact(start, system)
+            increment = solution.increment
+            worst = solution.change
+            n_iterations += solution.iterations
         if HAS_SLOPES:
-            for e in range(faces.of.shape[1]):
-                if faces.num[e, 0] != SET_VALUED:
-                    change, tries = solve_one_element(e, turn, faces, dt)
+            for e in range(elements.links.shape[1]):
+                if elements.num[e, 0] != SET_VALUED:
+                    change, count = solve_element(e, turn, elements, start.dt)
                     worst = max(worst, change)
-                    iterations += tries
-        set_free_motion(faces)
-        if turn < MAX_EVENT_TURNS // 2 and not (
-            rests_in_step(motion, modal_system, table, at, faces)
-            or stop_kernels.follow_step(dt, stops)
-        ):
-            return dq, iterations, False
+                    n_iterations += count
+        set_free_motion(elements)
+        if turn < MAX_EVENT_TURNS // 2:
+            if not (rests_in_step(at, system) or stop_kernels.follow_step(start.dt, stops)):
+                break
         if not stop_kernels.match_mean_forces(stops):
-            return dq, iterations, False
-        worst = max(worst, take_stop_forces(faces))
-        iterations += 1
-        if worst <= 1.0 or is_all_set_valued(faces):
-            return dq, iterations, stop_kernels.find_blows(stops) >= 0.0
+            break
+        worst = max(worst, take_stop_forces(elements))
+        n_iterations += 1
+        if worst <= 1.0 or is_all_set_valued(elements):
+            loses_energy = stop_kernels.find_blows(stops) >= 0.0
+            return EventStep(increment, n_iterations, loses_energy)
         if IS_COUPLED:
-            if turn > 4 and worst > 0.2 * last_worst:
-                newton_with_stops(faces, dt)
+            if turn > 4 and worst > SLOW_RATIO * last_worst:
+                newton_with_stops(elements, start.dt)
         last_worst = worst
-    return dq, iterations, False
+    return EventStep(increment, n_iterations, False)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def is_all_set_valued(faces):
+def is_all_set_valued(elements):
     """Return whether all elements are set-valued, so that they are solved at once."""
     if HAS_CONTACT:
         return False
     else:
-        return faces.stops.names.size == faces.of.shape[1]
+        return elements.stops.names.size == elements.links.shape[1]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def newton_with_stops(faces, dt):
+def newton_with_stops(elements, dt):
     """Take a step of Newton's method on the forces of the elements, which keep their stops.
 
     It does nothing if the rig has a contact that can open.
@@ -709,106 +732,103 @@ def newton_with_stops(faces, dt):
         if HAS_CONTACT:
             return
         else:
-            together.newton_step(faces, dt, True)
+            together.newton_step(elements, dt, True)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_step(q, v, motion, modal_system, table, at, interface, faces):
-    """Solve contact and elements over a step whose free slides are in faces.port.
+def solve_step(start, at, system):
+    """Solve contact and elements over a step whose free slides are in elements.port.
 
-    Blows of set-valued elements are in faces.stops then, or are left to `strike_modes`.
+    Blows of set-valued elements are in elements.stops then, or are left to `strike_modes`.
 
     Parameters
     ----------
-    q : float
-        Slide of the contact at the start of the step [m].
-    v : float
-        Its speed [m/s].
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
-    table : (s, k) array
-        Table of `propagator.Propagator`.
+    start : interfaces.arrays.StepStart
     at : int
         Row of the table for this step.
-    interface : tuple
-        Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.PortElements
+    system : element_arrays.MarchArrays
 
     Returns
     -------
-    float
-        Increment of the slide of the contact [m].
-    int
-        Number of iterations, negative if the forces do not converge.
+    interfaces.arrays.SolvedStep
+        Increment and mean force of the contact.
     """
+    elements = system.elements
+    n_event_iterations = 0
     if HAS_STOPS:
-        dq, tried, found = solve_with_events(
-            q, v, motion, modal_system, table, at, interface, faces
-        )
-        if found:
-            faces.own[STOPS_KNOWN] = 1.0
-            return dq, tried
-        dq, iterations = solve_coupled_forces(q, v, modal_system, interface, faces)
-        faces.own[STOPS_KNOWN] = 0.0
-        return dq, iterations + tried if iterations >= 0 else iterations - tried
-    else:
-        return solve_coupled_forces(q, v, modal_system, interface, faces)
+        step = solve_with_events(start, at, system)
+        if step.is_solved:
+            elements.contact[ContactPlace.STOPS_KNOWN] = 1.0
+            force = elements.contact[ContactPlace.FORCE]
+            return SolvedStep(step.increment, force, step.iterations)
+        n_event_iterations = step.iterations
+        elements.contact[ContactPlace.STOPS_KNOWN] = 0.0
+    increment, n_iterations = solve_coupled_forces(start, system)
+    total = n_iterations + n_event_iterations
+    if n_iterations < 0:
+        total = n_iterations - n_event_iterations
+    return SolvedStep(increment, elements.contact[ContactPlace.FORCE], total)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def set_accelerations(modal_system, faces, accel):
+def set_accelerations(modal_system, elements, accel):
     """Write the modal accelerations of all forces [m s-2] into accel (n,).
 
     Parameters
     ----------
     modal_system : interfaces.arrays.ModalArrays
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
     accel : (n,) array
         Modal accelerations of the forces [m s-2].
     """
     for k in range(accel.size):
         accel[k] = (
-            faces.modal[OTHER_ACCELERATION, k]
-            - modal_system.slide[k] * faces.own[CONTACT_FORCE] / modal_system.mass
+            elements.modal[ModalRow.OTHER_ACCELERATION, k]
+            - modal_system.slide[k] * elements.contact[ContactPlace.FORCE] / modal_system.mass
         )
-    for e in range(faces.of.shape[1]):
+    for e in range(elements.links.shape[1]):
         for k in range(accel.size):
             accel[k] -= (
-                faces.rows[faces.of[PORT, e], k] * faces.each[ELEMENT_FORCE, e] / modal_system.mass
+                elements.rows[elements.links[LinkRow.PORT, e], k]
+                * elements.state[ElementRow.FORCE, e]
+                / modal_system.mass
             )
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def friction_work(dq, row, faces):
+def write_mean_forces(increment, row, elements):
     """Write the mean forces of the step into the row of its start; return its friction work [J].
 
     Parameters
     ----------
-    dq : float
+    increment : float
         Increment of the slide of the contact [m].
     row : (k,) array
         Row of samples of `loop_kernels.march`; it is written.
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
 
     Returns
     -------
     float
     """
-    m = 2 * faces.modal.shape[1] + 7
-    work = faces.own[CONTACT_FORCE] * dq
-    row[m - 3] = faces.each[ELEMENT_FORCE, 0] if faces.of[IS_FRICTION, 0] else 0.0
+    state = elements.state
+    first_column = find_element_columns(elements.modal)
+    work = elements.contact[ContactPlace.FORCE] * increment
+    first_force = state[ElementRow.FORCE, 0] if elements.links[LinkRow.IS_FRICTION, 0] else 0.0
     if HAS_CONTACT:
-        row[m - 3] = faces.own[CONTACT_FORCE]
-    for e in range(faces.of.shape[1]):
-        row[m + ELEMENT_COLUMNS * e + 4] = faces.each[ELEMENT_FORCE, e]
-        if faces.of[IS_FRICTION, e]:
-            work += faces.each[ELEMENT_FORCE, e] * faces.each[INCREMENT, e]
+        first_force = elements.contact[ContactPlace.FORCE]
+    row[2 * elements.modal.shape[1] + SampleColumn.MEAN_FORCE] = first_force
+    for e in range(elements.links.shape[1]):
+        row[first_column + N_ELEMENT_COLUMNS * e + SampleColumn.MEAN_FORCE] = state[
+            ElementRow.FORCE, e
+        ]
+        if elements.links[LinkRow.IS_FRICTION, e]:
+            work += state[ElementRow.FORCE, e] * state[ElementRow.INCREMENT, e]
     return work
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def strike_modes(motion, mass, faces):
+def strike_modes(motion, mass, elements):
     """Change the speeds of the modes by the blows of set-valued elements; return the energy lost [J].
 
     If no stops are known, the blows bring the elements that do not slide to rest.
@@ -819,38 +839,32 @@ def strike_modes(motion, mass, faces):
         Coordinates and rates of the modes.
     mass : float
         [kg]
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
 
     Returns
     -------
     float
     """
-    stops = faces.stops
-    if faces.own[STOPS_KNOWN] == 0.0:
+    stops = elements.stops
+    if elements.contact[ContactPlace.STOPS_KNOWN] == 0.0:
         for i in range(stops.names.size):
-            stops.field[FACE_INCREMENT, i] = faces.each[INCREMENT, stops.element[i]]
+            stops.field[FaceRow.INCREMENT, i] = elements.state[
+                ElementRow.INCREMENT, stops.element[i]
+            ]
         stop_kernels.find_stopping_blows(motion, stops)
     return stop_kernels.apply_blows(motion, mass, stops)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def commit_step(q, v, dq, motion, modal_system, interface, faces):
+def commit_step(start, increment, system):
     """Move the memories of contact and elements by the step.
 
     Parameters
     ----------
-    q : float
-        Slide of the contact at the start of the step [m].
-    v : float
-        Its speed [m/s].
-    dq : float
+    start : interfaces.arrays.StepStart
+    increment : float
         Increment of the slide of the contact [m].
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
-    interface : tuple
-        Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.PortElements
+    system : element_arrays.MarchArrays
 
     Returns
     -------
@@ -859,57 +873,50 @@ def commit_step(q, v, dq, motion, modal_system, interface, faces):
     bool
         False if a memory is full.
     """
-    lost = 0.0
-    ok = True
+    elements = system.elements
+    state = elements.state
+    rates = system.motion[1]
+    loss = 0.0
+    has_room = True
     if HAS_CONTACT:
-        speed = 0.0
-        for k in range(modal_system.slide.size):
-            speed += modal_system.slide[k] * motion[1, k]
-        lost, ok = contact.commit_step(
-            dq, faces.own[CONTACT_FORCE], q, v, speed, modal_system.dt, interface
+        loss, has_room = contact.commit_step(
+            increment,
+            elements.contact[ContactPlace.FORCE],
+            start,
+            project_modes(system.modal_system.slide, rates),
+            system.interface,
         )
-        faces.own[CONTACT_INCREMENT] = dq
-    for e in range(faces.of.shape[1]):
-        speed = 0.0
-        for k in range(modal_system.slide.size):
-            speed += faces.rows[faces.of[PORT, e], k] * motion[1, k]
+        elements.contact[ContactPlace.INCREMENT] = increment
+    for e in range(elements.links.shape[1]):
+        is_single = True
         if HAS_PLANES:
-            if faces.of[MATE, e] == e:
-                lost += law.update_memory(
-                    faces.num[e],
-                    faces.mem[e],
-                    faces.each[INCREMENT, e],
-                    faces.each[ELEMENT_FORCE, e],
-                    faces.each[ELEMENT_SPEED, e],
-                    speed,
-                    modal_system.dt,
-                    faces.each[BOND_LENGTH, e],
+            mate = elements.links[LinkRow.MATE, e]
+            is_single = mate == e
+            if mate > e:
+                loss += plane.update_plane_memory(
+                    elements.num[e],
+                    elements.mem[e],
+                    elements.mem[mate],
+                    (state[ElementRow.INCREMENT, e], state[ElementRow.INCREMENT, mate]),
                 )
-            elif faces.of[MATE, e] > e:
-                lost += plane.update_plane_memory(
-                    faces.num[e],
-                    faces.mem[e],
-                    faces.mem[faces.of[MATE, e]],
-                    (faces.each[INCREMENT, e], faces.each[INCREMENT, faces.of[MATE, e]]),
-                )
-        else:
-            lost += law.update_memory(
-                faces.num[e],
-                faces.mem[e],
-                faces.each[INCREMENT, e],
-                faces.each[ELEMENT_FORCE, e],
-                faces.each[ELEMENT_SPEED, e],
-                speed,
-                modal_system.dt,
-                faces.each[BOND_LENGTH, e],
+        if is_single:
+            loss += law.update_memory(
+                elements.num[e],
+                elements.mem[e],
+                state[ElementRow.INCREMENT, e],
+                state[ElementRow.FORCE, e],
+                state[ElementRow.SPEED, e],
+                project_modes(elements.rows[elements.links[LinkRow.PORT, e]], rates),
+                start.dt,
+                state[ElementRow.BOND_LENGTH, e],
             )
-        faces.each[INCREMENT_BEFORE, e] = faces.each[LAST_INCREMENT, e]
-        faces.each[LAST_INCREMENT, e] = faces.each[INCREMENT, e]
-    return lost, ok
+        state[ElementRow.INCREMENT_BEFORE, e] = state[ElementRow.LAST_INCREMENT, e]
+        state[ElementRow.LAST_INCREMENT, e] = state[ElementRow.INCREMENT, e]
+    return loss, has_room
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def set_limits(load0, load1, mu, faces):
+def set_limits(load0, load1, mu, elements):
     """Set the limits of the set-valued elements under a load that changes linearly in the step.
 
     Parameters
@@ -920,36 +927,39 @@ def set_limits(load0, load1, mu, faces):
         Load at its end [N].
     mu : (2,) array
         Static and kinetic coefficient.
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
     """
-    stops = faces.stops
+    stops = elements.stops
     load1 = max(load1, 0.0)
     for i in range(stops.names.size):
         e = stops.element[i]
         for k in range(2):
-            stops.limit[STATIC + k, i] = mu[k] * load0
-            stops.limit[STATIC + k + AT_END, i] = mu[k] * load1
-            faces.num[e, 1 + k] = 0.5 * mu[k] * (load0 + load1)
+            stops.limit[LimitRow.STATIC + k, i] = mu[k] * load0
+            stops.limit[LimitRow.STATIC + k + LimitRow.AT_END, i] = mu[k] * load1
+            elements.num[e, 1 + k] = 0.5 * mu[k] * (load0 + load1)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def cap_forces(faces):
+def cap_forces(elements):
     """Limit the forces of the set-valued elements at a sample to their static friction."""
-    for i in range(faces.stops.names.size):
-        e = faces.stops.element[i]
-        faces.mem[e, 0] = min(max(faces.mem[e, 0], -faces.num[e, 1]), faces.num[e, 1])
+    for i in range(elements.stops.names.size):
+        e = elements.stops.element[i]
+        elements.mem[e, 0] = min(max(elements.mem[e, 0], -elements.num[e, 1]), elements.num[e, 1])
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def slide_freely(used, faces):
+def slide_freely(used, elements):
     """Let the only set-valued element slide through the step under a mean force.
 
     Returns its slide.
     """
-    f = faces.stops.field
-    faces.each[ELEMENT_FORCE, 0] = used
-    faces.each[INCREMENT, 0] = faces.port[FREE_SLIDE, 0] - faces.gives[BETA, 0, 0] * used
-    faces.own[STOPS_KNOWN] = 1.0
-    f[BLOW, 0] = 0.0
-    f[SLIP_STATE, 0] = 1.0 if used >= 0 else -1.0
-    return faces.each[INCREMENT, 0]
+    f = elements.stops.field
+    elements.state[ElementRow.FORCE, 0] = used
+    elements.state[ElementRow.INCREMENT, 0] = (
+        elements.port[PortRow.FREE_SLIDE, 0]
+        - elements.compliances[ComplianceRow.SLIDE, 0, 0] * used
+    )
+    elements.contact[ContactPlace.STOPS_KNOWN] = 1.0
+    f[FaceRow.BLOW, 0] = 0.0
+    f[FaceRow.SLIP_STATE, 0] = 1.0 if used >= 0 else -1.0
+    return elements.state[ElementRow.INCREMENT, 0]

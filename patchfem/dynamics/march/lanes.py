@@ -8,22 +8,35 @@ import numpy as np
 from ...compiled import load
 from ...core import ModalBasis, SineDrive
 from ..propagator import make_propagator
+from .lane_rows import (
+    LANES,
+    N_COLUMNS,
+    N_LOSS_COEFFICIENTS,
+    N_POINTS,
+    N_RIG_MODES,
+    N_SAMPLE,
+    N_WORKSPACE_ROWS,
+    At,
+    RigRow,
+    StepColumn,
+    get_rows,
+)
 
 LANES_KERNELS = "dynamics.march.lanes_kernels"
 
 
-# Row of `lanes_kernels` of each sum of a run.
-LEDGER_ROWS = {
-    "work_in": "WORK_IN",
-    "viscous": "VISCOUS_SUM",
-    "power": "DRIVE_WORK_SIZE",
-    "lost": "FRICTION_LOSS",
-    "peak": "MAX_STORED",
-    "booked": "FRICTION_WORK",
-    "sampled": "SAMPLED_WORK",
-    "passed": "FRICTION_WORK_SIZE",
-    "gone": "INTERFACE_LOSS",
-    "created": "INTERFACE_GAIN",
+# position in the workspace of each sum of a run
+LEDGER_POSITIONS = {
+    "work_in": At.WORK_IN,
+    "viscous": At.VISCOUS_SUM,
+    "power": At.DRIVE_WORK_SIZE,
+    "lost": At.FRICTION_LOSS,
+    "peak": At.MAX_STORED,
+    "booked": At.FRICTION_WORK,
+    "sampled": At.SAMPLED_WORK,
+    "passed": At.FRICTION_WORK_SIZE,
+    "gone": At.INTERFACE_LOSS,
+    "created": At.INTERFACE_GAIN,
 }
 
 
@@ -69,96 +82,79 @@ class MarchedCases(NamedTuple):
 
 def can_march(modes: ModalBasis) -> bool:
     """Return whether lanes can march a rig."""
-    return modes.omega.size <= load(LANES_KERNELS).N_RIG_MODES and modes.damping is None
+    return modes.omega.size <= N_RIG_MODES and modes.damping is None
 
 
-def _rig_rows(kernels, modes: ModalBasis, prop) -> np.ndarray:
+def _make_rig_rows(modes: ModalBasis, prop) -> np.ndarray:
     """Return the rows of a rig as the kernels take them.
 
     Parameters
     ----------
-    kernels
     modes : ModalBasis
     prop : propagator.Propagator
     """
     n = modes.omega.size
-    out = np.zeros((kernels.N_RIG_ROWS + 1, 3))
+    out = np.zeros((len(RigRow) + N_LOSS_COEFFICIENTS - 1, 3))
     for first, rows in (
-        (kernels.ZZ, prop.free),
-        (kernels.BY_Z, prop.push),
-        (kernels.REACH_Z, prop.reach[0].reshape(2, n)),
-        (kernels.LOSS, prop.loss),
-        (kernels.SLIDE_SHAPE, [modes.slide, modes.output, modes.omega**2]),
+        (RigRow.ZZ, prop.free),
+        (RigRow.BY_Z, prop.push),
+        (RigRow.REACH_Z, prop.reach[0].reshape(2, n)),
+        (RigRow.LOSS, prop.loss),
+        (RigRow.SLIDE_SHAPE, [modes.slide, modes.output, modes.omega**2]),
     ):
         out[first : first + len(rows), :n] = rows
-    out[-1] = prop.beta[0, 0], modes.mass, prop.dt
+    out[RigRow.STEP] = prop.beta[0, 0], modes.mass, prop.dt
     # these coefficients apply to forces [N] instead of accelerations
-    for first, power in (
-        (kernels.BY_Z, 1),
-        (kernels.BY_V, 1),
-        (kernels.LOSS + 3, 1),
-        (kernels.LOSS + 4, 1),
-        (kernels.LOSS + 5, 2),
-    ):
-        out[first] /= modes.mass**power
+    out[[RigRow.BY_Z, RigRow.BY_V, RigRow.LOSS + 3, RigRow.LOSS + 4]] /= modes.mass
+    out[RigRow.LOSS + 5] /= modes.mass**2
     return out
 
 
-def _step_table(kernels, modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
+def _make_step_table(modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
     """Return the table of the steps of a cycle under a drive of 1 m s-2.
 
     Parameters
     ----------
-    kernels
     modes : ModalBasis
-    drive : float
-        Acceleration of the base [m s-2].
-    steps
+    drive : SineDrive
+    steps : int
+        Number of steps of a cycle.
     prop : propagator.Propagator
     """
     n = modes.omega.size
-    unit = replace(drive, acceleration=1.0)
-    found = prop.tables(unit, 0, steps)
-    out = np.zeros((steps, kernels.N_COLUMNS))
+    table = prop.tables(replace(drive, acceleration=1.0), 0, steps)
+    out = np.zeros((steps, N_COLUMNS))
     for k in range(8):  # one column of each kind per mode
-        out[:, k * kernels.N_RIG_MODES : k * kernels.N_RIG_MODES + n] = found[
-            :, k * n : (k + 1) * n
-        ]
+        out[:, k * N_RIG_MODES : k * N_RIG_MODES + n] = table[:, k * n : (k + 1) * n]
     angle = 2 * np.pi * np.arange(steps) / steps
-    for forms in (
-        kernels.WORK_FORMS,
-        kernels.LOSS_FORMS,
-    ):  # these apply to forces [N] instead of accelerations
-        out[:, forms + 2 * kernels.N_RIG_MODES : forms + 3 * kernels.N_RIG_MODES] /= modes.mass
-    out[:, kernels.REMAINDERS : kernels.REMAINDERS + 2] = found[:, 8 * n : 8 * n + 2]
-    out[:, kernels.PORT_SLIDE] = found[:, 8 * n + 3]
-    out[:, kernels.WAVES :] = np.array([np.cos(angle), np.sin(angle)]).T
+    for forms in (StepColumn.WORK_FORMS, StepColumn.LOSS_FORMS):
+        # the last coefficients apply to forces [N] instead of accelerations
+        out[:, forms + 2 * N_RIG_MODES : forms + 3 * N_RIG_MODES] /= modes.mass
+    out[:, StepColumn.REMAINDERS : StepColumn.REMAINDERS + 2] = table[:, 8 * n : 8 * n + 2]
+    out[:, StepColumn.PORT_SLIDE] = table[:, 8 * n + 3]
+    out[:, StepColumn.WAVES :] = np.array([np.cos(angle), np.sin(angle)]).T
     return out
 
 
-def _make_workspace(kernels, cases: list) -> np.ndarray:
+def _make_workspace(cases: list) -> np.ndarray:
     """Return the workspace of cases at rest; the last case fills lanes that are left over."""
-    out = np.zeros((kernels.N_NUMBERS, kernels.LANES))
-    points = kernels.N_POINTS
-    for i in range(kernels.LANES):
-        one = cases[min(i, len(cases) - 1)]
-        few, modes = one.shape.shape
-        out[[kernels.DRIVE, kernels.BOND_LENGTH, kernels.LIMIT], i] = (
-            one.amplitude,
-            one.length,
-            one.limit.sum(),
-        )
-        out[kernels.POINT_LIMITS : kernels.POINT_LIMITS + few, i] = one.limit
-        out[kernels.STIFFNESSES : kernels.STIFFNESSES + kernels.N_PIECE_MODES, i] = (
-            one.stiffness.max()
-        )
-        for k in range(modes):
-            first = kernels.SHAPES + k * points
-            out[first : first + few, i] = one.shape[:, k]
-            out[kernels.STIFFNESSES + k, i] = one.stiffness[k]
-            out[kernels.MAX_SHAPES + k, i] = np.abs(one.shape[:, k]).max()
-            out[kernels.MEAN_SHAPES + k, i] = one.limit @ one.shape[:, k] / one.limit.sum()
-    return out
+    workspace = np.zeros((N_WORKSPACE_ROWS, LANES))
+    for i in range(LANES):
+        case = cases[min(i, len(cases) - 1)]
+        n_points, n_modes = case.shape.shape
+        lane = workspace[:, i : i + 1]
+        get_rows(lane, At.DRIVE)[:] = case.amplitude
+        get_rows(lane, At.BOND_LENGTH)[:] = case.length
+        get_rows(lane, At.LIMIT)[:] = case.limit.sum()
+        get_rows(lane, At.POINT_LIMITS)[:n_points, 0] = case.limit
+        # coordinates that a case does not have stay at 0 with any stiffness
+        get_rows(lane, At.STIFFNESSES)[:] = case.stiffness.max()
+        get_rows(lane, At.STIFFNESSES)[:n_modes, 0] = case.stiffness
+        for k, shape in enumerate(case.shape.T):
+            get_rows(lane, At.SHAPES)[k * N_POINTS : k * N_POINTS + n_points, 0] = shape
+            get_rows(lane, At.MAX_SHAPES)[k] = np.abs(shape).max()
+            get_rows(lane, At.MEAN_SHAPES)[k] = case.limit @ shape / case.limit.sum()
+    return workspace
 
 
 def march(
@@ -179,40 +175,38 @@ def march(
 
     Returns
     -------
-    Marched
+    MarchedCases
     """
     kernels = load(LANES_KERNELS)
     prop = make_propagator(modes, drive, steps)
-    rig = _rig_rows(kernels, modes, prop)
-    table = _step_table(kernels, modes, drive, steps, prop)
-    n = len(cases)
-    parts = []
-    for first in range(0, n, kernels.LANES):
-        workspace = _make_workspace(kernels, cases[first : first + kernels.LANES])
-        few = min(kernels.LANES, n - first)
-        history = np.zeros((cycles, 4, kernels.LANES))
-        work = np.zeros(kernels.LANES)
-        samples = np.zeros((window * steps + 1, kernels.N_SAMPLE, kernels.LANES))
+    rig = _make_rig_rows(modes, prop)
+    table = _make_step_table(modes, drive, steps, prop)
+    blocks = []
+    for first in range(0, len(cases), LANES):
+        block_cases = cases[first : first + LANES]
+        workspace = _make_workspace(block_cases)
+        history = np.zeros((cycles, 4, LANES))
+        work = np.zeros(LANES)
+        samples = np.zeros((window * steps + 1, N_SAMPLE, LANES))
         kernels.march(workspace.ravel(), rig, table, history, samples, work)
-        parts.append((workspace[:, :few], history[:, :, :few], samples[:, :, :few], work[:few]))
-    workspace, history, samples, work = (np.concatenate(one, axis=-1) for one in zip(*parts))
-    m = modes.omega.size
-    r = kernels.N_RIG_MODES
-    book = {name: workspace[getattr(kernels, row)] for name, row in LEDGER_ROWS.items()}
-    moving = (
-        workspace[kernels.RIG_RATE : kernels.RIG_RATE + m] ** 2
-        + (modes.omega[:, None] * workspace[:m]) ** 2
-    ).sum(axis=0)
-    book["stored"] = 0.5 * modes.mass * moving + workspace[kernels.INTERFACE_ENERGY]
+        arrays = workspace, history, samples, work
+        blocks.append([array[..., : len(block_cases)] for array in arrays])
+    workspace, history, samples, work = (np.concatenate(part, axis=-1) for part in zip(*blocks))
+    n = modes.omega.size
+    book = {name: get_rows(workspace, at)[0] for name, at in LEDGER_POSITIONS.items()}
+    rates = get_rows(workspace, At.RIG_RATE)[:n]
+    places = get_rows(workspace, At.RIG_POSITION)[:n]
+    squares = (rates**2 + (modes.omega[:, None] * places) ** 2).sum(axis=0)
+    book["stored"] = 0.5 * modes.mass * squares + get_rows(workspace, At.INTERFACE_ENERGY)[0]
     return MarchedCases(
-        history[:, :2].transpose(2, 0, 1),
-        (history[:, 2] + 1j * history[:, 3]).T,
-        book,
-        samples[:, :m],
-        samples[:, r : r + m],
-        samples[:, 2 * r],
-        samples[:, 2 * r + 1],
-        book["booked"] - work,
-        workspace[kernels.MAX_SLIDE],
-        workspace[kernels.N_UNSOLVED],
+        extremes=history[:, :2].transpose(2, 0, 1),
+        phasors=(history[:, 2] + 1j * history[:, 3]).T,
+        book=book,
+        z=samples[:, :n],
+        rate=samples[:, N_RIG_MODES : N_RIG_MODES + n],
+        force=samples[:, 2 * N_RIG_MODES],
+        slip=samples[:, 2 * N_RIG_MODES + 1],
+        worked=book["booked"] - work,
+        reach=get_rows(workspace, At.MAX_SLIDE)[0],
+        bad=get_rows(workspace, At.N_UNSOLVED)[0],
     )

@@ -4,7 +4,7 @@ The steps are those of `passing_kernels`.
 
 The cases share the modes of their rig and the frequency of their drive, and have N_POINTS points behind N_PIECE_MODES modes
 of the pieces each. In every step all lanes take as many turns of Newton's method as the slowest of them needs. The workspace
-is a flat array as in `lanes.rows_kernels`: row r of lane i is the element r * LANES + i. Stretches are over the bond length
+is a flat array as in `lanes.rows_kernels`, whose rows `lane_rows` names. Stretches are over the bond length
 and squares over its square, for bonds whose density is constant. A test compares a case with `march.Run`. Cost: 20 ns per
 step and case on a core with vectors of eight numbers.
 """
@@ -13,91 +13,7 @@ from math import sqrt
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
-
-LANES = 32  # number of cases that march side by side
-N_POINTS = 6  # points of the interface of a case
-N_PIECE_MODES = 2  # shear modes of the pieces of a case
-N_RIG_MODES = 2  # modes of the rig
-N_UNKNOWNS = 1 + N_PIECE_MODES  # increments of the slide and of the coordinates of the pieces
-
-# These rows are the state: coordinates and rates of the rig, coordinates of the pieces, stretches and their squares.
-RIG_POSITION = 0
-RIG_RATE = N_RIG_MODES
-PIECE_POSITION = 2 * N_RIG_MODES
-STRETCHES = PIECE_POSITION + N_PIECE_MODES
-SQUARES = STRETCHES + N_POINTS
-# These rows are the unknowns of a step, those of the two steps before, and the step of Newton's method.
-INCREMENTS = SQUARES + N_POINTS
-LAST_INCREMENTS = INCREMENTS + N_UNKNOWNS
-INCREMENTS_BEFORE = INCREMENTS + 2 * N_UNKNOWNS
-NEWTON_STEP = INCREMENTS + 3 * N_UNKNOWNS
-DESCENT = INCREMENTS + 4 * N_UNKNOWNS  # decrease that the last step of Newton's method predicts
-IS_SOLVED = DESCENT + 1  # 1 if the step is solved
-FREE_SLIDE = DESCENT + 2  # increment of the slide without friction [m]
-FRICTION = DESCENT + 3  # friction force at the sample [N]
-INTERFACE_ENERGY = DESCENT + 4  # energy of bonds and pieces [J]
-SLIP = DESCENT + 5  # mean slip of the points [m]
-OUTPUT = DESCENT + 6  # displacement of the output [m]
-OUTPUT_RATE = DESCENT + 7  # rate of the output [m/s]
-LAST_OUTPUT = DESCENT + 8  # the same at the start of the step
-LAST_OUTPUT_RATE = DESCENT + 9
-RIG_SLIDE = DESCENT + 10  # slide of the rig [m]
-MEAN_FORCE = DESCENT + 11  # mean friction force of the step [N]
-DRIVE_WORK = DESCENT + 12  # work of the drive in the step [J]
-VISCOUS_LOSS = DESCENT + 13  # viscous loss in the step [J]
-RATE_SQUARES = DESCENT + 14  # sum of v^2 + omega^2 z^2 of the modes
-# These rows are the numbers of a case.
-DRIVE = DESCENT + 15  # amplitude of its drive over that of the table
-BOND_LENGTH = DESCENT + 16  # [m]
-LIMIT = DESCENT + 17  # friction limit [N]
-POINT_LIMITS = DESCENT + 18  # friction limits of the points [N]
-SHAPES = POINT_LIMITS + N_POINTS  # slides of the points per coordinate of the pieces
-STIFFNESSES = SHAPES + N_PIECE_MODES * N_POINTS  # stiffness of the coordinates of the pieces [N/m]
-MAX_SHAPES = STIFFNESSES + N_PIECE_MODES  # largest absolute slide of a point per coordinate
-MEAN_SHAPES = MAX_SHAPES + N_PIECE_MODES  # mean slide of the points per coordinate
-# These rows are the sums of the run [J], which `lanes.LEDGER_ROWS` names.
-WORK_IN = MEAN_SHAPES + N_PIECE_MODES
-VISCOUS_SUM = WORK_IN + 1
-DRIVE_WORK_SIZE = WORK_IN + 2
-FRICTION_LOSS = WORK_IN + 3
-MAX_STORED = WORK_IN + 4
-FRICTION_WORK = WORK_IN + 5
-SAMPLED_WORK = WORK_IN + 6
-FRICTION_WORK_SIZE = WORK_IN + 7
-INTERFACE_LOSS = WORK_IN + 8
-INTERFACE_GAIN = WORK_IN + 9
-# These rows are the extremes and the phasor of the output in a cycle [m].
-MIN_OUTPUT = WORK_IN + 10
-MAX_OUTPUT = WORK_IN + 11
-COS_SUM = WORK_IN + 12
-SIN_SUM = WORK_IN + 13
-N_UNSOLVED = WORK_IN + 14  # number of steps without a solution
-MAX_SLIDE = WORK_IN + 15  # largest slide of the run [m]
-N_NUMBERS = WORK_IN + 16
-
-# Rows of a mode of the rig: its step as `propagator.Propagator` has it, for forces instead of accelerations.
-ZZ = 0
-ZV = 1
-VZ = 2
-VV = 3
-BY_Z = 4
-BY_V = 5
-REACH_Z = 6
-REACH_V = 7
-LOSS = 8  # six coefficients of the quadratic form of the viscous loss
-SLIDE_SHAPE = 14  # slide per coordinate
-OUTPUT_SHAPE = 15  # output per coordinate
-OMEGA_SQUARE = 16  # square of the angular frequency
-N_RIG_ROWS = 17  # after them: compliance of the slide [m/N], mass [kg], length of a step [s]
-# Columns of the table of a step, for a drive of 1 m s-2.
-BY_DRIVE = 0  # what it adds to coordinates and rates
-WORK_FORMS = 2 * N_RIG_MODES  # coefficients of its work
-LOSS_FORMS = 5 * N_RIG_MODES  # coefficients of the viscous loss
-REMAINDERS = 8 * N_RIG_MODES  # constant parts of work and loss
-PORT_SLIDE = REMAINDERS + 2  # increment of the slide
-WAVES = REMAINDERS + 3  # cosine and sine of the drive at the start of the step
-N_COLUMNS = WAVES + 2
-N_SAMPLE = 2 * N_RIG_MODES + 2  # numbers of a sample: coordinates, rates, force, slip
+from .lane_rows import LANES, N_POINTS, N_RIG_MODES, At, RigRow, StepColumn
 
 NEWTON_TOL = 4e-6  # last step of Newton's method, in bond lengths, as in `shear_solve_kernels`
 MAX_TURNS = 60  # turns of Newton's method
@@ -172,7 +88,7 @@ def add_point(s, workspace, lane, j, y, over, far):
     s : tuple of float
         Residual (3,), then rows of the lower half of the Hessian (6,).
     workspace : array
-        Rows of the lanes, named at the top of the module.
+        Rows of the lanes, see `lane_rows`.
     lane : int
     j : int
         Number of the point.
@@ -188,10 +104,10 @@ def add_point(s, workspace, lane, j, y, over, far):
     tuple of float
     """
     g0, g1, g2, h00, h01, h02, h11, h12, h22 = s
-    a = workspace[(SHAPES + j) * LANES + lane]
-    b = workspace[(SHAPES + N_POINTS + j) * LANES + lane]
-    limit = workspace[(POINT_LIMITS + j) * LANES + lane]
-    stretch = workspace[(STRETCHES + j) * LANES + lane]
+    a = workspace[At.SHAPES + j * LANES + lane]
+    b = workspace[At.SHAPES + (N_POINTS + j) * LANES + lane]
+    limit = workspace[At.POINT_LIMITS + j * LANES + lane]
+    stretch = workspace[At.STRETCHES + j * LANES + lane]
     xi = y[0] - a * y[1] - b * y[2]
     way = 1.0 if xi > 0.0 else -1.0
     x = abs(xi) * over
@@ -218,30 +134,30 @@ def take_newton_turn(workspace, lane, beta, far):
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, named at the top of the module.
+        Rows of the lanes, see `lane_rows`.
     lane : int
     beta : float
         Give of the slide in a step [m/N].
     far : bool
         Whether a slide may exceed MAX_SERIES; a constant of the call.
     """
-    y0 = workspace[INCREMENTS * LANES + lane]
-    y1 = workspace[(INCREMENTS + 1) * LANES + lane]
-    y2 = workspace[(INCREMENTS + 2) * LANES + lane]
-    p0 = workspace[NEWTON_STEP * LANES + lane]
-    p1 = workspace[(NEWTON_STEP + 1) * LANES + lane]
-    p2 = workspace[(NEWTON_STEP + 2) * LANES + lane]
-    length = workspace[BOND_LENGTH * LANES + lane]
-    fall = workspace[DESCENT * LANES + lane]
-    done = workspace[IS_SOLVED * LANES + lane]
+    y0 = workspace[At.INCREMENTS + lane]
+    y1 = workspace[At.INCREMENTS + LANES + lane]
+    y2 = workspace[At.INCREMENTS + 2 * LANES + lane]
+    p0 = workspace[At.NEWTON_STEP + lane]
+    p1 = workspace[At.NEWTON_STEP + LANES + lane]
+    p2 = workspace[At.NEWTON_STEP + 2 * LANES + lane]
+    length = workspace[At.BOND_LENGTH + lane]
+    fall = workspace[At.DESCENT + lane]
+    done = workspace[At.IS_SOLVED + lane]
     over = 1 / length
-    one = 0.5 * workspace[STIFFNESSES * LANES + lane]
-    two = 0.5 * workspace[(STIFFNESSES + 1) * LANES + lane]
+    one = 0.5 * workspace[At.STIFFNESSES + lane]
+    two = 0.5 * workspace[At.STIFFNESSES + LANES + lane]
     y = (y0, y1, y2)
     s = (
-        (y0 - workspace[FREE_SLIDE * LANES + lane]) / beta,
-        one * (2 * workspace[PIECE_POSITION * LANES + lane] + y1),
-        two * (2 * workspace[(PIECE_POSITION + 1) * LANES + lane] + y2),
+        (y0 - workspace[At.FREE_SLIDE + lane]) / beta,
+        one * (2 * workspace[At.PIECE_POSITION + lane] + y1),
+        two * (2 * workspace[At.PIECE_POSITION + LANES + lane] + y2),
         1 / beta,
         0.0,
         0.0,
@@ -267,25 +183,25 @@ def take_newton_turn(workspace, lane, beta, far):
     n2 = -(g2 - l2 * g0 - l3 * r1) / (h22 - l2 * h02 - l3 * m)
     n1 = -r1 * r11 - l3 * n2
     n0 = -g0 * r00 - l1 * n1 - l2 * n2
-    one = workspace[MAX_SHAPES * LANES + lane]
-    two = workspace[(MAX_SHAPES + 1) * LANES + lane]
+    one = workspace[At.MAX_SHAPES + lane]
+    two = workspace[At.MAX_SHAPES + LANES + lane]
     slopes = h00 - 1 / beta
     size = abs(n0) + one * abs(n1) + two * abs(n2)
     least = abs(y0) - one * abs(y1) - two * abs(y2)
     # where no point reverses in this step, the curvature of the forces over it follows from their slopes, which are 0
     # while all points slip
     near = size <= NEWTON_TOL * length or (
-        least > size and slopes * size * size <= BEND_TOL * workspace[LIMIT * LANES + lane] * length
+        least > size and slopes * size * size <= BEND_TOL * workspace[At.LIMIT + lane] * length
     )
     on = 0.0 if done > 0.0 else 1.0
-    workspace[INCREMENTS * LANES + lane] = y0 + on * (-0.5 * p0 if back else n0)
-    workspace[(INCREMENTS + 1) * LANES + lane] = y1 + on * (-0.5 * p1 if back else n1)
-    workspace[(INCREMENTS + 2) * LANES + lane] = y2 + on * (-0.5 * p2 if back else n2)
-    workspace[NEWTON_STEP * LANES + lane] = 0.5 * p0 if back else n0
-    workspace[(NEWTON_STEP + 1) * LANES + lane] = 0.5 * p1 if back else n1
-    workspace[(NEWTON_STEP + 2) * LANES + lane] = 0.5 * p2 if back else n2
-    workspace[DESCENT * LANES + lane] = 0.5 * fall if back else -(g0 * n0 + g1 * n1 + g2 * n2)
-    workspace[IS_SOLVED * LANES + lane] = 1.0 if done > 0.0 or (near and not back) else 0.0
+    workspace[At.INCREMENTS + lane] = y0 + on * (-0.5 * p0 if back else n0)
+    workspace[At.INCREMENTS + LANES + lane] = y1 + on * (-0.5 * p1 if back else n1)
+    workspace[At.INCREMENTS + 2 * LANES + lane] = y2 + on * (-0.5 * p2 if back else n2)
+    workspace[At.NEWTON_STEP + lane] = 0.5 * p0 if back else n0
+    workspace[At.NEWTON_STEP + LANES + lane] = 0.5 * p1 if back else n1
+    workspace[At.NEWTON_STEP + 2 * LANES + lane] = 0.5 * p2 if back else n2
+    workspace[At.DESCENT + lane] = 0.5 * fall if back else -(g0 * n0 + g1 * n1 + g2 * n2)
+    workspace[At.IS_SOLVED + lane] = 1.0 if done > 0.0 or (near and not back) else 0.0
 
 
 @njit(**NJIT_INLINE)
@@ -297,7 +213,7 @@ def move_point(s, workspace, lane, j, y, over, far):
     s : tuple of float
         Work over the limit, increase of the squares, force and squares of the points.
     workspace : array
-        Rows of the lanes, named at the top of the module.
+        Rows of the lanes, see `lane_rows`.
     lane : int
     j : int
         Number of the point.
@@ -313,11 +229,11 @@ def move_point(s, workspace, lane, j, y, over, far):
     tuple of float
     """
     worked, rise, force, square = s
-    a = workspace[(SHAPES + j) * LANES + lane]
-    b = workspace[(SHAPES + N_POINTS + j) * LANES + lane]
-    limit = workspace[(POINT_LIMITS + j) * LANES + lane]
-    stretch = workspace[(STRETCHES + j) * LANES + lane]
-    old = workspace[(SQUARES + j) * LANES + lane]
+    a = workspace[At.SHAPES + j * LANES + lane]
+    b = workspace[At.SHAPES + (N_POINTS + j) * LANES + lane]
+    limit = workspace[At.POINT_LIMITS + j * LANES + lane]
+    stretch = workspace[At.STRETCHES + j * LANES + lane]
+    old = workspace[At.SQUARES + j * LANES + lane]
     xi = y[0] - a * y[1] - b * y[2]
     way = 1.0 if xi > 0.0 else -1.0
     x = abs(xi) * over
@@ -326,8 +242,8 @@ def move_point(s, workspace, lane, j, y, over, far):
     new = e * (old + 2 * way * stretch * x + x * x) + (2 - e * (far_x * far_x + 2 * far_x + 2))
     new = new if x < MAX_EXPONENT else 2.0
     one = stretch * e + way * (1 - e)
-    workspace[(STRETCHES + j) * LANES + lane] = one
-    workspace[(SQUARES + j) * LANES + lane] = new
+    workspace[At.STRETCHES + j * LANES + lane] = one
+    workspace[At.SQUARES + j * LANES + lane] = new
     return (
         worked + limit * (stretch * f1 + way * x * f2) * xi,
         rise + limit * (new - old),
@@ -343,22 +259,22 @@ def commit_step(workspace, lane, beta, far):
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, named at the top of the module.
+        Rows of the lanes, see `lane_rows`.
     lane : int
     beta : float
         Give of the slide in a step [m/N].
     far : bool
         Whether a slide may exceed MAX_SERIES; a constant of the call.
     """
-    y0 = workspace[INCREMENTS * LANES + lane]
-    y1 = workspace[(INCREMENTS + 1) * LANES + lane]
-    y2 = workspace[(INCREMENTS + 2) * LANES + lane]
-    length = workspace[BOND_LENGTH * LANES + lane]
-    used = (workspace[FREE_SLIDE * LANES + lane] - y0) / beta
+    y0 = workspace[At.INCREMENTS + lane]
+    y1 = workspace[At.INCREMENTS + LANES + lane]
+    y2 = workspace[At.INCREMENTS + 2 * LANES + lane]
+    length = workspace[At.BOND_LENGTH + lane]
+    used = (workspace[At.FREE_SLIDE + lane] - y0) / beta
     over = 1 / length
     y = (y0, y1, y2)
-    b1 = workspace[PIECE_POSITION * LANES + lane] + y1
-    b2 = workspace[(PIECE_POSITION + 1) * LANES + lane] + y2
+    b1 = workspace[At.PIECE_POSITION + lane] + y1
+    b2 = workspace[At.PIECE_POSITION + LANES + lane] + y2
     s = move_point((0.0, 0.0, 0.0, 0.0), workspace, lane, 0, y, over, far)
     s = move_point(s, workspace, lane, 1, y, over, far)
     s = move_point(s, workspace, lane, 2, y, over, far)
@@ -367,35 +283,33 @@ def commit_step(workspace, lane, beta, far):
     worked, rise, force, square = move_point(s, workspace, lane, 5, y, over, far)
     energy = 0.5 * (
         length * square
-        + workspace[STIFFNESSES * LANES + lane] * b1 * b1
-        + workspace[(STIFFNESSES + 1) * LANES + lane] * b2 * b2
+        + workspace[At.STIFFNESSES + lane] * b1 * b1
+        + workspace[At.STIFFNESSES + LANES + lane] * b2 * b2
     )
     work = used * y0
-    q = workspace[RIG_SLIDE * LANES + lane]
-    gone = work - (energy - workspace[INTERFACE_ENERGY * LANES + lane])
-    noise = workspace[LIMIT * LANES + lane] * (1e-12 * abs(y0) + 1e-15 * abs(q))
-    workspace[PIECE_POSITION * LANES + lane] = b1
-    workspace[(PIECE_POSITION + 1) * LANES + lane] = b2
-    workspace[MEAN_FORCE * LANES + lane] = used
-    workspace[FRICTION_LOSS * LANES + lane] += worked - 0.5 * length * rise
-    workspace[FRICTION_WORK * LANES + lane] += work
-    workspace[FRICTION_WORK_SIZE * LANES + lane] += abs(work)
-    workspace[SAMPLED_WORK * LANES + lane] += (
-        0.5 * (workspace[FRICTION * LANES + lane] + force) * y0
-    )
-    workspace[INTERFACE_LOSS * LANES + lane] += gone if gone > -noise else 0.0
-    workspace[INTERFACE_GAIN * LANES + lane] -= gone if gone < -noise else 0.0
-    workspace[FRICTION * LANES + lane] = force
-    workspace[INTERFACE_ENERGY * LANES + lane] = energy
+    q = workspace[At.RIG_SLIDE + lane]
+    gone = work - (energy - workspace[At.INTERFACE_ENERGY + lane])
+    noise = workspace[At.LIMIT + lane] * (1e-12 * abs(y0) + 1e-15 * abs(q))
+    workspace[At.PIECE_POSITION + lane] = b1
+    workspace[At.PIECE_POSITION + LANES + lane] = b2
+    workspace[At.MEAN_FORCE + lane] = used
+    workspace[At.FRICTION_LOSS + lane] += worked - 0.5 * length * rise
+    workspace[At.FRICTION_WORK + lane] += work
+    workspace[At.FRICTION_WORK_SIZE + lane] += abs(work)
+    workspace[At.SAMPLED_WORK + lane] += 0.5 * (workspace[At.FRICTION + lane] + force) * y0
+    workspace[At.INTERFACE_LOSS + lane] += gone if gone > -noise else 0.0
+    workspace[At.INTERFACE_GAIN + lane] -= gone if gone < -noise else 0.0
+    workspace[At.FRICTION + lane] = force
+    workspace[At.INTERFACE_ENERGY + lane] = energy
     # the next guess is a quadratic extrapolation of the last three steps
     for k in range(3):
-        here = workspace[(INCREMENTS + k) * LANES + lane]
-        last = workspace[(LAST_INCREMENTS + k) * LANES + lane]
-        workspace[(INCREMENTS + k) * LANES + lane] = (
-            3 * (here - last) + workspace[(INCREMENTS_BEFORE + k) * LANES + lane]
+        here = workspace[At.INCREMENTS + k * LANES + lane]
+        last = workspace[At.LAST_INCREMENTS + k * LANES + lane]
+        workspace[At.INCREMENTS + k * LANES + lane] = (
+            3 * (here - last) + workspace[At.INCREMENTS_BEFORE + k * LANES + lane]
         )
-        workspace[(INCREMENTS_BEFORE + k) * LANES + lane] = last
-        workspace[(LAST_INCREMENTS + k) * LANES + lane] = here
+        workspace[At.INCREMENTS_BEFORE + k * LANES + lane] = last
+        workspace[At.LAST_INCREMENTS + k * LANES + lane] = here
 
 
 @njit(**NJIT_INLINE)
@@ -405,7 +319,7 @@ def move_mode(workspace, lane, k, mode, push):
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, named at the top of the module.
+        Rows of the lanes, see `lane_rows`.
     lane : int
     k : int
         Number of the mode.
@@ -432,25 +346,25 @@ def move_mode(workspace, lane, k, mode, push):
         rate,
     ) = mode
     more_z, more_v, work_z, work_v, work_f, lost_z, lost_v, lost_f = push
-    z = workspace[(RIG_POSITION + k) * LANES + lane]
-    v = workspace[(RIG_RATE + k) * LANES + lane]
-    f = slide * workspace[MEAN_FORCE * LANES + lane]
-    drive = workspace[DRIVE * LANES + lane]
+    z = workspace[At.RIG_POSITION + k * LANES + lane]
+    v = workspace[At.RIG_RATE + k * LANES + lane]
+    f = slide * workspace[At.MEAN_FORCE + lane]
+    drive = workspace[At.DRIVE + lane]
     z1 = zz * z + zv * v - by_z * f + drive * more_z
     v1 = vz * z + vv * v - by_v * f + drive * more_v
-    workspace[DRIVE_WORK * LANES + lane] += drive * (work_z * z + work_v * v - work_f * f)
-    workspace[VISCOUS_LOSS * LANES + lane] += (
+    workspace[At.DRIVE_WORK + lane] += drive * (work_z * z + work_v * v - work_f * f)
+    workspace[At.VISCOUS_LOSS + lane] += (
         drive * (lost_z * z + lost_v * v - lost_f * f)
         + (loss_zz * z + loss_zv * v - loss_zf * f) * z
         + (loss_vv * v - loss_vf * f) * v
         + loss_ff * f * f
     )
-    workspace[(RIG_POSITION + k) * LANES + lane] = z1
-    workspace[(RIG_RATE + k) * LANES + lane] = v1
-    workspace[RIG_SLIDE * LANES + lane] += slide * z1
-    workspace[OUTPUT * LANES + lane] += output * z1
-    workspace[OUTPUT_RATE * LANES + lane] += output * v1
-    workspace[RATE_SQUARES * LANES + lane] += v1 * v1 + rate * z1 * z1
+    workspace[At.RIG_POSITION + k * LANES + lane] = z1
+    workspace[At.RIG_RATE + k * LANES + lane] = v1
+    workspace[At.RIG_SLIDE + lane] += slide * z1
+    workspace[At.OUTPUT + lane] += output * z1
+    workspace[At.OUTPUT_RATE + lane] += output * v1
+    workspace[At.RATE_SQUARES + lane] += v1 * v1 + rate * z1 * z1
 
 
 @njit(**NJIT_INLINE)
@@ -460,7 +374,7 @@ def start_sums(workspace, lane, work, lost, cosine, sine):
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, named at the top of the module.
+        Rows of the lanes, see `lane_rows`.
     lane : int
     work : float
         Constant part of the work of the drive [J].
@@ -470,17 +384,17 @@ def start_sums(workspace, lane, work, lost, cosine, sine):
         Cosine of the drive at the start of the step.
     sine : float
     """
-    out = workspace[OUTPUT * LANES + lane]
-    square = workspace[DRIVE * LANES + lane] * workspace[DRIVE * LANES + lane]
-    workspace[COS_SUM * LANES + lane] += out * cosine
-    workspace[SIN_SUM * LANES + lane] += out * sine
-    workspace[LAST_OUTPUT * LANES + lane] = out
-    workspace[LAST_OUTPUT_RATE * LANES + lane] = workspace[OUTPUT_RATE * LANES + lane]
-    workspace[DRIVE_WORK * LANES + lane] = square * work
-    workspace[VISCOUS_LOSS * LANES + lane] = square * lost
-    workspace[RIG_SLIDE * LANES + lane] = workspace[OUTPUT * LANES + lane] = workspace[
-        OUTPUT_RATE * LANES + lane
-    ] = workspace[RATE_SQUARES * LANES + lane] = 0.0
+    out = workspace[At.OUTPUT + lane]
+    square = workspace[At.DRIVE + lane] * workspace[At.DRIVE + lane]
+    workspace[At.COS_SUM + lane] += out * cosine
+    workspace[At.SIN_SUM + lane] += out * sine
+    workspace[At.LAST_OUTPUT + lane] = out
+    workspace[At.LAST_OUTPUT_RATE + lane] = workspace[At.OUTPUT_RATE + lane]
+    workspace[At.DRIVE_WORK + lane] = square * work
+    workspace[At.VISCOUS_LOSS + lane] = square * lost
+    workspace[At.RIG_SLIDE + lane] = workspace[At.OUTPUT + lane] = workspace[
+        At.OUTPUT_RATE + lane
+    ] = workspace[At.RATE_SQUARES + lane] = 0.0
 
 
 @njit(**NJIT_INLINE)
@@ -490,33 +404,29 @@ def finish_sums(workspace, lane, half_mass):
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, named at the top of the module.
+        Rows of the lanes, see `lane_rows`.
     lane : int
     half_mass : float
         Half of the modal mass [kg].
     """
-    place = workspace[RIG_SLIDE * LANES + lane]
-    out = workspace[OUTPUT * LANES + lane]
-    work = workspace[DRIVE_WORK * LANES + lane]
-    workspace[WORK_IN * LANES + lane] += work
-    workspace[DRIVE_WORK_SIZE * LANES + lane] += abs(work)
-    workspace[VISCOUS_SUM * LANES + lane] += workspace[VISCOUS_LOSS * LANES + lane]
-    held = (
-        workspace[INTERFACE_ENERGY * LANES + lane]
-        + half_mass * workspace[RATE_SQUARES * LANES + lane]
-    )
-    workspace[MAX_STORED * LANES + lane] = max(workspace[MAX_STORED * LANES + lane], held)
-    workspace[MAX_SLIDE * LANES + lane] = max(workspace[MAX_SLIDE * LANES + lane], abs(place))
-    workspace[MIN_OUTPUT * LANES + lane] = min(workspace[MIN_OUTPUT * LANES + lane], out)
-    workspace[MAX_OUTPUT * LANES + lane] = max(workspace[MAX_OUTPUT * LANES + lane], out)
-    workspace[SLIP * LANES + lane] = (
+    place = workspace[At.RIG_SLIDE + lane]
+    out = workspace[At.OUTPUT + lane]
+    work = workspace[At.DRIVE_WORK + lane]
+    workspace[At.WORK_IN + lane] += work
+    workspace[At.DRIVE_WORK_SIZE + lane] += abs(work)
+    workspace[At.VISCOUS_SUM + lane] += workspace[At.VISCOUS_LOSS + lane]
+    held = workspace[At.INTERFACE_ENERGY + lane] + half_mass * workspace[At.RATE_SQUARES + lane]
+    workspace[At.MAX_STORED + lane] = max(workspace[At.MAX_STORED + lane], held)
+    workspace[At.MAX_SLIDE + lane] = max(workspace[At.MAX_SLIDE + lane], abs(place))
+    workspace[At.MIN_OUTPUT + lane] = min(workspace[At.MIN_OUTPUT + lane], out)
+    workspace[At.MAX_OUTPUT + lane] = max(workspace[At.MAX_OUTPUT + lane], out)
+    workspace[At.SLIP + lane] = (
         place
-        - workspace[MEAN_SHAPES * LANES + lane] * workspace[PIECE_POSITION * LANES + lane]
-        - workspace[(MEAN_SHAPES + 1) * LANES + lane]
-        * workspace[(PIECE_POSITION + 1) * LANES + lane]
-        - workspace[BOND_LENGTH * LANES + lane]
-        * workspace[FRICTION * LANES + lane]
-        / workspace[LIMIT * LANES + lane]
+        - workspace[At.MEAN_SHAPES + lane] * workspace[At.PIECE_POSITION + lane]
+        - workspace[At.MEAN_SHAPES + LANES + lane] * workspace[At.PIECE_POSITION + LANES + lane]
+        - workspace[At.BOND_LENGTH + lane]
+        * workspace[At.FRICTION + lane]
+        / workspace[At.LIMIT + lane]
     )
 
 
@@ -527,23 +437,23 @@ def set_free_slide(workspace, lane, rig, row):
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, named at the top of the module.
+        Rows of the lanes, see `lane_rows`.
     lane : int
     rig : (N_RIG_ROWS + 1, 3) array
         Rows of the modes of the rig.
     row : (N_COLUMNS,) array
         Row of the table of the step.
     """
-    free = workspace[DRIVE * LANES + lane] * row[PORT_SLIDE]
+    free = workspace[At.DRIVE + lane] * row[StepColumn.PORT_SLIDE]
     for k in range(N_RIG_MODES):
         free += (
-            rig[REACH_Z, k] * workspace[(RIG_POSITION + k) * LANES + lane]
-            + rig[REACH_V, k] * workspace[(RIG_RATE + k) * LANES + lane]
+            rig[RigRow.REACH_Z, k] * workspace[At.RIG_POSITION + k * LANES + lane]
+            + rig[RigRow.REACH_V, k] * workspace[At.RIG_RATE + k * LANES + lane]
         )
-    workspace[FREE_SLIDE * LANES + lane] = free
-    workspace[IS_SOLVED * LANES + lane] = workspace[DESCENT * LANES + lane] = 0.0
-    workspace[NEWTON_STEP * LANES + lane] = workspace[(NEWTON_STEP + 1) * LANES + lane] = workspace[
-        (NEWTON_STEP + 2) * LANES + lane
+    workspace[At.FREE_SLIDE + lane] = free
+    workspace[At.IS_SOLVED + lane] = workspace[At.DESCENT + lane] = 0.0
+    workspace[At.NEWTON_STEP + lane] = workspace[At.NEWTON_STEP + LANES + lane] = workspace[
+        At.NEWTON_STEP + 2 * LANES + lane
     ] = 0.0
 
 
@@ -553,12 +463,12 @@ def count_long_slides(workspace, lengths):
     near = 0.0
     for lane in range(LANES):
         far = (
-            abs(workspace[INCREMENTS * LANES + lane])
-            + workspace[MAX_SHAPES * LANES + lane] * abs(workspace[(INCREMENTS + 1) * LANES + lane])
-            + workspace[(MAX_SHAPES + 1) * LANES + lane]
-            * abs(workspace[(INCREMENTS + 2) * LANES + lane])
+            abs(workspace[At.INCREMENTS + lane])
+            + workspace[At.MAX_SHAPES + lane] * abs(workspace[At.INCREMENTS + LANES + lane])
+            + workspace[At.MAX_SHAPES + LANES + lane]
+            * abs(workspace[At.INCREMENTS + 2 * LANES + lane])
         )
-        near += 1.0 if far <= lengths * workspace[BOND_LENGTH * LANES + lane] else 0.0
+        near += 1.0 if far <= lengths * workspace[At.BOND_LENGTH + lane] else 0.0
     return LANES - near
 
 
@@ -567,7 +477,7 @@ def count_unsolved(workspace):
     """Return the number of lanes whose step is not solved."""
     done = 0.0
     for lane in range(LANES):
-        done += workspace[IS_SOLVED * LANES + lane]
+        done += workspace[At.IS_SOLVED + lane]
     return LANES - done
 
 
@@ -578,16 +488,15 @@ def update_extremes(workspace, dt):
     for lane in range(LANES):
         turns += (
             1.0
-            if workspace[LAST_OUTPUT_RATE * LANES + lane] * workspace[OUTPUT_RATE * LANES + lane]
-            < 0.0
+            if workspace[At.LAST_OUTPUT_RATE + lane] * workspace[At.OUTPUT_RATE + lane] < 0.0
             else 0.0
         )
     for lane in range(LANES if turns > 0.0 else 0):
-        if workspace[LAST_OUTPUT_RATE * LANES + lane] * workspace[OUTPUT_RATE * LANES + lane] < 0.0:
-            a = workspace[LAST_OUTPUT * LANES + lane]
-            b = workspace[OUTPUT * LANES + lane]
-            p = workspace[LAST_OUTPUT_RATE * LANES + lane] * dt
-            r = workspace[OUTPUT_RATE * LANES + lane] * dt
+        if workspace[At.LAST_OUTPUT_RATE + lane] * workspace[At.OUTPUT_RATE + lane] < 0.0:
+            a = workspace[At.LAST_OUTPUT + lane]
+            b = workspace[At.OUTPUT + lane]
+            p = workspace[At.LAST_OUTPUT_RATE + lane] * dt
+            r = workspace[At.OUTPUT_RATE + lane] * dt
             big = 2 * (a - b) + p + r
             mid = 3 * (b - a) - 2 * p - r
             root = sqrt(max(mid * mid - 3 * big * p, 0.0))
@@ -595,12 +504,8 @@ def update_extremes(workspace, dt):
                 s = -p / (mid + sign * root)
                 if 0.0 <= s <= 1.0:
                     value = a + p * s + mid * s * s + big * s * s * s
-                    workspace[MIN_OUTPUT * LANES + lane] = min(
-                        workspace[MIN_OUTPUT * LANES + lane], value
-                    )
-                    workspace[MAX_OUTPUT * LANES + lane] = max(
-                        workspace[MAX_OUTPUT * LANES + lane], value
-                    )
+                    workspace[At.MIN_OUTPUT + lane] = min(workspace[At.MIN_OUTPUT + lane], value)
+                    workspace[At.MAX_OUTPUT + lane] = max(workspace[At.MAX_OUTPUT + lane], value)
 
 
 @njit(**NJIT_INLINE)
@@ -610,13 +515,13 @@ def march_step(workspace, rig, row):
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, named at the top of the module.
+        Rows of the lanes, see `lane_rows`.
     rig : (N_RIG_ROWS + 1, 3) array
         Rows of the modes of the rig.
     row : (N_COLUMNS,) array
         Row of the table of the step.
     """
-    beta = rig[N_RIG_ROWS, 0]
+    beta = rig[RigRow.STEP, 0]
     for lane in range(LANES):
         set_free_slide(workspace, lane, rig, row)
     for _ in range(MAX_TURNS):
@@ -630,53 +535,53 @@ def march_step(workspace, rig, row):
             break
     if count_unsolved(workspace) > 0.0:
         for lane in range(LANES):
-            workspace[N_UNSOLVED * LANES + lane] += 1.0 - workspace[IS_SOLVED * LANES + lane]
+            workspace[At.N_UNSOLVED + lane] += 1.0 - workspace[At.IS_SOLVED + lane]
     if count_long_slides(workspace, MAX_SERIES) == 0.0:
         for lane in range(LANES):
             commit_step(workspace, lane, beta, False)
     else:
         for lane in range(LANES):
             commit_step(workspace, lane, beta, True)
-    work = row[REMAINDERS]
-    lost = row[REMAINDERS + 1]
-    cosine = row[WAVES]
-    sine = row[WAVES + 1]
-    half_mass = 0.5 * rig[N_RIG_ROWS, 1]
+    work = row[StepColumn.REMAINDERS]
+    lost = row[StepColumn.REMAINDERS + 1]
+    cosine = row[StepColumn.WAVES]
+    sine = row[StepColumn.WAVES + 1]
+    half_mass = 0.5 * rig[RigRow.STEP, 1]
     for lane in range(LANES):
         start_sums(workspace, lane, work, lost, cosine, sine)
     for k in range(N_RIG_MODES):
         mode = (
-            rig[ZZ, k],
-            rig[ZV, k],
-            rig[VZ, k],
-            rig[VV, k],
-            rig[BY_Z, k],
-            rig[BY_V, k],
-            rig[LOSS, k],
-            rig[LOSS + 1, k],
-            rig[LOSS + 2, k],
-            rig[LOSS + 3, k],
-            rig[LOSS + 4, k],
-            rig[LOSS + 5, k],
-            rig[SLIDE_SHAPE, k],
-            rig[OUTPUT_SHAPE, k],
-            rig[OMEGA_SQUARE, k],
+            rig[RigRow.ZZ, k],
+            rig[RigRow.ZV, k],
+            rig[RigRow.VZ, k],
+            rig[RigRow.VV, k],
+            rig[RigRow.BY_Z, k],
+            rig[RigRow.BY_V, k],
+            rig[RigRow.LOSS, k],
+            rig[RigRow.LOSS + 1, k],
+            rig[RigRow.LOSS + 2, k],
+            rig[RigRow.LOSS + 3, k],
+            rig[RigRow.LOSS + 4, k],
+            rig[RigRow.LOSS + 5, k],
+            rig[RigRow.SLIDE_SHAPE, k],
+            rig[RigRow.OUTPUT_SHAPE, k],
+            rig[RigRow.OMEGA_SQUARE, k],
         )
         push = (
-            row[BY_DRIVE + k],
-            row[BY_DRIVE + N_RIG_MODES + k],
-            row[WORK_FORMS + k],
-            row[WORK_FORMS + N_RIG_MODES + k],
-            row[WORK_FORMS + 2 * N_RIG_MODES + k],
-            row[LOSS_FORMS + k],
-            row[LOSS_FORMS + N_RIG_MODES + k],
-            row[LOSS_FORMS + 2 * N_RIG_MODES + k],
+            row[StepColumn.BY_DRIVE + k],
+            row[StepColumn.BY_DRIVE + N_RIG_MODES + k],
+            row[StepColumn.WORK_FORMS + k],
+            row[StepColumn.WORK_FORMS + N_RIG_MODES + k],
+            row[StepColumn.WORK_FORMS + 2 * N_RIG_MODES + k],
+            row[StepColumn.LOSS_FORMS + k],
+            row[StepColumn.LOSS_FORMS + N_RIG_MODES + k],
+            row[StepColumn.LOSS_FORMS + 2 * N_RIG_MODES + k],
         )
         for lane in range(LANES):
             move_mode(workspace, lane, k, mode, push)
     for lane in range(LANES):
         finish_sums(workspace, lane, half_mass)
-    update_extremes(workspace, rig[N_RIG_ROWS, 2])
+    update_extremes(workspace, rig[RigRow.STEP, 2])
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
@@ -685,8 +590,8 @@ def store_samples(workspace, sample):
     for lane in range(LANES):
         for k in range(2 * N_RIG_MODES):
             sample[k, lane] = workspace[k * LANES + lane]
-        sample[2 * N_RIG_MODES, lane] = workspace[FRICTION * LANES + lane]
-        sample[2 * N_RIG_MODES + 1, lane] = workspace[SLIP * LANES + lane]
+        sample[2 * N_RIG_MODES, lane] = workspace[At.FRICTION + lane]
+        sample[2 * N_RIG_MODES + 1, lane] = workspace[At.SLIP + lane]
 
 
 @njit(error_model="numpy", cache=True, nogil=True, **NJIT_NO_REFCOUNT)
@@ -696,7 +601,7 @@ def march(workspace, rig, table, history, samples, work):
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, named at the top of the module.
+        Rows of the lanes, see `lane_rows`.
     rig : (N_RIG_ROWS + 1, 3) array
         Rows of the modes of the rig.
     table : (s, N_COLUMNS) array
@@ -713,19 +618,19 @@ def march(workspace, rig, table, history, samples, work):
     first = cycles - (samples.shape[0] - 1) // steps
     for c in range(cycles):
         for lane in range(LANES):
-            workspace[MIN_OUTPUT * LANES + lane] = workspace[MAX_OUTPUT * LANES + lane] = workspace[
-                OUTPUT * LANES + lane
+            workspace[At.MIN_OUTPUT + lane] = workspace[At.MAX_OUTPUT + lane] = workspace[
+                At.OUTPUT + lane
             ]
-            workspace[COS_SUM * LANES + lane] = workspace[SIN_SUM * LANES + lane] = 0.0
+            workspace[At.COS_SUM + lane] = workspace[At.SIN_SUM + lane] = 0.0
             if c == first:
-                work[lane] = workspace[FRICTION_WORK * LANES + lane]
+                work[lane] = workspace[At.FRICTION_WORK + lane]
         for s in range(steps):
             if c >= first:
                 store_samples(workspace, samples[(c - first) * steps + s])
             march_step(workspace, rig, table[s])
         for lane in range(LANES):
-            history[c, 0, lane] = workspace[MIN_OUTPUT * LANES + lane]
-            history[c, 1, lane] = workspace[MAX_OUTPUT * LANES + lane]
-            history[c, 2, lane] = 2 * workspace[COS_SUM * LANES + lane] / steps
-            history[c, 3, lane] = -2 * workspace[SIN_SUM * LANES + lane] / steps
+            history[c, 0, lane] = workspace[At.MIN_OUTPUT + lane]
+            history[c, 1, lane] = workspace[At.MAX_OUTPUT + lane]
+            history[c, 2, lane] = 2 * workspace[At.COS_SUM + lane] / steps
+            history[c, 3, lane] = -2 * workspace[At.SIN_SUM + lane] / steps
     store_samples(workspace, samples[samples.shape[0] - 1])

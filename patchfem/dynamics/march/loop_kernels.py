@@ -7,16 +7,21 @@ module with `solve_step`, `apply_increment`, `commit_step` and `read_state`, see
 makes an instance of this text per contact and set of parts, and what a rig does not have is not compiled.
 """
 
+from typing import NamedTuple
+
 from ...compiled.jit import njit
-from ...contact.set_arrays import REFERENCE_LOAD
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+from ...friction.protocol_kernels import Reading
 from ..interfaces import element_kernels as contact
-from ..ledger import LEDGER
+from ..interfaces.arrays import SolvedStep, StepStart
+from ..ledger import Ledger, SampleColumn
 from ..modal_kernels import (
+    ModalSample,
     count_iterations,
     free_increment,
     modal_energy,
     move_modes,
+    project_modes,
     write_friction_accelerations,
     write_interface,
     write_modes,
@@ -36,57 +41,59 @@ MEMORY_FULL = 2
 NO_CONTACT_SET = 4
 
 
+class InterfaceSample(NamedTuple):
+    """Sample of modes and interface.
+
+    - modal: slide, speed and output
+    - reading: force, energy and slip of the interface
+    - energy_beside: energy of springs and preloaded contact [J]
+    """
+
+    modal: ModalSample
+    reading: Reading
+    energy_beside: float
+
+
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def sample_interface(i, last, drive, motion, modal_system, row, interface, faces, press):
+def sample_interface(i, is_last, drive, system, row):
     """Sample modes and interface at the start of a step and write them into a row.
 
     Parameters
     ----------
     i : int
         Number of the sample.
-    last : bool
+    is_last : bool
         Whether it is the last sample.
     drive : float
         Acceleration of the base in the step before [m s-2].
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
+    system : element_arrays.MarchArrays
     row : (k,) array
-        Row of samples of `loop_kernels.march`; it is written.
-    interface : tuple
-        Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.PortElements
-    press : interfaces.arrays.VaryingLoad or ConstantLoad
+        Row of samples of `march`; it is written.
 
     Returns
     -------
-    tuple
-        Slide [m], its speed [m/s] and output [m]; force [N], energy [J] and slip [m] of the interface; energy beside it [J].
+    InterfaceSample
     """
-    q, v, out = write_modes(row, motion, modal_system)
-    force = 0.0
-    energy = 0.0
-    slip = 0.0
-    beside = 0.0
+    modal = write_modes(row, system.motion, system.modal_system)
+    energy_beside = 0.0
     if LOAD_VARIES:
-        beside = pressing.sample_load(
-            i, last, motion, modal_system.mass, interface, faces, press, row
-        )
-        if press.slot[0] < 0:
-            return q, v, out, force, energy, slip, beside
+        energy_beside = pressing.sample_load(i, is_last, system, row)
+        if system.press.slot[0] < 0:
+            return InterfaceSample(modal, Reading(0.0, 0.0, 0.0), energy_beside)
     if HAS_ELEMENTS:
-        force, energy, slip, springs = coupling.sample_elements(q, v, motion, row, interface, faces)
-        beside += springs
+        reading, spring_energy = coupling.sample_elements(modal, system, row)
+        energy_beside += spring_energy
         if HAS_STOPS:
             if i > 0:
-                force = coupling.sample_set_valued(motion, modal_system, drive, force, row, faces)
+                force = coupling.sample_set_valued(drive, reading.force, system, row)
+                reading = Reading(force, reading.stored_energy, reading.slip)
     else:
-        force, energy, slip = contact.read_state(interface, q, v)
-    return q, v, out, force, energy, slip, beside
+        reading = contact.read_state(system.interface, modal.slide, modal.speed)
+    return InterfaceSample(modal, reading, energy_beside)
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def march(first, steps, motion, modal_system, table, interface, faces, press, travel, ledger, rows):
+def march(first, steps, system, rows):
     """March a number of steps, at 0.1 to 0.3 us per step and a few ns per point.
 
     Parameters
@@ -95,16 +102,8 @@ def march(first, steps, motion, modal_system, table, interface, faces, press, tr
         Row of the table for the first step; the rows are used in turns.
     steps : int
         Number of steps.
-    motion, modal_system, table
-        Coordinates and rates of the modes (2, n), their arrays, and the table of `propagator.Propagator`.
-    interface, faces, press
-        Arrays of the contact on port 0, of the elements and of the load, in `interfaces.arrays`.
-    travel : float
-        Largest displacement of the output [m], beyond which the march ends.
-    ledger : (9,) array
-        Energy balance [J] and counters, updated in place: work of the drive, viscous loss, sum of the absolute
-        works of the steps, dissipated energy, largest stored energy, iterations, most iterations of a step, steps
-        without convergence, friction work.
+    system : element_arrays.MarchArrays
+        Motion, memories and ledger are updated in place.
     rows : (steps + 1, k) array
         Samples, which are written. Columns: modes and their rates; of the contact, or else the first element,
         slide, speed, force, slip, mean force of the step that follows, energy, friction work of the step that
@@ -118,86 +117,105 @@ def march(first, steps, motion, modal_system, table, interface, faces, press, tr
     int
         Status, named at the top of the module.
     """
+    motion = system.motion
+    modal_system = system.modal_system
+    table = system.table
+    elements = system.elements
+    ledger = system.ledger
     slide = modal_system.slide
-    dt = modal_system.dt
-    around = table.shape[0]
-    size = 2 * modal_system.slide.size
+    size = 2 * slide.size
     accel = modal_system.workspace[0]
-    scratch = modal_system.workspace[1:]
-    beta = modal_system.beta
     if LOAD_VARIES:
-        press.few[:] = 0.0
-        press.few[0] = press.sets.reference[REFERENCE_LOAD]
+        pressing.start_march(system.press)
     for i in range(steps + 1):
-        drive = table[(first + i - 1) % around, 4 * size + 2] if HAS_STOPS else 0.0
-        q, v, out, force, energy, slip, beside = sample_interface(
-            i, i == steps, drive, motion, modal_system, rows[i], interface, faces, press
-        )
+        drive = table[(first + i - 1) % table.shape[0], 4 * size + 2] if HAS_STOPS else 0.0
+        sample = sample_interface(i, i == steps, drive, system, rows[i])
         if LOAD_VARIES:
-            if press.slot[0] < 0:
+            if system.press.slot[0] < 0:
                 return i, NO_CONTACT_SET
+        energy_beside = sample.energy_beside + modal_energy(motion, modal_system)
         status = write_interface(
-            rows[i, : size + 6],
-            force,
-            energy,
-            slip,
-            out,
-            travel,
-            energy + (beside + modal_energy(motion, modal_system)),
+            rows[i, : size + SampleColumn.STEP_WORK],
+            sample.reading,
+            sample.modal.output,
+            system.travel,
+            sample.reading.stored_energy + energy_beside,
             ledger,
         )
         if status:
             return i, status
         if i == steps:
             break
-        at = (first + i) % around
+        at = (first + i) % table.shape[0]
+        start = StepStart(sample.modal.slide, sample.modal.speed, modal_system.dt)
         if LOAD_VARIES:
-            dq, used, count = pressing.solve_coupled_forces(
-                i, q, v, motion, modal_system, table, at, interface, faces, press
-            )
-            if press.slot[0] < 0:
+            step = pressing.solve_coupled_forces(i, start, at, system)
+            if system.press.slot[0] < 0:
                 return i, NO_CONTACT_SET
         elif HAS_ELEMENTS:
-            coupling.prepare_step(motion, modal_system, table, at, dt, faces)
-            dq, count = coupling.solve_step(q, v, motion, modal_system, table, at, interface, faces)
+            coupling.prepare_step(at, system)
+            step = coupling.solve_step(start, at, system)
         else:
-            free = free_increment(motion, modal_system, 0, table, at)
-            dq, _, count = contact.solve_step(free, beta, q, v, dt, interface, faces.goal[0])
-            used = (free - dq) / beta
+            step = solve_contact_step(start, at, system)
         if HAS_ELEMENTS:
-            coupling.set_accelerations(modal_system, faces, accel)
-            work = coupling.friction_work(dq, rows[i], faces)
+            coupling.set_accelerations(modal_system, elements, accel)
+            work = coupling.write_mean_forces(step.increment, rows[i], elements)
         else:
-            write_friction_accelerations(used, slide, modal_system.mass, accel)
-            rows[i, size + 4] = used
-            work = used * dq
+            write_friction_accelerations(step.mean_force, slide, modal_system.mass, accel)
+            rows[i, size + SampleColumn.MEAN_FORCE] = step.mean_force
+            work = step.mean_force * step.increment
             if LOAD_VARIES:
-                pressing.add_press_accelerations(press, modal_system.mass, accel)
-        move_modes(motion, modal_system, table, at, accel, scratch, ledger)
+                pressing.add_press_accelerations(system.press, modal_system.mass, accel)
+        move_modes(motion, modal_system, table, at, accel, ledger)
         if HAS_STOPS:
-            blow = coupling.strike_modes(motion, modal_system.mass, faces)
-            work += blow
-            ledger[LEDGER.friction_loss] += blow
-        count_iterations(count, work, ledger)
-        rows[i, size + 6] = work
+            blow_energy = coupling.strike_modes(motion, modal_system.mass, elements)
+            work += blow_energy
+            ledger[Ledger.FRICTION_LOSS] += blow_energy
+        count_iterations(step.iterations, work, ledger)
+        rows[i, size + SampleColumn.STEP_WORK] = work
         if HAS_ELEMENTS:
-            lost, ok = coupling.commit_step(q, v, dq, motion, modal_system, interface, faces)
+            loss, is_committed = coupling.commit_step(start, step.increment, system)
         else:
-            after = 0.0
-            for k in range(slide.size):
-                after += slide[k] * motion[1, k]
-            lost, ok = contact.commit_step(dq, used, q, v, after, dt, interface)
-        ledger[LEDGER.friction_loss] += lost
-        if not ok:
+            loss, is_committed = contact.commit_step(
+                step.increment,
+                step.mean_force,
+                start,
+                project_modes(slide, motion[1]),
+                system.interface,
+            )
+        ledger[Ledger.FRICTION_LOSS] += loss
+        if not is_committed:
             if LOAD_VARIES and not HAS_LISTS:
-                ledger[LEDGER.n_unconverged] += 1.0
+                ledger[Ledger.N_UNCONVERGED] += 1.0
             else:
                 return i, MEMORY_FULL
     return steps, FINISHED
 
 
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
+def solve_contact_step(start, at, system):
+    """Solve a step of a contact that acts alone.
+
+    Parameters
+    ----------
+    start : interfaces.arrays.StepStart
+    at : int
+        Row of the table for this step.
+    system : element_arrays.MarchArrays
+
+    Returns
+    -------
+    interfaces.arrays.SolvedStep
+    """
+    modal_system = system.modal_system
+    free = free_increment(system.motion, modal_system, 0, system.table, at)
+    beta = modal_system.beta
+    step = contact.solve_step(free, beta, start, system.interface, system.elements.goal[0])
+    return SolvedStep(step.increment, (free - step.increment) / beta, step.iterations)
+
+
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def follow(path, dt, interface, goal, lost, forces):
+def follow(path, dt, interface, goal, energies, forces):
     """Move a contact along a prescribed slide.
 
     Parameters
@@ -210,7 +228,7 @@ def follow(path, dt, interface, goal, lost, forces):
         Arrays of the contact on port 0, in `interfaces.arrays`.
     goal : float
         Tolerance of a step [N].
-    lost : (k, 2) array
+    energies : (k, 2) array
         Energy dissipated in the step that follows and energy stored at the sample [J]; it is written.
     forces : (k, 3) array
         Force at the sample, mean force of the step that follows [N] and irreversible slip [m]; it is written.
@@ -220,20 +238,25 @@ def follow(path, dt, interface, goal, lost, forces):
     int
         Number of steps that did not converge or found the memory of the contact full.
     """
-    bad = 0
-    before = 0.0
+    n_failed = 0
+    last_velocity = 0.0
     for i in range(path.size):
-        dq = path[i + 1] - path[i] if i < path.size - 1 else before * dt
-        v = dq / dt if dt > 0 else 0.0
-        force, energy, slip = contact.read_state(interface, path[i], 0.5 * (before + v) if i else v)
-        forces[i, 0] = force
-        forces[i, 2] = slip
-        lost[i, 1] = energy
-        if i == path.size - 1:
+        is_last = i == path.size - 1
+        increment = last_velocity * dt if is_last else path[i + 1] - path[i]
+        velocity = increment / dt if dt > 0 else 0.0
+        mean_velocity = 0.5 * (last_velocity + velocity) if i else velocity
+        reading = contact.read_state(interface, path[i], mean_velocity)
+        forces[i, 0] = reading.force
+        forces[i, 2] = reading.slip
+        energies[i, 1] = reading.stored_energy
+        if is_last:
             break
-        mean, good = contact.apply_increment(dq, path[i], v, dt, interface, goal)
-        forces[i, 1] = mean
-        lost[i, 0], ok = contact.commit_step(dq, mean, path[i], v, v, dt, interface)
-        bad += not (good and ok)
-        before = v
-    return bad
+        start = StepStart(path[i], velocity, dt)
+        force, is_solved = contact.apply_increment(increment, start, interface, goal)
+        forces[i, 1] = force
+        energies[i, 0], is_committed = contact.commit_step(
+            increment, force, start, velocity, interface
+        )
+        n_failed += not (is_solved and is_committed)
+        last_velocity = velocity
+    return n_failed

@@ -14,6 +14,7 @@ from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.laws.stretch import growth_numbers, points_element, unpack_bonds
 from ...friction.protocol import Element
 from ..interfaces import arrays
+from ..interfaces.arrays import DragRow, FlowPlace, PointRow
 from ..interfaces.dispatch import COULOMB_LAW
 
 INTERFACES_FOLDER = "dynamics.interfaces"
@@ -103,7 +104,7 @@ class ContactModel:
             return {}
         if hasattr(contact, "bondlist"):
             # all bonds of a point count as equally stretched
-            load = contact.points[4]
+            load = contact.points[PointRow.LOAD]
             share = contact.statuses[:, STATUS.force]
             here = load * point_pressures(contact)
             return {
@@ -118,9 +119,17 @@ class ContactModel:
                 ),
                 "b": contact.b.copy(),
             }
-        m, z, s2, play = contact.points[:4, : self.reduction.points.size]
+        m, z, s2, play = contact.points[: PointRow.LOAD, : self.reduction.points.size]
         return {
-            "bonds": np.stack([m, z, s2, contact.flow[1] - self.reduction.shape @ contact.b, play]),
+            "bonds": np.stack(
+                [
+                    m,
+                    z,
+                    s2,
+                    contact.flow[FlowPlace.TOTAL_SLIDE] - self.reduction.shape @ contact.b,
+                    play,
+                ]
+            ),
             "b": contact.b.copy(),
         }
 
@@ -211,7 +220,7 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
         POINTS_MULTIPLE,
         sigma,
     )
-    fields["points"][0, : area.size] = law.initial * sigma
+    fields["points"][PointRow.DENSITY, : area.size] = law.initial * sigma
     limit = law.static * float(area @ sigma)
     return ContactModel(
         f"{INTERFACES_FOLDER}.shear_kernels",
@@ -252,17 +261,15 @@ def point_lists_model(
     ContactModel
     """
     limit = np.asarray(limit, float)
-    shape, stiffness = (
-        (np.zeros((limit.size, 0)), ())
-        if shear is None
-        else (np.asarray(shear.shape), shear.stiffness)
-    )
+    shape = np.zeros((limit.size, 0)) if shear is None else np.asarray(shear.shape)
+    stiffness = () if shear is None else shear.stiffness
     capacity = min(
         numbers.list_capacity(law, reach, merge),
         N_FIRST_ENTRIES + numbers.MAX_STRIPS_PER_LENGTH * int(min(reach, numbers.MAX_DAMAGE)),
     )
     fields = arrays.make_sheared_fields(limit, law.length, growth_numbers(law), shape, stiffness)
-    fields["points"][4], fields["drag"][2, 1:] = sigma, shape.T @ limit / limit.sum()
+    fields["points"][PointRow.LOAD] = sigma
+    fields["drag"][DragRow.MEAN_SLIDE, 1:] = shape.T @ limit / limit.sum()
     fields |= {
         "bondlist": np.zeros((N_ROWS, limit.size * capacity)),
         "status": numbers.make_status(capacity),
@@ -332,11 +339,9 @@ def point_pressures(contact) -> np.ndarray:
         return np.interp(
             contact.places + contact.nows[:, CLOCK.displacement], x, pressure, left=0.0, right=0.0
         )
-    return (
-        contact.pressed[1] / contact.points[4]
-        if contact.pressed.size
-        else np.ones(contact.weight.size)
-    )
+    if contact.pressed.size:
+        return contact.pressed[1] / contact.points[PointRow.LOAD]
+    return np.ones(contact.weight.size)
 
 
 def bond_list_model(law, limit: float, reach: float, merge: float) -> ContactModel:

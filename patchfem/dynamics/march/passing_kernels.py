@@ -14,44 +14,20 @@ import numpy as np
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..interfaces import shear_kernels as contact
-from ..interfaces.shear_kernels import DRAG_DIRECTION, DRAG_FORCE, MAX_MODE_SLIDE, TOTAL_SLIDE
-from ..ledger import LEDGER
+from ..interfaces.arrays import DragRow, FlowPlace, StepStart
+from ..ledger import N_SAMPLE_COLUMNS, Ledger, SampleColumn
 from ..modal_kernels import (
     count_iterations,
     free_increment,
     modal_energy,
     move_modes,
+    project_modes,
     write_friction_accelerations,
     write_interface,
     write_modes,
 )
+from .folded_arrays import N_BLOCK_ROWS, BlockRow, CycleColumn, SumPlace, TraceRow
 
-# Places in `sums` of `interfaces.arrays.FoldedCycles` [J].
-WORK_SUM = 0  # friction work
-LOSS_SUM = 1  # dissipated energy
-CREATED_SUM = 2  # created energy
-SAMPLED_SUM = 3  # friction work from the samples alone
-WORK_SIZE_SUM = 4  # sum of the absolute works of the steps
-# Rows of `trace`, at the samples of a cycle: output and its rate, cosine and sine of the drive.
-OUTPUT = 0
-OUTPUT_RATE = 1
-DRIVE_COS = 2
-DRIVE_SIN = 3
-# Columns of `cycles`: extremes and phasor of the output in a cycle [m].
-MIN_OUTPUT = 0
-MAX_OUTPUT = 1
-PHASOR_REAL = 2
-PHASOR_IMAG = 3
-# Rows of `workspace`, at the steps of a block. As many rows again receive results that are not used.
-DRIVE_WORK = 0
-VISCOUS_LOSS = 1
-SLIDE_ROW = 2
-SPEED_ROW = 3
-OUTPUT_ROW = 4
-RATE_ROW = 5
-ENERGY_ROW = 6
-N_BLOCK_ROWS = 7
-BLOCK = 32  # number of steps of a drag that are tried at once
 RATE_TOL = 1e-12  # product of two rates over the square of the largest one above which they have the same sign
 
 
@@ -86,16 +62,16 @@ def add_step(work, rise, q, after, mean, folded):
         Slide at the end [m].
     mean : float
         Mean of the forces at both ends [N].
-    folded : interfaces.arrays.FoldedCycles
+    folded : folded_arrays.FoldedCycles
     """
     sums = folded.sums
     lost = work - rise
     noise = folded.bounds.force * (1e-12 * abs(after - q) + 1e-15 * abs(q))
-    sums[WORK_SUM] += work
-    sums[LOSS_SUM] += lost if lost > -noise else 0.0
-    sums[CREATED_SUM] -= lost if lost < -noise else 0.0
-    sums[SAMPLED_SUM] += mean * (after - q)
-    sums[WORK_SIZE_SUM] += abs(work)
+    sums[SumPlace.WORK] += work
+    sums[SumPlace.LOSS] += lost if lost > -noise else 0.0
+    sums[SumPlace.CREATED] -= lost if lost < -noise else 0.0
+    sums[SumPlace.SAMPLED_WORK] += mean * (after - q)
+    sums[SumPlace.WORK_SIZE] += abs(work)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
@@ -106,23 +82,24 @@ def keep_largest(number, folded):
     ----------
     number : int
         Number of the sample.
-    folded : interfaces.arrays.FoldedCycles
+    folded : folded_arrays.FoldedCycles
     """
     row = folded.largest.row
     kept = folded.largest.kept
-    n = row.size - 7
+    n = row.size - N_SAMPLE_COLUMNS
     if not abs(row[n]) > abs(kept[n]):
         return
-    for k in range(n + 6):
+    n_copied = n + SampleColumn.STEP_WORK
+    for k in range(n_copied):
         kept[k] = row[k]
     for k in range(3):
-        kept[n + 6 + k] = folded.totals[k] + folded.sums[k]
-    kept[n + 9] = 0.0
+        kept[n_copied + k] = folded.totals[k] + folded.sums[k]
+    kept[n_copied + 3] = 0.0
     folded.largest.number[0] = number
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def swing_pieces(interface, did, slides):
+def swing_pieces(interface, n_steps, slides):
     """Advance the shear modes of the pieces over steps in which all points slip in one direction.
 
     The forces of the points are then constant. Each mode coordinate jumps in every step to the mirror image about its
@@ -133,19 +110,19 @@ def swing_pieces(interface, did, slides):
     Parameters
     ----------
     interface : interfaces.arrays.ShearedPoints
-    did : int
+    n_steps : int
         Number of steps.
-    slides : (did,) array
+    slides : (n_steps,) array
         Increments of the slide [m].
     """
-    way = interface.flow[DRAG_DIRECTION]
+    way = interface.flow[FlowPlace.DRAG_DIRECTION]
     last = interface.last
     for k in range(interface.y.shape[1]):
         swing = 0.0
         if k > 0:
-            middle = way * interface.drag[DRAG_FORCE, k] / interface.kappa[k - 1]
+            middle = way * interface.drag[DragRow.FORCE, k] / interface.kappa[k - 1]
             swing = 2 * (middle - interface.b[k - 1])
-        for m in range(max(0, did - 3), did):
+        for m in range(max(0, n_steps - 3), n_steps):
             if k == 0:
                 here = slides[m]
             else:
@@ -153,13 +130,13 @@ def swing_pieces(interface, did, slides):
             interface.y[0, k] = 3 * (here - last[0, k]) + last[1, k]
             last[1, k] = last[0, k]
             last[0, k] = here
-        if k > 0 and did % 2:
+        if k > 0 and n_steps % 2:
             interface.b[k - 1] += swing
     interface.ready[:] = 0.0
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def move_mode(k, count, motion, modal_system, table, at, accel, workspace):
+def move_mode(k, count, at, accel, system, workspace):
     """Move a mode by steps under a constant force, and add its outputs and energies to the workspace.
 
     Parameters
@@ -168,18 +145,17 @@ def move_mode(k, count, motion, modal_system, table, at, accel, workspace):
         Number of the mode.
     count : int
         Number of steps.
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
-    table : (s, k) array
-        Table of `propagator.Propagator`.
     at : int
-        Row of the table for this step.
+        Row of the table for the first step.
     accel : float
         Modal acceleration of the friction [m s-2].
-    workspace : (14, BLOCK) array
-        Space for a block of steps.
+    system : folded_arrays.FoldedMarch
+    workspace : (7, k) array
+        Rows of `folded_arrays.BlockRow`, to which the steps are added.
     """
+    motion = system.motion
+    modal_system = system.modal_system
+    table = system.table
     n = motion.shape[1]
     z = motion[0, k]
     v = motion[1, k]
@@ -200,21 +176,23 @@ def move_mode(k, count, motion, modal_system, table, at, accel, workspace):
     g = modal_system.loss[5, k] * accel * accel
     for s in range(count):
         row = at + s
-        workspace[DRIVE_WORK, s] += (
+        workspace[BlockRow.DRIVE_WORK, s] += (
             table[row, 2 * n + k] * z + table[row, 3 * n + k] * v + table[row, 4 * n + k] * accel
         )
-        workspace[VISCOUS_LOSS, s] += (
+        workspace[BlockRow.VISCOUS_LOSS, s] += (
             (table[row, 5 * n + k] + a * z + b * v + e) * z
             + (table[row, 6 * n + k] + d * v + f) * v
             + table[row, 7 * n + k] * accel
             + g
         )
-        z, v = zz * z + zv * v + by_z + table[row, k], vz * z + vv * v + by_v + table[row, n + k]
-        workspace[SLIDE_ROW, s] += slide * z
-        workspace[SPEED_ROW, s] += slide * v
-        workspace[OUTPUT_ROW, s] += output * z
-        workspace[RATE_ROW, s] += output * v
-        workspace[ENERGY_ROW, s] += v * v + square * z * z
+        next_z = zz * z + zv * v + by_z + table[row, k]
+        v = vz * z + vv * v + by_v + table[row, n + k]
+        z = next_z
+        workspace[BlockRow.SLIDE, s] += slide * z
+        workspace[BlockRow.SPEED, s] += slide * v
+        workspace[BlockRow.OUTPUT, s] += output * z
+        workspace[BlockRow.RATE, s] += output * v
+        workspace[BlockRow.SQUARES, s] += v * v + square * z * z
     motion[0, k] = z
     motion[1, k] = v
 
@@ -222,22 +200,22 @@ def move_mode(k, count, motion, modal_system, table, at, accel, workspace):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def compute_piece_swing(interface):
     """Return the `PieceSwing` of the next step in which all points slip in one direction."""
-    way = interface.flow[DRAG_DIRECTION]
+    way = interface.flow[FlowPlace.DRAG_DIRECTION]
     min_increment = 0.0
     taken = 0.0
-    energy = interface.eps[0] * interface.drag[DRAG_FORCE, 0]
+    energy = interface.eps[0] * interface.drag[DragRow.FORCE, 0]
     rise = 0.0
     for k in range(interface.b.size):
-        y = 2 * (way * interface.drag[DRAG_FORCE, k + 1] / interface.kappa[k] - interface.b[k])
-        min_increment += interface.drag[MAX_MODE_SLIDE, k + 1] * abs(y)
-        taken += way * interface.drag[DRAG_FORCE, k + 1] * y
+        y = 2 * (way * interface.drag[DragRow.FORCE, k + 1] / interface.kappa[k] - interface.b[k])
+        min_increment += interface.drag[DragRow.MAX_SLIDE, k + 1] * abs(y)
+        taken += way * interface.drag[DragRow.FORCE, k + 1] * y
         energy += 0.5 * interface.kappa[k] * interface.b[k] * interface.b[k]
         rise += interface.kappa[k] * y * (interface.b[k] + 0.5 * y)
     return PieceSwing(min_increment, taken, energy, rise)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def add_drag_steps(block, i, q, at, force, modal_system, table, interface, folded):
+def add_drag_steps(block, i, q, at, force, system):
     """Add the steps of a block to ledger, sums and trace until the points no longer all slip.
 
     The row SLIDE_ROW of the workspace then has the increments of the slide in these steps.
@@ -254,56 +232,57 @@ def add_drag_steps(block, i, q, at, force, modal_system, table, interface, folde
         Row of the table for the first step.
     force : float
         Friction force [N].
-    modal_system : interfaces.arrays.ModalArrays
-    table : (s, k) array
-        Table of `propagator.Propagator`.
-    interface : interfaces.arrays.ShearedPoints
-    folded : interfaces.arrays.FoldedCycles
+    system : folded_arrays.FoldedMarch
 
     Returns
     -------
     int
         Number of steps.
     """
-    way = interface.flow[DRAG_DIRECTION]
-    size = 2 * modal_system.slide.size
+    interface = system.interface
+    table = system.table
+    folded = system.folded
+    way = interface.flow[FlowPlace.DRAG_DIRECTION]
+    size = 2 * system.motion.shape[1]
     ledger = folded.ledger
     workspace = folded.workspace
     pieces = compute_piece_swing(interface)
-    did = 0
+    n_steps = 0
     for s in range(block):
-        after = workspace[SLIDE_ROW, s]
+        after = workspace[BlockRow.SLIDE, s]
         dq = after - q
         if way * dq <= pieces.min_increment:
             break
         # the modes of the pieces move forward in one step and back in the next one
-        did = s + 1
+        n_steps = s + 1
         sign = 1.0 if s % 2 == 0 else -1.0
         is_forward = 0.5 * (1.0 + sign)
-        power = workspace[DRIVE_WORK, s] + table[at + s, 4 * size]
+        power = workspace[BlockRow.DRIVE_WORK, s] + table[at + s, 4 * size]
         add_step(force * dq, sign * pieces.rise, q, after, force, folded)
-        ledger[LEDGER.drive_work] += power
-        ledger[LEDGER.viscous_loss] += workspace[VISCOUS_LOSS, s] + table[at + s, 4 * size + 1]
-        ledger[LEDGER.drive_power] += abs(power)
-        ledger[LEDGER.friction_loss] += force * dq - sign * pieces.taken
-        modal_energy = 0.5 * modal_system.mass * workspace[ENERGY_ROW, s]
-        ledger[LEDGER.max_stored] = max(
-            ledger[LEDGER.max_stored], pieces.energy + is_forward * pieces.rise + modal_energy
+        ledger[Ledger.DRIVE_WORK] += power
+        ledger[Ledger.VISCOUS_LOSS] += (
+            workspace[BlockRow.VISCOUS_LOSS, s] + table[at + s, 4 * size + 1]
         )
-        ledger[LEDGER.friction_work] += force * dq
-        folded.trace[OUTPUT, i + did] = workspace[OUTPUT_ROW, s]
-        folded.trace[OUTPUT_RATE, i + did] = workspace[RATE_ROW, s]
+        ledger[Ledger.DRIVE_POWER] += abs(power)
+        ledger[Ledger.FRICTION_LOSS] += force * dq - sign * pieces.taken
+        energy_of_modes = 0.5 * system.modal_system.mass * workspace[BlockRow.SQUARES, s]
+        ledger[Ledger.MAX_STORED] = max(
+            ledger[Ledger.MAX_STORED], pieces.energy + is_forward * pieces.rise + energy_of_modes
+        )
+        ledger[Ledger.FRICTION_WORK] += force * dq
+        folded.trace[TraceRow.OUTPUT, i + n_steps] = workspace[BlockRow.OUTPUT, s]
+        folded.trace[TraceRow.RATE, i + n_steps] = workspace[BlockRow.RATE, s]
         q = after
-        workspace[SLIDE_ROW, s] = dq
-        interface.flow[TOTAL_SLIDE] += dq
-        is_finite = np.isfinite(q + workspace[SPEED_ROW, s])
-        if not (abs(workspace[OUTPUT_ROW, s]) <= folded.bounds.travel and is_finite):
+        workspace[BlockRow.SLIDE, s] = dq
+        interface.flow[FlowPlace.TOTAL_SLIDE] += dq
+        is_finite = np.isfinite(q + workspace[BlockRow.SPEED, s])
+        if not (abs(workspace[BlockRow.OUTPUT, s]) <= folded.bounds.travel and is_finite):
             break
-    return did
+    return n_steps
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def march_drag(first, count, i, q, motion, modal_system, table, interface, folded):
+def march_drag(first, count, i, q, system):
     """March as long as all points slip in the same direction.
 
     The sample at the end of the last step is not read; no sample before it has a larger slide in its direction.
@@ -320,103 +299,83 @@ def march_drag(first, count, i, q, motion, modal_system, table, interface, folde
         Number of the sample in the cycle.
     q : float
         Slide at the start [m].
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
-    table : (s, k) array
-        Table of `propagator.Propagator`.
-    interface : interfaces.arrays.ShearedPoints
-    folded : interfaces.arrays.FoldedCycles
+    system : folded_arrays.FoldedMarch
 
     Returns
     -------
     int
         Number of steps.
     """
-    workspace = folded.workspace
+    motion = system.motion
+    modal_system = system.modal_system
+    interface = system.interface
+    workspace = system.folded.workspace
     n = motion.shape[1]
-    at = first % table.shape[0]
-    force = interface.flow[DRAG_DIRECTION] * interface.drag[DRAG_FORCE, 0]
+    at = first % system.table.shape[0]
+    force = interface.flow[FlowPlace.DRAG_DIRECTION] * interface.drag[DragRow.FORCE, 0]
     accel = modal_system.workspace[0]
     start = modal_system.workspace[1:]
     write_friction_accelerations(force, modal_system.slide, modal_system.mass, accel)
-    block = min(count, workspace.shape[1], table.shape[0] - at)
+    block = min(count, workspace.shape[1], system.table.shape[0] - at)
     for row in range(N_BLOCK_ROWS):
         for s in range(block):
             workspace[row, s] = 0.0
     for k in range(n):
         start[0, k] = motion[0, k]
         start[1, k] = motion[1, k]
-        move_mode(k, block, motion, modal_system, table, at, accel[k], workspace)
-    did = add_drag_steps(block, i, q, at, force, modal_system, table, interface, folded)
-    if did < block:
+        move_mode(k, block, at, accel[k], system, workspace)
+    n_steps = add_drag_steps(block, i, q, at, force, system)
+    if n_steps < block:
         for k in range(n):
             motion[0, k] = start[0, k]
             motion[1, k] = start[1, k]
-            move_mode(k, did, motion, modal_system, table, at, accel[k], workspace[N_BLOCK_ROWS:])
-    if did:
-        swing_pieces(interface, did, workspace[SLIDE_ROW])
-    return did
+            move_mode(k, n_steps, at, accel[k], system, workspace[N_BLOCK_ROWS:])
+    if n_steps:
+        swing_pieces(interface, n_steps, workspace[BlockRow.SLIDE])
+    return n_steps
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def march_step(at, q, v, motion, modal_system, table, interface, folded):
+def march_step(at, start, system):
     """March a step in which points may stick or slip; return the friction work [J].
 
     Parameters
     ----------
     at : int
         Row of the table for this step.
-    q : float
-        Slide at the start [m].
-    v : float
-        Its speed [m/s].
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
-    table : (s, k) array
-        Table of `propagator.Propagator`.
-    interface : interfaces.arrays.ShearedPoints
-    folded : interfaces.arrays.FoldedCycles
+    start : interfaces.arrays.StepStart
+    system : folded_arrays.FoldedMarch
 
     Returns
     -------
     float
     """
-    beta = modal_system.beta
-    dt = modal_system.dt
+    motion = system.motion
+    modal_system = system.modal_system
+    folded = system.folded
     accel = modal_system.workspace[0]
-    free = free_increment(motion, modal_system, 0, table, at)
-    dq, _, turns = contact.solve_step(free, beta, q, v, dt, interface, folded.bounds.goal)
-    used = (free - dq) / beta
-    write_friction_accelerations(used, modal_system.slide, modal_system.mass, accel)
-    work = used * dq
-    scratch = modal_system.workspace[1:]
-    move_modes(motion, modal_system, table, at, accel, scratch, folded.ledger)
-    count_iterations(turns, work, folded.ledger)
-    speed = 0.0
-    for k in range(modal_system.slide.size):
-        speed += modal_system.slide[k] * motion[1, k]
-    lost, _ = contact.commit_step(dq, used, q, v, speed, dt, interface)
-    folded.ledger[LEDGER.friction_loss] += lost
+    free = free_increment(motion, modal_system, 0, system.table, at)
+    step = contact.solve_step(free, modal_system.beta, start, system.interface, folded.bounds.goal)
+    force = (free - step.increment) / modal_system.beta
+    write_friction_accelerations(force, modal_system.slide, modal_system.mass, accel)
+    work = force * step.increment
+    move_modes(motion, modal_system, system.table, at, accel, folded.ledger)
+    count_iterations(step.iterations, work, folded.ledger)
+    end_velocity = project_modes(modal_system.slide, motion[1])
+    loss, _ = contact.commit_step(step.increment, force, start, end_velocity, system.interface)
+    folded.ledger[Ledger.FRICTION_LOSS] += loss
     return work
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def march_folded_cycle(first, motion, modal_system, table, interface, folded):
+def march_folded_cycle(first, system):
     """March a cycle.
 
     Parameters
     ----------
     first : int
         Row of the table for the first step; the rows are used in turns.
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
-    table : (s, k) array
-        Table of `propagator.Propagator`.
-    interface : interfaces.arrays.ShearedPoints
-    folded : interfaces.arrays.FoldedCycles
+    system : folded_arrays.FoldedMarch
 
     Returns
     -------
@@ -425,6 +384,10 @@ def march_folded_cycle(first, motion, modal_system, table, interface, folded):
     int
         Status of `loop_kernels`.
     """
+    motion = system.motion
+    modal_system = system.modal_system
+    interface = system.interface
+    folded = system.folded
     trace = folded.trace
     row = folded.largest.row
     count = trace.shape[1] - 1
@@ -432,45 +395,42 @@ def march_folded_cycle(first, motion, modal_system, table, interface, folded):
     i = 0
     is_step_open = False
     work = 0.0
-    q0 = 0.0
-    force0 = 0.0
-    energy0 = 0.0
+    start_slide = 0.0
+    start_force = 0.0
+    start_energy = 0.0
     while True:
-        q, v, out = write_modes(row, motion, modal_system)
-        force, energy, slip = contact.read_state(interface, q, v)
+        modal = write_modes(row, motion, modal_system)
+        reading = contact.read_state(interface, modal.slide, modal.speed)
+        stored = reading.stored_energy + modal_energy(motion, modal_system)
         status = write_interface(
-            row[: 2 * n + 6],
-            force,
-            energy,
-            slip,
-            out,
+            row[: 2 * n + SampleColumn.STEP_WORK],
+            reading,
+            modal.output,
             folded.bounds.travel,
-            energy + modal_energy(motion, modal_system),
+            stored,
             folded.ledger,
         )
         if is_step_open:
-            add_step(work, energy - energy0, q0, q, 0.5 * (force0 + force), folded)
-        rate = 0.0
-        for k in range(n):
-            rate += modal_system.output[k] * motion[1, k]
-        trace[OUTPUT, i] = out
-        trace[OUTPUT_RATE, i] = rate
+            rise = reading.stored_energy - start_energy
+            mean_force = 0.5 * (start_force + reading.force)
+            add_step(work, rise, start_slide, modal.slide, mean_force, folded)
+        trace[TraceRow.OUTPUT, i] = modal.output
+        trace[TraceRow.RATE, i] = project_modes(modal_system.output, motion[1])
         keep_largest(first + i, folded)
         if status or i == count:
             return i, status
-        if interface.flow[DRAG_DIRECTION] != 0.0 and modal_system.dense.size == 0:
-            did = march_drag(
-                first + i, count - i, i, q, motion, modal_system, table, interface, folded
-            )
-            if did:
-                i = i + did
+        if interface.flow[FlowPlace.DRAG_DIRECTION] != 0.0 and modal_system.dense.size == 0:
+            n_steps = march_drag(first + i, count - i, i, modal.slide, system)
+            if n_steps:
+                i = i + n_steps
                 is_step_open = False
                 continue
-        at = (first + i) % table.shape[0]
-        work = march_step(at, q, v, motion, modal_system, table, interface, folded)
-        q0 = q
-        force0 = force
-        energy0 = energy
+        at = (first + i) % system.table.shape[0]
+        start = StepStart(modal.slide, modal.speed, modal_system.dt)
+        work = march_step(at, start, system)
+        start_slide = modal.slide
+        start_force = reading.force
+        start_energy = reading.stored_energy
         is_step_open = True
         i = i + 1
 
@@ -497,19 +457,22 @@ def read_cycle(trace, dt, cycles):
     im = 0.0
     fastest = 0.0
     for i in range(count + 1):
-        low = min(low, trace[OUTPUT, i])
-        high = max(high, trace[OUTPUT, i])
-        fastest = max(fastest, abs(trace[OUTPUT_RATE, i]))
+        low = min(low, trace[TraceRow.OUTPUT, i])
+        high = max(high, trace[TraceRow.OUTPUT, i])
+        fastest = max(fastest, abs(trace[TraceRow.RATE, i]))
     for i in range(count):
-        re += trace[OUTPUT, i] * trace[DRIVE_COS, i]
-        im -= trace[OUTPUT, i] * trace[DRIVE_SIN, i]
+        re += trace[TraceRow.OUTPUT, i] * trace[TraceRow.DRIVE_COS, i]
+        im -= trace[TraceRow.OUTPUT, i] * trace[TraceRow.DRIVE_SIN, i]
     for i in range(count):
-        if not trace[OUTPUT_RATE, i] * trace[OUTPUT_RATE, i + 1] < -RATE_TOL * fastest * fastest:
+        if (
+            not trace[TraceRow.RATE, i] * trace[TraceRow.RATE, i + 1]
+            < -RATE_TOL * fastest * fastest
+        ):
             continue
-        a = trace[OUTPUT, i]
-        b = trace[OUTPUT, i + 1]
-        p = trace[OUTPUT_RATE, i] * dt
-        r = trace[OUTPUT_RATE, i + 1] * dt
+        a = trace[TraceRow.OUTPUT, i]
+        b = trace[TraceRow.OUTPUT, i + 1]
+        p = trace[TraceRow.RATE, i] * dt
+        r = trace[TraceRow.RATE, i + 1] * dt
         big = 2 * (a - b) + p + r
         mid = 3 * (b - a) - 2 * p - r
         root = np.sqrt(max(mid * mid - 3 * big * p, 0.0))
@@ -519,14 +482,14 @@ def read_cycle(trace, dt, cycles):
                 value = a + p * s + mid * s * s + big * s * s * s
                 low = min(low, value)
                 high = max(high, value)
-    cycles[MIN_OUTPUT] = low
-    cycles[MAX_OUTPUT] = high
-    cycles[PHASOR_REAL] = 2 * re / count
-    cycles[PHASOR_IMAG] = 2 * im / count
+    cycles[CycleColumn.MIN_OUTPUT] = low
+    cycles[CycleColumn.MAX_OUTPUT] = high
+    cycles[CycleColumn.PHASOR_REAL] = 2 * re / count
+    cycles[CycleColumn.PHASOR_IMAG] = 2 * im / count
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def march_folded_cycles(first, cycles, motion, modal_system, table, interface, folded):
+def march_folded_cycles(first, cycles, system):
     """March cycles of which the extremes, phasors and sums are kept.
 
     Parameters
@@ -535,13 +498,7 @@ def march_folded_cycles(first, cycles, motion, modal_system, table, interface, f
         Row of the table for the first step; the rows are used in turns.
     cycles : (k, 4) array
         Extremes and phasors of the cycles, which are written.
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
-    table : (s, k) array
-        Table of `propagator.Propagator`.
-    interface : interfaces.arrays.ShearedPoints
-    folded : interfaces.arrays.FoldedCycles
+    system : folded_arrays.FoldedMarch
 
     Returns
     -------
@@ -550,12 +507,11 @@ def march_folded_cycles(first, cycles, motion, modal_system, table, interface, f
     int
         Status of `loop_kernels`.
     """
-    count = folded.trace.shape[1] - 1
+    trace = system.folded.trace
+    count = trace.shape[1] - 1
     for cycle in range(cycles.shape[0]):
-        did, status = march_folded_cycle(
-            first + cycle * count, motion, modal_system, table, interface, folded
-        )
+        n_steps, status = march_folded_cycle(first + cycle * count, system)
         if status:
-            return cycle * count + did, status
-        read_cycle(folded.trace, modal_system.dt, cycles[cycle])
+            return cycle * count + n_steps, status
+        read_cycle(trace, system.modal_system.dt, cycles[cycle])
     return cycles.shape[0] * count, 0

@@ -18,17 +18,18 @@ from ...contact.press_path_kernels import path_mean
 from ...contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT, REFERENCE_STIFFNESS
 from ...friction.flags_kernels import NJIT_INTERNAL
 from ..interfaces import element_kernels as contact
-from ..modal_kernels import free_increment, free_rate
+from ..interfaces.arrays import LoadPlace, SolvedStep
+from ..modal_kernels import free_increment, free_rate, project_modes
 from . import faces_kernels as coupling
 from . import parts_kernels as parts
-from .stops_kernels import (
-    ELEMENT_FORCE,
-    FREE_SLIDE,
-    FREE_SPEED,
-    GAMMA,
-    INCREMENT,
-    OTHER_ACCELERATION,
-    STOPS_KNOWN,
+from .element_arrays import (
+    N_LOAD_COLUMNS,
+    ComplianceRow,
+    ContactPlace,
+    ElementRow,
+    LoadColumn,
+    ModalRow,
+    PortRow,
 )
 
 # Numba leaves out the branches of flags that are False.
@@ -41,12 +42,8 @@ MAX_GUESSES = 80
 BISECT_EVERY = 8  # guesses after which the secant method takes the middle of its bracket
 BRACKET_TOL = 4e-16  # width of a bracket over its ends below which it is closed
 MAX_ITERATIONS = 100  # Newton steps for heave and pitch
-# Places in `few` of `interfaces.arrays.VaryingLoad`.
-LOAD = 0  # load now [N]
-MEAN_PRESS = 3  # mean forces of the step on heave [N] and pitch [N m]
-PRESS_GUESS = 6  # increments of heave and pitch of the step before, the guess of this one
-PRESS_OUT = 8  # results of `path_mean` (9,)
-PRESS_START = 17  # heave, pitch, energy and forces at the start of the step (5,)
+MIN_STEP_FRACTION = 1e-9  # fraction of a Newton step below which it is not halved again
+ROUND_OFF = 4e-16  # round-off error of a sum over its largest term
 
 
 class Secant(NamedTuple):
@@ -55,139 +52,128 @@ class Secant(NamedTuple):
     low: float
     high: float
     guess: float
-    miss: float
+    residual: float
 
 
-@njit(error_model="numpy", **NJIT_INTERNAL)
-def port_motion(motion, rows, r):
-    """Return the slide, heave or pitch of the modes.
+class PressStep(NamedTuple):
+    """Solution of heave and pitch in a step.
 
-    Parameters
-    ----------
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    rows : (p, n) array
-        Slides of the ports per coordinate.
-    r : int
-        Number of the port.
-
-    Returns
-    -------
-    float
+    - end_set: contact set at the end of the step, negative if none fits
+    - iterations: number of iterations
+    - residual: as a force [N]
     """
-    out = 0.0
-    for i in range(motion.shape[1]):
-        out += rows[r, i] * motion[0, i]
-    return out
+
+    end_set: int
+    iterations: int
+    residual: float
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_press_step(press, k0, begin, f1, f2, turn, out):
+def start_march(press):
+    """Clear the workspace of a load at the start of a march, and set the load."""
+    press.few[:] = 0.0
+    press.few[LoadPlace.LOAD] = press.sets.reference[REFERENCE_LOAD]
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def solve_press_step(press, free_heave, free_pitch):
     """Solve heave and pitch of a step by Newton's method with step halving.
 
-    The increments are (f1, f2) - beta * mean force. The forces have a convex potential, so the solution is
-    unique; inside a single contact set one step finds it.
+    The increments are the free ones minus beta times the mean forces. The forces have a convex potential, so the
+    solution is unique; inside a single contact set one step finds it. The guess of the increments is in press.few,
+    where increments, mean forces and slopes are written.
 
     Parameters
     ----------
     press : interfaces.arrays.VaryingLoad
-    k0 : int
-        Contact set at the start.
-    begin : (5,) array
-        Heave, pitch, energy and forces at the start of the step.
-    f1 : float
+    free_heave : float
         Increment of the heave without contact forces [m].
-    f2 : float
+    free_pitch : float
         Increment of the pitch without contact forces [rad].
-    turn : (2,) array
-        Guess of the increments; the solution is written.
-    out : (9,) array
-        Mean forces and slopes, as `path_mean` writes them.
 
     Returns
     -------
-    int
-        Contact set at the end of the step, negative if none fits.
-    int
-        Number of iterations.
-    float
-        Residual as a force [N].
+    PressStep
     """
-    sets = press.sets
-    beta = press.beta
+    start = press.few[LoadPlace.START : LoadPlace.START + 5]
+    increments = press.few[LoadPlace.GUESS : LoadPlace.GUESS + 2]
+    out = press.few[LoadPlace.OUT : LoadPlace.OUT + 9]
     arm = press.arm[0]
-    b11 = beta[1, 1]
-    b12 = beta[1, 2]
-    b21 = beta[2, 1]
-    b22 = beta[2, 2]
-    softness = b11 + b22 / (arm * arm) + 2 / sets.reference[REFERENCE_STIFFNESS]
-    dh = turn[0]
-    dt = turn[1]
-    old_h = dh
-    old_t = dt
-    step_h = 0.0
-    step_t = 0.0
-    part = 1.0
-    best = np.inf
-    k = k0
+    b11 = press.beta[1, 1]
+    b12 = press.beta[1, 2]
+    b21 = press.beta[2, 1]
+    b22 = press.beta[2, 2]
+    heave = increments[0]
+    pitch = increments[1]
+    best_heave = heave
+    best_pitch = pitch
+    heave_step = 0.0
+    pitch_step = 0.0
+    step_fraction = 1.0
+    smallest = np.inf
+    end_set = press.slot[0]
+    n_iterations = MAX_ITERATIONS
     for count in range(1, MAX_ITERATIONS):
-        k = path_mean(sets, k0, begin[0], begin[1], dh, dt, out)
-        if k < 0:
-            return k, count, np.inf
-        p1 = b11 * out[0] + b12 * out[1]
-        p2 = b21 * out[0] + b22 * out[1]
-        r1 = dh - f1 + p1
-        r2 = dt - f2 + p2
-        size = abs(r1) + arm * abs(r2)
-        noise = 4e-16 * (abs(dh) + abs(f1) + abs(p1) + arm * (abs(dt) + abs(f2) + abs(p2)))
-        turn[0] = dh
-        turn[1] = dt
-        if size <= noise:
-            return k, count, 0.0
-        if size < best * (1 - 0.1 * part) or best == np.inf:
-            best = size
-            part = 1.0
-            old_h = dh
-            old_t = dt
+        end_set = path_mean(press.sets, press.slot[0], start[0], start[1], heave, pitch, out)
+        if end_set < 0:
+            return PressStep(end_set, count, np.inf)
+        heave_change = b11 * out[0] + b12 * out[1]
+        pitch_change = b21 * out[0] + b22 * out[1]
+        r1 = heave - free_heave + heave_change
+        r2 = pitch - free_pitch + pitch_change
+        residual = abs(r1) + arm * abs(r2)
+        noise = ROUND_OFF * (
+            abs(heave)
+            + abs(free_heave)
+            + abs(heave_change)
+            + arm * (abs(pitch) + abs(free_pitch) + abs(pitch_change))
+        )
+        increments[0] = heave
+        increments[1] = pitch
+        if residual <= noise:
+            return PressStep(end_set, count, 0.0)
+        if residual < smallest * (1 - 0.1 * step_fraction) or smallest == np.inf:
+            smallest = residual
+            step_fraction = 1.0
+            best_heave = heave
+            best_pitch = pitch
             j11 = 1 + b11 * out[5] + b12 * out[7]
             j12 = b11 * out[6] + b12 * out[8]
             j21 = b21 * out[5] + b22 * out[7]
             j22 = 1 + b21 * out[6] + b22 * out[8]
             det = j11 * j22 - j12 * j21
-            step_h = (j22 * r1 - j12 * r2) / det
-            step_t = (j11 * r2 - j21 * r1) / det
+            heave_step = (j22 * r1 - j12 * r2) / det
+            pitch_step = (j11 * r2 - j21 * r1) / det
         else:
-            part *= 0.5
-            if part < 1e-9 or size <= 64 * noise or (part < 0.2 and best <= 1e3 * noise):
-                turn[0] = old_h
-                turn[1] = old_t
-                k = path_mean(sets, k0, begin[0], begin[1], old_h, old_t, out)
-                return k, count, best / softness
-        dh = old_h - part * step_h
-        dt = old_t - part * step_t
-    return k, MAX_ITERATIONS, best / softness
+            step_fraction *= 0.5
+            is_stalled = step_fraction < 0.2 and smallest <= 1e3 * noise
+            if step_fraction < MIN_STEP_FRACTION or residual <= 64 * noise or is_stalled:
+                increments[0] = best_heave
+                increments[1] = best_pitch
+                end_set = path_mean(
+                    press.sets, press.slot[0], start[0], start[1], best_heave, best_pitch, out
+                )
+                n_iterations = count
+                break
+        heave = best_heave - step_fraction * heave_step
+        pitch = best_pitch - step_fraction * pitch_step
+    compliance = b11 + b22 / (arm * arm) + 2 / press.sets.reference[REFERENCE_STIFFNESS]
+    return PressStep(end_set, n_iterations, smallest / compliance)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def sample_load(i, last, motion, mass, interface, faces, press, row):
+def sample_load(i, is_last, system, row):
     """Write load, moment, contact energy, heave and pitch of a sample into the row.
 
-    press.slot is negative if no contact set fits.
+    system.press.slot is negative if no contact set fits.
 
     Parameters
     ----------
     i : int
         Number of the sample.
-    last : bool
+    is_last : bool
         Whether it is the last sample.
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    mass : float
-        [kg]
-    interface : tuple
-        Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.PortElements
-    press : interfaces.arrays.VaryingLoad
+    system : element_arrays.MarchArrays
     row : (k,) array
         Row of samples of `loop_kernels.march`; it is written.
 
@@ -196,76 +182,80 @@ def sample_load(i, last, motion, mass, interface, faces, press, row):
     float
         Energy of the preloaded contact [J].
     """
-    begin = press.few[PRESS_START : PRESS_START + 5]
-    load = press.few[LOAD]
-    moment = press.sets.reference[REFERENCE_MOMENT]
-    m = row.size - 5
-    begin[0], begin[1] = port_motion(motion, press.rows, 1), port_motion(motion, press.rows, 2)
-    begin[2] = 0.0
-    begin[3] = 0.0
-    begin[4] = 0.0
+    press = system.press
+    sets = press.sets
+    start = press.few[LoadPlace.START : LoadPlace.START + 5]
+    load = press.few[LoadPlace.LOAD]
+    moment = sets.reference[REFERENCE_MOMENT]
+    heave = project_modes(press.rows[1], system.motion[0])
+    pitch = project_modes(press.rows[2], system.motion[0])
+    start[0] = heave
+    start[1] = pitch
+    start[2] = 0.0
+    start[3] = 0.0
+    start[4] = 0.0
     if press.loads.size > 0:
         load = press.loads[i]
         press.now[0] = load
     else:
-        press.slot[0] = find_set(press.sets, press.slot[0], -begin[0], begin[1])
+        press.slot[0] = find_set(sets, press.slot[0], -heave, pitch)
         if press.slot[0] < 0:
             return 0.0
-        begin[2], begin[3], begin[4] = compute_energy(press.sets, press.slot[0], begin[0], begin[1])
-        load = max(press.sets.reference[REFERENCE_LOAD] - begin[3], 0.0)
-        moment = moment - begin[4]
-        if HAS_POINTS or last:
-            press_state(press.sets, press.slot[0], -begin[0], begin[1], press.now)
-    press.few[LOAD] = load
-    row[m] = load
-    row[m + 1] = moment
-    row[m + 2] = begin[2]
-    row[m + 3] = begin[0]
-    row[m + 4] = begin[1]
-    set_loads(load, load, interface, faces, press)
+        start[2], start[3], start[4] = compute_energy(sets, press.slot[0], heave, pitch)
+        load = max(sets.reference[REFERENCE_LOAD] - start[3], 0.0)
+        moment = moment - start[4]
+        if HAS_POINTS or is_last:
+            press_state(sets, press.slot[0], -heave, pitch, press.now)
+    press.few[LoadPlace.LOAD] = load
+    first_column = row.size - N_LOAD_COLUMNS
+    row[first_column + LoadColumn.LOAD] = load
+    row[first_column + LoadColumn.MOMENT] = moment
+    row[first_column + LoadColumn.ENERGY] = start[2]
+    row[first_column + LoadColumn.HEAVE] = heave
+    row[first_column + LoadColumn.PITCH] = pitch
+    set_loads(load, load, system)
     if HAS_STOPS:
-        coupling.cap_forces(faces)
-        set_press_accelerations(begin[3], begin[4], mass, press, faces.modal[OTHER_ACCELERATION])
-    return begin[2]
+        elements = system.elements
+        coupling.cap_forces(elements)
+        accel = elements.modal[ModalRow.OTHER_ACCELERATION]
+        set_press_accelerations(start[3:5], system.modal_system.mass, press, accel)
+    return start[2]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def set_loads(before, after, interface, faces, press):
+def set_loads(start_load, end_load, system):
     """Set the loads of friction at both ends of a step.
 
     The loads of points at the end of the step are in press.now.
 
     Parameters
     ----------
-    before : float
+    start_load : float
         Load at the start of the step [N].
-    after : float
+    end_load : float
         Load at its end [N].
-    interface : tuple
-        Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.PortElements
-    press : interfaces.arrays.VaryingLoad
+    system : element_arrays.MarchArrays
     """
+    press = system.press
+    interface = system.interface
     if HAS_POINTS:
         for i in range(press.now.size):
             interface.pressed[1, i] = press.now[i]
     elif HAS_STOPS:
-        coupling.set_limits(before, after, press.force, faces)
+        coupling.set_limits(start_load, end_load, press.force, system.elements)
     else:
-        interface.num[0, 1] = press.force[0] * 0.5 * (before + after)
+        interface.num[0, 1] = press.force[0] * 0.5 * (start_load + end_load)
         interface.bound[0] = interface.num[0, 1]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def set_press_accelerations(heave, pitch, mass, press, accel):
+def set_press_accelerations(force, mass, press, accel):
     """Write the modal accelerations under forces that resist heave and pitch into accel (n,).
 
     Parameters
     ----------
-    heave : float
-        Force that resists the heave [N].
-    pitch : float
-        Moment that resists the pitch [N m].
+    force : (2,) array
+        Force on the heave [N] and moment on the pitch [N m].
     mass : float
         [kg]
     press : interfaces.arrays.VaryingLoad
@@ -273,7 +263,7 @@ def set_press_accelerations(heave, pitch, mass, press, accel):
         Modal accelerations of the forces [m s-2].
     """
     for i in range(accel.size):
-        accel[i] = -(press.rows[1, i] * heave + press.rows[2, i] * pitch) / mass
+        accel[i] = -(press.rows[1, i] * force[0] + press.rows[2, i] * force[1]) / mass
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -290,80 +280,63 @@ def add_press_accelerations(press, mass, accel):
     """
     for i in range(accel.size):
         accel[i] -= (
-            press.rows[1, i] * press.few[MEAN_PRESS] + press.rows[2, i] * press.few[MEAN_PRESS + 1]
+            press.rows[1, i] * press.few[LoadPlace.MEAN_PRESS]
+            + press.rows[2, i] * press.few[LoadPlace.MEAN_PRESS + 1]
         ) / mass
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_friction_step(
-    q, v, force, whole, motion, modal_system, table, at, interface, faces, press
-):
+def solve_friction_step(start, force, is_whole, at, system):
     """Solve the friction of a step under given mean forces on heave and pitch.
 
     Parameters
     ----------
-    q : float
-        Slide of the contact at the start of the step [m].
-    v : float
-        Its speed [m/s].
+    start : interfaces.arrays.StepStart
     force : (2,) array
         Mean force on the heave [N] and moment on the pitch [N m].
-    whole : bool
+    is_whole : bool
         Whether stops and releases inside the step are left out.
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
-    table : (s, k) array
-        Table of `propagator.Propagator`.
     at : int
         Row of the table for this step.
-    interface : tuple
-        Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.PortElements
-    press : interfaces.arrays.VaryingLoad
+    system : element_arrays.MarchArrays
 
     Returns
     -------
-    float
-        Increment of the slide [m].
-    float
-        Mean friction force [N].
-    int
-        Number of iterations, negative if the solution fails.
+    interfaces.arrays.SolvedStep
     """
+    press = system.press
+    modal_system = system.modal_system
+    elements = system.elements
+    beta = press.beta
     free = (
-        free_increment(motion, modal_system, 0, table, at)
-        - press.beta[0, 1] * force[0]
-        - press.beta[0, 2] * force[1]
+        free_increment(system.motion, modal_system, 0, system.table, at)
+        - beta[0, 1] * force[0]
+        - beta[0, 2] * force[1]
     )
     if HAS_STOPS:
-        set_press_accelerations(
-            force[0], force[1], modal_system.mass, press, faces.modal[OTHER_ACCELERATION]
+        accel = elements.modal[ModalRow.OTHER_ACCELERATION]
+        set_press_accelerations(force, modal_system.mass, press, accel)
+        elements.port[PortRow.FREE_SLIDE, 0] = free
+        if beta[0, 0] == 0.0:  # no interface slides
+            return SolvedStep(coupling.slide_freely(0.0, elements), 0.0, 1)
+        elements.port[PortRow.FREE_SPEED, 0] = (
+            free_rate(system.motion, modal_system.slide, modal_system, system.table, at)
+            - elements.compliances[ComplianceRow.SPEED, 0, 1] * force[0]
+            - elements.compliances[ComplianceRow.SPEED, 0, 2] * force[1]
         )
-        faces.port[FREE_SLIDE, 0] = free
-        if press.beta[0, 0] == 0.0:  # no interface slides
-            return coupling.slide_freely(0.0, faces), 0.0, 1
-        faces.port[FREE_SPEED, 0] = (
-            free_rate(motion, modal_system.slide, modal_system, table, at)
-            - faces.gives[GAMMA, 0, 1] * force[0]
-            - faces.gives[GAMMA, 0, 2] * force[1]
-        )
-        if whole:
-            _, count = coupling.solve_coupled_forces(q, v, modal_system, interface, faces)
-            faces.own[STOPS_KNOWN] = 0.0
+        if is_whole:
+            _, n_iterations = coupling.solve_coupled_forces(start, system)
+            elements.contact[ContactPlace.STOPS_KNOWN] = 0.0
         else:
-            _, count = coupling.solve_step(q, v, motion, modal_system, table, at, interface, faces)
-        return faces.each[INCREMENT, 0], faces.each[ELEMENT_FORCE, 0], count
-    else:
-        return contact.solve_step(
-            free,
-            press.beta[0, 0],
-            q,
-            v,
-            modal_system.dt,
-            interface,
-            COUPLING_FACTOR * press.goal[0],
+            n_iterations = coupling.solve_step(start, at, system).iterations
+        return SolvedStep(
+            elements.state[ElementRow.INCREMENT, 0],
+            elements.state[ElementRow.FORCE, 0],
+            n_iterations,
         )
+    else:
+        tolerance = COUPLING_FACTOR * press.goal[0]
+        return contact.solve_step(free, beta[0, 0], start, system.interface, tolerance)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -375,39 +348,25 @@ def solve_press_part(heave, pitch, friction, press):
     heave, pitch : float
         Increments without interface forces [m], [rad].
     friction : float
-        [N]
+        Mean friction force [N].
     press : interfaces.arrays.VaryingLoad
 
     Returns
     -------
-    int
-        Contact set at the end of the step, negative if none fits.
-    int
-        Number of iterations.
-    float
-        Residual as a force [N].
+    PressStep
     """
     few = press.few
-    beta = press.beta
-    increments = few[PRESS_GUESS : PRESS_GUESS + 2]
-    out = few[PRESS_OUT : PRESS_OUT + 9]
-    start = few[PRESS_START : PRESS_START + 5]
-    end, iterations, residual = solve_press_step(
-        press,
-        press.slot[0],
-        start,
-        heave - beta[1, 0] * friction,
-        pitch - beta[2, 0] * friction,
-        increments,
-        out,
-    )
-    if end >= 0:
-        few[MEAN_PRESS] = out[0]
-        few[MEAN_PRESS + 1] = out[1]
+    free_heave = heave - press.beta[1, 0] * friction
+    free_pitch = pitch - press.beta[2, 0] * friction
+    step = solve_press_step(press, free_heave, free_pitch)
+    if step.end_set >= 0:
+        few[LoadPlace.MEAN_PRESS] = few[LoadPlace.OUT]
+        few[LoadPlace.MEAN_PRESS + 1] = few[LoadPlace.OUT + 1]
         if HAS_POINTS:
-            approach = -(start[0] + increments[0])
-            press_state(press.sets, end, approach, start[1] + increments[1], press.now)
-    return end, iterations, residual
+            approach = -(few[LoadPlace.START] + few[LoadPlace.GUESS])
+            tilt = few[LoadPlace.START + 1] + few[LoadPlace.GUESS + 1]
+            press_state(press.sets, step.end_set, approach, tilt, press.now)
+    return step
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -420,7 +379,7 @@ def is_closed(secant):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def next_guess(secant, guess, used, turn):
+def next_guess(secant, guess, force, turn):
     """Take a secant step inside the bracket.
 
     Every eighth step is a bisection, because jumps can make the secant steps alternate.
@@ -428,7 +387,7 @@ def next_guess(secant, guess, used, turn):
     Parameters
     ----------
     secant : Secant
-    guess, used : float
+    guess, force : float
         Force that was assumed, and the one that followed from it [N].
     turn : int
         Number of the guess, from 1.
@@ -439,24 +398,24 @@ def next_guess(secant, guess, used, turn):
     float
         Next guess [N].
     """
-    miss = used - guess
+    residual = force - guess
     low = secant.low
     high = secant.high
-    if miss > 0:
+    if residual > 0:
         low = guess
     else:
         high = guess
-    following = used
-    if secant.miss < np.inf and miss != secant.miss:
-        following = guess - miss * (guess - secant.guess) / (miss - secant.miss)
+    following = force
+    if secant.residual < np.inf and residual != secant.residual:
+        following = guess - residual * (guess - secant.guess) / (residual - secant.residual)
     if not (low < following < high) or turn % BISECT_EVERY == 0:
         is_bracket = low > -np.inf and high < np.inf
-        following = 0.5 * (low + high) if is_bracket else used
-    return Secant(low, high, guess, miss), following
+        following = 0.5 * (low + high) if is_bracket else force
+    return Secant(low, high, guess, residual), following
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_coupled_forces(i, q, v, motion, modal_system, table, at, interface, faces, press):
+def solve_coupled_forces(i, start, at, system):
     """Solve friction and normal contact over a step, each under the mean force of the other.
 
     If friction moves heave or pitch too, the secant method in a bracket finds the force on which both agree. The
@@ -468,102 +427,83 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, interface, fa
     ----------
     i : int
         Number of the sample at which the step starts.
-    q : float
-        Slide of the contact at the start of the step [m].
-    v : float
-        Its speed [m/s].
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    modal_system : interfaces.arrays.ModalArrays
-    table : (s, k) array
-        Table of `propagator.Propagator`.
+    start : interfaces.arrays.StepStart
     at : int
         Row of the table for this step.
-    interface : tuple
-        Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.PortElements
-    press : interfaces.arrays.VaryingLoad
+    system : element_arrays.MarchArrays
 
     Returns
     -------
-    float
-        Increment of the slide [m].
-    float
-        Mean friction force [N].
-    int
-        Number of iterations, negative if they do not agree.
+    interfaces.arrays.SolvedStep
+        The iterations are negative if friction and contact do not agree.
     """
+    press = system.press
+    few = press.few
     beta = press.beta
-    load = press.few[LOAD]
+    load = few[LoadPlace.LOAD]
+    preload = press.sets.reference[REFERENCE_LOAD]
     goal = press.goal[0]
-    is_given = press.loads.size > 0
-    moves = not is_given and (beta[1, 1] != 0 or beta[2, 2] != 0)
+    is_prescribed = press.loads.size > 0
+    moves = not is_prescribed and (beta[1, 1] != 0 or beta[2, 2] != 0)
     is_coupled = moves and (beta[0, 1] != 0 or beta[0, 2] != 0)
-    heave = free_increment(motion, modal_system, 1, table, at)
-    pitch = free_increment(motion, modal_system, 2, table, at)
-    after = load
-    if is_given:
-        after = press.loads[i + 1]
-        press.now[0] = after
+    heave = free_increment(system.motion, system.modal_system, 1, system.table, at)
+    pitch = free_increment(system.motion, system.modal_system, 2, system.table, at)
+    end_load = load
+    if is_prescribed:
+        end_load = press.loads[i + 1]
+        press.now[0] = end_load
     if HAS_POINTS:
         for k in range(press.now.size):
-            interface.pressed[0, k] = interface.pressed[1, k]
+            system.interface.pressed[0, k] = system.interface.pressed[1, k]
     guess = press.mean[0]
     secant = Secant(-np.inf, np.inf, 0.0, np.inf)
-    end = press.slot[0]
-    count = 0
-    wrong = 0.0
-    dq = 0.0
-    used = 0.0
+    end_set = press.slot[0]
+    n_iterations = 0
+    press_residual = 0.0
+    increment = 0.0
+    force = 0.0
     is_bad = False
     is_whole = False
     last_turn = MAX_GUESSES
     for turn in range(1, 2 * MAX_GUESSES + 1):
         if moves:
-            end, iterations, wrong = solve_press_part(heave, pitch, guess, press)
-            if end < 0:
-                press.slot[0] = end
-                return dq, used, count
-            count += iterations
-            after = 2 * max(press.sets.reference[REFERENCE_LOAD] - press.few[PRESS_OUT], 0.0) - load
-        set_loads(load, after, interface, faces, press)
-        dq, used, iterations = solve_friction_step(
-            q,
-            v,
-            press.few[MEAN_PRESS : MEAN_PRESS + 2],
-            is_whole,
-            motion,
-            modal_system,
-            table,
-            at,
-            interface,
-            faces,
-            press,
-        )
-        count += abs(iterations)
-        is_bad = iterations < 0 or wrong > goal
-        miss = used - guess
-        if not is_coupled or abs(miss) <= COUPLING_FACTOR * goal:
+            press_step = solve_press_part(heave, pitch, guess, press)
+            end_set = press_step.end_set
+            if end_set < 0:
+                press.slot[0] = end_set
+                return SolvedStep(increment, force, n_iterations)
+            press_residual = press_step.residual
+            n_iterations += press_step.iterations
+            end_load = 2 * max(preload - few[LoadPlace.OUT], 0.0) - load
+        set_loads(load, end_load, system)
+        press_force = few[LoadPlace.MEAN_PRESS : LoadPlace.MEAN_PRESS + 2]
+        step = solve_friction_step(start, press_force, is_whole, at, system)
+        increment = step.increment
+        force = step.mean_force
+        n_iterations += abs(step.iterations)
+        is_bad = step.iterations < 0 or press_residual > goal
+        residual = force - guess
+        if not is_coupled or abs(residual) <= COUPLING_FACTOR * goal:
             break
         if turn < last_turn and not is_closed(secant):
-            secant, guess = next_guess(secant, guess, used, turn)
+            secant, guess = next_guess(secant, guess, force, turn)
             continue
         if HAS_STOPS:
-            mean_load = 0.5 * (load + max(after, 0.0))
+            mean_load = 0.5 * (load + max(end_load, 0.0))
             if press.force[1] * mean_load <= abs(guess) <= press.force[0] * mean_load:
                 # A force between kinetic and static friction: the step starts to slip.
-                used = guess
-                dq = coupling.slide_freely(used, faces)
+                force = guess
+                increment = coupling.slide_freely(force, system.elements)
                 break
             if not is_whole:
                 is_whole = True
                 last_turn = turn + MAX_GUESSES
                 secant = Secant(-np.inf, np.inf, 0.0, np.inf)
                 continue
-        is_bad = is_bad or abs(miss) > goal
+        is_bad = is_bad or abs(residual) > goal
         break
-    press.mean[0] = used
-    press.slot[0] = end
+    press.mean[0] = force
+    press.slot[0] = end_set
     if moves:
-        press.few[LOAD] = max(press.sets.reference[REFERENCE_LOAD] - press.few[PRESS_OUT + 3], 0.0)
-    return dq, used, -count if is_bad else count
+        few[LoadPlace.LOAD] = max(preload - few[LoadPlace.OUT + 3], 0.0)
+    return SolvedStep(increment, force, -n_iterations if is_bad else n_iterations)

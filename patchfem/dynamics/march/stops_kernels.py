@@ -18,76 +18,18 @@ the tolerance times the friction force over the stiffness of the mode, and 72 %,
 tolerance, where all set-valued ones are.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INTERNAL, NJIT_NO_REFCOUNT
 from ..dense_kernels import factorise, solve_factorised
-from ..modal_kernels import write_accelerations
+from ..modal_kernels import project_modes, write_accelerations
+from .element_arrays import ComplianceRow, FaceRow, LimitRow
 
 # Number of the law in `num` of an element that holds without a stretch; it is set-valued.
 SET_VALUED = 0
-# Rows of `interfaces.arrays.PortElements`. `of`: port of an element, whether it is friction, and the element of the other
-# direction of a slide in a plane.
-PORT = 0
-IS_FRICTION = 1
-MATE = 2
-# `modal`: compliance of the coordinates [m/N], accelerations by other forces [m s-2], and the first row of scratch space.
-COORDINATE_GIVE = 0
-OTHER_ACCELERATION = 1
-MODAL_SCRATCH = 2
-N_MODAL_ROWS = 5
-# `own`: of the contact its mean force, increment of slide, force at the sample and tolerance of the force; then 1 if the
-# stops of the step are known.
-CONTACT_FORCE = 0
-CONTACT_INCREMENT = 1
-CONTACT_SAMPLE = 2
-CONTACT_TOL = 3
-STOPS_KNOWN = 4
-N_OWN = 5
-# `each`: of an element its mean force [N], slide, speed, bond length, increment of slide, residual, largest force (if
-# it is set-valued, of a step by mean forces alone), tolerance of the force, and increments of the last two steps.
-ELEMENT_FORCE = 0
-ELEMENT_SLIDE = 1
-ELEMENT_SPEED = 2
-BOND_LENGTH = 3
-INCREMENT = 4
-ELEMENT_RESIDUAL = 5
-MAX_FORCE = 6
-FORCE_TOL = 7
-LAST_INCREMENT = 8
-INCREMENT_BEFORE = 9
-N_ELEMENT_ROWS = 10
-# `gives`: reduction of slides [m/N], speeds [m/(s N)] and accelerations [1/kg] in a step per constant force.
-BETA = 0
-GAMMA = 1
-ACCELERANCE = 2
-# `limit`: static and kinetic friction at the start of the step, and AT_END rows further on at its end.
-STATIC = 0
-KINETIC = 1
-AT_END = 2
-# `field`, of a face in the step:
-FREE_SLIDE = 0  # increment of slide without its forces [m]
-FREE_SPEED = 1  # speed at the end without its forces [m/s]
-START_SPEED = 2  # speed at the start [m/s]
-WAS_RESTING = 3  # 1 if it rests at the start
-HOLDING_START = 4  # force that would hold it, at the start [N]
-HOLDING_END = 5  # force that would hold it, at the end [N]
-SLIDE = 6  # slide since the start [m]
-SPEED = 7  # speed now [m/s]
-MEAN_FORCE = 8  # mean force so far [N]
-FORCE_NOW = 9  # force now [N]
-FORCE_SLOPE = 10  # slope of the force over the step [N]
-# A face rests (0), slides (+-1), or carries its static friction while others hold it (+-2).
-SLIP_STATE = 11
-SLIDES_ON = 12  # 1 if it slides in one direction through the whole step
-RIGHT_SIDE = 13  # right-hand side of the equations that are solved
-SOLUTION = 14  # solution of these equations
-RESIDUAL = 15  # their residual, also scratch space
-FACE_INCREMENT = 16  # increment of slide of the step [m]
-BLOW = 17  # impulse at the end of the step [N s]
-N_FIELDS = 18
-
 # Relative shift of the diagonal, which makes the equations of dependent faces regular.
 DIAGONAL_SHIFT = 1e-10
 # compliance of a face while the others are held, over its compliance; below it the others hold the face
@@ -96,6 +38,19 @@ OVERLOAD_TOL = 1e-9  # fraction by which a force may exceed the static friction
 SAME_TIME_TOL = 1e-12  # fraction of a speed below which equal faces stop at once
 ZERO_SLIDE_TOL = 1e-14  # fraction of its terms below which an increment of slide is zero
 TINY = 1e-300  # keeps a divisor above 0
+
+
+class StepEvent(NamedTuple):
+    """Next stop or release in a step.
+
+    - distance: from the present time, in lengths of the step
+    - face: number of the face, -1 for no event
+    - slip_sign: sign of the slide after a release, 0 for a stop
+    """
+
+    distance: float
+    face: int
+    slip_sign: float
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -110,20 +65,22 @@ def friction_bound(which, e, x, stops):
         Number of the face.
     x : float
         Place in the step, from 0 at its start to 1.
-    stops : interfaces.arrays.Stops
+    stops : element_arrays.SetValuedElements
 
     Returns
     -------
     float
     """
-    return stops.limit[which, e] + x * (stops.limit[which + AT_END, e] - stops.limit[which, e])
+    return stops.limit[which, e] + x * (
+        stops.limit[which + LimitRow.AT_END, e] - stops.limit[which, e]
+    )
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def solve_shared_forces(which, count, stops):
     """Solve A x = b for the forces x that the faces `stops.names[:count]` share.
 
-    A is stops.gives[which] of these faces, b their row RIGHT_SIDE of stops.field, and x is written into the row
+    A is stops.compliances[which] of these faces, b their row RIGHT_SIDE of stops.field, and x is written into the row
     SOLUTION, both in the order of the names. Of forces that depend on each other the smallest x is found: a shift
     of the diagonal makes A regular, and one step of iterative refinement removes the shift where it has no
     effect.
@@ -134,7 +91,7 @@ def solve_shared_forces(which, count, stops):
         BETA, GAMMA or ACCELERANCE.
     count : int
         Number of faces.
-    stops : interfaces.arrays.Stops
+    stops : element_arrays.SetValuedElements
 
     Returns
     -------
@@ -142,17 +99,17 @@ def solve_shared_forces(which, count, stops):
         Whether A has a positive diagonal.
     """
     a = stops.system[:count, :count]
-    b = stops.field[RIGHT_SIDE]
-    x = stops.field[SOLUTION]
-    r = stops.field[RESIDUAL]
+    b = stops.field[FaceRow.RIGHT_SIDE]
+    x = stops.field[FaceRow.SOLUTION]
+    r = stops.field[FaceRow.RESIDUAL]
     names = stops.names
     if count == 1:
-        give = stops.gives[which, names[0], names[0]]
-        x[0] = b[0] / give
-        return give > 0.0
+        compliance = stops.compliances[which, names[0], names[0]]
+        x[0] = b[0] / compliance
+        return compliance > 0.0
     for i in range(count):
         for k in range(count):
-            a[i, k] = stops.gives[which, names[i], names[k]]
+            a[i, k] = stops.compliances[which, names[i], names[k]]
         a[i, i] *= 1 + DIAGONAL_SHIFT
         x[i] = 0.0
     if not factorise(a):
@@ -162,7 +119,7 @@ def solve_shared_forces(which, count, stops):
         for i in range(count):
             r[i] = b[i]
             for k in range(count):
-                r[i] -= stops.gives[which, names[i], names[k]] * x[k]
+                r[i] -= stops.compliances[which, names[i], names[k]] * x[k]
         solve_factorised(a, r[:count])
         for i in range(count):
             x[i] += r[i]
@@ -174,7 +131,7 @@ def list_resting(stops):
     """Write the numbers of the faces that rest into stops.names; return how many."""
     count = 0
     for e in range(stops.names.size):
-        if stops.field[SLIP_STATE, e] == 0.0:
+        if stops.field[FaceRow.SLIP_STATE, e] == 0.0:
             stops.names[count] = e
             count += 1
     return count
@@ -187,62 +144,70 @@ def find_forces(x, stops):
     Returns whether they exist.
     """
     f = stops.field
+    force = f[FaceRow.FORCE]
+    force_slope = f[FaceRow.FORCE_SLOPE]
+    holding_start = f[FaceRow.HOLDING_START]
+    slip_state = f[FaceRow.SLIP_STATE]
     count = list_resting(stops)
     for e in range(stops.names.size):
-        which = STATIC if abs(f[SLIP_STATE, e]) == 2.0 else KINETIC
-        way = np.sign(f[SLIP_STATE, e])
-        f[FORCE_NOW, e] = way * friction_bound(which, e, x, stops)
-        f[FORCE_SLOPE, e] = way * (stops.limit[which + AT_END, e] - stops.limit[which, e])
-    for part in range(2):
+        is_static = abs(slip_state[e]) == 2.0
+        which = LimitRow.STATIC if is_static else LimitRow.KINETIC
+        slip_sign = np.sign(slip_state[e])
+        limit_rise = stops.limit[which + LimitRow.AT_END, e] - stops.limit[which, e]
+        force[e] = slip_sign * friction_bound(which, e, x, stops)
+        force_slope[e] = slip_sign * limit_rise
+    for derivative in range(2):
         for i in range(count):
-            f[RIGHT_SIDE, i] = 0.0
+            f[FaceRow.RIGHT_SIDE, i] = 0.0
             for e in range(stops.names.size):
-                if f[SLIP_STATE, e] != 0.0:
-                    rise = f[HOLDING_END, e] - f[HOLDING_START, e]
-                    beyond = (
-                        f[HOLDING_START, e] + rise * x - f[FORCE_NOW, e]
-                        if part == 0
-                        else rise - f[FORCE_SLOPE, e]
-                    )
-                    f[RIGHT_SIDE, i] += stops.gives[ACCELERANCE, stops.names[i], e] * beyond
-        if count and not solve_shared_forces(ACCELERANCE, count, stops):
+                if slip_state[e] != 0.0:
+                    rise = f[FaceRow.HOLDING_END, e] - holding_start[e]
+                    excess = rise - force_slope[e]
+                    if derivative == 0:
+                        excess = holding_start[e] + rise * x - force[e]
+                    compliance = stops.compliances[ComplianceRow.ACCELERATION, stops.names[i], e]
+                    f[FaceRow.RIGHT_SIDE, i] += compliance * excess
+        if count and not solve_shared_forces(ComplianceRow.ACCELERATION, count, stops):
             return False
         for i in range(count):
             e = stops.names[i]
-            rise = f[HOLDING_END, e] - f[HOLDING_START, e]
-            if part == 0:
-                f[FORCE_NOW, e] = f[HOLDING_START, e] + rise * x + f[SOLUTION, i]
+            rise = f[FaceRow.HOLDING_END, e] - holding_start[e]
+            if derivative == 0:
+                force[e] = holding_start[e] + rise * x + f[FaceRow.SOLUTION, i]
             else:
-                f[FORCE_SLOPE, e] = rise + f[SOLUTION, i]
+                force_slope[e] = rise + f[FaceRow.SOLUTION, i]
     return True
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def release_face(e, way, stops):
+def release_face(e, slip_sign, stops):
     """Let a face slide, or carry its static friction if the other resting faces hold it.
 
     Parameters
     ----------
     e : int
         Number of the face.
-    way : float
+    slip_sign : float
         Sign of the slide.
-    stops : interfaces.arrays.Stops
+    stops : element_arrays.SetValuedElements
     """
     f = stops.field
     # the face no longer belongs to the resting ones
-    f[SLIP_STATE, e] = way
-    f[SLIDES_ON, e] = 0.0
+    f[FaceRow.SLIP_STATE, e] = slip_sign
+    f[FaceRow.SLIDES_ON, e] = 0.0
     count = list_resting(stops)
     for i in range(count):
-        f[RIGHT_SIDE, i] = stops.gives[ACCELERANCE, stops.names[i], e]
-    if count == 0 or not solve_shared_forces(ACCELERANCE, count, stops):
+        f[FaceRow.RIGHT_SIDE, i] = stops.compliances[ComplianceRow.ACCELERATION, stops.names[i], e]
+    if count == 0 or not solve_shared_forces(ComplianceRow.ACCELERATION, count, stops):
         return
-    left = stops.gives[ACCELERANCE, e, e]
+    compliance = stops.compliances[ComplianceRow.ACCELERATION, e, e]
     for i in range(count):
-        left -= stops.gives[ACCELERANCE, e, stops.names[i]] * f[SOLUTION, i]
-    if left <= DEPENDENT_TOL * stops.gives[ACCELERANCE, e, e]:
-        f[SLIP_STATE, e] = 2 * way
+        compliance -= (
+            stops.compliances[ComplianceRow.ACCELERATION, e, stops.names[i]]
+            * f[FaceRow.SOLUTION, i]
+        )
+    if compliance <= DEPENDENT_TOL * stops.compliances[ComplianceRow.ACCELERATION, e, e]:
+        f[FaceRow.SLIP_STATE, e] = 2 * slip_sign
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -252,48 +217,52 @@ def choose_states(x, stops):
     Returns whether it succeeds.
     """
     f = stops.field
+    slip_state = f[FaceRow.SLIP_STATE]
     for e in range(stops.names.size):
-        if abs(f[SLIP_STATE, e]) == 2.0:
-            f[SLIP_STATE, e] = 0.0
+        if abs(slip_state[e]) == 2.0:
+            slip_state[e] = 0.0
     for _ in range(2 * stops.names.size + 2):
         if not find_forces(x, stops):
             return False
-        worst = OVERLOAD_TOL
-        who = -1
+        worst_overload = OVERLOAD_TOL
+        worst_face = -1
         for e in range(stops.names.size):
-            over = abs(f[FORCE_NOW, e]) / max(friction_bound(STATIC, e, x, stops), TINY) - 1
-            if f[SLIP_STATE, e] == 0.0 and over > worst:
-                worst = over
-                who = e
-        if who < 0:
+            overload = (
+                abs(f[FaceRow.FORCE, e]) / max(friction_bound(LimitRow.STATIC, e, x, stops), TINY)
+                - 1
+            )
+            if slip_state[e] == 0.0 and overload > worst_overload:
+                worst_overload = overload
+                worst_face = e
+        if worst_face < 0:
             return True
-        release_face(who, 1.0 if f[FORCE_NOW, who] > 0 else -1.0, stops)
+        release_face(worst_face, 1.0 if f[FaceRow.FORCE, worst_face] > 0 else -1.0, stops)
     return False
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def first_zero(speed, start, bend):
-    """Return the first y >= 0 at which speed + start y + bend y^2 falls to 0, infinite if it does not.
+def first_zero(speed, rate, half_slope):
+    """Return the first y >= 0 at which speed + rate y + half_slope y^2 falls to 0, infinite if it does not.
 
-    The speed must not be negative, and `start` not negative where the speed is 0.
+    The speed must not be negative, and `rate` not negative where the speed is 0.
 
     Parameters
     ----------
     speed : float
-    start : float
-    bend : float
+    rate : float
+    half_slope : float
 
     Returns
     -------
     float
     """
     if speed == 0.0:
-        return -start / bend if bend < 0 else np.inf
-    root = start * start - 4 * bend * speed
-    if root < 0:
+        return -rate / half_slope if half_slope < 0 else np.inf
+    discriminant = rate * rate - 4 * half_slope * speed
+    if discriminant < 0:
         return np.inf
-    below = np.sqrt(root) - start
-    return 2 * speed / below if below > 0 else np.inf
+    denominator = np.sqrt(discriminant) - rate
+    return 2 * speed / denominator if denominator > 0 else np.inf
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -308,7 +277,7 @@ def speed_rates(e, x, dt, stops):
         Place in the step, from 0 at its start to 1.
     dt : float
         Length of the step [s].
-    stops : interfaces.arrays.Stops
+    stops : element_arrays.SetValuedElements
 
     Returns
     -------
@@ -317,17 +286,17 @@ def speed_rates(e, x, dt, stops):
     float
         [m/s]
     """
-    start = 0.0
-    bend = 0.0
+    rate = 0.0
+    half_slope = 0.0
     f = stops.field
     for k in range(stops.names.size):
-        g = dt * stops.gives[ACCELERANCE, e, k]
-        rise = f[HOLDING_END, k] - f[HOLDING_START, k]
-        start += g * (f[HOLDING_START, k] + rise * x - f[FORCE_NOW, k])
-        bend += 0.5 * g * (rise - f[FORCE_SLOPE, k])
-    if f[SPEED, e] == 0.0:  # a face that was just released slides forward, up to round-off
-        start = f[SLIP_STATE, e] * max(f[SLIP_STATE, e] * start, 0.0)
-    return start, bend
+        g = dt * stops.compliances[ComplianceRow.ACCELERATION, e, k]
+        rise = f[FaceRow.HOLDING_END, k] - f[FaceRow.HOLDING_START, k]
+        rate += g * (f[FaceRow.HOLDING_START, k] + rise * x - f[FaceRow.FORCE, k])
+        half_slope += 0.5 * g * (rise - f[FaceRow.FORCE_SLOPE, k])
+    if f[FaceRow.SPEED, e] == 0.0:  # a face that was just released slides forward, up to round-off
+        rate = f[FaceRow.SLIP_STATE, e] * max(f[FaceRow.SLIP_STATE, e] * rate, 0.0)
+    return rate, half_slope
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -340,84 +309,91 @@ def find_next_event(x, dt, stops):
         Place in the step, from 0 at its start to 1.
     dt : float
         Length of the step [s].
-    stops : interfaces.arrays.Stops
+    stops : element_arrays.SetValuedElements
 
     Returns
     -------
-    float
-        Distance to the event, in lengths of the step.
-    int
-        Number of the face, -1 for no event.
-    float
-        Sign of the slide after a release, 0 for a stop.
+    StepEvent
     """
     f = stops.field
-    y = 1.0 - x
-    who = -1
-    way = 0.0
+    slip_state = f[FaceRow.SLIP_STATE]
+    distance = 1.0 - x
+    face = -1
+    slip_sign = 0.0
     for e in range(stops.names.size):
-        if abs(f[SLIP_STATE, e]) == 1.0:
-            start, bend = speed_rates(e, x, dt, stops)
-            at = first_zero(
-                f[SLIP_STATE, e] * f[SPEED, e], f[SLIP_STATE, e] * start, f[SLIP_STATE, e] * bend
+        if abs(slip_state[e]) == 1.0:
+            rate, half_slope = speed_rates(e, x, dt, stops)
+            root = first_zero(
+                slip_state[e] * f[FaceRow.SPEED, e],
+                slip_state[e] * rate,
+                slip_state[e] * half_slope,
             )
-            if at < y:
-                y = at
-                who = e
-                way = 0.0
-        elif f[SLIP_STATE, e] == 0.0:
+            if root < distance:
+                distance = root
+                face = e
+                slip_sign = 0.0
+        elif slip_state[e] == 0.0:
             for sign in (1.0, -1.0):
-                rise = sign * f[FORCE_SLOPE, e] - (
-                    stops.limit[STATIC + AT_END, e] - stops.limit[STATIC, e]
+                rise = sign * f[FaceRow.FORCE_SLOPE, e] - (
+                    stops.limit[LimitRow.STATIC + LimitRow.AT_END, e]
+                    - stops.limit[LimitRow.STATIC, e]
                 )
                 if rise > 0:
-                    at = max(
-                        (friction_bound(STATIC, e, x, stops) - sign * f[FORCE_NOW, e]) / rise, 0.0
+                    root = max(
+                        (friction_bound(LimitRow.STATIC, e, x, stops) - sign * f[FaceRow.FORCE, e])
+                        / rise,
+                        0.0,
                     )
-                    if at < y:
-                        y = at
-                        who = e
-                        way = sign
-    return y, who, way
+                    if root < distance:
+                        distance = root
+                        face = e
+                        slip_sign = sign
+    return StepEvent(distance, face, slip_sign)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def advance_faces(x, y, who, dt, stops):
+def advance_faces(x, distance, face, dt, stops):
     """Move all faces on from a fraction of the step up to an event.
 
     Parameters
     ----------
     x : float
         Place in the step, from 0 at its start to 1.
-    y : float
+    distance : float
         Distance in lengths of the step.
-    who : int
+    face : int
         Number of the face that has the event, -1 for none; it stops if it slides.
     dt : float
         Length of the step [s].
-    stops : interfaces.arrays.Stops
+    stops : element_arrays.SetValuedElements
     """
     f = stops.field
+    slip_state = f[FaceRow.SLIP_STATE]
+    speed = f[FaceRow.SPEED]
     for e in range(stops.names.size):
-        f[MEAN_FORCE, e] += y * (f[FORCE_NOW, e] + 0.5 * y * f[FORCE_SLOPE, e])
-        if abs(f[SLIP_STATE, e]) == 1.0:
-            start, bend = speed_rates(e, x, dt, stops)
-            f[SLIDE, e] += y * dt * (f[SPEED, e] + y * (0.5 * start + y * bend / 3))
-            f[RESIDUAL, e] = f[SPEED, e] + y * (start + y * bend)
+        f[FaceRow.MEAN_FORCE, e] += distance * (
+            f[FaceRow.FORCE, e] + 0.5 * distance * f[FaceRow.FORCE_SLOPE, e]
+        )
+        if abs(slip_state[e]) == 1.0:
+            rate, half_slope = speed_rates(e, x, dt, stops)
+            f[FaceRow.SLIDE, e] += (
+                distance * dt * (speed[e] + distance * (0.5 * rate + distance * half_slope / 3))
+            )
+            f[FaceRow.RESIDUAL, e] = speed[e] + distance * (rate + distance * half_slope)
     for e in range(stops.names.size):
-        if abs(f[SLIP_STATE, e]) == 1.0:
-            last = abs(f[SPEED, e])
-            f[SPEED, e] = f[RESIDUAL, e]
+        if abs(slip_state[e]) == 1.0:
+            last_speed = abs(speed[e])
+            speed[e] = f[FaceRow.RESIDUAL, e]
             # equal faces stop at the same time
-            least = SAME_TIME_TOL * last if last > 0.0 else -1.0
+            smallest_speed = SAME_TIME_TOL * last_speed if last_speed > 0.0 else -1.0
             if (
-                e == who
-                or (who < 0 and f[SLIP_STATE, e] * f[SPEED, e] <= 0)
-                or f[SLIP_STATE, e] * f[SPEED, e] <= least
+                e == face
+                or (face < 0 and slip_state[e] * speed[e] <= 0)
+                or slip_state[e] * speed[e] <= smallest_speed
             ):
-                f[SPEED, e] = 0.0
-                f[SLIP_STATE, e] = 0.0
-                f[SLIDES_ON, e] = 0.0
+                speed[e] = 0.0
+                slip_state[e] = 0.0
+                f[FaceRow.SLIDES_ON, e] = 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -427,13 +403,13 @@ def follow_events(dt, stops):
     for _ in range(6 * stops.names.size + 12):
         if not choose_states(x, stops):
             return False
-        y, who, way = find_next_event(x, dt, stops)
-        advance_faces(x, y, who, dt, stops)
-        if who < 0:
+        event = find_next_event(x, dt, stops)
+        advance_faces(x, event.distance, event.face, dt, stops)
+        if event.face < 0:
             return True
-        x += y
-        if way != 0.0:
-            release_face(who, way, stops)
+        x += event.distance
+        if event.slip_sign != 0.0:
+            release_face(event.face, event.slip_sign, stops)
     return False
 
 
@@ -444,22 +420,23 @@ def check_all_slide(stops):
     If so, stops.field gets their speeds.
     """
     f = stops.field
+    slip_state = f[FaceRow.SLIP_STATE]
     count = stops.names.size
     for e in range(count):
-        f[SLIP_STATE, e] = np.sign(f[START_SPEED, e])
-        f[SLIDES_ON, e] = 1.0
-        if f[START_SPEED, e] == 0.0:
+        slip_state[e] = np.sign(f[FaceRow.START_SPEED, e])
+        f[FaceRow.SLIDES_ON, e] = 1.0
+        if f[FaceRow.START_SPEED, e] == 0.0:
             return False
     for e in range(count):
-        dq = f[FREE_SLIDE, e]
-        end = f[FREE_SPEED, e]
+        dq = f[FaceRow.FREE_SLIDE, e]
+        end = f[FaceRow.FREE_SPEED, e]
         for k in range(count):
-            force = f[SLIP_STATE, k] * friction_bound(KINETIC, k, 0.5, stops)
-            dq -= stops.gives[BETA, e, k] * force
-            end -= stops.gives[GAMMA, e, k] * force
-        if f[SLIP_STATE, e] * dq < 0 or f[SLIP_STATE, e] * end <= 0:
+            force = slip_state[k] * friction_bound(LimitRow.KINETIC, k, 0.5, stops)
+            dq -= stops.compliances[ComplianceRow.SLIDE, e, k] * force
+            end -= stops.compliances[ComplianceRow.SPEED, e, k] * force
+        if slip_state[e] * dq < 0 or slip_state[e] * end <= 0:
             return False
-        f[SPEED, e] = end
+        f[FaceRow.SPEED, e] = end
     return True
 
 
@@ -474,75 +451,108 @@ def find_holding_forces(dt, stops):
     anywhere.
     """
     f = stops.field
-    coupling = stops.names.size
+    mean_force = f[FaceRow.MEAN_FORCE]
+    solution = f[FaceRow.SOLUTION]
+    n_faces = stops.names.size
     for stage in range(2):
-        count = coupling
+        count = n_faces
         if stage == 0:
-            for e in range(coupling):
+            for e in range(n_faces):
                 stops.names[e] = e
         else:
             count = list_resting(stops)
-            if count == 0 or count == coupling:
+            if count == 0 or count == n_faces:
                 return True
             if not find_forces(0.0, stops):
                 return False
-        for part in range(2):
-            which = BETA if part == 0 else GAMMA
-            for i in range(count):
-                e = stops.names[i]
-                f[RIGHT_SIDE, i] = (
-                    f[FREE_SLIDE, e] - f[START_SPEED, e] * dt
-                    if part == 0
-                    else f[FREE_SPEED, e] - f[START_SPEED, e]
+        # mean forces give the slides, and forces weighted by the time to the end give the speeds
+        if not solve_holding_forces(ComplianceRow.SLIDE, stage, count, dt, stops):
+            return False
+        for i in range(count):
+            mean_force[stops.names[i]] = solution[i]
+        if not solve_holding_forces(ComplianceRow.SPEED, stage, count, dt, stops):
+            return False
+        for i in range(count):
+            e = stops.names[i]
+            start_force = 3 * mean_force[e] - 2 * solution[i]
+            end_force = 4 * solution[i] - 3 * mean_force[e]
+            if stage == 1:
+                start_force = f[FaceRow.HOLDING_START, e] + start_force - f[FaceRow.FORCE, e]
+                end_force = (
+                    f[FaceRow.HOLDING_END, e]
+                    + end_force
+                    - f[FaceRow.FORCE, e]
+                    - f[FaceRow.FORCE_SLOPE, e]
                 )
-                for k in range(coupling if stage == 1 else 0):
-                    if f[SLIP_STATE, k] != 0.0:
-                        mean = f[FORCE_NOW, k] + f[FORCE_SLOPE, k] * (1 / 3 if part == 0 else 1 / 2)
-                        f[RIGHT_SIDE, i] -= stops.gives[which, e, k] * mean
-            if not solve_shared_forces(which, count, stops):
-                return False
-            for i in range(count):
-                e = stops.names[i]
-                found = f[SOLUTION, i]
-                if part == 0:
-                    f[MEAN_FORCE, e] = found
-                else:
-                    first = 3 * f[MEAN_FORCE, e] - 2 * found
-                    last = 4 * found - 3 * f[MEAN_FORCE, e]
-                    f[HOLDING_START, e] = (
-                        first if stage == 0 else f[HOLDING_START, e] + first - f[FORCE_NOW, e]
-                    )
-                    f[HOLDING_END, e] = (
-                        last
-                        if stage == 0
-                        else f[HOLDING_END, e] + last - f[FORCE_NOW, e] - f[FORCE_SLOPE, e]
-                    )
+            f[FaceRow.HOLDING_START, e] = start_force
+            f[FaceRow.HOLDING_END, e] = end_force
     return True
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def solve_holding_forces(which, stage, count, dt, stops):
+    """Solve for the forces on the faces `stops.names[:count]` that leave them no slide, or no change of speed.
+
+    Parameters
+    ----------
+    which : int
+        ComplianceRow.SLIDE or ComplianceRow.SPEED.
+    stage : int
+        0 for all faces, 1 for the resting ones beside those that slide.
+    count : int
+        Number of faces.
+    dt : float
+        Length of the step [s].
+    stops : element_arrays.SetValuedElements
+
+    Returns
+    -------
+    bool
+        Whether the forces exist; they are in the row SOLUTION of stops.field.
+    """
+    f = stops.field
+    right_side = f[FaceRow.RIGHT_SIDE]
+    is_slide = which == ComplianceRow.SLIDE
+    slope_weight = 1 / 3 if is_slide else 1 / 2
+    for i in range(count):
+        e = stops.names[i]
+        if is_slide:
+            right_side[i] = f[FaceRow.FREE_SLIDE, e] - f[FaceRow.START_SPEED, e] * dt
+        else:
+            right_side[i] = f[FaceRow.FREE_SPEED, e] - f[FaceRow.START_SPEED, e]
+        if stage == 0:
+            continue
+        for k in range(stops.names.size):
+            if f[FaceRow.SLIP_STATE, k] != 0.0:
+                mean = f[FaceRow.FORCE, k] + f[FaceRow.FORCE_SLOPE, k] * slope_weight
+                right_side[i] -= stops.compliances[which, e, k] * mean
+    return solve_shared_forces(which, count, stops)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def follow_step(dt, stops):
     """Follow the faces through a step into stops.field; return whether that succeeds."""
     f = stops.field
-    resolved = True
+    start_speed = f[FaceRow.START_SPEED]
+    is_resolved = True
     for e in range(stops.names.size):
-        give = dt * stops.gives[ACCELERANCE, e, e]
-        resolved = (
-            resolved
-            and stops.gives[BETA, e, e] > 0.25 * give * dt
-            and stops.gives[GAMMA, e, e] > 0.5 * give
+        compliance = dt * stops.compliances[ComplianceRow.ACCELERATION, e, e]
+        is_resolved = (
+            is_resolved
+            and stops.compliances[ComplianceRow.SLIDE, e, e] > 0.25 * compliance * dt
+            and stops.compliances[ComplianceRow.SPEED, e, e] > 0.5 * compliance
         )
-        f[START_SPEED, e] = 0.0 if f[WAS_RESTING, e] == 1.0 else f[START_SPEED, e]
+        start_speed[e] = 0.0 if f[FaceRow.WAS_RESTING, e] == 1.0 else start_speed[e]
     if check_all_slide(stops):
         return True
-    if not resolved or not find_holding_forces(dt, stops):
+    if not is_resolved or not find_holding_forces(dt, stops):
         return False
     for e in range(stops.names.size):
-        f[SPEED, e] = f[START_SPEED, e]
-        f[SLIP_STATE, e] = np.sign(f[START_SPEED, e])
-        f[SLIDE, e] = 0.0
-        f[MEAN_FORCE, e] = 0.0
-        f[SLIDES_ON, e] = abs(f[SLIP_STATE, e])
+        f[FaceRow.SPEED, e] = start_speed[e]
+        f[FaceRow.SLIP_STATE, e] = np.sign(start_speed[e])
+        f[FaceRow.SLIDE, e] = 0.0
+        f[FaceRow.MEAN_FORCE, e] = 0.0
+        f[FaceRow.SLIDES_ON, e] = abs(f[FaceRow.SLIP_STATE, e])
     return follow_events(dt, stops)
 
 
@@ -553,37 +563,46 @@ def match_mean_forces(stops):
     Returns whether they exist.
     """
     f = stops.field
+    free_slide = f[FaceRow.FREE_SLIDE]
+    increment = f[FaceRow.INCREMENT]
+    mean_force = f[FaceRow.MEAN_FORCE]
     count = 0
     for e in range(stops.names.size):
-        if f[SLIDES_ON, e] == 1.0:
-            f[MEAN_FORCE, e] = f[SLIP_STATE, e] * friction_bound(KINETIC, e, 0.5, stops)
+        if f[FaceRow.SLIDES_ON, e] == 1.0:
+            mean_force[e] = f[FaceRow.SLIP_STATE, e] * friction_bound(
+                LimitRow.KINETIC, e, 0.5, stops
+            )
         else:
             stops.names[count] = e
             count += 1
     for i in range(count):
         e = stops.names[i]
-        f[RIGHT_SIDE, i] = f[FREE_SLIDE, e] - f[SLIDE, e]
+        f[FaceRow.RIGHT_SIDE, i] = free_slide[e] - f[FaceRow.SLIDE, e]
         for k in range(stops.names.size):
-            f[RIGHT_SIDE, i] -= stops.gives[BETA, e, k] * f[MEAN_FORCE, k]
-    if count and not solve_shared_forces(BETA, count, stops):
+            f[FaceRow.RIGHT_SIDE, i] -= stops.compliances[ComplianceRow.SLIDE, e, k] * mean_force[k]
+    if count and not solve_shared_forces(ComplianceRow.SLIDE, count, stops):
         return False
     for i in range(count):
         e = stops.names[i]
-        most = max(stops.limit[STATIC, e], stops.limit[STATIC + AT_END, e])
-        f[MEAN_FORCE, e] = min(max(f[MEAN_FORCE, e] + f[SOLUTION, i], -most), most)
+        largest_limit = max(
+            stops.limit[LimitRow.STATIC, e], stops.limit[LimitRow.STATIC + LimitRow.AT_END, e]
+        )
+        mean_force[e] = min(
+            max(mean_force[e] + f[FaceRow.SOLUTION, i], -largest_limit), largest_limit
+        )
     for e in range(stops.names.size):
-        f[FACE_INCREMENT, e] = f[FREE_SLIDE, e]
-        size = abs(f[FREE_SLIDE, e])
+        increment[e] = free_slide[e]
+        scale = abs(free_slide[e])
         for k in range(stops.names.size):
-            part = stops.gives[BETA, e, k] * f[MEAN_FORCE, k]
-            f[FACE_INCREMENT, e] -= part
-            size += abs(part)
+            share = stops.compliances[ComplianceRow.SLIDE, e, k] * mean_force[k]
+            increment[e] -= share
+            scale += abs(share)
         if (
-            f[SLIDE, e] == 0.0
-            and f[SLIDES_ON, e] == 0.0
-            and abs(f[FACE_INCREMENT, e]) <= ZERO_SLIDE_TOL * size
+            f[FaceRow.SLIDE, e] == 0.0
+            and f[FaceRow.SLIDES_ON, e] == 0.0
+            and abs(increment[e]) <= ZERO_SLIDE_TOL * scale
         ):
-            f[FACE_INCREMENT, e] = 0.0
+            increment[e] = 0.0
     return True
 
 
@@ -591,25 +610,28 @@ def match_mean_forces(stops):
 def find_blows(stops):
     """Find the impulses that cause the speeds of the faces; return the friction work [J]."""
     f = stops.field
+    free_speed = f[FaceRow.FREE_SPEED]
     count = 0
     work = 0.0
     for e in range(stops.names.size):
-        f[BLOW, e] = 0.0
-        work += f[MEAN_FORCE, e] * f[FACE_INCREMENT, e]
+        f[FaceRow.BLOW, e] = 0.0
+        work += f[FaceRow.MEAN_FORCE, e] * f[FaceRow.INCREMENT, e]
         for k in range(stops.names.size):
-            f[FREE_SPEED, e] -= stops.gives[GAMMA, e, k] * f[MEAN_FORCE, k]
-        turned = f[SLIDES_ON, e] == 0.0 or f[SLIP_STATE, e] * f[FREE_SPEED, e] <= 0.0
-        if turned and abs(f[SLIP_STATE, e]) != 2.0:
+            free_speed[e] -= stops.compliances[ComplianceRow.SPEED, e, k] * f[FaceRow.MEAN_FORCE, k]
+        has_reversed = (
+            f[FaceRow.SLIDES_ON, e] == 0.0 or f[FaceRow.SLIP_STATE, e] * free_speed[e] <= 0.0
+        )
+        if has_reversed and abs(f[FaceRow.SLIP_STATE, e]) != 2.0:
             stops.names[count] = e
             count += 1
     for i in range(count):
-        f[RIGHT_SIDE, i] = f[FREE_SPEED, stops.names[i]] - f[SPEED, stops.names[i]]
-    if count and not solve_shared_forces(ACCELERANCE, count, stops):
+        f[FaceRow.RIGHT_SIDE, i] = free_speed[stops.names[i]] - f[FaceRow.SPEED, stops.names[i]]
+    if count and not solve_shared_forces(ComplianceRow.ACCELERATION, count, stops):
         return -np.inf
     for i in range(count):
         e = stops.names[i]
-        f[BLOW, e] = f[SOLUTION, i]
-        work += 0.5 * f[SOLUTION, i] * (f[FREE_SPEED, e] + f[SPEED, e])
+        f[FaceRow.BLOW, e] = f[FaceRow.SOLUTION, i]
+        work += 0.5 * f[FaceRow.SOLUTION, i] * (free_speed[e] + f[FaceRow.SPEED, e])
     return work
 
 
@@ -619,33 +641,15 @@ def find_stopping_blows(motion, stops):
     f = stops.field
     count = 0
     for e in range(stops.names.size):
-        f[BLOW, e] = 0.0
-        f[SLIP_STATE, e] = np.sign(f[FACE_INCREMENT, e])
-        if f[FACE_INCREMENT, e] == 0.0:
-            f[RIGHT_SIDE, count] = face_speed(motion, e, stops)
+        f[FaceRow.BLOW, e] = 0.0
+        f[FaceRow.SLIP_STATE, e] = np.sign(f[FaceRow.INCREMENT, e])
+        if f[FaceRow.INCREMENT, e] == 0.0:
+            f[FaceRow.RIGHT_SIDE, count] = project_modes(stops.rows[e], motion[1])
             stops.names[count] = e
             count += 1
-    if count and solve_shared_forces(ACCELERANCE, count, stops):
+    if count and solve_shared_forces(ComplianceRow.ACCELERATION, count, stops):
         for i in range(count):
-            f[BLOW, stops.names[i]] = f[SOLUTION, i]
-
-
-@njit(error_model="numpy", **NJIT_INTERNAL)
-def face_speed(motion, e, stops):
-    """Return the speed of a face [m/s].
-
-    Parameters
-    ----------
-    motion : (2, n) array
-        Coordinates and rates of the modes.
-    e : int
-        Number of the face.
-    stops : interfaces.arrays.Stops
-    """
-    out = 0.0
-    for k in range(motion.shape[1]):
-        out += stops.rows[e, k] * motion[1, k]
-    return out
+            f[FaceRow.BLOW, stops.names[i]] = f[FaceRow.SOLUTION, i]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -658,27 +662,27 @@ def apply_blows(motion, mass, stops):
         Coordinates and rates of the modes.
     mass : float
         [kg]
-    stops : interfaces.arrays.Stops
+    stops : element_arrays.SetValuedElements
 
     Returns
     -------
     float
     """
     f = stops.field
-    lost = 0.0
+    loss = 0.0
     for k in range(motion.shape[1]):
         change = 0.0
         for e in range(stops.names.size):
-            change -= stops.rows[e, k] * f[BLOW, e] / mass
-        lost -= mass * change * (motion[1, k] + 0.5 * change)
+            change -= stops.rows[e, k] * f[FaceRow.BLOW, e] / mass
+        loss -= mass * change * (motion[1, k] + 0.5 * change)
         motion[1, k] += change
     for e in range(stops.names.size):
-        f[WAS_RESTING, e] = 0.0 if abs(f[SLIP_STATE, e]) == 1.0 else 1.0
-    return lost
+        f[FaceRow.WAS_RESTING, e] = 0.0 if abs(f[FaceRow.SLIP_STATE, e]) == 1.0 else 1.0
+    return loss
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def find_reactions(motion, modal_system, drive, accel, scratch, stops):
+def find_reactions(motion, modal_system, drive, accel, stops):
     """Find the forces on the resting faces that leave them no acceleration at an instant.
 
     They are written into the row SOLUTION of stops.field, in the order of stops.names.
@@ -692,49 +696,51 @@ def find_reactions(motion, modal_system, drive, accel, scratch, stops):
         Acceleration of the base [m s-2].
     accel : (n,) array
         Modal accelerations of the forces [m s-2].
-    scratch : (2, n) array
-        Space for results.
-    stops : interfaces.arrays.Stops
+    stops : element_arrays.SetValuedElements
 
     Returns
     -------
     int
         Number of the forces, 0 if none are found.
     """
-    write_accelerations(motion, modal_system, drive, accel, scratch)
+    write_accelerations(motion, modal_system, drive, accel, modal_system.workspace[1:])
     count = list_resting(stops)
     for i in range(count):
-        stops.field[RIGHT_SIDE, i] = 0.0
+        stops.field[FaceRow.RIGHT_SIDE, i] = 0.0
         for k in range(accel.size):
-            stops.field[RIGHT_SIDE, i] += stops.rows[stops.names[i], k] * scratch[0, k]
-    return count if count and solve_shared_forces(ACCELERANCE, count, stops) else 0
+            stops.field[FaceRow.RIGHT_SIDE, i] += (
+                stops.rows[stops.names[i], k] * modal_system.workspace[1, k]
+            )
+    return count if count and solve_shared_forces(ComplianceRow.ACCELERATION, count, stops) else 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rests_through_step(stops):
     """Return whether all faces rest through the step under mean forces below their static friction."""
     f = stops.field
-    coupling = stops.names.size
-    for e in range(coupling):
-        if f[WAS_RESTING, e] == 0.0 and f[START_SPEED, e] != 0.0:
+    n_faces = stops.names.size
+    for e in range(n_faces):
+        if f[FaceRow.WAS_RESTING, e] == 0.0 and f[FaceRow.START_SPEED, e] != 0.0:
             return False
         stops.names[e] = e
-        f[RIGHT_SIDE, e] = f[FREE_SLIDE, e]
-    if not solve_shared_forces(BETA, coupling, stops):
+        f[FaceRow.RIGHT_SIDE, e] = f[FaceRow.FREE_SLIDE, e]
+    if not solve_shared_forces(ComplianceRow.SLIDE, n_faces, stops):
         return False
-    for e in range(coupling):
-        if abs(f[SOLUTION, e]) > min(stops.limit[STATIC, e], stops.limit[STATIC + AT_END, e]):
+    for e in range(n_faces):
+        if abs(f[FaceRow.SOLUTION, e]) > min(
+            stops.limit[LimitRow.STATIC, e], stops.limit[LimitRow.STATIC + LimitRow.AT_END, e]
+        ):
             return False
-        f[MEAN_FORCE, e] = f[SOLUTION, e]
-        f[SLIP_STATE, e] = 0.0
-        f[SLIDES_ON, e] = 0.0
-        f[SLIDE, e] = 0.0
-        f[SPEED, e] = 0.0
+        f[FaceRow.MEAN_FORCE, e] = f[FaceRow.SOLUTION, e]
+        f[FaceRow.SLIP_STATE, e] = 0.0
+        f[FaceRow.SLIDES_ON, e] = 0.0
+        f[FaceRow.SLIDE, e] = 0.0
+        f[FaceRow.SPEED, e] = 0.0
     return True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def rests_at_end(motion, modal_system, drive, accel, scratch, stops):
+def rests_at_end(motion, modal_system, drive, accel, stops):
     """Return whether static friction holds the faces at the end of a step through which they rest.
 
     A straight line between the holding forces at both ends would miss a peak of them beyond the end.
@@ -748,26 +754,27 @@ def rests_at_end(motion, modal_system, drive, accel, scratch, stops):
         Acceleration of the base [m s-2].
     accel : (n,) array
         Modal accelerations of the forces [m s-2].
-    scratch : (2, n) array
-        Space for results.
-    stops : interfaces.arrays.Stops
+    stops : element_arrays.SetValuedElements
 
     Returns
     -------
     bool
     """
-    coupling = stops.names.size
-    for e in range(coupling):
-        stops.field[RIGHT_SIDE, e] = face_speed(motion, e, stops)
+    n_faces = stops.names.size
+    for e in range(n_faces):
+        stops.field[FaceRow.RIGHT_SIDE, e] = project_modes(stops.rows[e], motion[1])
         stops.names[e] = e
-    if not solve_shared_forces(ACCELERANCE, coupling, stops):
+    if not solve_shared_forces(ComplianceRow.ACCELERATION, n_faces, stops):
         return False
     for k in range(accel.size):
-        for e in range(coupling):
-            motion[1, k] -= stops.rows[e, k] * stops.field[SOLUTION, e] / modal_system.mass
-    if find_reactions(motion, modal_system, drive, accel, scratch, stops) < coupling:
+        for e in range(n_faces):
+            motion[1, k] -= stops.rows[e, k] * stops.field[FaceRow.SOLUTION, e] / modal_system.mass
+    if find_reactions(motion, modal_system, drive, accel, stops) < n_faces:
         return False
-    for i in range(coupling):
-        if abs(stops.field[SOLUTION, i]) > stops.limit[STATIC + AT_END, stops.names[i]]:
+    for i in range(n_faces):
+        if (
+            abs(stops.field[FaceRow.SOLUTION, i])
+            > stops.limit[LimitRow.STATIC + LimitRow.AT_END, stops.names[i]]
+        ):
             return False
     return True

@@ -15,30 +15,14 @@ from ...friction.laws import elastic_plastic_kernels as law
 from ...friction.laws import plane_kernels as plane
 from ..dense_kernels import factorise, solve_by_elimination, solve_factorised
 from . import parts_kernels as parts
-from .stops_kernels import (
-    BETA,
-    BOND_LENGTH,
-    COORDINATE_GIVE,
-    ELEMENT_FORCE,
-    ELEMENT_RESIDUAL,
-    ELEMENT_SLIDE,
-    FORCE_TOL,
-    FREE_SLIDE,
-    INCREMENT,
-    MATE,
-    MAX_FORCE,
-    MODAL_SCRATCH,
-    PORT,
-    SET_VALUED,
-    SLIDE,
-    SLIDES_ON,
-)
+from .element_arrays import ComplianceRow, ElementRow, FaceRow, LinkRow, ModalRow, PortRow
+from .stops_kernels import SET_VALUED
 
 HAS_PLANES = parts.HAS_PLANES
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def element_slide(e, y, faces):
+def element_slide(e, y, elements):
     """Return the slide of an element [m] at y.
 
     Parameters
@@ -47,21 +31,21 @@ def element_slide(e, y, faces):
         Number of the element.
     y : (n,) array
         What the forces take from the coordinates.
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
 
     Returns
     -------
     float
     """
-    p = faces.of[PORT, e]
-    out = faces.port[FREE_SLIDE, p]
+    p = elements.links[LinkRow.PORT, e]
+    out = elements.port[PortRow.FREE_SLIDE, p]
     for i in range(y.size):
-        out -= faces.rows[p, i] * y[i]
+        out -= elements.rows[p, i] * y[i]
     return out
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def slope_along(t, y, step, trial, faces, dt):
+def slope_along(t, y, step, trial, elements, dt):
     """Return the slope of the function that is minimised along a step, at y + t step.
 
     Parameters
@@ -73,7 +57,7 @@ def slope_along(t, y, step, trial, faces, dt):
     step : (n,) array
     trial : (n,) array
         Space for y + t step.
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
     dt : float
         Length of the step [s].
 
@@ -84,33 +68,33 @@ def slope_along(t, y, step, trial, faces, dt):
     out = 0.0
     for i in range(y.size):
         trial[i] = y[i] + t * step[i]
-        out += step[i] * trial[i] / faces.modal[COORDINATE_GIVE, i]
-    for e in range(faces.of.shape[1]):
+        out += step[i] * trial[i] / elements.modal[ModalRow.COMPLIANCE, i]
+    for e in range(elements.links.shape[1]):
         force = law.mean_force(
-            faces.num[e],
-            faces.mem[e],
-            faces.each[ELEMENT_SLIDE, e],
-            element_slide(e, trial, faces),
-            faces.each[BOND_LENGTH, e],
+            elements.num[e],
+            elements.mem[e],
+            elements.state[ElementRow.SLIDE, e],
+            element_slide(e, trial, elements),
+            elements.state[ElementRow.BOND_LENGTH, e],
             dt,
         )[0]
         for i in range(y.size):
-            out -= step[i] * faces.rows[faces.of[PORT, e], i] * force
+            out -= step[i] * elements.rows[elements.links[LinkRow.PORT, e], i] * force
     return out
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def newton_equations(y, step, faces, dt, hess):
+def newton_equations(y, step, elements, dt, hess):
     """Write minus the gradient at y into `step`, and the Hessian.
 
-    The forces of the laws are written into faces.each.
+    The forces of the laws are written into elements.state.
 
     Parameters
     ----------
     y : (n,) array
         What the forces take from the coordinates.
     step : (n,) array
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
     dt : float
         Length of the step [s].
     hess : (n, n) array
@@ -124,63 +108,67 @@ def newton_equations(y, step, faces, dt, hess):
     n = y.size
     worst = 0.0
     for i in range(n):
-        step[i] = -y[i] / faces.modal[COORDINATE_GIVE, i]
+        step[i] = -y[i] / elements.modal[ModalRow.COMPLIANCE, i]
         for k in range(n):
             hess[i, k] = 0.0
-        hess[i, i] = 1 / faces.modal[COORDINATE_GIVE, i]
-    for e in range(faces.of.shape[1]):
-        p = faces.of[PORT, e]
+        hess[i, i] = 1 / elements.modal[ModalRow.COMPLIANCE, i]
+    for e in range(elements.links.shape[1]):
+        p = elements.links[LinkRow.PORT, e]
         force, slope = law.mean_force(
-            faces.num[e],
-            faces.mem[e],
-            faces.each[ELEMENT_SLIDE, e],
-            element_slide(e, y, faces),
-            faces.each[BOND_LENGTH, e],
+            elements.num[e],
+            elements.mem[e],
+            elements.state[ElementRow.SLIDE, e],
+            element_slide(e, y, elements),
+            elements.state[ElementRow.BOND_LENGTH, e],
             dt,
         )
-        worst = max(worst, abs(force - faces.each[ELEMENT_FORCE, e]) / faces.each[FORCE_TOL, e])
-        faces.each[ELEMENT_FORCE, e] = force
+        worst = max(
+            worst,
+            abs(force - elements.state[ElementRow.FORCE, e])
+            / elements.state[ElementRow.FORCE_TOL, e],
+        )
+        elements.state[ElementRow.FORCE, e] = force
         slope = max(slope, 0.0)
         for i in range(n):
-            step[i] += faces.rows[p, i] * force
+            step[i] += elements.rows[p, i] * force
             for k in range(i + 1):
-                hess[i, k] += slope * faces.rows[p, i] * faces.rows[p, k]
+                hess[i, k] += slope * elements.rows[p, i] * elements.rows[p, k]
     return worst
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_smooth(faces, dt):
+def solve_smooth(elements, dt):
     """Solve the forces of a step by Newton's method.
 
     Returns the iterations, negative if it fails.
     """
-    y = faces.modal[MODAL_SCRATCH]
-    step = faces.modal[MODAL_SCRATCH + 1]
-    trial = faces.modal[MODAL_SCRATCH + 2]
-    hess = faces.hess
+    y = elements.modal[ModalRow.SCRATCH]
+    step = elements.modal[ModalRow.SCRATCH + 1]
+    trial = elements.modal[ModalRow.SCRATCH + 2]
+    hess = elements.hess
     n = y.size
-    count = faces.of.shape[1]
+    count = elements.links.shape[1]
     for i in range(n):
         y[i] = 0.0
         for e in range(count):
             y[i] += (
-                faces.modal[COORDINATE_GIVE, i]
-                * faces.rows[faces.of[PORT, e], i]
-                * faces.each[ELEMENT_FORCE, e]
+                elements.modal[ModalRow.COMPLIANCE, i]
+                * elements.rows[elements.links[LinkRow.PORT, e], i]
+                * elements.state[ElementRow.FORCE, e]
             )
     for turn in range(1, 80):
-        worst = newton_equations(y, step, faces, dt, hess)
+        worst = newton_equations(y, step, elements, dt, hess)
         if turn > 1 and worst <= 0.1:
             return turn
         if not factorise(hess):
             return -turn
         solve_factorised(hess, step)
-        begin = slope_along(0.0, y, step, trial, faces, dt)
+        begin = slope_along(0.0, y, step, trial, elements, dt)
         low = 0.0
         high = np.inf
         t = 1.0
         for _ in range(40):
-            here = slope_along(t, y, step, trial, faces, dt)
+            here = slope_along(t, y, step, trial, elements, dt)
             if abs(here) <= 0.1 * abs(begin):
                 break
             if here > 0:
@@ -194,62 +182,64 @@ def solve_smooth(faces, dt):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def force_equations(faces, dt, known):
-    """Write the Newton equations of the residual forces - law(free - beta forces) into faces.system.
+def force_equations(elements, dt, known):
+    """Write the Newton equations of the residual forces - law(free - beta forces) into elements.system.
 
     An element that holds has the equation of no slide, with a trace of give where elements that depend on each
     other could share their force in several ways; an element that slips keeps its force.
 
     Parameters
     ----------
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
     dt : float
         Length of the step [s].
     known : bool
-        Whether the slides of the faces that do not slip all the way are known, in faces.stops.
+        Whether the slides of the faces that do not slip all the way are known, in elements.stops.
     """
-    count = faces.of.shape[1]
-    beta = faces.gives[BETA]
+    count = elements.links.shape[1]
+    beta = elements.compliances[ComplianceRow.SLIDE]
     face = 0
     for e in range(count):
-        p = faces.of[PORT, e]
-        dq = faces.port[FREE_SLIDE, p]
+        p = elements.links[LinkRow.PORT, e]
+        dq = elements.port[PortRow.FREE_SLIDE, p]
         own = beta[p, p]
         for k in range(count):
-            dq -= beta[p, faces.of[PORT, k]] * faces.each[ELEMENT_FORCE, k]
-        if faces.num[e, 0] == SET_VALUED:
-            holds = faces.each[INCREMENT, e] == 0.0
+            dq -= beta[p, elements.links[LinkRow.PORT, k]] * elements.state[ElementRow.FORCE, k]
+        if elements.num[e, 0] == SET_VALUED:
+            holds = elements.state[ElementRow.INCREMENT, e] == 0.0
             goal = 0.0
             if known:
-                holds = faces.stops.field[SLIDES_ON, face] == 0.0
-                goal = faces.stops.field[SLIDE, face]
+                holds = elements.stops.field[FaceRow.SLIDES_ON, face] == 0.0
+                goal = elements.stops.field[FaceRow.SLIDE, face]
             face += 1
-            faces.each[ELEMENT_RESIDUAL, e] = (dq - goal) / own if holds else 0.0
+            elements.state[ElementRow.RESIDUAL, e] = (dq - goal) / own if holds else 0.0
             for k in range(count):
-                faces.system[e, k] = beta[p, faces.of[PORT, k]] / own if holds else 0.0
-            faces.system[e, e] += 1e-9 if holds else 1.0
+                elements.system[e, k] = (
+                    beta[p, elements.links[LinkRow.PORT, k]] / own if holds else 0.0
+                )
+            elements.system[e, e] += 1e-9 if holds else 1.0
             continue
         if HAS_PLANES:
-            if faces.of[MATE, e] != e:
-                if faces.of[MATE, e] > e:
-                    plane_equations(e, faces.of[MATE, e], dq, faces)
+            if elements.links[LinkRow.MATE, e] != e:
+                if elements.links[LinkRow.MATE, e] > e:
+                    plane_equations(e, elements.links[LinkRow.MATE, e], dq, elements)
                 continue
         force, slope = law.mean_force(
-            faces.num[e],
-            faces.mem[e],
-            faces.each[ELEMENT_SLIDE, e],
+            elements.num[e],
+            elements.mem[e],
+            elements.state[ElementRow.SLIDE, e],
             dq,
-            faces.each[BOND_LENGTH, e],
+            elements.state[ElementRow.BOND_LENGTH, e],
             dt,
         )
-        faces.each[ELEMENT_RESIDUAL, e] = force - faces.each[ELEMENT_FORCE, e]
+        elements.state[ElementRow.RESIDUAL, e] = force - elements.state[ElementRow.FORCE, e]
         for k in range(count):
-            faces.system[e, k] = slope * beta[p, faces.of[PORT, k]]
-        faces.system[e, e] += 1.0
+            elements.system[e, k] = slope * beta[p, elements.links[LinkRow.PORT, k]]
+        elements.system[e, e] += 1.0
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def plane_equations(e, f, dx, faces):
+def plane_equations(e, f, dx, elements):
     """Write the two Newton equations of an element in a plane.
 
     Parameters
@@ -260,56 +250,58 @@ def plane_equations(e, f, dx, faces):
         Number of the element of its second direction.
     dx : float
         Increment of the slide of e [m].
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
     """
-    beta = faces.gives[BETA]
-    p = faces.of[PORT, e]
-    r = faces.of[PORT, f]
-    dy = faces.port[FREE_SLIDE, r]
-    for k in range(faces.of.shape[1]):
-        dy -= beta[r, faces.of[PORT, k]] * faces.each[ELEMENT_FORCE, k]
+    force = elements.state[ElementRow.FORCE]
+    beta = elements.compliances[ComplianceRow.SLIDE]
+    p = elements.links[LinkRow.PORT, e]
+    r = elements.links[LinkRow.PORT, f]
+    dy = elements.port[PortRow.FREE_SLIDE, r]
+    for k in range(elements.links.shape[1]):
+        dy -= beta[r, elements.links[LinkRow.PORT, k]] * force[k]
     slide = plane.advance_straight(
-        (faces.num[e, 2], faces.num[e, 3]), (faces.mem[e, 3], faces.mem[f, 3]), (dx, dy)
+        (elements.num[e, 2], elements.num[e, 3]), (elements.mem[e, 3], elements.mem[f, 3]), (dx, dy)
     )
-    faces.each[ELEMENT_RESIDUAL, e] = slide.mean_x - faces.each[ELEMENT_FORCE, e]
-    faces.each[ELEMENT_RESIDUAL, f] = slide.mean_y - faces.each[ELEMENT_FORCE, f]
-    for k in range(faces.of.shape[1]):
-        one = beta[p, faces.of[PORT, k]]
-        other = beta[r, faces.of[PORT, k]]
-        faces.system[e, k] = slide.slope.xx * one + slide.slope.xy * other
-        faces.system[f, k] = slide.slope.yx * one + slide.slope.yy * other
-    faces.system[e, e] += 1.0
-    faces.system[f, f] += 1.0
+    elements.state[ElementRow.RESIDUAL, e] = slide.mean_x - force[e]
+    elements.state[ElementRow.RESIDUAL, f] = slide.mean_y - force[f]
+    for k in range(elements.links.shape[1]):
+        one = beta[p, elements.links[LinkRow.PORT, k]]
+        other = beta[r, elements.links[LinkRow.PORT, k]]
+        elements.system[e, k] = slide.slope.xx * one + slide.slope.xy * other
+        elements.system[f, k] = slide.slope.yx * one + slide.slope.yy * other
+    elements.system[e, e] += 1.0
+    elements.system[f, f] += 1.0
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def newton_step(faces, dt, known):
+def newton_step(elements, dt, known):
     """Take a Newton step on the forces of all elements at once; return whether it succeeds.
 
     Parameters
     ----------
-    faces : interfaces.arrays.PortElements
+    elements : element_arrays.PortElements
     dt : float
         Length of the step [s].
     known : bool
-        Whether the slides of the faces that do not slip all the way are known, in faces.stops.
+        Whether the slides of the faces that do not slip all the way are known, in elements.stops.
 
     Returns
     -------
     bool
     """
-    count = faces.of.shape[1]
-    miss = faces.each[ELEMENT_RESIDUAL]
-    force_equations(faces, dt, known)
+    force = elements.state[ElementRow.FORCE]
+    count = elements.links.shape[1]
+    miss = elements.state[ElementRow.RESIDUAL]
+    force_equations(elements, dt, known)
     # no row exchanges are needed: 1 + slope beta dominates its row for laws that resist the slide
-    if not solve_by_elimination(faces.system, miss):
+    if not solve_by_elimination(elements.system, miss):
         return False
     for e in range(count):
         if not np.isfinite(miss[e]):
             return False
     for e in range(count):
-        faces.each[ELEMENT_FORCE, e] += miss[e]
-        if faces.num[e, 0] == SET_VALUED:
-            limit = faces.num[e, 1] if known else faces.each[MAX_FORCE, e]
-            faces.each[ELEMENT_FORCE, e] = min(max(faces.each[ELEMENT_FORCE, e], -limit), limit)
+        force[e] += miss[e]
+        if elements.num[e, 0] == SET_VALUED:
+            limit = elements.num[e, 1] if known else elements.state[ElementRow.MAX_FORCE, e]
+            force[e] = min(max(force[e], -limit), limit)
     return True

@@ -21,12 +21,14 @@ from ...friction.laws.stretch import growth_numbers
 from ...friction.laws.tanh import TanhLaw
 from ...slip.shear_modes import N_SHEAR_MODES, enough_modes, shear_modes
 from ..interfaces import arrays
+from ..interfaces.arrays import LoadPlace, PointRow, PressedPlace
 from ..interfaces.dispatch import COULOMB_LAW
+from ..ledger import SampleColumn
 from .faces import STEP_TOL
 from .instances import COMMON_LOAD, POINT_LOADS, SHEARED_LISTS
-from .march import Run
 from .march import march as run
 from .models import IDLE_KIND, Joint, element_model, nodal_load_fields, point_lists_model
+from .run import Run
 
 # Kinds of laws.
 COULOMB = 0
@@ -188,7 +190,9 @@ def make_pressed_fields(law: VaryingLoadLaw, normal, shear, limit: float) -> tup
     memory = np.zeros((3, normal.size))
     size = normal.size
     plastic = law.kind == PLASTIC
-    memory[1 if plastic else 0] = normal if plastic else normal * law.force[3]
+    memory[1 if plastic else 0] = (
+        normal if plastic else normal * law.force[PressedPlace.INITIAL_DENSITY]
+    )
     psi, kappa = (np.zeros((size, 0)), ()) if shear is None else (shear.shape, shear.stiffness)
     weight = np.full(size, law.static / (1.0 if plastic else law.length))
     return (
@@ -266,11 +270,10 @@ class VaryingLoadModel:
     @property
     def joints(self) -> tuple:
         """The set-valued element, under the preload."""
-        law = self.law
-        load = self.preload
-        return (
-            (Joint(0, Coulomb(law.force[1], law.static).element(load)),) if self.set_valued else ()
-        )
+        if not self.set_valued:
+            return ()
+        law = Coulomb(self.law.force[PressedPlace.MU_KINETIC], self.law.static)
+        return (Joint(0, law.element(self.preload)),)
 
     @property
     def kind(self) -> tuple:
@@ -289,7 +292,9 @@ class VaryingLoadModel:
                 np.full(1 if self.load is not None else self.sets.x.size, self.preload)
             )
         return element_model(
-            TanhLaw(law.static, law.force[1] if law.kind == RATE else 1.0).element(self.preload)
+            TanhLaw(
+                law.static, law.force[PressedPlace.MU_KINETIC] if law.kind == RATE else 1.0
+            ).element(self.preload)
         ).build()
 
     def points(self, force):
@@ -432,12 +437,12 @@ class VaryingLoadRun(Run):
             np.array([slot]),
             np.zeros(1),
             np.array([goal]),
-            np.zeros(22),
+            np.zeros(LoadPlace.START + 5),
         )
 
-    def _changing_arrays(self) -> tuple:
+    def _changing_arrays(self) -> list:
         press = self.load
-        return *super()._changing_arrays(), press.now, press.slot, press.mean, press.few
+        return [*super()._changing_arrays(), press.now, press.slot, press.mean, press.few]
 
     def _load_of_steps(self, count: int) -> arrays.VaryingLoad:
         loads = self.load.loads
@@ -456,8 +461,8 @@ class VaryingLoadRun(Run):
         """
         n = 2 * self.modes.omega.size
         work = self._step_works(rows)
-        lost = work - np.diff(rows[:, n + 5])
-        size = np.maximum(self.model.limit, np.abs(rows[:-1, n + 4]))
+        lost = work - np.diff(rows[:, n + SampleColumn.ENERGY])
+        size = np.maximum(self.model.limit, np.abs(rows[:-1, n + SampleColumn.MEAN_FORCE]))
         digit = np.abs(rows[:, : n // 2]) @ np.abs(self.modes.slide)
         slip_path = np.abs(np.diff(rows[:, n]))
         beta = self.prop.beta[0, 0]
@@ -465,7 +470,8 @@ class VaryingLoadRun(Run):
         noise = (
             size * (1e-12 * slip_path + 2e-15 * digit)
             + 2e-16 * slip_path**2 / (beta or np.inf)
-            + 1e-14 * np.maximum(rows[:-1, n + 5], rows[1:, n + 5])
+            + 1e-14
+            * np.maximum(rows[:-1, n + SampleColumn.ENERGY], rows[1:, n + SampleColumn.ENERGY])
         )
         return np.stack(
             [work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)]
@@ -476,7 +482,7 @@ class VaryingLoadRun(Run):
         found = {"b": np.zeros(0), "memory": np.zeros((3, nodal.size)), "bend": 0.0}
         c = self.contact
         if self.model.law.kind == LISTS:  # all bonds of a point count as equally stretched
-            force = self.model.law.static * c.points[4] * c.statuses[:, STATUS.force]
+            force = self.model.law.static * c.points[PointRow.LOAD] * c.statuses[:, STATUS.force]
             law = self.model.law
             found = {
                 "b": c.b.copy(),

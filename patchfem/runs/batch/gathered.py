@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import load
 from ...core import STICK_SPEED_RATIO
 from ...dynamics.march import lanes
+from ...dynamics.march.lane_rows import LANES, N_PIECE_MODES, N_POINTS
 from ...effects import is_bond_list, law_has_trait
 from ...model.model import Model
 from ...response import run_events
@@ -156,9 +156,8 @@ def _gather_points(model: Model, numerics, patch) -> _GatheredPoints | None:
         return None
     if choose_quadrature(model, numerics).engine != "recursion":
         return None
-    kernels = load(lanes.LANES_KERNELS)
     tolerance = REDUCTION_TOL_FRACTION * model.accuracy.tolerance
-    points = few_points(patch, model.bonds, tolerance, kernels.N_POINTS, kernels.N_PIECE_MODES)
+    points = few_points(patch, model.bonds, tolerance, N_POINTS, N_PIECE_MODES)
     if points is None:
         return None
     pieces, limit, error = points
@@ -194,10 +193,9 @@ def _march_side_by_side(models: list, cases: list, steps: int) -> tuple[CaseResu
     """
     results = CaseResults.blank(len(models))
     runs_singly = np.zeros(len(models), bool)
-    n_lanes = load(lanes.LANES_KERNELS).LANES
     relative_drives = [case.fine.case.amplitude / case.fine.case.limit.sum() for case in cases]
     order = np.argsort(relative_drives, kind="stable")
-    size = max(1, MAX_SAMPLES // (steps * cases[0].numerics.window * n_lanes)) * n_lanes
+    size = max(1, MAX_SAMPLES // (steps * cases[0].numerics.window * LANES)) * LANES
     for first in range(0, len(models), size):
         indices = order[first : first + size]
         marched = _march_cases([models[k] for k in indices], [cases[k] for k in indices], steps)

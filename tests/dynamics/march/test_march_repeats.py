@@ -12,6 +12,7 @@ from varying_load_cases import LAWS, crowned, modes
 
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.march import march as marching
+from patchfem.dynamics.march import run as marching_run
 from patchfem.dynamics.march import varying_load
 from patchfem.dynamics.march.joints import JointsModel
 from patchfem.dynamics.march.march import march
@@ -58,7 +59,7 @@ def marched(case: str, monkeypatch, repeats: bool, **more):
     basis, model = CASES[case]()
     steps = []
     moved = marching.Run._march_rows
-    monkeypatch.setattr(marching, "PERIODIC_TOL", 1e-12 if repeats else -1.0)
+    monkeypatch.setattr(marching_run, "PERIODIC_TOL", 1e-12 if repeats else -1.0)
     monkeypatch.setattr(
         marching.Run,
         "_march_rows",

@@ -1,0 +1,238 @@
+"""Arrays of the friction elements and springs of a march, and the names of their rows."""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+
+class LinkRow(IntEnum):
+    """Rows of `PortElements.links`.
+
+    - PORT: port on which the element acts
+    - IS_FRICTION: 1 for friction, 0 for a spring
+    - MATE: element of the other direction of a slide in a plane, else its own number
+    """
+
+    PORT = 0
+    IS_FRICTION = 1
+    MATE = 2
+
+
+class ElementRow(IntEnum):
+    """Rows of `PortElements.state`: numbers of an element in the present step.
+
+    - FORCE: mean force of the step [N]
+    - SLIDE, SPEED: slide [m] and its speed [m/s] at the start
+    - BOND_LENGTH: bond length of the step [m]
+    - INCREMENT: increment of the slide [m]
+    - RESIDUAL: residual of the force [N]
+    - MAX_FORCE: largest force [N]; of a set-valued element in a step by mean forces alone
+    - FORCE_TOL: tolerance of the force [N]
+    - LAST_INCREMENT, INCREMENT_BEFORE: increments of the last two steps [m]
+    """
+
+    FORCE = 0
+    SLIDE = 1
+    SPEED = 2
+    BOND_LENGTH = 3
+    INCREMENT = 4
+    RESIDUAL = 5
+    MAX_FORCE = 6
+    FORCE_TOL = 7
+    LAST_INCREMENT = 8
+    INCREMENT_BEFORE = 9
+
+
+class ContactPlace(IntEnum):
+    """Places in `PortElements.contact`: the contact on port 0 in the present step.
+
+    - FORCE: mean force [N]
+    - INCREMENT: increment of the slide [m]
+    - SAMPLE_FORCE: force at the sample [N]
+    - FORCE_TOL: tolerance of the force [N]
+    - STOPS_KNOWN: 1 if the stops of the step are known
+    """
+
+    FORCE = 0
+    INCREMENT = 1
+    SAMPLE_FORCE = 2
+    FORCE_TOL = 3
+    STOPS_KNOWN = 4
+
+
+class PortRow(IntEnum):
+    """Rows of `PortElements.port`: increment of the slide [m] and speed at the end [m/s] without forces."""
+
+    FREE_SLIDE = 0
+    FREE_SPEED = 1
+
+
+class ModalRow(IntEnum):
+    """Rows of `PortElements.modal`.
+
+    - COMPLIANCE: compliance of the coordinates in a step [m/N]
+    - OTHER_ACCELERATION: accelerations by forces other than those of contact and elements [m s-2]
+    - SCRATCH: first of three rows of scratch space
+    """
+
+    COMPLIANCE = 0
+    OTHER_ACCELERATION = 1
+    SCRATCH = 2
+
+
+class ComplianceRow(IntEnum):
+    """First index of `compliances`: what a constant force takes from the motion of a port in a step.
+
+    - SLIDE: from the slide [m/N]
+    - SPEED: from the speed [m/(s N)]
+    - ACCELERATION: from the acceleration [1/kg]; of set-valued elements alone
+    """
+
+    SLIDE = 0
+    SPEED = 1
+    ACCELERATION = 2
+
+
+class LimitRow(IntEnum):
+    """Rows of `SetValuedElements.limit` [N]; those of the end of the step are AT_END rows further on."""
+
+    STATIC = 0
+    KINETIC = 1
+    AT_END = 2
+
+
+class FaceRow(IntEnum):
+    """Rows of `SetValuedElements.field`: numbers of a set-valued element, a face, in the present step.
+
+    - FREE_SLIDE, FREE_SPEED: increment of the slide [m] and speed at the end [m/s] without the forces of the faces
+    - START_SPEED: speed at the start [m/s]
+    - WAS_RESTING: 1 if the face rests at the start
+    - HOLDING_START, HOLDING_END: force that would hold it, at the start and at the end [N]
+    - SLIDE: slide since the start [m]
+    - SPEED: present speed [m/s]
+    - MEAN_FORCE: mean force so far [N]
+    - FORCE, FORCE_SLOPE: present force and its slope over the step [N]
+    - SLIP_STATE: 0 for a face that rests, +-1 for one that slides, +-2 for one that carries its static friction while
+      other faces hold it
+    - SLIDES_ON: 1 if it slides in one direction through the whole step
+    - RIGHT_SIDE, SOLUTION, RESIDUAL: of the equations that are solved; RESIDUAL is also scratch space
+    - INCREMENT: increment of the slide in the step [m]
+    - BLOW: impulse at the end of the step [N s]
+    """
+
+    FREE_SLIDE = 0
+    FREE_SPEED = 1
+    START_SPEED = 2
+    WAS_RESTING = 3
+    HOLDING_START = 4
+    HOLDING_END = 5
+    SLIDE = 6
+    SPEED = 7
+    MEAN_FORCE = 8
+    FORCE = 9
+    FORCE_SLOPE = 10
+    SLIP_STATE = 11
+    SLIDES_ON = 12
+    RIGHT_SIDE = 13
+    SOLUTION = 14
+    RESIDUAL = 15
+    INCREMENT = 16
+    BLOW = 17
+
+
+class LoadColumn(IntEnum):
+    """Last columns of a sample under a load that varies.
+
+    - LOAD, MOMENT: normal force [N] and its moment [N m]
+    - ENERGY: energy of the preloaded contact [J]
+    - HEAVE, PITCH: [m] and [rad]
+    """
+
+    LOAD = 0
+    MOMENT = 1
+    ENERGY = 2
+    HEAVE = 3
+    PITCH = 4
+
+
+# An element has the first columns of `dynamics.ledger.SampleColumn` up to the mean force.
+N_ELEMENT_COLUMNS = 5
+N_LOAD_COLUMNS = len(LoadColumn)
+
+
+class SingleContact(NamedTuple):
+    """A contact on port 0 alone; goal: (1,) of its residual [N]."""
+
+    goal: np.ndarray
+
+
+class SetValuedElements(NamedTuple):
+    """The m set-valued elements of a march, the faces of `stops_kernels`.
+
+    - element, names: (m,) their numbers, and workspace for numbers
+    - limit: (4, m) friction limits, see `LimitRow`
+    - compliances: (3, m, m), see `ComplianceRow`
+    - rows: (m, n) relative displacement per coordinate
+    - system, field: (m, m) and (18, m) workspace, see `FaceRow`
+    """
+
+    element: np.ndarray
+    names: np.ndarray
+    limit: np.ndarray
+    compliances: np.ndarray
+    rows: np.ndarray
+    system: np.ndarray
+    field: np.ndarray
+
+
+class PortElements(NamedTuple):
+    """Elements (e,) on ports (p,), in addition to a contact on port 0 or in its place.
+
+    - rows: (p, n) displacement of every port per coordinate
+    - compliances: (2, p, p), see `ComplianceRow`
+    - links: (3, e), see `LinkRow`
+    - num, mem: (e, ...) numbers and memory of the laws; num[e, 0] is the number of the law
+    - state: (10, e), see `ElementRow`
+    - contact: (5,), see `ContactPlace`
+    - port: (2, p), see `PortRow`
+    - modal: (5, n), see `ModalRow`
+    - system, hess: (e, e) and (n, n) workspace
+    - stops: the set-valued elements
+    """
+
+    rows: np.ndarray
+    compliances: np.ndarray
+    links: np.ndarray
+    num: np.ndarray
+    mem: np.ndarray
+    state: np.ndarray
+    contact: np.ndarray
+    port: np.ndarray
+    modal: np.ndarray
+    system: np.ndarray
+    hess: np.ndarray
+    stops: SetValuedElements
+
+
+class MarchArrays(NamedTuple):
+    """Arrays that the compiled loop of a march takes.
+
+    - motion: (2, n) coordinates and rates of the modes
+    - modal_system: `interfaces.arrays.ModalArrays`
+    - table: (s, k) table of `propagator.Propagator`
+    - interface: arrays of the contact on port 0, in `interfaces.arrays`
+    - elements: `PortElements` or `SingleContact`
+    - press: `interfaces.arrays.VaryingLoad` or `ConstantLoad`
+    - ledger: (9,) see `dynamics.ledger.Ledger`
+    - travel: largest displacement of the output [m], beyond which the march ends
+    """
+
+    motion: np.ndarray
+    modal_system: tuple
+    table: np.ndarray
+    interface: tuple
+    elements: tuple
+    press: tuple
+    ledger: np.ndarray
+    travel: float

@@ -1,0 +1,148 @@
+"""Sizes and rows of the arrays of `lanes_kernels`."""
+
+from enum import IntEnum
+
+LANES = 32  # number of cases that march side by side
+N_POINTS = 6  # points of the interface of a case
+N_PIECE_MODES = 2  # shear modes of the pieces of a case
+N_RIG_MODES = 2  # modes of the rig
+N_UNKNOWNS = 1 + N_PIECE_MODES  # increments of the slide and of the coordinates of the pieces
+N_LOSS_COEFFICIENTS = 6  # coefficients of the quadratic form of the viscous loss of a mode
+N_SAMPLE = 2 * N_RIG_MODES + 2  # numbers of a sample: coordinates, rates, force, slip
+
+# number of rows of each quantity of a case in the workspace
+WORKSPACE_ROWS = {
+    # state
+    "RIG_POSITION": N_RIG_MODES,  # coordinates of the rig
+    "RIG_RATE": N_RIG_MODES,  # their rates
+    "PIECE_POSITION": N_PIECE_MODES,  # coordinates of the pieces [m]
+    "STRETCHES": N_POINTS,  # mean stretch of the bonds of the points [bond lengths]
+    "SQUARES": N_POINTS,  # mean square of the stretch [bond lengths squared]
+    # solution of a step
+    "INCREMENTS": N_UNKNOWNS,  # unknowns [m]
+    "LAST_INCREMENTS": N_UNKNOWNS,  # those of the last step [m]
+    "INCREMENTS_BEFORE": N_UNKNOWNS,  # those of the step before it [m]
+    "NEWTON_STEP": N_UNKNOWNS,  # last step of Newton's method [m]
+    "DESCENT": 1,  # decrease that this step predicts
+    "IS_SOLVED": 1,  # 1 if the step is solved
+    "FREE_SLIDE": 1,  # increment of the slide without friction [m]
+    # sample
+    "FRICTION": 1,  # friction force [N]
+    "INTERFACE_ENERGY": 1,  # energy of bonds and pieces [J]
+    "SLIP": 1,  # mean slip of the points [m]
+    "OUTPUT": 1,  # displacement of the output [m]
+    "OUTPUT_RATE": 1,  # its rate [m/s]
+    "LAST_OUTPUT": 1,  # the same at the start of the step
+    "LAST_OUTPUT_RATE": 1,
+    "RIG_SLIDE": 1,  # slide of the rig [m]
+    "MEAN_FORCE": 1,  # mean friction force of the step [N]
+    "DRIVE_WORK": 1,  # work of the drive in the step [J]
+    "VISCOUS_LOSS": 1,  # viscous loss in the step [J]
+    "RATE_SQUARES": 1,  # sum of v^2 + omega^2 z^2 of the modes
+    # numbers of the case
+    "DRIVE": 1,  # amplitude of its drive over that of the table
+    "BOND_LENGTH": 1,  # [m]
+    "LIMIT": 1,  # friction limit [N]
+    "POINT_LIMITS": N_POINTS,  # friction limits of the points [N]
+    "SHAPES": N_PIECE_MODES * N_POINTS,  # slides of the points per coordinate of the pieces
+    "STIFFNESSES": N_PIECE_MODES,  # stiffness of the coordinates of the pieces [N/m]
+    "MAX_SHAPES": N_PIECE_MODES,  # largest absolute slide of a point per coordinate
+    "MEAN_SHAPES": N_PIECE_MODES,  # mean slide of the points per coordinate
+    # sums of the run [J]
+    "WORK_IN": 1,
+    "VISCOUS_SUM": 1,
+    "DRIVE_WORK_SIZE": 1,
+    "FRICTION_LOSS": 1,
+    "MAX_STORED": 1,
+    "FRICTION_WORK": 1,
+    "SAMPLED_WORK": 1,
+    "FRICTION_WORK_SIZE": 1,
+    "INTERFACE_LOSS": 1,
+    "INTERFACE_GAIN": 1,
+    # extremes and phasor of the output in a cycle [m]
+    "MIN_OUTPUT": 1,
+    "MAX_OUTPUT": 1,
+    "COS_SUM": 1,
+    "SIN_SUM": 1,
+    "N_UNSOLVED": 1,  # number of steps without a solution
+    "MAX_SLIDE": 1,  # largest slide of the run [m]
+}
+N_WORKSPACE_ROWS = sum(WORKSPACE_ROWS.values())
+
+
+def _stack_rows(row_counts: dict, row_length: int) -> dict:
+    """Return the position of the first number of each quantity, stored one after the other."""
+    positions = {}
+    end = 0
+    for name, count in row_counts.items():
+        positions[name] = end
+        end += count * row_length
+    return positions
+
+
+# First element of each quantity in the flat workspace: lane i of its row k is `At.NAME + k * LANES + i`.
+At = IntEnum("At", _stack_rows(WORKSPACE_ROWS, LANES), module=__name__)
+
+
+class RigRow(IntEnum):
+    """Rows of a mode of the rig: its step as `propagator.Propagator` has it, for forces instead of accelerations.
+
+    - ZZ to VV: free motion of coordinate and rate
+    - BY_Z, BY_V: motion per force
+    - REACH_Z, REACH_V: increment of the slide per coordinate and rate
+    - LOSS: first of the coefficients of the quadratic form of the viscous loss
+    - SLIDE_SHAPE, OUTPUT_SHAPE: slide and output per coordinate
+    - OMEGA_SQUARE: square of the angular frequency
+    - STEP: compliance of the slide [m/N], mass [kg] and length of a step [s], for all modes
+    """
+
+    ZZ = 0
+    ZV = 1
+    VZ = 2
+    VV = 3
+    BY_Z = 4
+    BY_V = 5
+    REACH_Z = 6
+    REACH_V = 7
+    LOSS = 8
+    SLIDE_SHAPE = LOSS + N_LOSS_COEFFICIENTS
+    OUTPUT_SHAPE = SLIDE_SHAPE + 1
+    OMEGA_SQUARE = SLIDE_SHAPE + 2
+    STEP = SLIDE_SHAPE + 3
+
+
+class StepColumn(IntEnum):
+    """Columns of the table of the steps, for a drive of 1 m s-2.
+
+    - BY_DRIVE: what the drive adds to coordinates and rates
+    - WORK_FORMS, LOSS_FORMS: coefficients of its work and of the viscous loss
+    - REMAINDERS: constant parts of work and loss
+    - PORT_SLIDE: increment of the slide
+    - WAVES: cosine and sine of the drive at the start of the step
+    """
+
+    BY_DRIVE = 0
+    WORK_FORMS = 2 * N_RIG_MODES
+    LOSS_FORMS = 5 * N_RIG_MODES
+    REMAINDERS = 8 * N_RIG_MODES
+    PORT_SLIDE = REMAINDERS + 2
+    WAVES = REMAINDERS + 3
+
+
+N_COLUMNS = StepColumn.WAVES + 2
+
+
+def get_rows(workspace, position: At):
+    """Return a view of the rows of a quantity in a workspace.
+
+    Parameters
+    ----------
+    workspace : (N_WORKSPACE_ROWS, n) array
+    position : At
+
+    Returns
+    -------
+    (k, n) array
+    """
+    first = position // LANES
+    return workspace[first : first + WORKSPACE_ROWS[position.name]]

@@ -1,0 +1,677 @@
+"""State of a march, and the pieces of one or some drive cycles in which it goes on."""
+
+from collections import deque
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from ...core import ModalBasis, Outcome, Response, SineDrive
+from ...formatting import format_length
+from ...friction.bonds.list_rows_kernels import STATUS
+from ...friction.path_work import sampled_work
+from ..checkpoint import MarchedCycle
+from ..integrated import make_histories
+from ..interfaces import arrays
+from ..interfaces.arrays import ModalArrays
+from ..ledger import N_SAMPLE_COLUMNS, Ledger, SampleColumn
+from ..periodicity import (
+    FIRST_CHECK,
+    bound_remaining_change,
+    cycles_to_next_check,
+    is_checked_after,
+)
+from ..propagator import make_propagator
+from .capacity import copy_state, enlarge_list
+from .element_arrays import (
+    N_ELEMENT_COLUMNS,
+    N_LOAD_COLUMNS,
+    LoadColumn,
+    MarchArrays,
+)
+from .faces import STEP_TOL, make_faces
+from .models import frictionless_model
+from .recording import FIRST_SUM, N_SUMS, Mark, make_mark, read_output_extremes
+
+# Status of `loop_kernels.march`: the output exceeds the travel, a list of bonds is full, the motion is not finite, and
+# no contact set fits the motion.
+EXCEEDS_TRAVEL = 1
+MEMORY_FULL = 2
+NOT_FINITE = 3
+NO_CONTACT_SET = 4
+# A step has not followed the motion if its displacement exceeds the travel by this factor.
+DIVERGED_FACTOR = 10.0
+MAX_PIECE_STEPS = 8000  # number of steps of a piece of a march
+MAX_PIECE_CYCLES = 16  # number of cycles of a piece of a march
+PERIODIC_TOL = 1e-12  # change of a periodic motion in all cycles that are left, over its size
+# Positions in the ledger that grow from cycle to cycle.
+SUMS = [
+    Ledger.DRIVE_WORK,
+    Ledger.VISCOUS_LOSS,
+    Ledger.DRIVE_POWER,
+    Ledger.FRICTION_LOSS,
+    Ledger.N_ITERATIONS,
+    Ledger.N_UNCONVERGED,
+    Ledger.FRICTION_WORK,
+]
+
+
+def _make_response(rows, number, dt, modes, drive) -> Response:
+    """Return the histories of samples.
+
+    Parameters
+    ----------
+    rows : (k, w) array
+        Samples, as the loop writes them.
+    number : (k,) array
+        Numbers of their steps.
+    dt : float
+        Length of the step [s].
+    modes : ModalBasis
+    drive : float
+        Acceleration of the base [m s-2].
+    """
+    n = modes.omega.size
+    first_sum = 2 * n + FIRST_SUM
+    # friction work, stored, dissipated and created energy
+    ledger_columns = [first_sum, 2 * n + SampleColumn.ENERGY, first_sum + 1, first_sum + 2]
+    return make_histories(
+        modes,
+        drive,
+        number * dt,
+        (rows[:, :n], rows[:, n : 2 * n]),
+        rows[:, 2 * n : 2 * n + SampleColumn.MEAN_FORCE].T,
+        {"ledger": rows[:, ledger_columns].T},
+    )
+
+
+def make_modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
+    """Return the `ModalArrays` of a basis and its propagator."""
+    damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
+    arrays_of_modes = (
+        modes.omega,
+        2 * modes.zeta * modes.omega,
+        modes.slide,
+        modes.base,
+        modes.output,
+        damping,
+        prop.free,
+        prop.push,
+        prop.dense,
+        prop.reach,
+        prop.loss,
+        prop.dense_loss,
+    )
+    return ModalArrays(
+        *(np.array(array, float, order="C") for array in arrays_of_modes),
+        dt=float(prop.dt),
+        beta=float(prop.beta[0, 0]),
+        mass=float(modes.mass),
+        workspace=np.zeros((3, modes.omega.size)),
+    )
+
+
+class Run:
+    """State of a march: its arrays and the number of steps done.
+
+    - `state` (2, n): coordinates and rates of the modes.
+    - `contact`, `faces`, `load`: arrays of the contact, the elements and the load, in `interfaces.arrays`.
+    - `ledger` (9,): energy balance of `loop_kernels.march`.
+    - `totals` (3,): friction work, dissipated and created energy since the start [J].
+    - `second` (2,): friction work from the samples, and sum of the absolute works of the steps [J].
+    - `done`: number of steps that are done.
+    - `outcome`, `message`: how it ended.
+    """
+
+    def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
+        self.modes = modes
+        self.drive = drive
+        self.model = model
+        self.travel = travel
+        self.loops = loops
+        self.prop = make_propagator(modes, drive, steps_per_cycle, getattr(model, "rows", None))
+        self.contact = model.build()
+        self.state = np.zeros((2, modes.omega.size))
+        if start is not None:
+            self.state[:] = start.z, start.v
+        self.ledger = np.zeros(len(Ledger))
+        self.done = 0
+        self.outcome = None
+        self.message = ""
+        self.totals = np.zeros(N_SUMS)
+        # friction work from the samples, and energy exchanged in both directions [J]
+        self.second = np.zeros(2)
+        # energy that is stored at the start counts as work input
+        self.ledger[Ledger.DRIVE_WORK] = self.find_modal_energy()
+        self.modal_system = make_modal_arrays(modes, self.prop)
+        self.faces = make_faces(model, self.prop, self.modal_system, modes.mass)
+        self.load = self._initial_load()
+        self.width = 2 * modes.omega.size + N_SAMPLE_COLUMNS
+        self.width += N_ELEMENT_COLUMNS * len(model.joints)
+        if model.loading:
+            self.width += N_LOAD_COLUMNS
+        if model.joints or model.loading:
+            self.ledger[Ledger.DRIVE_WORK] += self.find_interface_energy()
+        self.periodic = (
+            self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, SineDrive) else None
+        )
+        # `is_periodic` uses the states at the last check and one cycle before the next one, their sizes, and the
+        # energies one cycle before.
+        self.looks = np.zeros((3, sum(map(len, self._carried_state()))))
+        self.books = np.zeros(14)
+        self.change = np.inf
+
+    def fork(self, drive):
+        """Return a copy of the march as it is, which continues under another drive."""
+        twin = copy(self)
+        twin.drive = drive
+        twin.periodic = None
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                setattr(twin, name, value.copy())
+        twin.contact, twin.faces, twin.load = map(
+            arrays.copy_arrays, (self.contact, self.faces, self.load)
+        )
+        return twin
+
+    def _carried_state(self) -> list:
+        """Return the state that the march carries to the next step, as rows of numbers of one kind.
+
+        The first row has the coordinates and the rates over the frequency of the drive, the others the
+        memories. The list is empty if no period brings the state back.
+        """
+        model = self.model
+        element = getattr(model, "element", None) or frictionless_model().element
+        memories = arrays.split_memory(self.contact, element)
+        if self.periodic is None or memories is None or getattr(model, "load", None) is not None:
+            return []
+        rows = [np.append(self.state[0], self.state[1] / self.drive.omega), *memories]
+        for k, joint in enumerate(model.joints):
+            memory = self.faces.mem[k, : joint.element.memory.size]
+            rows += arrays.split_element_memory(joint.element, memory)
+        return rows
+
+    def _sums_so_far(self) -> np.ndarray:
+        """Return the ledger, the totals and the second energies, (14,)."""
+        return np.concatenate([self.ledger, self.totals, self.second])
+
+    def is_periodic(self, n_left: int) -> bool:
+        """Return whether the motion has become periodic, so that `n_left` more cycles may be skipped.
+
+        It is to be called at the end of every cycle, or of those that `dynamics.periodicity.cycles_to_next_check` names.
+        """
+        number = self.done // self.prop.steps
+        size = self.looks.shape[1]
+        if (
+            not size
+            or self.periodic is None
+            or not (is_checked_after(number) or is_checked_after(number + 1))
+        ):
+            return False
+        rows = self._carried_state()
+        now = np.concatenate(rows)
+        if not is_checked_after(number):
+            self.looks[1] = now
+            self.books = self._sums_so_far()
+            return False
+        sizes = np.repeat([np.abs(row).max(initial=0.0) for row in rows], [*map(len, rows)])
+        self.looks[2] = np.maximum(self.looks[2], sizes)
+        scale = np.where(self.looks[2] > 0, self.looks[2], 1.0)
+        change = float(np.max(np.abs(now - self.looks[0]) / scale))
+        last_change = float(np.max(np.abs(now - self.looks[1]) / scale))
+        before = self.change
+        self.change = change
+        self.looks[0] = now
+        # changes over two intervals between checks are known
+        known = n_left > 0 and number >= 4 * FIRST_CHECK
+        return (
+            known
+            and max(change, last_change) <= PERIODIC_TOL
+            and bound_remaining_change(change, before, n_left, number) <= PERIODIC_TOL
+        )
+
+    def skip_cycles(self, count: int) -> None:
+        """Skip `count` cycles that are equal to the last one, directly after `is_periodic`."""
+        grown = count * (self._sums_so_far() - self.books)
+        self.ledger[SUMS] += grown[SUMS]
+        self.totals += grown[9:12]
+        self.second += grown[12:]
+        self.done += count * self.prop.steps
+
+    def move_to(self, place, rate) -> None:
+        """Move the march to coordinates and rates (n,) at the start of a cycle.
+
+        The contact slides there slowly.
+        """
+        path = np.array([self.modes.slide @ self.state[0], self.modes.slide @ place])
+        if path[0] != path[1]:
+            self._slide_contact(path)
+        self.state[:] = (place, rate)
+        self.done = 0
+
+    def _slide_contact(self, path) -> None:
+        """Move the memory of the contact along a slide path (2,) [m] in a second."""
+        self.loops.follow_path(
+            path,
+            1.0,
+            self.model.kind,
+            self.contact,
+            STEP_TOL * self.model.limit,
+            np.zeros((2, 2)),
+            np.zeros((2, 3)),
+        )
+
+    def reset_balance(self) -> None:
+        """Start the energy balance here, with the present energies, at the start of a cycle."""
+        self.ledger[:] = 0.0
+        self.totals[:] = 0.0
+        self.second[:] = 0.0
+        self.done = 0
+        self.ledger[Ledger.DRIVE_WORK] = self.find_modal_energy() + self.find_interface_energy()
+
+    def march_to_mark(self, cycles: int, window: int) -> Mark:
+        """March more cycles and return the `Mark` of the last `window` of them."""
+        parts = deque(maxlen=window)
+        for _ in range(cycles):
+            parts.append(self.march_cycle(self.prop.steps, 0, []))
+            if self.outcome is not None:
+                break
+        return make_mark(self, list(parts), read_output_extremes(parts, self))
+
+    def step_table(self, count: int) -> tuple:
+        """Return a table of `propagator.tables` for the next steps, and the row of the first of them."""
+        if self.periodic is not None:
+            return self.periodic, self.done % len(self.periodic)
+        return self.prop.tables(self.drive, self.done, max(count, 1)), 0
+
+    def make_response(self, rows, number) -> Response:
+        """Return the histories of the samples with step numbers `number` (k,)."""
+        out = _make_response(rows, number, self.prop.dt, self.modes, self.drive)
+        return self._add_elements(out, rows) if hasattr(self.model, "patch") else out
+
+    def _add_elements(self, out, rows) -> Response:
+        """Add the elements to the histories.
+
+        `extra` gets slides, slide_rates, forces and slips (k, i) of the interfaces, spring_forces (k, s), and
+        for elements in a plane lateral_slides and so on (k, i), which are 0 for the other elements.
+        """
+        modes = self.modes
+        faces = self.faces
+        columns = self._element_columns(rows)
+        ports, is_friction, mates = faces.links
+        is_second = mates < np.arange(mates.size)
+        is_interface = (is_friction == 1) & ~is_second
+        forces = columns[:, :, SampleColumn.FORCE]
+        push = -np.einsum("ke,en->kn", forces, faces.rows[ports]) / modes.mass
+        if self.model.patch is None:
+            # that of the first element is counted already
+            push += np.outer(out.force, modes.slide) / modes.mass
+        extra = out.extra | {"spring_forces": forces[:, ~(is_interface | is_second)]}
+        names = ("slides", "slide_rates", "forces", "slips")
+        if is_interface.any():
+            extra |= {name: columns[:, is_interface, k] for k, name in enumerate(names)}
+        for k, name in enumerate(names if is_second.any() else ()):
+            lateral = np.zeros((len(rows), is_interface.sum()))
+            lateral[:, mates[is_second]] = columns[:, is_second, k]
+            extra[f"lateral_{name}"] = lateral
+        return replace(out, acceleration=out.acceleration + push @ modes.output, extra=extra)
+
+    def _element_columns(self, rows) -> np.ndarray:
+        """Return the columns of the elements (k, e, 5) of samples."""
+        count = len(self.model.joints)
+        begin = 2 * self.modes.omega.size + N_SAMPLE_COLUMNS + rows.shape[1] - self.width
+        columns = rows[:, begin : begin + N_ELEMENT_COLUMNS * count]
+        return columns.reshape(len(rows), count, N_ELEMENT_COLUMNS)
+
+    def march_without_samples(self, steps: int, after_piece=None) -> bool:
+        """March to a step in long pieces without keeping samples.
+
+        Returns whether the march reached the step. `after_piece` is called after each piece.
+        """
+        size = self.prop.steps
+        while self.done < steps and self.outcome is None:
+            next_check = self.done // size + cycles_to_next_check(self.done // size)
+            look = next_check * size - self.done
+            count = min(steps - self.done, MAX_PIECE_STEPS, MAX_PIECE_CYCLES * size, look)
+            rows = self._march_rows(count, 0, [])
+            self.totals += self._step_energies(rows).sum(axis=1)
+            n_left = (steps - self.done) // size
+            if self.done % size == 0 and self.outcome is None and self.is_periodic(n_left):
+                self.skip_cycles(n_left)
+            if after_piece is not None:
+                after_piece()
+        return self.outcome is None
+
+    def march_cycles(self, size: int, stop: int, frames: int, snapshots: list) -> list:
+        """March a cycle, or several whole cycles at once.
+
+        No cycle goes beyond the step `stop` or the next look of `is_periodic`. With frames the last cycle is
+        marched by itself, in as many pieces, with a snapshot after each.
+
+        Parameters
+        ----------
+        size : int
+            Number of steps.
+        stop : int
+            Number of a step.
+        frames : int
+            Number of snapshots.
+        snapshots : list
+            Snapshots, which are appended.
+
+        Returns
+        -------
+        list of list of MarchedCycle
+            Whole cycles, and then the part of the next one that was begun if the march ends.
+        """
+        first = self.done
+        cycle_steps = self.prop.steps
+        n_cycles = min(
+            MAX_PIECE_CYCLES,
+            MAX_PIECE_STEPS // cycle_steps,
+            (stop - first) // cycle_steps,
+            cycles_to_next_check(-(-first // cycle_steps)),
+        )
+        if frames and first + n_cycles * cycle_steps == stop:
+            n_cycles -= 1
+        count = max(1, n_cycles) if size == cycle_steps else 1
+        rows = self._march_rows(count * size, frames if first + size == stop else 0, snapshots)
+        works = self._step_works(rows)
+        first_sum = 2 * self.modes.omega.size + FIRST_SUM
+        sums = self._running_sums(rows).T
+        samples = np.concatenate([rows[:, :first_sum], sums, rows[:, first_sum:]], axis=1)
+        n_whole = (len(rows) - 1) // size if size else 0
+        end = n_whole * size
+        parts = []
+        if n_whole:
+            cycle_rows = sliding_window_view(samples, size + 1, axis=0)[::size].swapaxes(1, 2)
+            cycle_works = works[:end].reshape(n_whole, size).sum(axis=1)
+            first_steps = range(first, first + end, size)
+            parts.append([*map(MarchedCycle, first_steps, cycle_rows, cycle_works)])
+        if end < len(rows) - 1 or not n_whole:
+            parts.append(
+                [MarchedCycle(first + end, samples[end:], works[None, end:].sum(axis=1)[0])]
+            )
+        return parts
+
+    def march_cycle(self, size: int, frames: int, snapshots: list) -> MarchedCycle:
+        """March `size` steps as one cycle.
+
+        Parameters
+        ----------
+        size : int
+            Number of steps.
+        frames : int
+            Number of snapshots.
+        snapshots : list
+            Snapshots, which are appended.
+
+        Returns
+        -------
+        MarchedCycle
+        """
+        ((cycle,),) = self.march_cycles(size, self.done + size, frames, snapshots)
+        return cycle
+
+    def _march_rows(self, size: int, frames: int, snapshots: list) -> np.ndarray:
+        """Return the rows (steps + 1, width) of `size` steps as the loop writes them.
+
+        The arguments are those of `march_cycles`.
+
+        Parameters
+        ----------
+        size : int
+            Number of steps.
+        frames : int
+            Number of snapshots.
+        snapshots : list
+            Snapshots, which are appended.
+        """
+        parts = []
+        edges = np.linspace(0, size, max(min(frames, size), 1) + 1).round().astype(int)
+        for piece in np.diff(edges) if size else [0]:
+            rows = np.empty((piece + 1, self.width))
+            rows[-1] = 0.0  # the entries of the step that follows the last one are not known yet
+            saved_state = copy_state(self.contact, *self._changing_arrays())
+            start = self._copy_before_piece()
+            n_steps, status = self._march_steps(int(piece), rows)
+            while status == MEMORY_FULL:
+                place = f"at step {self.done + n_steps}"
+                self.contact = enlarge_list(
+                    self.contact, saved_state, place, *self._changing_arrays()
+                )
+                n_steps, status = self._march_steps(int(piece), rows)
+            if start and self._has_diverged(rows[: n_steps + 1]):
+                for array, start_array in zip((*self.contact, *self._changing_arrays()), start):
+                    array[...] = start_array
+                n_steps, _ = self._march_steps(n_steps - 1, rows)
+                status = EXCEEDS_TRAVEL
+                distance = format_length(self._output_distance(rows[n_steps]), 3)
+                self.message = (
+                    f"beyond a displacement of {distance} the motion grows without limit, because the "
+                    "force of the softening spring no longer pulls the block back; the run ended there"
+                )
+            self.done += n_steps
+            parts.append(rows[: n_steps + 1])
+            self.set_outcome(status)
+            if frames:
+                snapshots.append(self._snapshot(rows[n_steps]))
+            if self.outcome is not None:
+                break
+        rows = parts[0]
+        if len(parts) > 1:
+            rows = np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:])
+        self.second += self._sampled_works(rows).sum(), np.abs(self._step_works(rows)).sum()
+        return rows
+
+    def _copy_before_piece(self) -> tuple:
+        """Return copies of all arrays that steps change if a spring is nonlinear, else nothing."""
+        if all(joint.potential is None for joint in self.model.joints):
+            return ()
+        return tuple(array.copy() for array in (*self.contact, *self._changing_arrays()))
+
+    def _has_diverged(self, rows) -> bool:
+        """Return whether the last step ends far beyond the travel, or is not finite."""
+        return len(rows) > 1 and not (
+            self._output_distance(rows[-1]) <= DIVERGED_FACTOR * self.travel
+            and np.isfinite(rows[-1]).all()
+        )
+
+    def _output_distance(self, row) -> float:
+        """Return the distance of the output from rest [m] in a row."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            return abs(float(self.modes.output @ row[: self.modes.omega.size]))
+
+    def _march_steps(self, count: int, rows) -> tuple:
+        """March `count` steps into rows (count + 1, width); return the number of steps done and the status."""
+        table, row = self.step_table(count)
+        return self.loops.march(self.model, row, count, self._make_system(table, count), rows)
+
+    def _make_system(self, table, count: int) -> MarchArrays:
+        """Return the arrays that the compiled loop takes for the next steps."""
+        return MarchArrays(
+            motion=self.state,
+            modal_system=self.modal_system,
+            table=table,
+            interface=self.contact,
+            elements=self.faces,
+            press=self._load_of_steps(count),
+            ledger=self.ledger,
+            travel=float(self.travel),
+        )
+
+    def _initial_load(self):
+        """Return the load at the start; here it is constant."""
+        return arrays.ConstantLoad(np.zeros(0))
+
+    def _load_of_steps(self, count: int):
+        """Return the arrays of the load in the next steps."""
+        return self.load
+
+    def _running_sums(self, rows) -> np.ndarray:
+        """Return friction work, dissipated and created energy since the start at the rows (3, steps + 1) [J].
+
+        `march_cycles` inserts them into the rows as further columns.
+        """
+        parts = self._step_energies(rows)
+        sums = np.empty((3, parts.shape[1] + 1))
+        sums[:, 0] = self.totals
+        np.cumsum(parts, axis=1, out=sums[:, 1:])
+        sums[:, 1:] += self.totals[:, None]
+        self.totals = sums[:, -1].copy()
+        return sums
+
+    def _step_energies(self, rows) -> np.ndarray:
+        """Return the friction work, the dissipated and the created energy of the steps between the rows (3, steps) [J].
+
+        The dissipated energy is the work less the increase of the energy of the interface.
+        """
+        n = 2 * self.modes.omega.size
+        parts = np.zeros((3, len(rows) - 1))
+        parts[0] = self._step_works(rows)
+        lost = parts[0] - np.diff(rows[:, n + SampleColumn.ENERGY])
+        if lost.min(initial=0.0) == 0.0:
+            parts[1] = lost
+            return parts
+        # error of the work due to the tolerance of the step solution and to round-off of the slide
+        noise = self.model.limit * (
+            1e-12 * np.abs(np.diff(rows[:, n])) + 1e-15 * np.abs(rows[:-1, n])
+        )
+        np.copyto(parts[1], lost, where=lost > -noise)
+        np.copyto(parts[2], -lost, where=lost < -noise)
+        return parts
+
+    def _step_works(self, rows) -> np.ndarray:
+        """Return the friction work of the steps between the rows [J]."""
+        return rows[:-1, 2 * self.modes.omega.size + SampleColumn.STEP_WORK]
+
+    def _sampled_works(self, rows) -> np.ndarray:
+        """Return the friction work of the steps between the rows [J] from slides and forces alone.
+
+        Blows at the end of a step, of slides that stop, have no slide from which their work could be read;
+        their work is added if all friction is set-valued.
+        """
+        n = 2 * self.modes.omega.size
+        model = self.model
+        has_smooth_friction = not model.joints or getattr(model, "patch", None) is not None
+        works = np.zeros(len(rows) - 1)
+        if has_smooth_friction:
+            works = sampled_work(rows[:, n], rows[:, n + SampleColumn.FORCE])
+        blows = rows[:-1, n + SampleColumn.STEP_WORK].copy()
+        for joint, columns in zip(model.joints, self._element_columns(rows).transpose(1, 2, 0)):
+            if joint.potential is not None:
+                continue
+            slide = columns[SampleColumn.SLIDE]
+            mean_force = columns[SampleColumn.MEAN_FORCE, :-1]
+            is_smooth = bool(joint.element.kernels)
+            works += sampled_work(
+                slide, columns[SampleColumn.FORCE], None if is_smooth else mean_force
+            )
+            blows -= mean_force * np.diff(slide)
+            has_smooth_friction |= is_smooth
+        return works if has_smooth_friction else works + blows
+
+    def _changing_arrays(self) -> list:
+        """Return the arrays that a step changes, without those of the contact."""
+        arrays_of_elements = [*self.faces[:-1]]
+        if self.model.joints:
+            arrays_of_elements += self.faces.stops
+        return [self.state, self.ledger, *arrays_of_elements]
+
+    def set_outcome(self, status: int) -> None:
+        """Set outcome and message from the status of a compiled loop."""
+        if status == EXCEEDS_TRAVEL:
+            self.outcome = Outcome.EXCEEDS_TRAVEL
+        if status == NOT_FINITE:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = (
+                f"at step {self.done} the computed motion is not a finite number; raise "
+                "accuracy.steps_per_cycle"
+            )
+        if status == NO_CONTACT_SET:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = (
+                f"at step {self.done} the method could not determine which points are in contact; raise "
+                "accuracy.steps_per_cycle"
+            )
+
+    def _snapshot(self, row) -> dict:
+        n = 2 * self.modes.omega.size
+        return {
+            "time": self.done * self.prop.dt,
+            "slide": row[n + SampleColumn.SLIDE],
+            "rate": row[n + SampleColumn.SPEED],
+            "force": row[n + SampleColumn.FORCE],
+            "slip": row[n + SampleColumn.SLIP],
+        } | self.model.picture_fields(self.contact)
+
+    def check_steps(self) -> None:
+        """Set the outcome to not_converged if a step missed its residual; the samples are kept."""
+        if self.ledger[Ledger.N_UNCONVERGED]:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = (
+                f"{int(self.ledger[Ledger.N_UNCONVERGED])} of {self.done} time steps have an error of the friction force "
+                f"above the permitted {STEP_TOL:.0e} of the friction limit; raise accuracy.steps_per_cycle"
+            )
+
+    def read_rates_and_slips(self, rows) -> tuple:
+        """Return slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in the rows of `march_cycles`."""
+        n = 2 * self.modes.omega.size
+        columns = self._element_columns(rows)
+        rates = [rows[:, n + SampleColumn.SPEED], columns[:, :, SampleColumn.SPEED]]
+        slips = [rows[:, n + SampleColumn.SLIP], columns[:, :, SampleColumn.SLIP]]
+        return np.column_stack(rates), np.column_stack(slips)
+
+    def find_modal_energy(self) -> float:
+        """Return the kinetic and elastic energy of the modes [J]."""
+        return (
+            0.5
+            * self.modes.mass
+            * float(np.sum(self.state[1] ** 2 + (self.modes.omega * self.state[0]) ** 2))
+        )
+
+    def find_interface_energy(self) -> float:
+        """Return the energy [J] stored in the interfaces, the springs and the normal contact."""
+        n = 2 * self.modes.omega.size
+        rows = np.zeros((1, self.width))
+        table = np.zeros((1, 4 * n + 3))
+        system = self._make_system(table, 0)._replace(travel=np.inf, ledger=np.zeros(len(Ledger)))
+        self.loops.march(self.model, 0, 0, system, rows)
+        energy = rows[0, n + SampleColumn.ENERGY]
+        if self.model.loading:
+            energy += rows[0, LoadColumn.ENERGY - N_LOAD_COLUMNS]
+        for joint, columns in zip(self.model.joints, self._element_columns(rows)[0]):
+            if joint.potential is not None:
+                energy += joint.potential(columns[0])
+        return float(energy)
+
+    def energy_balance(self) -> dict:
+        """Return the energy balance [J] and the counters by name."""
+        names = (
+            "work_in",
+            "viscous",
+            "power",
+            "friction",
+            "peak_stored",
+            "iterations",
+            "worst_iterations",
+        )
+        balance = dict(zip(names, map(float, self.ledger))) | {
+            "stored": self.find_modal_energy() + self.find_interface_energy()
+        }
+        balance |= {
+            "booked": float(self.ledger[Ledger.FRICTION_WORK]),
+            "sampled": float(self.second[0]),
+            "passed": float(self.second[1]),
+        }
+        if hasattr(self.contact, "status"):
+            status = getattr(self.contact, "statuses", self.contact.status[None])
+            totals = status.sum(axis=0)
+            balance |= {
+                "created": float(totals[STATUS.created]),
+                "dissipated": float(totals[STATUS.dissipated]),
+                "substeps": float(totals[STATUS.n_extra]),
+                "strips": float(status[:, STATUS.max_strips].max()),
+            }
+        return balance
