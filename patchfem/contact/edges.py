@@ -34,22 +34,6 @@ class ContactEdge(NamedTuple):
     position: float
 
 
-class EdgeValues(NamedTuple):
-    """Quantities that depend on where a contact ends, numbers or (q,).
-
-    - length: length in contact [m]; the mean of strips.
-    - width: distance between the first and the last end [m].
-    - normal, tangential: stiffness [N/m].
-    - rotational: stiffness [N m/rad].
-    """
-
-    length: float
-    width: float
-    normal: float
-    tangential: float
-    rotational: float
-
-
 def edge_offset_fraction(aspect):
     """Return the offset of an edge over the length of the last cell in contact.
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from ...contact.active_set import patch_problem
 from ...contact.conjugate_gradients import solve_by_gradients
-from ...contact.edges import EdgeValues
 from ...contact.half_space.layer import end_compliance, layer_compliance
 from ...contact.half_space.point_compliance import (
     PointCompliance,
@@ -27,6 +26,7 @@ from ...elasticity.lapack import one_thread
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...model import profile
 from ...model.pieces import make_elastic_layers
+from .edge_values import EdgeValues
 from .measures import (
     MIN_EDGE_OFFSET,
     PEAK_MEASURES,

@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact.batch.intervals import ContactBatch, Intervals
-from ...contact.edges import EdgeValues
 from ...contact.unilateral import RESIDUAL_TOL
 from ...core import ContactState, Outcome, frozen_array
 from ...elasticity.lapack import one_thread
 from ...mesh.tensor import TensorGrid
 from .condensed import Pair, shared_pair, shared_pairs
+from .edge_values import EdgeValues
 from .measures import (
     MIN_ERROR,
     UNRESOLVED_NODES,

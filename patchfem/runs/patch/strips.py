@@ -19,6 +19,7 @@ from ...contact.strips import (
     strips_stiffness,
 )
 from ...core import Compliance, ContactState, frozen_array
+from .edge_values import EdgeValues
 from .skin import MIN_RELATIVE_PRESSURE, cut_off_pressure, skin_law
 
 
@@ -99,7 +100,7 @@ def rotational_stiffness(state, c, x, weight) -> float:
     return out
 
 
-def strip_edge_values(patch) -> edges.EdgeValues:
+def strip_edge_values(patch) -> EdgeValues:
     """Return the extent of contact and the stiffnesses of a pressed patch in strips."""
     weight = patch.pair.compliance.interface.weight / len(patch.strips.offsets)
     if isinstance(patch.skin, SmoothAsperities):
@@ -107,7 +108,7 @@ def strip_edge_values(patch) -> edges.EdgeValues:
     return _between_nodes(patch, weight)
 
 
-def _behind_skin(patch, weight) -> edges.EdgeValues:
+def _behind_skin(patch, weight) -> EdgeValues:
     """Return the edge values of strips with a smooth asperity layer."""
     state = patch.strips
     x = patch.x
@@ -124,7 +125,7 @@ def _behind_skin(patch, weight) -> edges.EdgeValues:
     ratio = patch.model.interface.skin.tangential_ratio
     first = min(interval[0, 0] for interval in intervals)
     last = max(interval[-1, 1] for interval in intervals)
-    return edges.EdgeValues(
+    return EdgeValues(
         length=float(sum(np.diff(interval).sum() for interval in intervals) / count),
         width=float(last - first),
         normal=strips_stiffness(normal, weight, state),
@@ -133,7 +134,7 @@ def _behind_skin(patch, weight) -> edges.EdgeValues:
     )
 
 
-def _between_nodes(patch, weight) -> edges.EdgeValues:
+def _between_nodes(patch, weight) -> EdgeValues:
     """Return the edge values of strips whose contact ends between nodes (`contact.edges`)."""
     state = patch.strips
     x = patch.x
@@ -162,4 +163,4 @@ def _between_nodes(patch, weight) -> edges.EdgeValues:
         last = max(last, intervals[-1, 1])
         motions = ((normal, unit), (tangential, unit), (normal, x))
         stiffnesses += [edges.set_stiffness(c, force > 0, motion, ends) for c, motion in motions]
-    return edges.EdgeValues(float(length / count), float(last - first), *map(float, stiffnesses))
+    return EdgeValues(float(length / count), float(last - first), *map(float, stiffnesses))

@@ -11,6 +11,7 @@ from ...contact import edges, stiffness
 from ...core import Outcome
 from ...elasticity.lapack import one_thread
 from . import strips
+from .edge_values import EdgeValues
 from .press import Patch
 
 # a parabola may have at most this many times the curvature of its neighbour on a smooth curve
@@ -102,7 +103,7 @@ def _border_pressures(x, sigma) -> np.ndarray:
     return peaks
 
 
-def static_values(length: float, area: float, state, peak, edge_values: edges.EdgeValues) -> dict:
+def static_values(length: float, area: float, state, peak, edge_values: EdgeValues) -> dict:
     """Return the values of the static measures by name, numbers or (q,) of q patches.
 
     Parameters
@@ -160,7 +161,7 @@ def _values(patch: Patch) -> dict:
     """Return the values of a patch without a node at a step."""
     state = patch.strips
     sigma = patch.pressure.sigma_n[None] if state is None else state.pressure
-    edge_values = edges.EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0)
+    edge_values = EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0)
     if state is None and patch.pressure.outcome is not Outcome.NO_CONTACT:
         with one_thread():
             edge_values = _edge_values(patch)
@@ -182,12 +183,12 @@ def _values(patch: Patch) -> dict:
     return out
 
 
-def _edge_values(patch: Patch) -> edges.EdgeValues:
+def _edge_values(patch: Patch) -> EdgeValues:
     """Return the quantities of a patch without strips that depend on where its contact ends."""
     x = patch.x
     ends = contact_ends(patch)
     intervals = contact_intervals(patch, ends)
-    return edges.EdgeValues(
+    return EdgeValues(
         length=float(np.diff(intervals).sum()),
         width=float(intervals[-1, 1] - intervals[0, 0]),
         normal=edges.set_stiffness(patch.pieces.normal, patch.active, np.ones(x.size), ends),
