@@ -52,7 +52,7 @@ def move_cases(
         for model, elements in zip(models, fine)
     ]
     steps = lane_steps.steps_at_rate(rates, lane_steps.PATCH_STEPS)
-    max_size = load(f"{march.HERE}.table_curve_kernels").N_YIELDS - 1
+    max_size = load(f"{march.HERE}.rows_kernels").N_YIELDS - 1
     sizes = [max(a.stiffness.size, b.stiffness.size) for a, b in zip(fine, coarse)]
     fits = (steps > 0) & (np.array(sizes) < max_size)
     results = CaseResults.blank(len(models))
