@@ -14,10 +14,10 @@ from scene_texts import BENCH, COULOMB, LINEAR, POINT, SHORT, SMALL_PATCH, STRUC
 import patchfem as pf
 from patchfem import api
 from patchfem.core import Measure
+from patchfem.export import measure_object
 from patchfem.export.pages.sentences import format_with_error
-from patchfem.export.summary import measure_object
-from patchfem.response.rows import TABLE
-from patchfem.runs.results.result import meaning
+from patchfem.response import TABLE
+from patchfem.runs import meaning
 
 RIG = POINT + COULOMB + SHORT
 TWO = """\
@@ -180,7 +180,7 @@ def test_exact_a_text_and_a_file_are_told_apart(tmp_path):
 )
 def test_exact_a_value_sets_what_its_text_sets(key, written, value, tmp_path):
     (tmp_path / "a.toml").write_text(SMALL_PATCH, "utf-8")
-    from patchfem.scene.scene import load
+    from patchfem.scene import load
 
     by_text = load(tmp_path / "a.toml", [f"{key}={written}"])
     assert pf.load(tmp_path / "a.toml", **{key: value}).tables() == by_text.tables()

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numba.core.registry import CPUDispatcher
 
-from patchfem.compiled import jit
-from patchfem.compiled.jit import InlinedDispatcher, njit
+from patchfem.compiled import jit, njit
+from patchfem.compiled.jit import InlinedDispatcher
 
 KERNELS = """\
 import numpy as np

@@ -17,8 +17,8 @@ import pytest
 from import_graph import FUNCTIONS, import_cycles, import_graph, imports, sources, syntax_nodes
 
 from patchfem.exceptions import PatchfemError
-from patchfem.scene.keys.contact import Material, OnePiece
-from patchfem.scene.keys.tables import Tables
+from patchfem.scene import Material, Tables
+from patchfem.scene.keys.contact import OnePiece
 from patchfem.scene.keys.types import find_inner_table, is_array_attribute, list_allowed_values
 from patchfem.scene.text import EFFECT_KEYS
 

@@ -6,7 +6,7 @@ import pytest
 from scene_texts import BENCH
 
 from patchfem import cost_model, plan
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 
 def test_exact_a_machine_of_half_the_pace_takes_twice_as_long(monkeypatch):

@@ -113,7 +113,7 @@ def test_always_every_picture_of_the_studies_is_linked():
 
 
 def test_exact_the_scene_and_the_keys_of_the_readme():
-    from patchfem.scene.scene import loads
+    from patchfem.scene import loads
 
     scene = loads(re.search(r"```toml\n(.*?)```", text("README.md"), re.S)[1])
     assert scene.kind == "rig" and scene.contact.tilt.angle == pytest.approx(1e-4)

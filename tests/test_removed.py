@@ -10,9 +10,9 @@ from command_line import cli
 from scene_texts import COATED, COULOMB, DRIVE, KEYS, MODE, NONLOCAL, POINT, TRIANGLE
 
 import patchfem as pf
-from patchfem.mesh.files import read_pieces
+from patchfem.mesh import read_pieces
 from patchfem.scene.keys import removed
-from patchfem.surface.files.read import read_surface
+from patchfem.surface import read_surface
 
 RIG = POINT + COULOMB + MODE + DRIVE
 GROOVED = (

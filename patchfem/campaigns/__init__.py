@@ -2,3 +2,98 @@
 
 Read `cost` first.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "backbone.curves": ("compute_backbone",),
+    "backbone.records": (
+        "Backbone",
+        "Curve",
+    ),
+    "compare": (
+        "SurfaceRuns",
+        "run_both_surfaces",
+        "surface_runs_data",
+    ),
+    "cost": (
+        "Cost",
+        "TOLERANCE",
+        "changed_measures",
+        "cost_sentence",
+        "fastest_by_measure",
+        "measures_with_error",
+        "setting_curve",
+        "worst_error",
+        "worst_of_run",
+    ),
+    "fits.curve": (
+        "DEFAULT_STARTS",
+        "FittedCurve",
+        "fit_curve",
+        "is_curve",
+    ),
+    "fits.loop": (
+        "FittedLoop",
+        "fit_loop",
+    ),
+    "fits.loop_path": ("LoopOptions",),
+    "fits.patch": (
+        "FittedPatch",
+        "fit_patch",
+        "read_slides",
+    ),
+    "fits.patch_laws": (
+        "FITTED_LAWS",
+        "FittedLaw",
+    ),
+    "fits.problem": (
+        "FittedKeys",
+        "parse_ranges",
+    ),
+    "fits.wear": (
+        "FittedCoefficient",
+        "KEY",
+        "fit_wear",
+    ),
+    "numerical_settings": (
+        "NUMERICAL_SETTINGS",
+        "applicable_settings",
+    ),
+    "rows.cells": ("scores",),
+    "rows.condition_models": (
+        "FitRequest",
+        "GAIN_KEYS",
+    ),
+    "rows.fit": (
+        "FittedRows",
+        "RowsOptions",
+        "SAME_SCORE",
+        "fit_rows",
+    ),
+    "rows.null_models": ("NULL_MODELS",),
+    "rows.search": (
+        "SearchSettings",
+        "UNSTABLE",
+    ),
+    "sweeps.case_models": ("SweepScene",),
+    "sweeps.cases": ("Cases",),
+    "sweeps.estimate": (
+        "MAX_CASES_WITH_SUMMARY",
+        "MAX_CASES_WITH_TABLES",
+        "estimate_sweep",
+    ),
+    "sweeps.executors.cluster": ("environment_versions",),
+    "sweeps.parse_request": (
+        "Request",
+        "contradictions",
+        "read_cases",
+        "read_sweep",
+    ),
+    "sweeps.ranking": ("compute_sobol_indices",),
+    "sweeps.sweep": (
+        "RemainingTime",
+        "Work",
+        "format_duration",
+        "iterate_chunks",
+    ),
+}

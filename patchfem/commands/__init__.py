@@ -6,3 +6,16 @@ return at once. `shared` has the options and refusals of several commands.
 
 Read `run` first.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "shared": (
+        "Ended",
+        "Refused",
+        "print_message",
+    ),
+    "streams": (
+        "make_printable",
+        "prepare_streams",
+    ),
+}

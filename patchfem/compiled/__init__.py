@@ -44,6 +44,15 @@ from ..disk.installed import find_package_version
 from . import cache_limit, machine, prebuilt
 from .no_jit import load_uncompiled
 
+# names that other folders use, by module
+PUBLIC = {
+    "jit": (
+        "NJIT_INTERNAL",
+        "NJIT_NO_REFCOUNT",
+        "njit",
+    ),
+}
+
 PACKAGE_FOLDER = Path(__file__).parents[1]  # folder of the package
 # Modules of tuples that kernels take and of row numbers. They belong to the hash because the machine code depends on
 # the order of the fields and on the numbers.

@@ -13,3 +13,76 @@ set. Read `gaps`, `unilateral` and `active_set` first.
 `contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `polygon_kernels`,
 `press_path_kernels`), `batch` solves many cases at once, and `half_space` serves rows of thousands of points.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "active_set": ("patch_problem",),
+    "asperity_laws": (
+        "ExponentialAsperities",
+        "HertzAsperities",
+        "LinearAsperities",
+        "SmoothAsperities",
+    ),
+    "batch.intervals": (
+        "ContactBatch",
+        "Intervals",
+    ),
+    "conjugate_gradients": ("solve_by_gradients",),
+    "contact_sets": ("ContactSets",),
+    "edges": (
+        "MIN_RELATIVE_PRESSURE",
+        "contact_intervals",
+        "edge_offset_fraction",
+        "find_pressure_edges",
+        "parabola_change",
+        "snap_to_steps",
+    ),
+    "gaps": ("SHAPE_PROPERTIES",),
+    "half_space.layer": (
+        "end_compliance",
+        "layer_compliance",
+    ),
+    "half_space.point_compliance": (
+        "PointCompliance",
+        "smooth_modes",
+    ),
+    "press_kernels": (
+        "compute_energy",
+        "find_set",
+        "press_state",
+    ),
+    "press_path_kernels": ("path_mean",),
+    "set_arrays": (
+        "N_BUILT",
+        "REFERENCE_LOAD",
+        "REFERENCE_MOMENT",
+        "REFERENCE_STIFFNESS",
+        "SetArrays",
+        "make_set_arrays",
+        "name_set",
+    ),
+    "stiffness": (
+        "coupled_stiffness",
+        "rotational_stiffness",
+        "tangential_stiffness",
+    ),
+    "strip_compliance": (
+        "StripCompliance",
+        "WarmStart",
+    ),
+    "strips": (
+        "HolderLoads",
+        "StripLayout",
+        "StripModel",
+        "press_strips",
+        "split_into_strips",
+        "strip_offsets",
+        "strips_stiffness",
+    ),
+    "unilateral": (
+        "INDEFINITE_MESSAGE",
+        "RESIDUAL_TOL",
+        "press",
+        "press_to_approach",
+    ),
+}

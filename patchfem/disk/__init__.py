@@ -5,3 +5,43 @@ failed, with the previous file untouched. `atomic_write` writes files, `exchange
 process write to a folder, `open_with_timeout` opens files for reading, `user_cache` keeps files between runs,
 `file_hashes` detects files that changed, `installed` lists package versions. Read `atomic_write` first.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "atomic_write": (
+        "RESUMABLE_FOLDERS",
+        "WriteError",
+        "describe_space_shortage",
+        "explain_mkdir_error",
+        "explain_write_error",
+        "is_partial_name",
+        "open_lossy",
+        "write_atomically",
+        "write_bytes",
+        "write_in_partial_folder",
+        "write_rows",
+        "write_text",
+    ),
+    "exchange": (
+        "defer_signals",
+        "make_old_folder_path",
+        "replace_folder",
+        "restore_folder",
+    ),
+    "file_hashes": (
+        "hash_named_files",
+        "iterate_texts",
+    ),
+    "installed": (
+        "find_package_version",
+        "list_installed_versions",
+    ),
+    "lock": ("FolderLock",),
+    "open_with_timeout": ("open_for_reading",),
+    "user_cache": (
+        "find_cache_base",
+        "make_process_folder",
+        "prepare_folder",
+        "write_cache_file",
+    ),
+}

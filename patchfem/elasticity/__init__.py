@@ -20,3 +20,60 @@ complement S = K_ss - K_si K_ii^-1 K_is.
 - `recovery` computes stresses and their errors, `coating_traction` the traction below a coating.
 - `cache` stores compliances on disk; `lapack` loads BLAS and LAPACK quickly.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "cache": (
+        "grid_key",
+        "load_arrays",
+        "mesh_key",
+        "store_arrays",
+    ),
+    "coating_traction": (
+        "compute_coating_traction",
+        "interpolate_coating_traction",
+    ),
+    "elasticity": (
+        "InterfaceCompliance",
+        "Layers",
+        "Piece",
+        "compute_displacement",
+        "interface_compliance",
+        "lame",
+        "make_piece",
+        "von_mises",
+    ),
+    "fronts": (
+        "SparseFactor",
+        "ZeroEnergyMotion",
+    ),
+    "grid_fronts": (
+        "predict_bytes",
+        "predict_seconds",
+    ),
+    "lapack": (
+        "cho_factor",
+        "cho_solve",
+        "dpotrf",
+        "dpotrs",
+        "dtrsm",
+        "dtrtri",
+        "one_thread",
+    ),
+    "mortar": (
+        "PieceInterface",
+        "join_pieces",
+    ),
+    "recovery": (
+        "Cells",
+        "Recovery",
+        "StressError",
+        "centre_stress",
+        "choose_rounding_step",
+        "estimate_error",
+        "fit_recovery",
+        "get_cells",
+        "make_points",
+    ),
+    "substructure": ("Substructure",),
+}

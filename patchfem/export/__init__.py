@@ -26,3 +26,107 @@ In: a `Result`. Out: files. A module imports only entries of this list that come
 
 Read `folder` first.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "backbone": (
+        "COLUMNS",
+        "backbone_charts",
+        "backbone_contents",
+        "format_backbone",
+        "write_backbone",
+    ),
+    "convert": (
+        "export_results",
+        "view_results",
+    ),
+    "cost": (
+        "cost_data",
+        "format_cost",
+        "format_details",
+        "write",
+        "write_picture",
+    ),
+    "drawing.pictures": ("draw_charts",),
+    "drawing.swept": ("sweep_chart",),
+    "fields.bodies": ("write_fields",),
+    "fits.options": ("FitOptions",),
+    "fits.request": (
+        "Listener",
+        "choose_kind",
+        "fit_into",
+    ),
+    "folder": (
+        "is_complete",
+        "run_into",
+        "save_run",
+        "saves_state",
+        "write_run_page",
+    ),
+    "histories": ("result_contents",),
+    "lab.imported": (
+        "Estimate",
+        "convert_file",
+    ),
+    "lab.structures": ("export_structure",),
+    "pages.driven": ("list_changed_keys",),
+    "pages.headline": ("summarise_sweep",),
+    "pages.released": ("describe_release",),
+    "pages.sentences": (
+        "format_measures",
+        "headline_sentence",
+        "notebook_html",
+        "tolerance_sentence",
+        "verdict_sentence",
+    ),
+    "report": ("draw_axes",),
+    "reports": ("write_report",),
+    "results": ("Folder",),
+    "summary": (
+        "count_cycles",
+        "measure_object",
+        "read_summary",
+        "summarise_run",
+        "write_json",
+    ),
+    "surfaces.compare": (
+        "comparison_data",
+        "format_comparison",
+        "pressed_traces",
+        "write_difference",
+        "write_trace",
+    ),
+    "surfaces.pairs": (
+        "compare_pairs",
+        "format_pairs",
+        "pairs_data",
+    ),
+    "surfaces.roughness": (
+        "format_roughness",
+        "means_data",
+        "means_lines",
+        "roughness_data",
+        "write_surfaces",
+    ),
+    "surfaces.worn": (
+        "format_wear",
+        "wear_data",
+        "wear_verdict",
+    ),
+    "surfaces.worn_runs": ("compare_runs",),
+    "sweeps.folder": ("case_folder_name",),
+    "sweeps.manifest": (
+        "hash_request",
+        "read_manifest",
+        "write_manifest",
+    ),
+    "sweeps.page": ("sweep_table",),
+    "sweeps.run": (
+        "SweepTarget",
+        "collect_shards",
+        "compute_in_memory",
+        "sweep_into",
+    ),
+    "sweeps.tables": ("table_contents",),
+    "written": ("shorten_number",),
+}

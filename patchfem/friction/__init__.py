@@ -5,3 +5,113 @@ the step (`protocol`). `laws/` has one law per file, `bonds/` the sum over bonds
 *kernels are compiled and have their NumPy form beside them. `grooves` has matched grooves, whose flanks the load climbs.
 `path_work` computes the friction work of samples. Read `protocol` first, then `laws/elastic_plastic`.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "bonds.engines": (
+        "RequestedEngine",
+        "choose_engine",
+        "unsupported_reason",
+    ),
+    "bonds.list_forms_kernels": (
+        "FORM_MOMENTS",
+        "FORM_POWER",
+        "FORM_REPORT_GROWING",
+    ),
+    "bonds.list_kernels": (
+        "list_force",
+        "list_mean",
+        "list_slope",
+        "list_step",
+    ),
+    "bonds.list_numbers": (
+        "MAX_DAMAGE",
+        "MAX_STRIPS_PER_LENGTH",
+        "gamma_table",
+        "law_numbers",
+        "list_capacity",
+        "make_clocks",
+        "make_status",
+        "sum_form",
+    ),
+    "bonds.list_rows_kernels": (
+        "CLOCK",
+        "LAW",
+        "N_ROWS",
+        "STATUS",
+    ),
+    "bonds.parameters": (
+        "Bonds",
+        "MAX_LIST_SECONDS",
+        "growth_path_ratio",
+    ),
+    "bonds.point_kernels": (
+        "MAX_SHORT_PATH",
+        "bond_end_stretch",
+        "bond_mean",
+        "bond_step",
+        "elastic_bond_mean",
+        "elastic_bond_step",
+        "grow",
+        "press_point",
+        "short_bond_mean",
+        "short_bond_step",
+    ),
+    "bonds.quadrature": ("Quadrature",),
+    "bonds.recursion": ("FirstOrderBonds",),
+    "bonds.spread": ("carried_fraction",),
+    "bonds.temperature": ("surface_temperature_rise",),
+    "flags_kernels": (
+        "FASTMATH_FLAGS",
+        "NJIT_INLINE",
+        "NJIT_KERNEL",
+    ),
+    "grooves": ("Grooves",),
+    "laws.coulomb": ("Coulomb",),
+    "laws.coulomb_kernels": ("solve_coulomb_step",),
+    "laws.elastic_plastic": (
+        "masing_loop",
+        "parallel_element",
+    ),
+    "laws.elastic_plastic_kernels": (
+        "press_springs",
+        "spring_end",
+        "spring_mean",
+        "spring_step",
+        "update_memory",
+    ),
+    "laws.iwan": ("max_yield_displacement",),
+    "laws.lugre": ("LuGre",),
+    "laws.plane_kernels": (
+        "advance_straight",
+        "solve_plane_step",
+        "update_plane_memory",
+    ),
+    "laws.stretch": (
+        "growth_numbers",
+        "points_element",
+        "unpack_bonds",
+    ),
+    "laws.stretch_kernels": (
+        "end_motion",
+        "relax_stretch",
+        "start_motion",
+        "state_rates",
+    ),
+    "laws.tanh": ("TanhLaw",),
+    "laws.tanh_kernels": ("HAS_SPEED_LAYER",),
+    "path_work": ("sampled_work",),
+    "protocol": (
+        "Element",
+        "Step",
+    ),
+    "protocol_kernels": (
+        "Reading",
+        "step_bond_length",
+    ),
+    "record": (
+        "make_law",
+        "steady_loop",
+        "stick_stiffness",
+    ),
+}

@@ -4,3 +4,29 @@ In: a residual as a function of parameters, or records over time. Out: best valu
 the data do not determine; frequencies, damping ratios and shapes of modes. Read `least_squares` first for
 fits of any model, and `measured_modes` for modes.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "least_squares": (
+        "Descent",
+        "Fit",
+        "Problem",
+        "SearchCounts",
+        "assemble_fit",
+        "run_descents",
+    ),
+    "measured_modes": (
+        "SHAPE_QUANTITIES",
+        "compute_decay_curve",
+        "estimate_record",
+        "identify_decay_modes",
+        "identify_driven_modes",
+        "list_shape_modes",
+    ),
+    "space": (
+        "CubeResidual",
+        "make_space_filling_points",
+    ),
+    "two_models": ("TwoModels",),
+    "words": ("describe_fit",),
+}

@@ -11,3 +11,52 @@ Files of laboratories: `records` selects and converts channels that share one ti
 Matrices of finite-element programs: `matrices`, with the formats of Nastran in `nastran`.
 Read `columns` first.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "cells": (
+        "NUMBER_PATTERN",
+        "TableFormat",
+        "parse_header",
+        "read_text",
+        "split_cells",
+    ),
+    "columns": ("read_columns",),
+    "laboratory": ("read_records",),
+    "loops": (
+        "Loop",
+        "read_loop",
+    ),
+    "matlab": ("read_variables",),
+    "matrices": (
+        "Matrix",
+        "align_rows",
+        "compute_form_deviation",
+        "estimate_rounding",
+        "read_matrix",
+    ),
+    "measured": (
+        "is_readable",
+        "read_table",
+    ),
+    "records": (
+        "parse_requests",
+        "shift_to_zero",
+    ),
+    "signals": (
+        "read_signal",
+        "read_spectrum",
+    ),
+    "slides": ("read_slide",),
+    "units": (
+        "CHANNEL_UNITS",
+        "FORCE_UNITS",
+        "SI_UNITS",
+        "SLIDE_UNITS",
+    ),
+    "universal": (
+        "FunctionType",
+        "OrdinateType",
+        "read_datasets",
+    ),
+}

@@ -11,3 +11,41 @@ In: sizes and layers, or a file with tagged cells and edges. Out: a `TensorGrid`
   builds both pieces; `recognise` detects tensor grids; `pairs` joins two pieces into one mesh.
 - `nodal_averages` adds up values over the cells around a node.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "anymesh": (
+        "PieceMesh",
+        "cell_edges",
+    ),
+    "ends": (
+        "End",
+        "SHARP_END",
+    ),
+    "files": (
+        "read_bodies",
+        "read_pieces",
+        "write_mesh",
+    ),
+    "grading": (
+        "LENGTH_TOL",
+        "Layout",
+        "divide_into_columns",
+        "divide_into_rows",
+        "tributary_lengths",
+    ),
+    "nodal_averages": (
+        "Patches",
+        "collect_patches",
+    ),
+    "recognise": (
+        "find_holes",
+        "measure_fixed_length",
+    ),
+    "shaped": ("shaped_grid",),
+    "tensor": (
+        "ROW_GROWTH",
+        "TensorGrid",
+        "graded_grid",
+    ),
+}

@@ -18,3 +18,104 @@ would run, `run` runs it. A module imports only its own entry of this list and e
 13. `run`  from a plan to its result
 14. `batch`  many models at once
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "batch.batches": (
+        "batch_compile_seconds",
+        "choose_batch",
+        "solve_models",
+    ),
+    "batch.case_results": (
+        "CaseResults",
+        "FAILED_OUTCOME",
+    ),
+    "batch.meshes": (
+        "Shared",
+        "with_shared_meshes",
+    ),
+    "batch.watched": ("MotionObserver",),
+    "bench.engine": (
+        "choose_smooth_bond_sum",
+        "steps_per_cycle",
+    ),
+    "bench.errors": ("estimate_pass_errors",),
+    "bench.ledger": ("PassOptions",),
+    "joint": (
+        "remove_joint",
+        "stuck_patch_stiffness",
+    ),
+    "patch.faces": (
+        "UNKNOWN",
+        "has_error_meshes",
+        "static_measures_without_errors",
+    ),
+    "patch.jenkins_elements": (
+        "elements",
+        "strip_elements",
+    ),
+    "patch.ladder": (
+        "solve_all",
+        "solve_split",
+    ),
+    "patch.measures": ("measures",),
+    "patch.meshes": ("geometry_key",),
+    "patch.press": ("areas",),
+    "patch.result": ("bodies",),
+    "patch.strength": (
+        "Strength",
+        "YIELDING_NEGLECTED",
+        "yield_strength",
+    ),
+    "patch.values": (
+        "contact_ends",
+        "contact_intervals",
+    ),
+    "plan": (
+        "GROUPS",
+        "Plan",
+        "compile_words",
+    ),
+    "results.patch_rows": (
+        "TABLE",
+        "minimum_value",
+        "unknown_measures",
+    ),
+    "results.result": (
+        "Result",
+        "choices",
+        "meaning",
+        "measure_engines",
+        "patch_surface",
+        "shorten_file_names",
+    ),
+    "rig.costs": ("count_merges",),
+    "rig.decays": (
+        "coarse_laws",
+        "decay_rows",
+        "laws_on",
+        "mesh_error",
+        "mesh_errors_of_decay",
+        "slip_sentences",
+        "static_rows",
+        "with_automatic_method",
+    ),
+    "rig.engines": (
+        "ENGINES",
+        "PIECES",
+        "SMOOTH",
+        "motion_properties",
+    ),
+    "rig.numerics": ("choose",),
+    "rig.pieces": ("YieldingElements",),
+    "rig.plan": (
+        "drive_and_knee",
+        "stuck_stiffness",
+    ),
+    "rig.solve": ("solve",),
+    "run": (
+        "StateFile",
+        "marches",
+    ),
+    "wear.evolve": ("evolve",),
+}

@@ -4,3 +4,98 @@ In: text of a scene and --set words. Out: `Scene`, frozen tables of SI values wi
 `keys/` holds the keys and their kinds, `rules/` what excludes or needs what, `text` the resolved scene.
 Read `scene` first, then `keys/tables`. README.md in this folder explains every key.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "axes": (
+        "Axis",
+        "FormattedNumbers",
+        "LENGTH_KEY",
+        "SampledRange",
+        "describe_ranges",
+        "make_axis",
+        "read_axes",
+        "read_lengths",
+    ),
+    "files": (
+        "file_exists",
+        "list_named_files",
+        "require_files",
+    ),
+    "keys.contact": (
+        "Asperities",
+        "Coating",
+        "Contact",
+        "Material",
+        "compute_outermost_strip_distance",
+    ),
+    "keys.lookup": ("find_key",),
+    "keys.materials": (
+        "MATERIALS",
+        "THERMAL_PROPERTIES",
+        "YIELD_STRENGTHS",
+    ),
+    "keys.memoize": ("memoize",),
+    "keys.quantities": (
+        "NUMBER_PATTERN",
+        "UNIT_FACTORS",
+        "parse_quantity",
+    ),
+    "keys.removed": ("describe_removed_option",),
+    "keys.tables": (
+        "Drive",
+        "Friction",
+        "Structure",
+        "Tables",
+        "Temperature",
+    ),
+    "keys.types": ("find_meaning",),
+    "lines": (
+        "locate_key",
+        "number_items_from_one",
+        "split_key",
+    ),
+    "overrides": (
+        "BaseScene",
+        "PlainNumbers",
+    ),
+    "ranges": (
+        "Range",
+        "read_ranges",
+    ),
+    "rules.accuracy": (
+        "has_effect",
+        "list_fixed_settings",
+    ),
+    "rules.limits": ("find_lateral_slide_obstacle",),
+    "rules.methods": (
+        "EngineSupport",
+        "Joint",
+        "MotionFeatures",
+        "find_first_unsupported",
+        "find_unsupported_feature",
+    ),
+    "scene": (
+        "Scene",
+        "load",
+        "loads",
+        "move_scene",
+        "read_sweep_axes",
+    ),
+    "schema": ("make_schema",),
+    "sets": (
+        "find_oversized_lengths",
+        "format_assignments",
+        "format_scene",
+        "format_values",
+        "require_units",
+    ),
+    "starting": (
+        "NEXT_VERBS",
+        "TEMPLATE_DESCRIPTIONS",
+        "find_shipped_scene",
+        "read_template",
+    ),
+    "text": ("format_toml",),
+    "toml_text": ("read_text",),
+}

@@ -8,3 +8,27 @@ or to a few modes of D^1/2 C D^1/2 for laws with memory; `fields` recovers tract
 the states of both. `mesh_correction` estimates the error of elements that yield node by node. Read
 `shear_modes` first.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "fields": (
+        "bond_shear_modes",
+        "element_fields",
+        "point_fields",
+    ),
+    "mesh_correction": (
+        "SPREAD_FACTOR",
+        "spread_elements",
+    ),
+    "shear_modes": (
+        "JenkinsSet",
+        "N_REFERENCE_MODES",
+        "N_SHEAR_MODES",
+        "comparison_mode_count",
+        "enough_modes",
+        "fewest_gauss_points",
+        "jenkins_set",
+        "modes_on_gauss",
+        "scale_limits",
+    ),
+}

@@ -5,3 +5,49 @@ drives with their signals. The modal coordinates follow
 z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4). Read `matrices` first for modes, and `drives` for
 signals.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "arrays": ("read_arrays",),
+    "drive_sizes": (
+        "DriveKeys",
+        "MAX_STORED_SAMPLES",
+        "MIN_SAMPLES_PER_CYCLE",
+        "choose_samples_per_cycle",
+        "count_cycles_per_level",
+        "count_repeat_cycles",
+        "estimate_peak_speed",
+        "find_decay_rate",
+        "find_drive_omega",
+        "find_first_period",
+        "find_max_acceleration",
+        "find_max_frequency_ratio",
+        "find_min_decay_rate",
+        "has_full_cycle",
+        "is_periodic",
+        "is_sinusoidal",
+    ),
+    "drives": ("make_release",),
+    "masses": ("set_lateral_displacements",),
+    "modal_fit": (
+        "ModalFit",
+        "add_mode",
+    ),
+    "places": (
+        "DIRECTION_NAMES",
+        "MeasuredModes",
+        "note_missing_mass",
+    ),
+    "reduced": (
+        "CRAIG_BAMPTON",
+        "reduce_matrices",
+    ),
+    "response": ("compute_receptance",),
+    "starts": (
+        "start_at_rest",
+        "start_from_base_step",
+        "start_from_output_displacement",
+        "start_from_values",
+    ),
+    "universal": ("read_universal",),
+}

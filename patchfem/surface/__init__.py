@@ -4,3 +4,86 @@ In: files of traces and areal scans (`files`). Out: levelled heights averaged ov
 interface nodes (`nodes`), roughness with intervals (`roughness`), and what changed between two
 traces (`compare`) or two scans (`scans`). Read `profile` first, then `nodes`.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "areal": ("level_plane",),
+    "compare.compare": (
+        "AMPLITUDE",
+        "Comparison",
+        "SLOPE",
+    ),
+    "compare.pairs": (
+        "average_pairs",
+        "collect_quantities",
+        "compare_pairs",
+        "find_group",
+        "parse_quantity",
+        "read_pairs",
+    ),
+    "compare.ratios": (
+        "correlate_traces",
+        "divide_sizes",
+        "measure_size",
+        "resample",
+    ),
+    "compare.reference": ("NO_LIMIT",),
+    "compare.verdict": ("judge_files",),
+    "files.read": (
+        "read_profile",
+        "read_surface",
+    ),
+    "fine": (
+        "ELEMENTS_PER_WAVE",
+        "describe_lost_waves",
+        "fine_fraction",
+    ),
+    "nodes": (
+        "average_at_nodes",
+        "is_note",
+        "place_over_patch",
+    ),
+    "profile": (
+        "Profile",
+        "clean",
+        "level",
+        "resample_evenly",
+    ),
+    "quantity": (
+        "LEVEL",
+        "Quantity",
+        "make_unknown",
+    ),
+    "roughness.filter": ("mean_line",),
+    "roughness.form": ("parse_form",),
+    "roughness.means": (
+        "Means",
+        "average_reports",
+    ),
+    "roughness.parameters": (
+        "Heights",
+        "abbott_curve",
+    ),
+    "roughness.peaks": (
+        "Moments",
+        "PERSSON",
+        "Peaks",
+        "TraceMoments",
+        "gaussian_peaks",
+        "persson_stiffness",
+        "trace_moments",
+    ),
+    "roughness.report": (
+        "RoughnessReport",
+        "fitting_cutoff",
+        "make_report",
+    ),
+    "roughness.spectrum": (
+        "BAND",
+        "Spectrum",
+    ),
+    "scans.change": (
+        "Change",
+        "refuse_hidden_wear",
+    ),
+}

@@ -5,3 +5,15 @@ that wear adds to the gap. Archard's law is dh = kappa p ds, its energy form dh 
 together. `depth` solves one jump over many cycles together with the contact; `jumps` chooses the lengths of the jumps.
 Read `depth` first.
 """
+
+# names that other folders use, by module
+PUBLIC = {
+    "depth": ("wear_rates",),
+    "jumps": (
+        "WearProblem",
+        "WearState",
+        "replay_jumps",
+        "start_wear",
+        "take_jump",
+    ),
+}

@@ -21,7 +21,7 @@ from drawing import drawing
 from friction_forms import steady_bond_length
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.model.model import build
+from patchfem.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from patchfem.core import ModalBasis, SineDrive, frozen_array
-from patchfem.dynamics.events.elements import make_coulomb_elements
+from patchfem.dynamics import make_coulomb_elements
 from patchfem.dynamics.events.histories import evaluate_motion
 
 

@@ -10,7 +10,7 @@ from math import tanh
 
 import numpy as np
 
-from patchfem.compiled.jit import njit
+from patchfem.compiled import njit
 from patchfem.friction.flags_kernels import NJIT_NO_REFCOUNT
 
 # kinds of laws

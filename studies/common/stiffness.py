@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
-from patchfem.elasticity.elasticity import Piece
+from patchfem.elasticity import Piece
 from patchfem.elasticity.substructure import assemble_stiffness
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.formatting import format_length
-from patchfem.surface.profile import Profile
+from patchfem.surface import Profile
 
 DOMINANT = 80e-6  # [m] the 80 micron scale of the report, 4.D
 SHORTEST = 8e-6  # [m] a stylus of 12.5 um traces no shorter waves

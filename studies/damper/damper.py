@@ -22,10 +22,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 
-from patchfem.campaigns.fits.loop import LOAD_UNITS, fit_loop
-from patchfem.campaigns.fits.loop_path import LoopOptions
-from patchfem.inputs.loops import read_loop
-from patchfem.scene.scene import loads
+from patchfem.campaigns import LoopOptions, fit_loop
+from patchfem.campaigns.fits.loop import LOAD_UNITS
+from patchfem.inputs import read_loop
+from patchfem.scene import loads
 
 SOURCE = "ARTS-Laboratory, Dataset-Friction-Damper-with-Backlash, dataset-1, 1 Hz, 20 lb tension; CC BY-SA 4.0"
 LOAD = 10e3  # N, to which friction is referred; only load times friction is known

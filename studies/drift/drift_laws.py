@@ -11,10 +11,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "friction_ladder"))
 import ladder_cycles as ladder
 import today
 
-from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import FirstOrderBonds
+from patchfem.friction import FirstOrderBonds, Quadrature, Step
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.friction.protocol import Step
 
 LENGTH = ladder.LENGTH  # [m] bond length
 PERIOD = 1 / ladder.HERTZ  # [s] of a cycle

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import brentq
 
-from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction import Quadrature
 
 
 class OutOfReach(ArithmeticError):

@@ -17,7 +17,7 @@ from force_control import OutOfReach, drift
 from friction_forms import dither_drift, stretch_loop
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.friction.bonds.recursion import FirstOrderBonds
+from patchfem.friction import FirstOrderBonds
 
 FOLDER = Path(__file__).parent
 COLOURS = (BLUE, "#4f9bd9", "#e0975f", ORANGE)

@@ -12,14 +12,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 import today
 
-from patchfem.dynamics.march.models import (
-    bond_list_model,
-    jenkins_model,
-    load_instances,
-    points_model,
-)
-from patchfem.friction.bonds.list_kernels import list_mean, list_step
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.dynamics import bond_list_model, jenkins_model, load_instances, points_model
+from patchfem.friction import Bonds, list_mean, list_step
 from patchfem.friction.bonds.quadrature import cutoff_age
 
 loop_kernels = load_instances()

@@ -14,12 +14,11 @@ import problems
 from patchfem.core import InitialState, ModalBasis
 from patchfem.dynamics.march import march as marching
 from patchfem.dynamics.march import models
-from patchfem.model.model import build
-from patchfem.runs.patch.ladder import solve_all
+from patchfem.model import build
+from patchfem.runs import choose, solve_all
 from patchfem.runs.rig.interface import contact_model
-from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
-from patchfem.structure.drives import make_release
+from patchfem.structure import make_release
 
 FOLDER = Path(__file__).parent
 POINTS = 20  # per cycle at which slides are compared

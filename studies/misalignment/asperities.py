@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from halfspace import press_periodic, wave_numbers
 
 from patchfem.closed_forms import contact as exact
-from patchfem.contact.asperity_laws import HertzAsperities
+from patchfem.contact import HertzAsperities
 from patchfem.contact.unilateral import solve_forces
 
 CARBIDE = (250e9, 0.24)  # Young's modulus [Pa] and Poisson's ratio in rig.toml

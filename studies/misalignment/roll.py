@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import tilted
 from scipy.optimize import brentq
 
-from patchfem.runs.patch.measures import measures
+from patchfem.runs import measures
 from patchfem.runs.patch.press import press_patch
 from patchfem.runs.patch.values import values
 

@@ -37,7 +37,7 @@ import tilted
 from asperities import MEAN
 
 from patchfem.closed_forms import contact as exact
-from patchfem.contact.unilateral import press
+from patchfem.contact import press
 from patchfem.core import frozen_array
 from patchfem.runs.patch.press import with_linear_skin
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from patchfem.mesh.grading import Layout, divide_into_columns
-from patchfem.mesh.tensor import TensorGrid, graded_depth
-from patchfem.model.model import build
+from patchfem.mesh import Layout, TensorGrid, divide_into_columns
+from patchfem.mesh.tensor import graded_depth
+from patchfem.model import build
 from patchfem.model.patch import PatchModel
+from patchfem.runs import measures
 from patchfem.runs.patch.condensed import Pair, condense
-from patchfem.runs.patch.measures import measures
 from patchfem.runs.patch.press import Patch, press_patch
 from patchfem.scene import scene
 

@@ -10,11 +10,12 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from peer import measure_seconds
 
 from patchfem.closed_forms import contact as exact
+from patchfem.contact import press
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, frozen_array
-from patchfem.elasticity.elasticity import Layers, interface_compliance, make_piece
-from patchfem.mesh.tensor import TensorGrid, graded_rows
+from patchfem.elasticity import Layers, interface_compliance, make_piece
+from patchfem.mesh import TensorGrid
+from patchfem.mesh.tensor import graded_rows
 
 HALF = 0.1e-3  # half width a of the contact [m]
 LOAD = 9107.0  # [N/m]

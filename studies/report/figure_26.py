@@ -29,7 +29,7 @@ from study_text import read_answer
 
 import patchfem as pf
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.structure.response import compute_receptance
+from patchfem.structure import compute_receptance
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

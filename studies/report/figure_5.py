@@ -31,8 +31,8 @@ from study_text import read_answer
 import patchfem as pf
 from patchfem.dynamics.cycles import find_hermite_extremes
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.model.model import build
-from patchfem.scene.scene import load as load_scene
+from patchfem.model import build
+from patchfem.scene import load as load_scene
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

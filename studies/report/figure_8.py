@@ -33,10 +33,9 @@ from drawing import drawing
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.campaigns.fits.loop import fit_loop
-from patchfem.campaigns.fits.loop_path import LoopOptions
+from patchfem.campaigns import LoopOptions, fit_loop
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

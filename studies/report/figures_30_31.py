@@ -41,14 +41,13 @@ from drawing import drawing
 from study_text import read_answer
 
 from patchfem.core import frozen_array
+from patchfem.export import write_trace
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.export.surfaces.compare import write_trace
+from patchfem.surface import BAND, Profile, level, make_report
 from patchfem.surface.compare.compare import compare_directions, compare_traces
 from patchfem.surface.compare.sentences import describe_ratio_change
 from patchfem.surface.compare.verdict import compose_verdict
-from patchfem.surface.profile import Profile, level
-from patchfem.surface.roughness.report import make_report
-from patchfem.surface.roughness.spectrum import BAND, band_amplitude, estimate_spectrum
+from patchfem.surface.roughness.spectrum import band_amplitude, estimate_spectrum
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

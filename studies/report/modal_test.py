@@ -11,10 +11,10 @@ from scipy import signal
 from scipy.optimize import least_squares
 
 import patchfem as pf
-from patchfem.dynamics.march.march import march, warm_up
-from patchfem.runs.patch.ladder import solve_all
+from patchfem.dynamics import warm_up
+from patchfem.dynamics.march.march import march
+from patchfem.runs import choose, solve_all
 from patchfem.runs.rig.interface import make_contact
-from patchfem.runs.rig.numerics import choose
 from patchfem.structure.drives import RecordedDrive
 
 G = 9.80665  # [m/s^2]

@@ -36,9 +36,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from study_text import read_answer
 
 from patchfem.export import histories, netcdf
-from patchfem.inputs.measured import MeasuredRow, read_table
+from patchfem.inputs import read_table
+from patchfem.inputs.measured import MeasuredRow
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

@@ -32,12 +32,11 @@ from figure_27 import POINT
 from modal_test import march_samples
 from study_text import read_answer
 
-from patchfem.campaigns.rows.condition_models import FitRequest
-from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
+from patchfem.campaigns import FitRequest, RowsOptions, fit_rows
+from patchfem.campaigns.rows.fit import SearchSettings
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.inputs.measured import read_table
-from patchfem.scene.ranges import read_ranges
-from patchfem.scene.scene import loads
+from patchfem.inputs import read_table
+from patchfem.scene import loads, read_ranges
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

@@ -13,7 +13,7 @@ from drawing import drawing
 
 from patchfem.core import G_N
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.inputs.measured import read_table
+from patchfem.inputs import read_table
 from patchfem.runs import run as runner
 from patchfem.scene import scene
 

@@ -20,7 +20,7 @@ import numpy as np
 import patchfem as pf
 from patchfem.runs import run as runner
 from patchfem.scene import scene
-from patchfem.slip.shear_modes import jenkins_set
+from patchfem.slip import jenkins_set
 
 FOLDER = Path(__file__).parent
 TILTS = (0.0, 1e-5, 1e-4, 1e-3)

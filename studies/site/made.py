@@ -27,7 +27,8 @@ from patchfem.effects import EFFECTS, LAWS
 from patchfem.formatting import format_value
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
-from patchfem.scene.keys.types import attributes_by_key, find_meaning
+from patchfem.scene import find_meaning
+from patchfem.scene.keys.types import attributes_by_key
 
 ROOT = Path(__file__).parents[2]
 SHOWN_EFFECTS = [name for name in EFFECTS if not name.startswith("structure.interface.")]

@@ -36,14 +36,12 @@ from peer import Peer, measure_seconds, run
 from rig_texts import TEXTS
 from switched import PROBLEMS, follow
 
-from patchfem.campaigns.sweeps.case_models import SweepScene
-from patchfem.campaigns.sweeps.cases import Cases
+from patchfem.campaigns import Cases, SweepScene
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.core import Missing
-from patchfem.export.sweeps.run import compute_in_memory
+from patchfem.export import compute_in_memory
 from patchfem.runs.batch import batches
-from patchfem.scene.axes import make_axis
-from patchfem.scene.scene import loads
+from patchfem.scene import loads, make_axis
 
 CYCLES = 200  # cycles of a run
 POINTS = 200  # samples of a cycle of the loop in NumPy

@@ -24,11 +24,10 @@ import steady_pictures
 from rig_texts import ONE_MODE, TEXTS
 
 from patchfem.dynamics.harmonic.branch import find_backbone
-from patchfem.model.model import build
+from patchfem.model import build
+from patchfem.runs import choose, solve_all
 from patchfem.runs import run as runner
-from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_model
-from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 
 FOLDER = Path(__file__).parent

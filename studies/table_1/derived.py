@@ -9,10 +9,11 @@ from math import pi
 
 import numpy as np
 
+from patchfem.campaigns import FitRequest
 from patchfem.campaigns.rows.computed import ModelReadings
-from patchfem.campaigns.rows.condition_models import ConditionModels, FitRequest
+from patchfem.campaigns.rows.condition_models import ConditionModels
 from patchfem.core import frozen_array
-from patchfem.model.model import build
+from patchfem.model import build
 
 MASS = 1.19396625  # [kg] block of every scene here
 AXIAL = 143.0  # [Hz] axial mode of every scene here

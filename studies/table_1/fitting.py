@@ -22,13 +22,15 @@ from rungs import (
     TABLE,
 )
 
-from patchfem.campaigns.rows.cells import read_readings, scores
+from patchfem.campaigns import scores
+from patchfem.campaigns.rows.cells import read_readings
 from patchfem.campaigns.rows.computed import ModelReadings
 from patchfem.campaigns.rows.null_models import fit_null_model
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N
-from patchfem.identify.least_squares import NEAR_BOUND_FRACTION, run_descents
-from patchfem.identify.space import CubeResidual, make_space
+from patchfem.identify import CubeResidual, run_descents
+from patchfem.identify.least_squares import NEAR_BOUND_FRACTION
+from patchfem.identify.space import make_space
 
 MIL = 25.4e-6
 SCORES = FOLDER / "scores.json"

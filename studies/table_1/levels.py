@@ -28,7 +28,7 @@ from patchfem.campaigns.rows.computed import ModelReadings
 from patchfem.core import G_N
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 FREQUENCIES = (135.0, 143.0, 150.0, 155.0)
 DISTORTION_LIMIT = (

@@ -27,9 +27,8 @@ from pathlib import Path
 
 from derived import Derived, Number, rods
 
-from patchfem.campaigns.rows.condition_models import FitRequest
-from patchfem.scene.ranges import read_ranges
-from patchfem.scene.scene import Scene, load, loads
+from patchfem.campaigns import FitRequest
+from patchfem.scene import Scene, load, loads, read_ranges
 
 FOLDER = Path(__file__).parent
 TABLE = FOLDER.parent / "rig" / "table1.csv"

@@ -16,12 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from patchfem.campaigns.rows.cells import read_readings, scores
+from patchfem.campaigns import FitRequest, RowsOptions, fit_rows, scores
+from patchfem.campaigns.rows.cells import read_readings
 from patchfem.campaigns.rows.computed import ModelReadings
-from patchfem.campaigns.rows.condition_models import FitRequest
-from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
-from patchfem.scene.ranges import read_ranges
-from patchfem.scene.scene import load, loads
+from patchfem.campaigns.rows.fit import SearchSettings
+from patchfem.scene import load, loads, read_ranges
 
 FOLDER = Path(__file__).parent
 TABLE = FOLDER.parent / "rig" / "table1.csv"

@@ -16,8 +16,9 @@ from fitting import KIND, better, intervals, read_records, training
 from fitting import NULLS as RIVALS
 from rungs import FOLDER, PROTOCOLS, ROOT2, RUNGS, STUCK_READING, TABLE, variants
 
-from patchfem.campaigns.rows.cells import read_readings, scores
-from patchfem.campaigns.rows.null_models import NULL_MODELS, fit_null_model
+from patchfem.campaigns import NULL_MODELS, scores
+from patchfem.campaigns.rows.cells import read_readings
+from patchfem.campaigns.rows.null_models import fit_null_model
 
 UNITS = {
     "static": "",

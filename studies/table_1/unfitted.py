@@ -17,7 +17,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from rig_texts import TEXTS
 
-from patchfem.campaigns.rows.cells import read_readings, scores
+from patchfem.campaigns import scores
+from patchfem.campaigns.rows.cells import read_readings
 from patchfem.core import G_N
 from patchfem.runs import run as runner
 from patchfem.scene import scene

@@ -27,11 +27,11 @@ from drawing import drawing
 
 from patchfem.core import G_N
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.model.model import build
+from patchfem.model import build
+from patchfem.runs import choose
 from patchfem.runs import run as runner
 from patchfem.runs.patch.press import press_patch
 from patchfem.runs.rig import levels, solve
-from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 
 FOLDER = Path(__file__).parent

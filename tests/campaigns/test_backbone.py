@@ -6,8 +6,8 @@ from scene_texts import IWAN, JOINT_SHAKEN, shaken
 from scipy.integrate import solve_ivp
 
 import patchfem as pf
+from patchfem.campaigns import compute_backbone
 from patchfem.campaigns.backbone.bench_loops import run_loop, settle_loop
-from patchfem.campaigns.backbone.curves import compute_backbone
 from patchfem.campaigns.backbone.joint import build_joint
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'

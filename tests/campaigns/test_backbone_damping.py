@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
-from patchfem.campaigns.backbone.curves import compute_backbone
+from patchfem.campaigns import compute_backbone
 from patchfem.export import backbone as backbone_files
 from patchfem.export.drawing import pictures
 from patchfem.runs import joint

@@ -11,17 +11,18 @@ from scene_texts import BENCH, PIECE
 
 import patchfem as pf
 from patchfem import build
-from patchfem.campaigns import cost, numerical_settings
-from patchfem.campaigns.cost import (
+from patchfem.campaigns import (
     TOLERANCE,
     Cost,
+    cost,
     cost_sentence,
     fastest_by_measure,
-    fastest_run,
+    numerical_settings,
     setting_curve,
 )
+from patchfem.campaigns.cost import fastest_run
 from patchfem.core import NotConverged, PatchfemError
-from patchfem.export.cost import format_cost
+from patchfem.export import format_cost
 from patchfem.runs.run import run
 
 LENGTH = 12.7e-3

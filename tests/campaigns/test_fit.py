@@ -12,15 +12,15 @@ from scipy.integrate import solve_ivp
 from scipy.stats import t as student
 
 from patchfem import SceneError, build
-from patchfem.campaigns.fits.loop import LOAD_UNITS, fit_loop
+from patchfem.campaigns import fit_loop
+from patchfem.campaigns.fits.loop import LOAD_UNITS
 from patchfem.campaigns.fits.loop_model import BenchModel
 from patchfem.core import PatchfemError
 from patchfem.export.fits.files import fitted_scene_text
 from patchfem.export.fits.text import format_fitted
-from patchfem.inputs.loops import read_loop
+from patchfem.inputs import read_loop
 from patchfem.runs.bench import bench
-from patchfem.scene.ranges import read_ranges
-from patchfem.scene.scene import load, loads
+from patchfem.scene import load, loads, read_ranges
 
 LOAD = 100.0
 POINT = '[normal]\nload = "100 N"\n'

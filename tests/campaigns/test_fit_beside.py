@@ -7,10 +7,10 @@ import pytest
 from command_line import cli
 from test_fit import LAWS, LOAD, POINT, SINE, dahl, free_of, play, rows, scene_of, table
 
-from patchfem.campaigns.fits.loop import fit_loop
-from patchfem.campaigns.fits.loop_path import LoopOptions, count_whole_cycles, extend_start
+from patchfem.campaigns import LoopOptions, fit_loop
+from patchfem.campaigns.fits.loop_path import count_whole_cycles, extend_start
 from patchfem.core import PatchfemError
-from patchfem.inputs.loops import read_loop
+from patchfem.inputs import read_loop
 
 TRUTH = [0.31, 2.3e-6]
 NAMES = ("friction.static", "friction.bond_length")

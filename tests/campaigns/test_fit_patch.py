@@ -8,11 +8,11 @@ from command_line import cli
 from scene_texts import DRIVE, KILOGRAM, PIECE, POINT, friction_of
 
 import patchfem as pf
-from patchfem.campaigns.fits.patch import fit_patch
+from patchfem.campaigns import fit_patch
 from patchfem.campaigns.fits.patch_laws import Curves, LawProblem
 from patchfem.formatting import format_number, format_quantity
-from patchfem.friction.record import steady_loop
-from patchfem.scene.keys.tables import Friction
+from patchfem.friction import steady_loop
+from patchfem.scene import Friction
 
 SLIDE = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n'
 CROWN = (

@@ -10,8 +10,10 @@ from scene_texts import IWAN, shaken
 
 from patchfem import formatting
 from patchfem.__main__ import main
-from patchfem.campaigns.backbone.records import Backbone, Curve, LossExponents, ModeFrequencies
-from patchfem.export.backbone import backbone_charts, page_html
+from patchfem.campaigns import Backbone, Curve
+from patchfem.campaigns.backbone.records import LossExponents, ModeFrequencies
+from patchfem.export import backbone_charts
+from patchfem.export.backbone import page_html
 
 COLUMNS = [
     "method",

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from command_line import cli
 
-from patchfem.scene.starting import NEXT_VERBS, TEMPLATE_DESCRIPTIONS, read_template
+from patchfem.scene import NEXT_VERBS, TEMPLATE_DESCRIPTIONS, read_template
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "studies").glob("*/*.toml"))

@@ -12,8 +12,9 @@ from scene_texts import COULOMB, POINT
 from test_compare_verb import NAMES
 
 import patchfem as pf
+from patchfem.export import compare_runs
 from patchfem.export.surfaces import worn
-from patchfem.export.surfaces.worn_runs import compare_runs, hidden_line, hidden_plane
+from patchfem.export.surfaces.worn_runs import hidden_line, hidden_plane
 
 ROOT = Path(__file__).parents[2]
 GUIDE = ROOT / "patchfem" / "scene" / "GUIDE.md"

@@ -11,7 +11,7 @@ from pairs import UM, pair
 from synthetic import report_area
 
 import patchfem as pf
-from patchfem.surface.profile import Profile
+from patchfem.surface import Profile
 
 NAMES = (
     "shift",

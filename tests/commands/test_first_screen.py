@@ -14,23 +14,19 @@ import patchfem as pf
 from patchfem.__main__ import VERB_GROUPS, app, register_verbs
 from patchfem.commands import shared
 from patchfem.core import Measure, Outcome
+from patchfem.export import format_measures, headline_sentence, tolerance_sentence, verdict_sentence
 from patchfem.export.pages.sentences import (
     EXACT_NOTE,
     GROUPS,
-    format_measures,
     format_with_error,
     format_zero,
-    headline_sentence,
     measure_group,
-    tolerance_sentence,
-    verdict_sentence,
 )
 from patchfem.export.summary import loop_entry
-from patchfem.response.outcome import OPEN_LOOP
+from patchfem.response import OPEN_LOOP
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
-from patchfem.scene.keys.quantities import UNIT_FACTORS
-from patchfem.scene.starting import read_template
+from patchfem.scene import UNIT_FACTORS, read_template
 
 UNIT = {"g": 9.80665, "%": 0.01, "deg": UNIT_FACTORS["angle"]["deg"]}
 

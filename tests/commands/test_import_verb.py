@@ -12,9 +12,7 @@ from lab_modes import OMEGA, RESIDUE, TIME, ZETA, driven, free
 
 from patchfem import build
 from patchfem.core import PatchfemError
-from patchfem.inputs.loops import read_loop
-from patchfem.inputs.signals import read_signal
-from patchfem.inputs.slides import read_slide
+from patchfem.inputs import read_loop, read_signal, read_slide
 from patchfem.structure import universal
 
 HERTZ = OMEGA / (2 * np.pi)

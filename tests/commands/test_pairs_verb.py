@@ -10,8 +10,8 @@ from pairs import UM, track
 from scipy.stats import t
 
 import patchfem as pf
-from patchfem.surface.compare.pairs import read_pairs
-from patchfem.surface.quantity import Quantity, average_quantities
+from patchfem.surface import Quantity, read_pairs
+from patchfem.surface.quantity import average_quantities
 
 COUNT = 1201
 

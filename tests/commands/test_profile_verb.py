@@ -9,8 +9,7 @@ import pytest
 from command_line import ALWAYS, FROM_SHELL, cli, loaded
 
 from patchfem.export.results import FILES
-from patchfem.surface.files.read import read_surface
-from patchfem.surface.roughness.report import make_report
+from patchfem.surface import make_report, read_surface
 
 UM = 1e-6
 

@@ -4,7 +4,7 @@ import pytest
 from command_line import cli
 from scene_texts import COULOMB, IWAN, POINT, SHORT, shaken
 
-from patchfem.scene.starting import read_template
+from patchfem.scene import read_template
 
 RIG = POINT + COULOMB + SHORT
 TRACE = "x [um],z [um]\n" + "".join(f"{k},{k % 7}\n" for k in range(2001))

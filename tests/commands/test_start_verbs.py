@@ -18,12 +18,7 @@ from patchfem.__main__ import VERBS, app, register_verbs
 from patchfem.commands import examine
 from patchfem.commands.sources import SOURCES, bibtex
 from patchfem.effects import EFFECTS
-from patchfem.scene.starting import (
-    NEXT_VERBS,
-    TEMPLATE_DESCRIPTIONS,
-    find_shipped_scene,
-    read_template,
-)
+from patchfem.scene import NEXT_VERBS, TEMPLATE_DESCRIPTIONS, find_shipped_scene, read_template
 
 register_verbs([])  # all verbs
 

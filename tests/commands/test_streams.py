@@ -8,8 +8,8 @@ import pytest
 from command_line import cli
 from scene_texts import COULOMB, PIECE, POINT, STRUCTURE
 
-from patchfem.commands.streams import make_printable
-from patchfem.runs.results.result import shorten_file_names
+from patchfem.commands import make_printable
+from patchfem.runs import shorten_file_names
 
 PATCH = PIECE + 'load = "26 lbf"\nelement_size = "0.1 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
 SCENE = 'title = "ü ± µ"\n' + POINT + COULOMB + STRUCTURE

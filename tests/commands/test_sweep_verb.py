@@ -21,7 +21,7 @@ from scene_texts import COULOMB, POINT, SHORT
 import patchfem as pf
 from patchfem.campaigns.sweeps import sweep
 from patchfem.commands.sweep import Progress
-from patchfem.export.summary import summarise_run
+from patchfem.export import summarise_run
 from patchfem.export.sweeps.folder import TABLES, Folder
 from patchfem.export.sweeps.page import read_table
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from pieces import TITANIUM, bare, pair_of, refined_middle
 
+from patchfem.contact import press
 from patchfem.contact.gaps import crown
-from patchfem.contact.unilateral import press
 
 A = 0.1e-3  # half width wanted [m]
 LOAD = 9107.0  # per metre of width [N/m]

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from pieces import LOAD, coated_pair, rough
 
 from patchfem.compiled import load
-from patchfem.contact.contact_sets import ContactSets
-from patchfem.contact.set_arrays import N_BUILT, N_PIVOTS, N_STORED, name_set
-from patchfem.contact.unilateral import press, solve_forces
+from patchfem.contact import N_BUILT, ContactSets, name_set, press
+from patchfem.contact.set_arrays import N_PIVOTS, N_STORED
+from patchfem.contact.unilateral import solve_forces
 from patchfem.core import PatchfemError
 
 PRESS = load("contact.press_kernels")

@@ -7,10 +7,9 @@ import pytest
 from pieces import TITANIUM, bare, refined_middle
 
 from patchfem.closed_forms.contact import hertz_half_width
-from patchfem.contact import edges
-from patchfem.contact.unilateral import press
+from patchfem.contact import edges, press
 from patchfem.core import Compliance, Interface, frozen_array
-from patchfem.elasticity.elasticity import interface_compliance, make_piece
+from patchfem.elasticity import interface_compliance, make_piece
 
 WIDTH = 12.7e-3
 A = 0.1e-3

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from patchfem.closed_forms import contact as closed_forms
-from patchfem.contact.active_set import patch_problem
-from patchfem.contact.conjugate_gradients import solve_by_gradients
-from patchfem.contact.half_space.layer import end_compliance, layer_compliance
-from patchfem.contact.half_space.point_compliance import (
+from patchfem.contact import (
     PointCompliance,
-    find_edges,
-    set_stiffness,
+    end_compliance,
+    layer_compliance,
+    patch_problem,
     smooth_modes,
+    solve_by_gradients,
 )
+from patchfem.contact.half_space.point_compliance import find_edges, set_stiffness
+from patchfem.elasticity import Layers, make_piece
 from patchfem.elasticity.condense import condense
-from patchfem.elasticity.elasticity import Layers, make_piece
 
 LENGTH, HEIGHT, THICK = 12.7e-3, 6.35e-3, 0.1524e-3
 COATED = Layers((250e9, 0.24), (120e9, 0.32), "strain")

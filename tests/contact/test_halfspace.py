@@ -12,9 +12,11 @@ from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM, pair_of
 from study_module import study
 
 from patchfem.closed_forms import contact as exact
+from patchfem.contact import press
 from patchfem.contact.gaps import crown
-from patchfem.contact.unilateral import press, solve_forces
-from patchfem.mesh.tensor import TensorGrid, graded_rows
+from patchfem.contact.unilateral import solve_forces
+from patchfem.mesh import TensorGrid
+from patchfem.mesh.tensor import graded_rows
 
 halfspace = study("common/halfspace.py")
 press_periodic, residuals, wave_numbers = (

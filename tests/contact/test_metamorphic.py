@@ -21,10 +21,10 @@ from pieces import (
     rough,
 )
 
+from patchfem.contact import press, press_to_approach
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.unilateral import press, press_to_approach
-from patchfem.elasticity.elasticity import interface_compliance, make_piece
-from patchfem.mesh.tensor import graded_grid
+from patchfem.elasticity import interface_compliance, make_piece
+from patchfem.mesh import graded_grid
 
 CELLS = 60
 RUNS = settings(max_examples=25, deadline=None)

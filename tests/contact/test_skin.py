@@ -14,21 +14,17 @@ from scipy.integrate import quad
 from scipy.stats import norm
 from skins import longer, solve, strips_of, tangent
 
-from patchfem.contact import asperity_layer
-from patchfem.contact.asperity_laws import (
+from patchfem.contact import (
     ExponentialAsperities,
     HertzAsperities,
-    LinearAsperities,
-    peak_integral,
-)
-from patchfem.contact.stiffness import tangential_stiffness
-from patchfem.contact.strips import (
-    STRIP_RESIDUAL_TOL,
     HolderLoads,
-    HolderPosition,
-    compute_strip_residuals,
+    LinearAsperities,
+    asperity_layer,
+    press,
+    tangential_stiffness,
 )
-from patchfem.contact.unilateral import press
+from patchfem.contact.asperity_laws import peak_integral
+from patchfem.contact.strips import STRIP_RESIDUAL_TOL, HolderPosition, compute_strip_residuals
 from patchfem.core import NotConverged, Outcome, PatchfemError
 
 AREA = LENGTH * WIDTH

@@ -11,23 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 
-from patchfem.contact import unilateral
-from patchfem.contact.active_set import (
-    ContactProblem,
-    patch_problem,
-    solve_primal,
-    solve_primal_dual,
-)
-from patchfem.contact.conjugate_gradients import project_forces
-from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.strip_compliance import StripCompliance
-from patchfem.contact.unilateral import (
+from patchfem.contact import (
     RESIDUAL_TOL,
-    explain_singular_set,
+    StripCompliance,
+    patch_problem,
     press,
     press_to_approach,
-    solve,
+    unilateral,
 )
+from patchfem.contact.active_set import ContactProblem, solve_primal, solve_primal_dual
+from patchfem.contact.conjugate_gradients import project_forces
+from patchfem.contact.gaps import crown, tilt
+from patchfem.contact.unilateral import explain_singular_set, solve
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
 
 

@@ -16,16 +16,20 @@ from patchfem.closed_forms.contact import (
     wedge_on_linear_foundation,
     wedge_opening_tilt,
 )
-from patchfem.contact.asperity_laws import ExponentialAsperities, HertzAsperities, LinearAsperities
-from patchfem.contact.stiffness import tangential_stiffness
-from patchfem.contact.strip_compliance import StripCompliance
-from patchfem.contact.strips import (
-    STRIP_RESIDUAL_TOL,
+from patchfem.contact import (
+    ExponentialAsperities,
+    HertzAsperities,
+    LinearAsperities,
+    StripCompliance,
+    press,
+    press_to_approach,
     split_into_strips,
     strip_offsets,
     strips_stiffness,
+    tangential_stiffness,
 )
-from patchfem.contact.unilateral import press, press_to_approach, solve_forces
+from patchfem.contact.strips import STRIP_RESIDUAL_TOL
+from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
 
 AREA = LENGTH * WIDTH

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from pieces import COATED, COATING, LENGTH, LOAD, TILTS, WIDTH, coated_pair, pair_of, rough
 
+from patchfem.contact import press, press_to_approach
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.unilateral import press, press_to_approach, solve_forces
+from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Outcome
-from patchfem.mesh.tensor import graded_grid
+from patchfem.mesh import graded_grid
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e-3, 3e-3])

@@ -13,12 +13,12 @@ from limits import limited
 from scene_texts import BENCH
 
 from patchfem.core import Missing
-from patchfem.disk import exchange
-from patchfem.disk.lock import HOST_HASH, OWN_LOCK_PATHS, FolderLock, is_running, read_start_ticks
-from patchfem.export.results import Folder
+from patchfem.disk import FolderLock, exchange
+from patchfem.disk.lock import HOST_HASH, OWN_LOCK_PATHS, is_running, read_start_ticks
+from patchfem.export import Folder
 from patchfem.export.sweeps.folder import Folder as SweepFolder
 from patchfem.export.sweeps.folder import Writer
-from patchfem.runs.batch.case_results import CaseResults
+from patchfem.runs import CaseResults
 
 PYTHON = [sys.executable, "-c"]
 # each of several processes tries to own every file, all at the same instants

@@ -17,16 +17,14 @@ from limits import limited
 from scene_texts import BENCH, COATED
 
 from patchfem.core import Missing
-from patchfem.disk.atomic_write import (
-    PLACED_PATHS,
-    find_free_space,
+from patchfem.disk import (
     is_partial_name,
-    make_partial_path,
     open_lossy,
     write_atomically,
     write_in_partial_folder,
     write_text,
 )
+from patchfem.disk.atomic_write import PLACED_PATHS, find_free_space, make_partial_path
 
 SIZES = [1 << 10, 1 << 14, 1 << 16]
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.dynamics.curve_points import sample_adaptively
+from patchfem.dynamics import sample_adaptively
 
 
 def mode(f, zeta):

@@ -8,8 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from patchfem.core import ModalBasis
-from patchfem.dynamics import limit_cycles
-from patchfem.dynamics.harmonic.forces import LawGroup
+from patchfem.dynamics import LawGroup, limit_cycles
 from patchfem.dynamics.harmonic.laws import Jenkins
 
 

@@ -12,9 +12,9 @@ from pieces import CARBIDE, COATED, TITANIUM
 from stiffness import free_stiffness
 
 from patchfem.core import NotConverged
+from patchfem.elasticity import Layers, interface_compliance, make_piece
 from patchfem.elasticity.condense import MAX_REFINEMENT_CHANGE, condense
-from patchfem.elasticity.elasticity import Layers, interface_compliance, make_piece
-from patchfem.mesh.tensor import TensorGrid, graded_grid
+from patchfem.mesh import TensorGrid, graded_grid
 
 
 def piece_of(grid, layers=COATED):

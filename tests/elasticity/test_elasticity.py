@@ -11,14 +11,15 @@ from scipy.sparse.linalg import spsolve
 from stiffness import free_stiffness
 
 from patchfem.closed_forms.contact import layered_compliance
-from patchfem.elasticity.elasticity import (
+from patchfem.elasticity import (
     Layers,
+    centre_stress,
     compute_displacement,
+    get_cells,
     make_piece,
     von_mises,
 )
-from patchfem.elasticity.recovery import centre_stress, get_cells
-from patchfem.mesh.tensor import TensorGrid, graded_grid
+from patchfem.mesh import TensorGrid, graded_grid
 
 materials = st.tuples(st.floats(1e9, 1e12), st.floats(0.0, 0.45))
 planes = st.sampled_from(["strain", "stress"])

@@ -14,10 +14,9 @@ from scipy.spatial import Delaunay
 from stiffness import free_stiffness
 
 from patchfem.core import NotConverged
-from patchfem.elasticity import fronts
+from patchfem.elasticity import Substructure, fronts
 from patchfem.elasticity.dissect import MAX_LEAF_NODES, dissect_nodes
-from patchfem.elasticity.substructure import Substructure
-from patchfem.mesh.tensor import graded_grid
+from patchfem.mesh import graded_grid
 
 
 def scattered(count, seed):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from pieces import COATED
 
+from patchfem.elasticity import make_piece, predict_bytes, predict_seconds
 from patchfem.elasticity.condense import condense
-from patchfem.elasticity.elasticity import make_piece
-from patchfem.elasticity.grid_fronts import predict_bytes, predict_seconds, predict_work
+from patchfem.elasticity.grid_fronts import predict_work
 
 
 @pytest.mark.parametrize("mirrored", [False, True])

@@ -10,17 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pieces import HEIGHT, LENGTH, TITANIUM, bare, refined_middle
 
+from patchfem.contact import press
 from patchfem.contact.gaps import crown
-from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, PatchfemError
-from patchfem.elasticity import elasticity, mortar, recovery, substructure
-from patchfem.elasticity.mortar import (
-    PieceInterface,
-    clip_nodes,
-    transfer_matrix,
-)
-from patchfem.mesh.anymesh import PieceMesh
-from patchfem.mesh.grading import tributary_lengths
+from patchfem.elasticity import PieceInterface, elasticity, mortar, recovery, substructure
+from patchfem.elasticity.mortar import clip_nodes, transfer_matrix
+from patchfem.mesh import PieceMesh, tributary_lengths
 from patchfem.mesh.tensor import graded_rows
 
 A = 0.1e-3  # half width of the Hertz contact [m]

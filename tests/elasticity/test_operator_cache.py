@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from limits import limited
 
-from patchfem.elasticity import cache
-from patchfem.elasticity.elasticity import Layers
-from patchfem.mesh.anymesh import PieceMesh
+from patchfem.elasticity import Layers, cache
+from patchfem.mesh import PieceMesh
 
 LAYERS = Layers((250e9, 0.24), (121e9, 0.32), "strain")
 X, DEPTH = np.linspace(-1, 1, 7), np.linspace(0, 1, 4)

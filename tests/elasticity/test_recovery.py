@@ -11,19 +11,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, TITANIUM, bare, refined_middle
 
-from patchfem.elasticity import elasticity, substructure
-from patchfem.elasticity.coating_traction import compute_coating_traction
-from patchfem.elasticity.elasticity import Layers, hooke, lame
-from patchfem.elasticity.recovery import (
+from patchfem.elasticity import (
     Cells,
+    Layers,
     centre_stress,
     choose_rounding_step,
+    compute_coating_traction,
+    elasticity,
     estimate_error,
     fit_recovery,
     get_cells,
+    lame,
     make_points,
+    substructure,
 )
-from patchfem.mesh.tensor import TensorGrid, graded_grid, graded_rows
+from patchfem.elasticity.elasticity import hooke
+from patchfem.mesh import TensorGrid, graded_grid
+from patchfem.mesh.tensor import graded_rows
 
 A, LOAD = 0.1e-3, 9107.0
 P0 = 2 * LOAD / (np.pi * A)

@@ -13,13 +13,17 @@ from stiffness import free_stiffness
 
 from patchfem.closed_forms.contact import layered_compliance
 from patchfem.core import NotConverged
-from patchfem.elasticity import elasticity
+from patchfem.elasticity import (
+    Layers,
+    Substructure,
+    centre_stress,
+    compute_displacement,
+    elasticity,
+    get_cells,
+)
+from patchfem.elasticity import interface_compliance as condense
 from patchfem.elasticity.condense import MAX_REFINEMENT_CHANGE
-from patchfem.elasticity.elasticity import Layers, compute_displacement
-from patchfem.elasticity.elasticity import interface_compliance as condense
-from patchfem.elasticity.recovery import centre_stress, get_cells
-from patchfem.elasticity.substructure import Substructure
-from patchfem.mesh.tensor import graded_grid
+from patchfem.mesh import graded_grid
 
 materials = st.tuples(st.floats(1e9, 1e12), st.floats(0.0, 0.45))
 planes = st.sampled_from(["strain", "stress"])

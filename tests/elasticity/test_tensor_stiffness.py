@@ -16,16 +16,10 @@ from skfem import Basis, ElementQuad1, ElementTriP1, ElementVector, MeshQuad, Me
 from skfem.models.elasticity import linear_elasticity
 from stiffness import free_stiffness, make_matrix, make_stencil
 
-from patchfem.elasticity.elasticity import (
-    Layers,
-    Piece,
-    grid_cells,
-    lame,
-    make_piece,
-)
-from patchfem.elasticity.substructure import Substructure
+from patchfem.elasticity import Layers, Piece, Substructure, lame, make_piece
+from patchfem.elasticity.elasticity import grid_cells
 from patchfem.elasticity.tensor_stiffness import apply_stencil
-from patchfem.mesh.tensor import graded_grid
+from patchfem.mesh import graded_grid
 
 LINES = st.lists(st.floats(0.01, 10.0), min_size=2, max_size=9)
 

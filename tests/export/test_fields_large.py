@@ -19,9 +19,8 @@ from scene_texts import COATED
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import patchfem
-from patchfem.disk.atomic_write import is_partial_name
-from patchfem.elasticity.elasticity import lame
-from patchfem.elasticity.recovery import get_cells, make_points
+from patchfem.disk import is_partial_name
+from patchfem.elasticity import get_cells, lame, make_points
 from patchfem.export.fields import bodies, vtkhdf
 from patchfem.export.fields.series import Series
 from patchfem.export.fields.vtkhdf import NAME, round_to_bits, round_to_step

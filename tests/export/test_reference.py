@@ -10,18 +10,11 @@ from scene_texts import SMALL_PATCH, STRUCTURE
 
 from patchfem import SceneError
 from patchfem.effects import EFFECTS, LAWS
-from patchfem.response.rows import TABLE as MOTION
-from patchfem.runs.results.patch_rows import TABLE as STATIC
+from patchfem.response import TABLE as MOTION
+from patchfem.runs import TABLE as STATIC
+from patchfem.scene import MATERIALS, UNIT_FACTORS, find_meaning, loads, parse_quantity
 from patchfem.scene.keys.lookup import is_table_or_value
-from patchfem.scene.keys.materials import MATERIALS
-from patchfem.scene.keys.quantities import UNIT_FACTORS, parse_quantity
-from patchfem.scene.keys.types import (
-    attributes_by_key,
-    find_inner_table,
-    find_key_record,
-    find_meaning,
-)
-from patchfem.scene.scene import loads
+from patchfem.scene.keys.types import attributes_by_key, find_inner_table, find_key_record
 
 PAGE = text()
 

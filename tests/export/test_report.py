@@ -20,7 +20,7 @@ from patchfem.export.drawing import charts
 from patchfem.export.page_data import Measured, Motion, PressedPatch, RunData, SceneText, Verdict
 from patchfem.export.pages import sentences
 from patchfem.export.pages.document import sentence_html
-from patchfem.response.rows import TABLE as MOTION
+from patchfem.response import TABLE as MOTION
 
 PERIOD, MIL = 1 / 143, 25.4e-6
 

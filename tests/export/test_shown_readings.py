@@ -6,7 +6,7 @@ import pytest
 from patchfem import SceneError, run
 from patchfem.export.page_data import collect_run_data
 from patchfem.export.report import run_page
-from patchfem.scene.scene import load
+from patchfem.scene import load
 
 LINEAR = """
 [structure]

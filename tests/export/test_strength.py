@@ -11,7 +11,7 @@ from command_line import cli
 
 import patchfem as pf
 from patchfem.export.fields.strength import find_yielding
-from patchfem.scene.keys.materials import MATERIALS, YIELD_STRENGTHS
+from patchfem.scene import MATERIALS, YIELD_STRENGTHS
 
 RADIUS, WIDTH = 14.5e-3, 10e-3
 MODULUS = MATERIALS["steel"].young / (2 * (1 - MATERIALS["steel"].poisson ** 2))

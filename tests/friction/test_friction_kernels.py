@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from patchfem.friction import parallel_element
 from patchfem.friction.laws import elastic_plastic_kernels
-from patchfem.friction.laws.elastic_plastic import parallel_element
 
 # ---- bond points
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from patchfem.friction.grooves import Grooves
+from patchfem.friction import Grooves
 
 
 @pytest.mark.parametrize("mu", [0.0, 1e-4, 0.05, 0.4, 1.2])

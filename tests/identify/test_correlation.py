@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from patchfem.identify import Problem
 from patchfem.identify.correlation import estimate_effective_rows
-from patchfem.identify.least_squares import Problem
 
 
 def process(count, tie, seed):

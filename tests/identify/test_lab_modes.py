@@ -5,10 +5,10 @@ import pytest
 from lab_modes import OMEGA, RESIDUE, SAMPLES, STEP, TIME, ZETA, driven, free
 
 from patchfem.core import PatchfemError
+from patchfem.identify import identify_decay_modes, identify_driven_modes
 from patchfem.identify.decay import fit_decay
 from patchfem.identify.driven_modes import fit_driven_modes
 from patchfem.identify.frequency_response import estimate_response, find_time_step
-from patchfem.identify.measured_modes import identify_decay_modes, identify_driven_modes
 
 HERTZ = OMEGA / (2 * np.pi)
 

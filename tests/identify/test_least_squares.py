@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from scipy.stats import t as student
 
 from patchfem.core import Missing, NotConverged, Outcome, PatchfemError
-from patchfem.identify.least_squares import Problem
+from patchfem.identify import Problem, describe_fit
 from patchfem.identify.space import make_space
-from patchfem.identify.words import describe_fit
 
 RNG = np.random.default_rng(7)
 DESIGN = RNG.normal(size=(30, 3))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
-from patchfem.identify.measured_modes import compute_decay_curve
+from patchfem.identify import compute_decay_curve
 from patchfem.identify.swings import find_half_swings
-from patchfem.response.decay_curve import compute_swing_curve
+from patchfem.response import compute_swing_curve
 
 
 def viscous(rng):

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
-from patchfem.identify.least_squares import Problem
+from patchfem.identify import Problem, TwoModels
 from patchfem.identify.space import make_space
-from patchfem.identify.two_models import TwoModels
 
 X = np.linspace(0.1, 3.0, 30)
 # no values of the models below leave nothing over

@@ -14,9 +14,7 @@ from test_matlab73 import RUN, by_scipy
 from test_matlab73 import written as write_version_73
 
 from patchfem.core import PatchfemError
-from patchfem.inputs import matlab5, matlab73, matrices, nastran
-from patchfem.inputs.matlab import read_variables
-from patchfem.inputs.universal import read_datasets
+from patchfem.inputs import matlab5, matlab73, matrices, nastran, read_datasets, read_variables
 
 K = np.array([[4.0, -1.5, 0.0], [-1.5, 3.0, -2.0], [0.0, -2.0, 6.5e-3]])
 MATRIX_73 = b"MATLAB 7.3 MAT-file" + bytes(500)

@@ -3,10 +3,8 @@
 import pytest
 
 from patchfem.core import PatchfemError
-from patchfem.inputs import matrices
-from patchfem.inputs.laboratory import read_records
-from patchfem.inputs.records import MAX_BYTES, parse_requests
-from patchfem.inputs.slides import read_slide
+from patchfem.inputs import matrices, parse_requests, read_records, read_slide
+from patchfem.inputs.records import MAX_BYTES
 
 
 def test_exact_path_of_a_file_in_metres_with_its_lateral_column(tmp_path):

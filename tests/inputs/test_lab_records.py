@@ -7,10 +7,7 @@ from lab_files import INCH, SI, loop, record, written
 from scipy.io import savemat
 
 from patchfem.core import PatchfemError
-from patchfem.inputs.laboratory import read_records
-from patchfem.inputs.loops import read_loop
-from patchfem.inputs.records import parse_requests
-from patchfem.inputs.signals import read_signal
+from patchfem.inputs import parse_requests, read_loop, read_records, read_signal
 from patchfem.inputs.units import find_unit_factor
 
 TIME, SLIDE, FORCE = loop(20, 1)

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
-from patchfem.inputs import cells, measured
-from patchfem.inputs.cells import TableFormat
-from patchfem.inputs.columns import read_columns
+from patchfem.inputs import TableFormat, cells, measured, read_columns
 from patchfem.mesh import files as meshes
 from patchfem.structure import arrays, universal
 

@@ -8,7 +8,7 @@ from scipy.io import loadmat, savemat
 from scipy.sparse import random as scattered
 
 from patchfem.core import PatchfemError
-from patchfem.inputs.matlab import read_variables
+from patchfem.inputs import read_variables
 
 SPARSE = scattered(7, 5, 0.4, "csc", random_state=3)
 NAMES = np.array(["axial", "yaw", "é"], dtype=object)

@@ -10,10 +10,8 @@ import scipy
 from scipy.io import savemat
 
 from patchfem.core import PatchfemError
-from patchfem.inputs.laboratory import read_records
-from patchfem.inputs.matlab import read_variables
+from patchfem.inputs import parse_requests, read_records, read_variables
 from patchfem.inputs.matlab5 import MAX_UNPACK_RATIO
-from patchfem.inputs.records import parse_requests
 from patchfem.structure import arrays
 
 SHIPPED = Path(scipy.__file__).parent / "io/matlab/tests/data"  # written by MATLAB itself

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from patchfem.core import G_N, Missing, PatchfemError
-from patchfem.inputs.measured import FLAG_MEANINGS, read_table
+from patchfem.inputs import read_table
+from patchfem.inputs.measured import FLAG_MEANINGS
 
 TABLE_1 = Path(__file__).parents[2] / "studies" / "rig" / "table1.csv"
 OMEGA = 2 * pi * 143

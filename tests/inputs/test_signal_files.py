@@ -6,7 +6,7 @@ import pyuff
 from lab_files import INCH, record, written
 
 from patchfem.core import PatchfemError
-from patchfem.inputs.signals import read_signal
+from patchfem.inputs import read_signal
 
 W = 2 * np.pi * 143
 

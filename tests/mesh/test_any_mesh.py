@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
-from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, read_pieces, write_mesh
+from patchfem.mesh import graded_grid, read_pieces, write_mesh
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
 from patchfem.mesh.pairs import as_piece
-from patchfem.mesh.tensor import graded_grid
 
 KINDS = ("quads", "triangles", "mixed")
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from rounded import rounded_pair
 
-from patchfem.closed_forms.contact import rounded_punch_half_width, rounded_punch_pressure
-from patchfem.contact.unilateral import press
+from patchfem.closed_forms import rounded_punch_half_width
+from patchfem.closed_forms.contact import rounded_punch_pressure
+from patchfem.contact import press
 from patchfem.core import Compliance, Interface, Missing, PatchfemError
-from patchfem.elasticity.elasticity import Layers
-from patchfem.elasticity.elasticity import interface_compliance as condense
-from patchfem.elasticity.substructure import Substructure
-from patchfem.mesh.files import read_pieces, write_mesh
+from patchfem.elasticity import Layers, Substructure
+from patchfem.elasticity import interface_compliance as condense
+from patchfem.mesh import read_pieces, write_mesh
 
 try:
     import gmsh  # noqa: F401

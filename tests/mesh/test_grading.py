@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.mesh.grading import Layout, divide_into_columns, divide_into_rows
-from patchfem.mesh.tensor import TensorGrid, graded_depth, graded_grid
+from patchfem.mesh import Layout, TensorGrid, divide_into_columns, divide_into_rows, graded_grid
+from patchfem.mesh.tensor import graded_depth
 
 
 @given(

@@ -11,9 +11,8 @@ from any_mesh_cases import drawn, write_msh22
 from pair_meshes import pair_mesh
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.mesh.anymesh import PieceMesh
-from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, read_bodies, write_mesh
-from patchfem.mesh.tensor import TensorGrid, graded_grid
+from patchfem.mesh import PieceMesh, TensorGrid, graded_grid, read_bodies, write_mesh
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
 
 GRIDS = {
     "coated": graded_grid(12.7e-3, 6.35e-3, 0.4e-3, 152.4e-6),

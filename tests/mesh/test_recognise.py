@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from any_mesh_cases import FORMATS, GRID, drawn, of_grid
 
-from patchfem.mesh.anymesh import PieceMesh
-from patchfem.mesh.files import EDGE_TAGS, read_bodies
-from patchfem.mesh.recognise import find_holes, measure_fixed_length, recognise_grid
+from patchfem.mesh import PieceMesh, find_holes, measure_fixed_length, read_bodies
+from patchfem.mesh.files import EDGE_TAGS
+from patchfem.mesh.recognise import recognise_grid
 
 
 def bodies(m, folder, form):

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.mesh.ends import MAX_INTERFACE_SLOPE, SHARP_END, End
+from patchfem.mesh import SHARP_END, End, graded_grid, shaped_grid
+from patchfem.mesh.ends import MAX_INTERFACE_SLOPE
 from patchfem.mesh.pairs import as_piece
-from patchfem.mesh.shaped import shaped_grid
-from patchfem.mesh.tensor import graded_grid
 
 LENGTH, HEIGHT, COATING = 10e-3, 4e-3, 0.2e-3
 ENDS = {"sharp": SHARP_END, "chamfer": End("chamfer", 0.7e-3), "radius": End("radius", 1.1e-3)}

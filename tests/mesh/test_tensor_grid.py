@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
-from patchfem.mesh.tensor import MIN_COATING_ROWS, ROW_GROWTH, graded_grid, graded_rows
+from patchfem.mesh import ROW_GROWTH, graded_grid
+from patchfem.mesh.tensor import MIN_COATING_ROWS, graded_rows
 
 lengths = st.floats(1e-6, 1.0)
 growths = st.floats(1.02, 1.6)

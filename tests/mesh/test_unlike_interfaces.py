@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
-from patchfem.mesh.tensor import TensorGrid, graded_grid
+from patchfem.mesh import TensorGrid, graded_grid
 
 
 def unlike(lower, upper):

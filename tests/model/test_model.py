@@ -21,10 +21,10 @@ from scene_texts import (
 )
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.model.model import build
+from patchfem.model import build
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 KINDS = {
     "a patch": (PATCH, "patch"),

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from patchfem.model import SlidePath
 from patchfem.model.load import PointLoad
-from patchfem.model.slide import SlidePath
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.7, -2.0])

@@ -7,14 +7,14 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import patchfem as pf
-from patchfem.campaigns.backbone.curves import compute_backbone
-from patchfem.response.decay_curve import (
+from patchfem.campaigns import compute_backbone
+from patchfem.response import (
     compute_swing_curve,
     find_turning_points,
     find_turning_points_outside,
     half_swings_between,
 )
-from patchfem.runs.rig.decays import mesh_errors_of_decay
+from patchfem.runs import mesh_errors_of_decay
 
 RELEASED = DRIVE[: DRIVE.index("kind")] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import Response
-from patchfem.response.ends import estimate_window_error
+from patchfem.response import estimate_window_error
 from patchfem.response.loops import drift
 from patchfem.response.run_events import slips_and_slides
 

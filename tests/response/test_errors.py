@@ -6,20 +6,19 @@ import numpy as np
 import pytest
 
 from patchfem import build, run
-from patchfem.response.errors import (
-    SAFETY_FACTOR,
+from patchfem.response import (
     absolute_change,
     add_errors,
     coarser_errors,
     convergence_error,
     convergence_errors,
+    error_floor,
     merged_cell_errors,
-    observed_orders,
     step_errors,
 )
-from patchfem.response.rows import error_floor
+from patchfem.response.errors import SAFETY_FACTOR, observed_orders
+from patchfem.runs import choose
 from patchfem.runs.rig import march as rig_march
-from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 
 NAME = "relative_displacement_amplitude"

@@ -5,7 +5,7 @@ import pytest
 from scene_texts import MODE, POINT
 
 from patchfem.core import G_N
-from patchfem.response.levels import (
+from patchfem.response import (
     MIN_JUMP_FACTOR,
     Level,
     bracket_onset,
@@ -14,7 +14,7 @@ from patchfem.response.levels import (
     make_onset_test,
 )
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 NAME = "relative_displacement_amplitude"
 RIG = (

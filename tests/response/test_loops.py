@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from scene_texts import COULOMB, DRIVE, MODE, POINT
 
 from patchfem import run
-from patchfem.response import loops
-from patchfem.response.measures import compute_harmonic
+from patchfem.response import compute_harmonic, loops
 
 OMEGA = 2 * pi * 143
 PERIOD = 2 * pi / OMEGA
@@ -186,7 +185,7 @@ def test_exact_drift(count, samples):
 
 def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
     """Slide (k,) [m] at the middles of equal parts of the cycle that begins at `begin` cycles, by the event engine."""
-    from patchfem.dynamics.events.elements import make_coulomb_elements
+    from patchfem.dynamics import make_coulomb_elements
     from patchfem.dynamics.events.histories import evaluate_motion
 
     model = done.plan.model

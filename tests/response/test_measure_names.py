@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import Measure
-from patchfem.response.rows import set_final_floors
+from patchfem.response import set_final_floors
 
 
 def test_exact_what_is_a_difference_is_judged_by_its_larger_terms():

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem.core import Response, SineDrive
-from patchfem.response.spectrum import READINGS, read_instrument
+from patchfem.response import read_instrument
+from patchfem.response.spectrum import READINGS
 
 OMEGA = 2 * np.pi * 143
 

@@ -7,14 +7,9 @@ import pytest
 
 from patchfem import run
 from patchfem.core import DriveSegment, Measure
+from patchfem.response import STICKS_AT_REVERSAL, find_missing_loops
 from patchfem.response.events import RELEASE_UP
-from patchfem.response.reasons import (
-    APERIODIC,
-    OUTPUT_AT_REST,
-    STICKS_AT_REVERSAL,
-    UNCLOSED,
-    find_missing_loops,
-)
+from patchfem.response.reasons import APERIODIC, OUTPUT_AT_REST, UNCLOSED
 
 FREE = SimpleNamespace(segments=(DriveSegment(0.0),), period=0.1)
 RELEASED = """[normal]

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from patchfem.core import Outcome, Response
-from patchfem.friction.laws.lugre import LuGre
-from patchfem.response import settling
-from patchfem.response.inside_steps import N_STEP_PARTS, divide_steps, motion_inside_steps
-from patchfem.response.measures import compute_step_harmonic
+from patchfem.friction import LuGre
+from patchfem.response import compute_step_harmonic, motion_inside_steps, settling
+from patchfem.response.inside_steps import N_STEP_PARTS, divide_steps
 
 
 @pytest.mark.parametrize(

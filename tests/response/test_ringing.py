@@ -8,7 +8,8 @@ from scene_texts import KILOGRAM
 
 from patchfem import load
 from patchfem.compiled.no_jit import load_uncompiled
-from patchfem.response.ringing import fit_ring, measure_ringing
+from patchfem.response import measure_ringing
+from patchfem.response.ringing import fit_ring
 from patchfem.runs.run import run
 
 RELEASE = (

@@ -7,11 +7,9 @@ from hypothesis import strategies as st
 
 import patchfem as pf
 from patchfem.core import Outcome
-from patchfem.response import settling
-from patchfem.response.outcome import UNSETTLED
-from patchfem.response.reasons import CHANGE_NOT_RESOLVED
+from patchfem.response import CHANGE_NOT_RESOLVED, UNSETTLED, settling
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 
 @pytest.mark.parametrize("ratio", [0.3, 0.8, 0.97, 0.995, -0.6])

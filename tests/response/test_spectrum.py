@@ -8,8 +8,7 @@ import pytest
 from patchfem import build
 from patchfem.core import Response, SineDrive
 from patchfem.response import spectrum
-from patchfem.runs.rig.numerics import choose
-from patchfem.runs.rig.solve import solve
+from patchfem.runs import choose, solve
 
 OMEGA, PERIOD = 2.0, pi
 

@@ -7,14 +7,13 @@ import pytest
 
 from patchfem import SceneError, build, plan
 from patchfem.core import Missing
-from patchfem.friction.bonds.parameters import MAX_LIST_SECONDS
-from patchfem.friction.record import steady_loop
+from patchfem.friction import MAX_LIST_SECONDS, steady_loop
+from patchfem.runs import PassOptions, solve_all
 from patchfem.runs.bench import bench
-from patchfem.runs.bench.ledger import BLOCK, PassOptions, Slide
+from patchfem.runs.bench.ledger import BLOCK, Slide
 from patchfem.runs.bench.stepped import slide_step_by_step
-from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 POINT = '[normal]\nload = "100 N"\n'
 PATCH = (

@@ -12,7 +12,7 @@ from scipy.integrate import quad, solve_ivp
 from patchfem import build, plan, run
 from patchfem.core import PatchfemError
 from patchfem.runs.bench import bench
-from patchfem.scene.scene import load, loads
+from patchfem.scene import load, loads
 
 SPEED, LENGTH, RATIO, A_S, L_K, FLOOR = 1e-3, 2e-6, 0.5, 2e-6, 1e-6, 1e-6
 NONLOCAL = """[friction]

@@ -3,7 +3,7 @@
 import pytest
 
 from patchfem import load
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction import Bonds
 from patchfem.runs.results.notes import unbounded_bonds
 from patchfem.runs.run import run
 

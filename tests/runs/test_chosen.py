@@ -3,7 +3,7 @@
 import pytest
 
 import patchfem as pf
-from patchfem.export.summary import summarise_run
+from patchfem.export import summarise_run
 
 HEAD = '[normal]\nload = "100 N"\n[friction]\nlaw = "{}"\nstatic = 0.3\n'
 RIG = (

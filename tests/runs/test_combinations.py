@@ -16,7 +16,7 @@ from patchfem import SceneError
 from patchfem.dynamics.march import march
 from patchfem.effects import LAWS
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 VALUES = {
     "reference_speed": "1 mm/s",

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem import load, plan
+from patchfem.runs import choose
 from patchfem.runs.rig.lists import list_cost
-from patchfem.runs.rig.numerics import choose
 from patchfem.runs.run import run
 
 TURNED = """[contact]

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import patchfem as pf
-from patchfem.scene.starting import read_template
+from patchfem.scene import read_template
 
 LAWS = ("none", "coulomb", "elastic-plastic", "chain", "iwan", "bouc-wen")
 FIRST, COUNT = 71_000_000, 30

@@ -5,7 +5,8 @@ from scene_texts import FORCED
 
 import patchfem as pf
 from patchfem.core import Measure, Outcome
-from patchfem.runs.rig.engines import ENGINES, describe_balance_error
+from patchfem.runs import ENGINES
+from patchfem.runs.rig.engines import describe_balance_error
 
 SCENE = """
 [normal]

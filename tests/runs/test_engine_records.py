@@ -3,15 +3,9 @@
 from itertools import product
 
 from patchfem.effects import LAWS, SINE_WAVEFORM, WAVEFORMS
-from patchfem.runs.rig.engines import ENGINES
-from patchfem.scene.keys.tables import Friction
-from patchfem.scene.rules.methods import (
-    ENGINE_SUPPORT,
-    FEATURE_FINDERS,
-    Joint,
-    MotionFeatures,
-    find_unsupported_feature,
-)
+from patchfem.runs import ENGINES
+from patchfem.scene import Friction, Joint, MotionFeatures, find_unsupported_feature
+from patchfem.scene.rules.methods import ENGINE_SUPPORT, FEATURE_FINDERS
 
 LEVELS = WAVEFORMS["levels"]
 

@@ -10,14 +10,13 @@ import pytest
 from scene_texts import PIECE
 
 from patchfem import build
+from patchfem.runs import measures, solve_all
 from patchfem.runs.patch import ladder
 from patchfem.runs.patch.condensed import condense
-from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.limits import extrapolate
-from patchfem.runs.patch.measures import measures
 from patchfem.runs.patch.press import press_patch
 from patchfem.runs.patch.values import values
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 BLOCKS = PIECE + 'substrate = "Ti-8Al-1Mo-1V"\n'
 ALWAYS = {"uniform": (4, 13, 15, 28, 50), "graded": (3001, 3036)}

@@ -14,11 +14,10 @@ from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
 
 from patchfem import plan
 from patchfem.core import Missing
-from patchfem.runs import memory, run
+from patchfem.runs import choose, memory, run
 from patchfem.runs.plan import UPPER_LIMIT_NOTE, refuse_size
 from patchfem.runs.rig import costs
-from patchfem.runs.rig.numerics import choose
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 TANH = COULOMB.replace("coulomb", "tanh") + 'reference_speed = "1 mm/s"\n'
 RIG = POINT + TANH + STRUCTURE

@@ -10,8 +10,7 @@ import pytest
 import patchfem as pf
 from patchfem import load
 from patchfem.core import Measure, Outcome, SineDrive
-from patchfem.response import settling
-from patchfem.response.outcome import judge_outcome
+from patchfem.response import judge_outcome, settling
 
 FOUND = Path(__file__).parent / "found"
 TRUE = (  # scene, measure, truth: DOP853 from reversal to reversal at 3e-14, or a march of 4000 steps a cycle

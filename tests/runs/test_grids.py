@@ -5,10 +5,10 @@ import pytest
 from scene_texts import SMALL_PATCH
 
 from patchfem import build
+from patchfem.runs import solve_all
 from patchfem.runs.patch import grids, store
-from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.plan import expected_grids
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 PIECES = """[contact]
 length = "12 mm"

@@ -7,7 +7,7 @@ from scene_texts import BLOCK
 import patchfem as pf
 from patchfem import SceneError
 from patchfem.core import Outcome
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 GROOVES = 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}'
 PRESSED = f"""

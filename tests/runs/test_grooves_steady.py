@@ -8,9 +8,9 @@ import patchfem as pf
 from patchfem import build
 from patchfem.core import Outcome
 from patchfem.dynamics.march.march import march
+from patchfem.runs import choose
 from patchfem.runs.rig import interface
-from patchfem.runs.rig.numerics import choose
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 RIG = """
 [normal]

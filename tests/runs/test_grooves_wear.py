@@ -6,7 +6,7 @@ from scipy.integrate import quad, solve_ivp
 
 from patchfem import build
 from patchfem.runs.run import run as run_plan
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 MU, LOAD, KAPPA, WAVE, AREA = 0.4, 115.65, 2e-14, 2 * np.pi / 80e-6, 12.7e-3**2
 PIECES = """

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from patchfem.core import Missing, PatchfemError
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 W = 2 * pi * 100  # rad/s, of 1 kg
 LOAD = 100.0

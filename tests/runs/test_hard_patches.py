@@ -12,7 +12,7 @@ from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.core import Outcome, PatchfemError
 from patchfem.runs.patch import ladder
 from patchfem.runs.patch.grids import predict_condensing_seconds
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 SIZE, WIDTH, LOAD = 12.7e-3, 12.7e-3, 115.653761996773
 MODULUS = 121e9 / (1 - 0.31**2) / 2  # E* of two pieces of the material below

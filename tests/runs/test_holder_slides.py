@@ -6,7 +6,7 @@ from scene_texts import BENCH, PATCH, RIG, only
 from scipy.integrate import solve_ivp
 
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 STIFF, LIMIT = 5e6, 0.3 * 26 * 4.4482216152605
 PIECE = PATCH + BENCH[BENCH.index("[friction]") :]

@@ -9,7 +9,7 @@ from scene_texts import COATING, PIECE
 from patchfem import build
 from patchfem.contact.gaps import step
 from patchfem.core import Outcome
-from patchfem.runs.patch.ladder import solve_all
+from patchfem.runs import solve_all
 from patchfem.runs.patch.values import values
 from patchfem.scene import scene
 

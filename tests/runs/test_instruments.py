@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem import SceneError, run
-from patchfem.response.measures import measure_half_swing
-from patchfem.response.spectrum import read_instrument
-from patchfem.scene.scene import loads
+from patchfem.response import measure_half_swing, read_instrument
+from patchfem.scene import loads
 
 MODES = """
 [structure]

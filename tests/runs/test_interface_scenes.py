@@ -8,9 +8,9 @@ import xarray as xr
 from command_line import cli
 from march_paths import share_one_loop
 
-from patchfem.response.events import KIND_NAMES
+from patchfem.response import KIND_NAMES
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 FIG16 = f"""\
 [structure]

@@ -8,10 +8,10 @@ from scene_texts import COULOMB, DRIVE, MODE, NONLOCAL, PLASTIC, POINT
 
 from patchfem import build
 from patchfem.core import G_N, Outcome
+from patchfem.runs import choose
 from patchfem.runs.rig.march import run_march
-from patchfem.runs.rig.numerics import choose
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 SECOND = """\
 [[structure.mode]]
@@ -72,7 +72,7 @@ def done(tmp_path_factory):
                 words = ["accuracy.method=march"]
             path = folder / "scene.toml"
             path.write_text(ENGINES[engine] + DRIVES[drive], "utf-8")
-            from patchfem.scene.scene import load
+            from patchfem.scene import load
 
             scene = load(path, words)
             kept[engine, drive] = scene, run(scene, estimate=False)

@@ -5,8 +5,8 @@ import pytest
 from scene_texts import COATED, MODE, PLASTIC, SHEAR
 
 import patchfem as pf
+from patchfem.runs import with_shared_meshes
 from patchfem.runs.batch import one_by_one
-from patchfem.runs.batch.meshes import with_shared_meshes
 from patchfem.runs.patch import store
 from patchfem.runs.patch.store import content_key
 

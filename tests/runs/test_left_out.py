@@ -10,14 +10,14 @@ from scene_texts import COATED, COULOMB, MODE, NONLOCAL, PIECE
 
 from patchfem import build, plan
 from patchfem.core import NotConverged, PatchfemError
+from patchfem.mesh import graded_grid
 from patchfem.mesh.files import EDGE_TAGS
-from patchfem.mesh.tensor import graded_grid
-from patchfem.model.pieces import make_piece_meshes
+from patchfem.model import make_piece_meshes
 from patchfem.runs.patch.condensed import condense
 from patchfem.runs.patch.press import press_patch
 from patchfem.runs.patch.values import values
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 SINE = '[slide]\nkind = "sine"\nfrequency = "1 Hz"\ncycles = 1\namplitude = "{}"\n'
 HELD = (

@@ -3,7 +3,7 @@
 import numpy as np
 
 from patchfem import run
-from patchfem.export.summary import summarise_run
+from patchfem.export import summarise_run
 from patchfem.runs.patch.values import values
 from patchfem.runs.results import patch_rows
 

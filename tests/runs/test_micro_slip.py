@@ -5,7 +5,7 @@ import re
 import pytest
 
 import patchfem as pf
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 # crowned steel pieces, slid by a fortieth of the slide at which all of them slips
 CROWNED = """

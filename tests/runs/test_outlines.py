@@ -9,25 +9,18 @@ from wedges import falling
 
 import patchfem as pf
 from patchfem import build
-from patchfem.closed_forms.contact import (
-    punch_pressure,
-    rounded_punch_half_width,
-    rounded_punch_pressure,
-)
+from patchfem.closed_forms import rounded_punch_half_width
+from patchfem.closed_forms.contact import punch_pressure, rounded_punch_pressure
 from patchfem.core import PatchfemError, frozen_array
-from patchfem.elasticity.coating_traction import compute_coating_traction
-from patchfem.elasticity.elasticity import compute_displacement
-from patchfem.elasticity.recovery import get_cells
-from patchfem.mesh.files import write_mesh
-from patchfem.mesh.tensor import TensorGrid, graded_depth, graded_rows
-from patchfem.model.files import find_file_faults
-from patchfem.model.pieces import extend_grid, find_rounded_edges, make_piece_meshes
-from patchfem.runs.patch.ladder import solve_all
-from patchfem.runs.patch.measures import measures
+from patchfem.elasticity import compute_coating_traction, compute_displacement, get_cells
+from patchfem.mesh import TensorGrid, write_mesh
+from patchfem.mesh.tensor import graded_depth, graded_rows
+from patchfem.model import extend_grid, find_file_faults, find_rounded_edges, make_piece_meshes
+from patchfem.runs import measures, solve_all
 from patchfem.runs.patch.press import solve
 from patchfem.runs.patch.result import warn_of_strains
 from patchfem.runs.patch.values import values
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 BLOCK = """\
 [contact]

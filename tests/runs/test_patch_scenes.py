@@ -13,16 +13,15 @@ from patchfem import build, plan
 from patchfem.closed_forms import contact as exact
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.formatting import format_length
-from patchfem.mesh.files import write_mesh
+from patchfem.mesh import graded_grid, write_mesh
 from patchfem.mesh.pairs import as_piece
-from patchfem.mesh.tensor import graded_grid
-from patchfem.model.pieces import make_piece_meshes
-from patchfem.runs.patch.ladder import solve_all
-from patchfem.runs.patch.measures import measures, plane_band
+from patchfem.model import make_piece_meshes
+from patchfem.runs import measures, solve_all
+from patchfem.runs.patch.measures import plane_band
 from patchfem.runs.patch.press import solve
 from patchfem.runs.patch.values import values
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 LENGTH, WIDTH, HEIGHT, LOAD = 12.7e-3, 12.7e-3, 6.35e-3, 115.653761996773
 TEXT = (

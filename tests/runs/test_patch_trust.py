@@ -6,7 +6,7 @@ import pytest
 from scene_texts import COATING, PIECE
 
 import patchfem as pf
-from patchfem.export.summary import summarise_run
+from patchfem.export import summarise_run
 
 RIG = PIECE + 'load = "26 lbf"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
 STEP = RIG + '[contact.step]\nheight = "0.1 um"\nat = "2 mm"\n'

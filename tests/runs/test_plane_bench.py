@@ -9,12 +9,11 @@ from scene_texts import NONLOCAL, POINT, SMALL_PATCH, TRIANGLE
 
 from patchfem import build, plan
 from patchfem.core import PatchfemError
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.recursion import FirstOrderBonds
+from patchfem.friction import Bonds, FirstOrderBonds
+from patchfem.runs import solve_all
 from patchfem.runs.bench import bench as law_bench
-from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.run import run
-from patchfem.scene.scene import load, loads
+from patchfem.scene import load, loads
 
 LONGER = NONLOCAL.replace("1 um", "2 um")
 FILE = '[slide]\nkind = "file"\nfile = "path.csv"\n'

@@ -10,7 +10,7 @@ import patchfem as pf
 from patchfem import build
 from patchfem.closed_forms import contact as closed_forms
 from patchfem.runs.patch import fine as trace
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 SKIN = (
     '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e14 Pa/m"\ntangential_ratio = 0.8\n'

@@ -4,8 +4,7 @@ import pytest
 from scene_texts import KEYS
 
 import patchfem as pf
-from patchfem.scene.scene import loads
-from patchfem.scene.starting import read_template
+from patchfem.scene import loads, read_template
 
 LAWS = "coulomb", "elastic-plastic", "nonlocal", "tanh", "lugre", "iwan"
 

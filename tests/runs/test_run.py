@@ -19,11 +19,11 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from patchfem.core import G_N, Outcome
 from patchfem.effects import EFFECTS
+from patchfem.runs import choose
 from patchfem.runs.plan import plan
 from patchfem.runs.rig import rig
-from patchfem.runs.rig.numerics import choose
 from patchfem.runs.run import run
-from patchfem.scene.scene import load, loads
+from patchfem.scene import load, loads
 
 STUDIES = Path(__file__).parents[2] / "studies"
 LOAD, WIDTH, OMEGA = 115.653761996773, 0.0127, 2 * np.pi * 143

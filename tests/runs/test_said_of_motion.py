@@ -8,9 +8,8 @@ import pytest
 import patchfem as pf
 from patchfem import load
 from patchfem.core import Measure, Outcome
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.response.measures import relative_gap
-from patchfem.response.rows import LastCycles
+from patchfem.friction import Bonds
+from patchfem.response import LastCycles, relative_gap
 from patchfem.runs.results.notes import warn_of_creep
 
 BONDS = 'law = "nonlocal"\nbond_length = "{} m"\n'

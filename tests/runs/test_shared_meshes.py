@@ -8,7 +8,7 @@ from scene_texts import COATING, CROWNED_JOINT, PIECE
 
 from patchfem import build
 from patchfem.core import PatchfemError
-from patchfem.runs.batch.meshes import with_shared_meshes
+from patchfem.runs import with_shared_meshes
 from patchfem.runs.run import run
 from patchfem.scene import scene
 

@@ -4,7 +4,7 @@ import pytest
 from shear_scenes import RIG, compare_chain, compare_joint, compare_rig
 
 import patchfem as pf
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 
 @pytest.mark.parametrize(

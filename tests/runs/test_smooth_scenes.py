@@ -5,7 +5,7 @@ import pytest
 from scene_texts import DRIVE, MODE, NONLOCAL, POINT
 
 import patchfem as pf
-from patchfem.runs.rig.numerics import choose
+from patchfem.runs import choose
 
 SCENE = (
     POINT

@@ -13,7 +13,7 @@ from static_scenes import JUDGED, KINDS, drawn, judged_rows, solve_reference, te
 
 import patchfem as pf
 from patchfem import build
-from patchfem.model.pieces import make_piece_meshes
+from patchfem.model import make_piece_meshes
 from patchfem.runs.patch.condensed import condense
 from patchfem.runs.patch.press import press_patch
 

@@ -5,7 +5,7 @@ import pytest
 from scene_texts import COATED, COULOMB, MODE, PLASTIC, POINT, SECOND, SHEAR, SWEEP
 
 import patchfem as pf
-from patchfem.response.levels import LEVEL_MEASURES
+from patchfem.response import LEVEL_MEASURES
 from patchfem.runs.rig.steady import curves
 from patchfem.runs.rig.steady.curves import COLUMN_MEASURES
 

@@ -16,7 +16,7 @@ from support.scene_texts import (
 )
 
 import patchfem as pf
-from patchfem.export.summary import summarise_run
+from patchfem.export import summarise_run
 
 RIG = POINT + PLASTIC + MODE + DRIVE
 STEADY = {"accuracy.method": "harmonic"}

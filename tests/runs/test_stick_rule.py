@@ -5,7 +5,7 @@ from math import pi
 import pytest
 
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 SCENE = """\
 [normal]

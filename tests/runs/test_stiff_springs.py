@@ -6,7 +6,7 @@ import pytest
 from scene_texts import FORCED, MODE, PAIR, POINT, SHEAR, SMALL_PATCH, TRIANGLE, mistakes
 
 import patchfem as pf
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 LOAD, STIFF = 26 * 0.45359237 * 9.80665, 7e6  # N, N/m
 LAW = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\n'

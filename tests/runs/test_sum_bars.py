@@ -6,7 +6,7 @@ from patchfem import build
 from patchfem.runs.bench.engine import bench_engine
 from patchfem.runs.bench.errors import sum_error
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 RIG = (
     '[normal]\nload = "90 N"\n[friction]\nstatic = 0.3\nlaw = "nonlocal"\nbond_length = "4 um"\n{law}'

@@ -6,7 +6,7 @@ from scene_texts import BENCH, POINT
 from tolerance_forecasts import cured, misses
 
 import patchfem as pf
-from patchfem.scene.starting import read_template
+from patchfem.scene import read_template
 
 MODE = """\
 [structure]

@@ -5,10 +5,10 @@ import pytest
 from scene_texts import BENCH, RIG, STRUCTURE, only
 
 from patchfem.contact.unilateral import solve_forces
-from patchfem.dynamics.march.varying_load import make_contact_sets
+from patchfem.dynamics import make_contact_sets
 from patchfem.export.histories import collect_histories
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 PITCH = RIG.replace("slide = 0.1", 'slide = 0.1\npitch = "40 rad/m"').replace(
     "cycles = 200", "cycles = 12"

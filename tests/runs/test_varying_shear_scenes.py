@@ -6,7 +6,7 @@ from scene_texts import RIG
 
 from patchfem import plan
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 MOVING = RIG.replace("slide = 0.8", 'slide = 0.8\nnormal = 0.02\npitch = "5 rad/m"')
 MOVING = MOVING.replace("cycles = 200", "cycles = 12")

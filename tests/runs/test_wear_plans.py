@@ -3,8 +3,8 @@
 import pytest
 
 import patchfem as pf
+from patchfem.runs import evolve
 from patchfem.runs.patch.result import solve_all
-from patchfem.runs.wear.evolve import evolve
 from patchfem.runs.wear.plan import N_SMOOTH_JUMPS, jumps_about
 
 SCENE = """

@@ -19,12 +19,12 @@ from patchfem import build
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
-from patchfem.elasticity.elasticity import interface_compliance, make_piece
+from patchfem.elasticity import interface_compliance, make_piece
 from patchfem.runs.patch.result import solve_all
 from patchfem.runs.wear import evolve
-from patchfem.scene.scene import loads
-from patchfem.slip.shear_modes import jenkins_set
-from patchfem.wear.jumps import WearProblem, start_wear, take_jump
+from patchfem.scene import loads
+from patchfem.slip import jenkins_set
+from patchfem.wear import WearProblem, start_wear, take_jump
 
 TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'

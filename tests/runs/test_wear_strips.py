@@ -9,7 +9,7 @@ from scene_texts import COATED, COULOMB, MODE, PIECE, mistakes
 
 import patchfem as pf
 from patchfem.runs.rig.strips import lateral_motion
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 STRIPS = "[contact.strips]\ncount = 4\n"
 ROLLED = STRIPS + 'roll = "0.1 mrad"\n'

@@ -11,7 +11,7 @@ import patchfem as pf
 from patchfem.core import PatchfemError
 from patchfem.export import folder
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 HALF = "wear.cycles=1e6"
 

@@ -6,10 +6,10 @@ from command_line import cli
 
 import patchfem as pf
 from patchfem import SceneError
+from patchfem.runs import evolve
 from patchfem.runs.patch.result import solve_all
-from patchfem.runs.wear.evolve import evolve
 from patchfem.runs.wear.plan import jumps_about
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 LOAD, AREA, PATH = 26 * 4.4482216152605, 12.7e-3**2, 40e-6
 ALPHA, MU, DEPTH, CYCLES = 1e-13, 0.4, 10e-6, 5e6  # friction falls to nothing at DEPTH

@@ -8,11 +8,15 @@ from scene_texts import BENCH, DRIVE, KILOGRAM, line_of, mistakes
 
 import patchfem as pf
 from patchfem.core import PatchfemError
-from patchfem.model.model import build
-from patchfem.scene.axes import SampledRange, describe_ranges, read_axes
-from patchfem.scene.keys.quantities import parse_quantity
-from patchfem.scene.scene import loads
-from patchfem.scene.sets import format_values
+from patchfem.model import build
+from patchfem.scene import (
+    SampledRange,
+    describe_ranges,
+    format_values,
+    loads,
+    parse_quantity,
+    read_axes,
+)
 
 RIG = KILOGRAM + DRIVE
 SWEPT = BENCH + '[sweep]\n"friction.static" = "0.1..0.6:6"\nnormal.load = "26 lbf, 100 N"\n'

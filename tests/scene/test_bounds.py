@@ -5,9 +5,9 @@ import time
 import pytest
 from scene_texts import BENCH, COULOMB, PATCH, POINT, RIG, STRUCTURE, mistakes
 
-from patchfem.scene.keys.tables import Tables
+from patchfem.scene import Tables, load, loads
 from patchfem.scene.keys.types import attributes_by_key, find_inner_table, iterate_annotation_parts
-from patchfem.scene.scene import SceneError, load, loads
+from patchfem.scene.scene import SceneError
 
 MASSES = '[structure]\nmasses = [{}]\n[drive]\nkind = "base"\n'
 

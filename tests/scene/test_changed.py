@@ -5,9 +5,8 @@ import pytest
 from scene_texts import COULOMB, DRIVE, MODE, NONLOCAL, PATCH, POINT, SECOND
 
 from patchfem.api import load
-from patchfem.scene.files import require_files
-from patchfem.scene.overrides import BaseScene
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene import BaseScene, loads, require_files
+from patchfem.scene.scene import SceneError
 
 RIG = POINT + COULOMB + MODE + SECOND + DRIVE
 CHANGES = [  # scene, strings as --set takes them

@@ -26,10 +26,9 @@ from torture.toml import known, text_of
 from patchfem.core import Missing, NotConverged, PatchfemError
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.keys.quantities import UNIT_FACTORS
-from patchfem.scene.keys.tables import Tables
+from patchfem.scene import UNIT_FACTORS, Tables, loads
 from patchfem.scene.keys.types import find_inner_table
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene.scene import SceneError
 
 FLAT = PIECE + 'load = "26 lbf"\nelement_size = "2 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
 SHAKEN = KILOGRAM + DRIVE.replace("cycles = 30", "cycles = 6")

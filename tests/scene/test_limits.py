@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from scene_texts import BENCH, LINEAR, PATCH, RIG, line_of, mistakes, only
 
-from patchfem.scene.scene import SceneError, load, loads
+from patchfem.scene import load, loads
+from patchfem.scene.scene import SceneError
 
 SHEAR = "contact.shear={}"
 COULOMB, PLASTIC = "friction.law=coulomb", "friction.law=elastic-plastic"

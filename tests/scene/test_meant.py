@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from patchfem.scene.scene import SceneError, loads
-from patchfem.scene.starting import read_template
+from patchfem.scene import loads, read_template
+from patchfem.scene.scene import SceneError
 
 MEANT = [  # kind of scene, what stands there, what was written, what was meant
     ("rig", "static = 0.3", "mu = 0.3", "static"),

@@ -10,12 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.scene.keys.quantities import (
-    EXAMPLE_QUANTITIES,
-    UNIT_FACTORS,
-    format_si,
-    parse_quantity,
-)
+from patchfem.scene import UNIT_FACTORS, parse_quantity
+from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES, format_si
 
 
 @pytest.mark.parametrize(

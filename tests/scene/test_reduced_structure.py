@@ -8,7 +8,7 @@ from scipy import sparse
 from scipy.io import mmwrite
 
 import patchfem as pf
-from patchfem.response.errors import ERROR_MEASURES
+from patchfem.response import ERROR_MEASURES
 
 COUNT = 40
 SCENE = """\

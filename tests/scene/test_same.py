@@ -2,7 +2,8 @@
 
 import gc
 
-from patchfem.scene.keys.memoize import MAX_CACHED_RESULTS, memoize
+from patchfem.scene import memoize
+from patchfem.scene.keys.memoize import MAX_CACHED_RESULTS
 
 
 class Held:

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scene_texts import BENCH, FULL, LINEAR, PATCH, RIG
 
-from patchfem.scene.keys.materials import MATERIALS
+from patchfem.scene import MATERIALS, Scene, load, loads
 from patchfem.scene.lines import find_key_lines
-from patchfem.scene.scene import Scene, SceneError, load, loads
+from patchfem.scene.scene import SceneError
 
 
 def test_exact_rig_in_si():

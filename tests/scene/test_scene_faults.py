@@ -16,7 +16,8 @@ from scene_texts import (
     mistakes,
 )
 
-from patchfem.scene.scene import SceneError, load, loads
+from patchfem.scene import load, loads
+from patchfem.scene.scene import SceneError
 
 WORN_FRICTION = """\
 [wear]

@@ -23,8 +23,9 @@ from scene_texts import (
     only,
 )
 
+from patchfem.scene import load, loads
 from patchfem.scene.rules.limits import UNSUPPORTED_KEY
-from patchfem.scene.scene import SceneError, load, loads
+from patchfem.scene.scene import SceneError
 
 # (text, sets, key whose line is named, what the message says)
 BAD_VALUES = [

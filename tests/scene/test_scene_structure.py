@@ -7,13 +7,12 @@ import pytest
 from scene_texts import BLOCK, COULOMB, LINEAR, MODE, STRUCTURE, line_of, only
 
 from patchfem.core import PatchfemError
-from patchfem.model.model import build
-from patchfem.model.source import locate_errors
-from patchfem.model.structure import build_modes, compute_initial_state, compute_named_motions
+from patchfem.model import build, compute_named_motions, locate_errors
+from patchfem.model.structure import build_modes, compute_initial_state
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.overrides import BaseScene
-from patchfem.scene.scene import SceneError, load, loads
+from patchfem.scene import BaseScene, load, loads
+from patchfem.scene.scene import SceneError
 
 MASSES = """\
 [structure]

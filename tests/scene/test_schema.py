@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft202012Validator
 
-from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES, UNIT_FACTORS, parse_quantity
-from patchfem.scene.scene import SceneError, loads
-from patchfem.scene.schema import make_quantity_pattern, make_schema
-from patchfem.scene.starting import TEMPLATE_DESCRIPTIONS as TEMPLATES
-from patchfem.scene.starting import read_template
+from patchfem.scene import TEMPLATE_DESCRIPTIONS as TEMPLATES
+from patchfem.scene import UNIT_FACTORS, loads, make_schema, parse_quantity, read_template
+from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES
+from patchfem.scene.scene import SceneError
+from patchfem.scene.schema import make_quantity_pattern
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / "studies").rglob("*.toml"))

@@ -6,11 +6,12 @@ from scipy.linalg import eigh
 
 import patchfem as pf
 from patchfem.core import Outcome, PatchfemError
-from patchfem.scene.scene import load, loads
-from patchfem.scene.starting import (
+from patchfem.scene import (
     NEXT_VERBS,
     TEMPLATE_DESCRIPTIONS,
     find_shipped_scene,
+    load,
+    loads,
     read_template,
 )
 

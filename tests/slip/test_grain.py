@@ -6,8 +6,8 @@ import pytest
 import patchfem as pf
 from patchfem import build
 from patchfem.runs.bench.engine import slips_by_elements
-from patchfem.scene.scene import loads
-from patchfem.slip.mesh_correction import spread_elements
+from patchfem.scene import loads
+from patchfem.slip import spread_elements
 
 
 def work(k, y, amplitude):

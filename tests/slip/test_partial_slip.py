@@ -9,19 +9,11 @@ from hypothesis import strategies as st
 from pieces import LOAD, TILTS, coated_pair, rough
 from slip_paths import elements, histories
 
+from patchfem.contact import press, tangential_stiffness
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.stiffness import tangential_stiffness
-from patchfem.contact.unilateral import press
 from patchfem.core import PatchfemError
-from patchfem.slip.shear_modes import (
-    enough_modes,
-    fewest_gauss_points,
-    fewest_modes,
-    gauss_rule,
-    jenkins_set,
-    scale_limits,
-    shear_modes,
-)
+from patchfem.slip import enough_modes, fewest_gauss_points, jenkins_set, scale_limits
+from patchfem.slip.shear_modes import fewest_modes, gauss_rule, shear_modes
 
 MU = 0.3
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from pieces import COATED, COATING, HEIGHT, LENGTH, WIDTH, bare, coated_pair
 
-from patchfem.contact.stiffness import coupled_stiffness, tangential_stiffness
+from patchfem.contact import coupled_stiffness, tangential_stiffness
 from patchfem.core import Compliance, Interface
-from patchfem.elasticity.elasticity import interface_compliance, make_piece
-from patchfem.mesh.tensor import graded_grid
+from patchfem.elasticity import interface_compliance, make_piece
+from patchfem.mesh import graded_grid
 
 
 def unlike_pieces() -> tuple:

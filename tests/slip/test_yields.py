@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
-from patchfem.slip import shear_modes
-from patchfem.slip.shear_modes import jenkins_set
+from patchfem.slip import jenkins_set, shear_modes
 
 
 def yielded(c, limit):

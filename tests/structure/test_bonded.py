@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import ModalBasis, PatchfemError
-from patchfem.structure import masses
+from patchfem.structure import compute_receptance, masses
 from patchfem.structure.bonded import add_spring, remove_springs
-from patchfem.structure.response import compute_receptance
 
 
 def one(omega=3.0, zeta=0.01, slide=0.8, mass=2.0):

@@ -7,16 +7,11 @@ from scipy.integrate import quad, solve_ivp
 
 from patchfem import SceneError, plan, run
 from patchfem.core import InitialState, ModalBasis, Outcome, PatchfemError, SineDrive
+from patchfem.dynamics import coulomb_model, jenkins_model
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import coulomb_model, jenkins_model
-from patchfem.scene.scene import loads
-from patchfem.structure.drives import (
-    RecordedDrive,
-    SweepDrive,
-    make_levels,
-    make_release,
-    make_step,
-)
+from patchfem.scene import loads
+from patchfem.structure import make_release
+from patchfem.structure.drives import RecordedDrive, SweepDrive, make_levels, make_step
 
 W = 2 * np.pi * 143
 

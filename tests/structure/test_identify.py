@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
-from patchfem.structure import masses
+from patchfem.structure import compute_receptance, masses
 from patchfem.structure.modal_fit import fit_poles, identify_modes
-from patchfem.structure.response import compute_receptance
 
 BAND = np.arange(20.0, 400.0, 0.5)
 

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from scipy.linalg import eigh
 
 from patchfem.core import PatchfemError
-from patchfem.structure import masses, matrices
-from patchfem.structure.response import compute_receptance
+from patchfem.structure import compute_receptance, masses, matrices
 
 
 def chain(n, held=True, k=1.0):

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
-from patchfem.structure import masses, matrices
-from patchfem.structure.response import compute_receptance
+from patchfem.structure import compute_receptance, masses, matrices
 
 
 @given(st.integers(0, 10**6), st.booleans())

@@ -5,8 +5,7 @@ import pytest
 import pyuff
 
 from patchfem.core import PatchfemError
-from patchfem.structure import masses, places, universal
-from patchfem.structure.response import compute_receptance
+from patchfem.structure import compute_receptance, masses, places, universal
 
 SIX = 2e-5  # dataset 55 and the frequencies of 58 have six digits
 RIG = masses.build_basis(

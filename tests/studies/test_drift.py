@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from study_module import study
 
-from patchfem.friction.bonds.recursion import FirstOrderBonds
+from patchfem.friction import FirstOrderBonds
 
 
 @pytest.fixture(scope="module")

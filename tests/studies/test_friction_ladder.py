@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from study_module import study
 
-from patchfem.friction.bonds.recursion import FirstOrderBonds
+from patchfem.friction import FirstOrderBonds
 
 
 @pytest.fixture(scope="module")

@@ -73,7 +73,7 @@ def test_exact_the_docstring_of_fixtures_holds_what_it_prints(tilted, fixtures, 
 
 
 def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
-    from patchfem.runs.patch.measures import measures
+    from patchfem.runs import measures
 
     found = fixtures.held_pieces(1e-3, None)
     two = measures(press_patch(found, tilted.pair(1)), press_patch(found, tilted.pair(0)))
@@ -90,8 +90,7 @@ def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
 @pytest.mark.slow
 @pytest.mark.parametrize(("angle", "skin"), [(3e-5, "bare"), (1e-2, "bare"), (1e-2, "linear")])
 def test_always_meshes_graded_anew_agree_within_the_errors(tilted, angle, skin):
-    from patchfem.runs.patch.ladder import solve_all
-    from patchfem.runs.patch.measures import measures
+    from patchfem.runs import measures, solve_all
 
     found = tilted.case(angle, skin)
     ours = tilted.compute_measures(found)

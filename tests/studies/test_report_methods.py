@@ -17,7 +17,8 @@ from report_methods import (
 from scipy.linalg import expm
 
 from patchfem.core import DriveSegment, InitialState, SineDrive
-from patchfem.structure.drives import PiecewiseDrive, RecordedDrive, make_release
+from patchfem.structure import make_release
+from patchfem.structure.drives import PiecewiseDrive, RecordedDrive
 
 DRIVE = SineDrive(1.3, 0.9)
 NO_FRICTION = 1e-300

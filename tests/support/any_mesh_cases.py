@@ -9,9 +9,8 @@ import numpy as np
 from pair_meshes import pair_mesh
 from scipy.spatial import Delaunay
 
-from patchfem.mesh.anymesh import PieceMesh
-from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, read_pieces
-from patchfem.mesh.tensor import graded_grid
+from patchfem.mesh import PieceMesh, graded_grid, read_pieces
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
 
 NO_QUADS = np.empty((0, 4), np.int64)
 

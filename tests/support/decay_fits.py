@@ -21,15 +21,15 @@ import numpy as np
 from campaigns import Row
 
 import patchfem as pf
-from patchfem.campaigns.backbone.curves import compute_backbone
-from patchfem.campaigns.fits.curve import fit_curve, read_curve
+from patchfem.campaigns import compute_backbone, fit_curve
+from patchfem.campaigns.fits.curve import read_curve
 from patchfem.core import PatchfemError
 from patchfem.export.lab import imported
+from patchfem.identify import CubeResidual
 from patchfem.identify.least_squares import descend
-from patchfem.identify.space import CubeResidual, make_space
-from patchfem.model.model import build
-from patchfem.scene.overrides import BaseScene
-from patchfem.scene.ranges import read_ranges
+from patchfem.identify.space import make_space
+from patchfem.model import build
+from patchfem.scene import BaseScene, read_ranges
 
 LOAD, MASS, OWN, SLIDERS, BETA = 100.0, 1.0, 2 * np.pi * 100.0, 400, 0.5
 STEPS, KEPT, PERIODS = 400, 8, 150

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from patchfem.dynamics import make_coulomb_elements
 from patchfem.dynamics.events import histories, stick_steady
-from patchfem.dynamics.events.elements import make_coulomb_elements
 from patchfem.dynamics.events.positions_kernels import BEGIN, Column
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import gamma
 
-from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction import Quadrature
 
 sys.path.append(str(Path(__file__).parents[2] / "studies/drift"))
 from force_control import drift, slides  # noqa: F401  (force control: one door for the tests of the laws)

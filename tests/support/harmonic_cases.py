@@ -5,9 +5,7 @@ from scipy.linalg import expm
 
 from patchfem.core import ModalBasis
 from patchfem.dynamics.harmonic.laws import FlowLaw, SpeedLaw
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.laws.stretch import points_element
-from patchfem.friction.laws.tanh import TanhLaw
+from patchfem.friction import Bonds, TanhLaw, points_element
 
 
 def of_speed(limit, speed):

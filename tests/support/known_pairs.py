@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from patchfem.core import frozen_array
-from patchfem.surface.profile import Profile
+from patchfem.surface import Profile
 
 KINDS = (
     "unworn",

@@ -13,11 +13,11 @@ from scene_texts import MODE
 
 import patchfem as pf
 from patchfem.api import get_base_scene
-from patchfem.response.rows import TABLE as MOTION
+from patchfem.response import TABLE as MOTION
+from patchfem.runs import TABLE as STATIC
 from patchfem.runs.batch import meshes, one_by_one
 from patchfem.runs.batch.lumped import lane_ringing, lanes
-from patchfem.runs.results.patch_rows import TABLE as STATIC
-from patchfem.scene.sets import format_assignments
+from patchfem.scene import format_assignments
 
 SCENE = (
     '[normal]\nload = "30 N"\n[friction]\n{law}\n'

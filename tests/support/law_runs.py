@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from scene_texts import DRIVE, MODE
 
-from patchfem.campaigns.fits.loop import fit_loop
-from patchfem.model.model import build
+from patchfem.campaigns import fit_loop
+from patchfem.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run
-from patchfem.scene.scene import load, loads
+from patchfem.scene import load, loads
 
 LOAD = 100.0  # N on every contact
 POINT = '[normal]\nload = "100 N"\n'

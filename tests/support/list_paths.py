@@ -5,11 +5,17 @@ from typing import NamedTuple
 import numpy as np
 
 from patchfem.dynamics.interfaces.arrays import BondList
+from patchfem.friction import (
+    N_ROWS,
+    STATUS,
+    gamma_table,
+    growth_numbers,
+    law_numbers,
+    make_clocks,
+    make_status,
+)
 from patchfem.friction.bonds import list_kernels
-from patchfem.friction.bonds.list_numbers import gamma_table, law_numbers, make_clocks, make_status
-from patchfem.friction.bonds.list_rows_kernels import N_ROWS, STATUS
 from patchfem.friction.bonds.quadrature import cutoff_age
-from patchfem.friction.laws.stretch import growth_numbers
 
 for kernel in (list_kernels.list_mean, list_kernels.list_force, list_kernels.list_step):
     if hasattr(kernel, "enable_caching"):  # not where numba is told to compile nothing

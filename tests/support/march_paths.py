@@ -3,10 +3,8 @@
 import numpy as np
 
 from patchfem.core import ModalBasis
-from patchfem.dynamics.march.faces import STEP_TOL
-from patchfem.dynamics.march.joints import JointsModel
-from patchfem.dynamics.march.models import element_model, load_instances
-from patchfem.friction.laws.tanh import TanhLaw
+from patchfem.dynamics import STEP_TOL, JointsModel, element_model, load_instances
+from patchfem.friction import TanhLaw
 
 OMEGA = 2 * np.pi * 143
 # laws of the one compiled loop of joints that most tests share

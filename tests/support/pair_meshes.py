@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from patchfem.mesh import TensorGrid
 from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
 from patchfem.mesh.pairs import join_meshes
-from patchfem.mesh.tensor import TensorGrid
 
 
 def pair_mesh(grid: TensorGrid) -> dict:

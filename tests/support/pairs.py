@@ -6,7 +6,7 @@ import numpy as np
 from synthetic import report_trace
 
 from patchfem.core import frozen_array
-from patchfem.surface.profile import Profile
+from patchfem.surface import Profile
 
 UM = 1e-6
 # the surface that both traces are cut from: pieces of it scatter as measured traces do

@@ -7,8 +7,9 @@ from functools import cache
 import numpy as np
 
 from patchfem.core import Compliance, Interface
-from patchfem.elasticity.elasticity import Layers, interface_compliance, make_piece
-from patchfem.mesh.tensor import TensorGrid, graded_grid, graded_rows
+from patchfem.elasticity import Layers, interface_compliance, make_piece
+from patchfem.mesh import TensorGrid, graded_grid
+from patchfem.mesh.tensor import graded_rows
 
 TITANIUM = (121e9, 0.32)
 CARBIDE = (250e9, 0.24)  # sprayed WC-Co, the project's assumed default

@@ -22,10 +22,10 @@ import numpy as np
 from campaigns import measure_rows
 
 import patchfem as pf
-from patchfem.model.model import build
+from patchfem.model import build
 from patchfem.runs import run as runs
 from patchfem.runs.patch import ladder as patches
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 # Largest age of a bond that counts, and half-width of the first bonds [bond lengths].
 MOST, FIRST_WIDE = (

@@ -13,7 +13,8 @@ from torture import scenes
 from torture.toml import text_of
 from torture.trial import Trial
 
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene import loads
+from patchfem.scene.scene import SceneError
 
 WORD = r"'[^']*'|\"[^\"]*\""
 LIST = rf"((?:{WORD})(?:(?:, | or )(?:{WORD}))*)"

@@ -16,11 +16,10 @@ from scene_texts import COATING, PIECE
 from synthetic import self_affine
 
 import patchfem as pf
-from patchfem.model.model import build
+from patchfem.model import build
+from patchfem.runs import measures, solve_all
 from patchfem.runs.patch import ladder
-from patchfem.runs.patch.ladder import solve_all
-from patchfem.runs.patch.measures import measures
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 LENGTH, CELLS = 12.7e-3, 1588  # of the interface [m]; of the even mesh beside
 KINDS = ("corner", "roofs", "punch", "wave", "short wave", "rough", "smooth rough", "crowned wave")

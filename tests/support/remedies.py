@@ -16,7 +16,8 @@ from torture.trial import Trial
 from patchfem.core import NotConverged, PatchfemError
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene import loads
+from patchfem.scene.scene import SceneError
 
 KINDS = ("patch", "bench", "rig", "masses", "wear", "harmonic", "soft", "linear", "rig", "bench")
 DEAR = 3.0  # planned seconds beyond which a scene is not drawn

@@ -62,7 +62,7 @@ KINDS = {
 
 def trace(kind: str, seed: int):
     """One trace of a kind [Profile], heights of about a micrometre."""
-    from patchfem.surface.profile import Profile
+    from patchfem.surface import Profile
 
     z = UM * KINDS[kind](np.random.default_rng([seed, sorted(KINDS).index(kind)]))
     return Profile(np.arange(z.size) * STEP, z, f"{kind}-{seed}")
@@ -70,11 +70,10 @@ def trace(kind: str, seed: int):
 
 def means(kind: str) -> dict:
     """Mean of every parameter over the others, by name: no interval is worked out."""
-    from patchfem.surface.profile import level
+    from patchfem.surface import BAND, Heights, level
     from patchfem.surface.roughness import rows
     from patchfem.surface.roughness.filter import filter_trace
-    from patchfem.surface.roughness.parameters import Heights
-    from patchfem.surface.roughness.spectrum import BAND, band_amplitude, estimate_spectrum
+    from patchfem.surface.roughness.spectrum import band_amplitude, estimate_spectrum
 
     found = defaultdict(list)
     for seed in range(FIRST, FIRST + OTHERS):
@@ -99,7 +98,7 @@ def means(kind: str) -> dict:
 
 def coverage(kind: str, seeds) -> dict:
     """Name -> (share of the intervals that hold the mean, share of traces that have an interval)."""
-    from patchfem.surface.roughness.report import make_report
+    from patchfem.surface import make_report
 
     truth = means(kind)
     held = defaultdict(list)

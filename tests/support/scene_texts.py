@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene import loads
+from patchfem.scene.scene import SceneError
 
 # keys that a law asks for beside its static friction
 KEYS = {

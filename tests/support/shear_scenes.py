@@ -13,7 +13,7 @@ from campaigns import measure_rows
 
 import patchfem as pf
 from patchfem.response.rows import INTERFACE_MEASURES
-from patchfem.scene.scene import Scene, loads
+from patchfem.scene import Scene, loads
 
 JOINT_TOLERANCE = 1e-6  # of the reference of a joint
 RIG_TOLERANCE = 1e-5  # of the reference of a rig or a chain

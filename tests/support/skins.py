@@ -7,10 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from patchfem.contact import strips
-from patchfem.contact.asperity_laws import ExponentialAsperities, LinearAsperities
-from patchfem.contact.strip_compliance import StripCompliance
-from patchfem.contact.unilateral import press, press_to_approach
+from patchfem.contact import (
+    ExponentialAsperities,
+    LinearAsperities,
+    StripCompliance,
+    press,
+    press_to_approach,
+    strips,
+)
 from patchfem.core import Compliance, Interface, Outcome
 
 

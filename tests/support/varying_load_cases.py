@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from patchfem.contact.contact_sets import ContactSets
+from patchfem.contact import ContactSets
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.march import varying_load
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.response.measures import energy_balance
+from patchfem.friction import Bonds
+from patchfem.response import energy_balance
 
 MASS, LOAD, STILL = 0.884, 116.0, SineDrive(0.0, 2 * np.pi * 143)
 LAWS = {

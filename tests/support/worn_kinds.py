@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from patchfem.core import frozen_array
-from patchfem.surface.profile import Profile
+from patchfem.surface import Profile
 
 UM = 1e-6
 KINDS = (

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError, frozen_array
-from patchfem.surface.areal import Areal, level_plane
+from patchfem.surface import level_plane
+from patchfem.surface.areal import Areal
 
 
 def scan(z, notes=("one",)) -> Areal:

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from synthetic import self_affine, sine, waves
 
 from patchfem.core import PatchfemError
-from patchfem.surface.fine import describe_lost_waves, fine_fraction, wave_spectrum
-from patchfem.surface.profile import Profile, level
+from patchfem.surface import Profile, describe_lost_waves, fine_fraction, level
+from patchfem.surface.fine import wave_spectrum
 
 LENGTH = 12.7e-3
 X = np.linspace(0, LENGTH, 4001)

@@ -11,11 +11,18 @@ import pytest
 from scipy.io import loadmat
 
 from patchfem.core import PatchfemError
-from patchfem.surface.areal import level_plane
-from patchfem.surface.files.read import read_surface
-from patchfem.surface.fine import describe_lost_waves, wave_spectrum
-from patchfem.surface.nodes import average_at_nodes, place_over_patch
-from patchfem.surface.profile import Profile, clean, find_spikes, level
+from patchfem.surface import (
+    Profile,
+    average_at_nodes,
+    clean,
+    describe_lost_waves,
+    level,
+    level_plane,
+    place_over_patch,
+    read_surface,
+)
+from patchfem.surface.fine import wave_spectrum
+from patchfem.surface.profile import find_spikes
 
 pytestmark = pytest.mark.skipif(
     "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"

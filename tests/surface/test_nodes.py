@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from synthetic import sine
 
 from patchfem.core import PatchfemError
-from patchfem.surface.nodes import AS_LONG, average_at_nodes, place_over_patch
-from patchfem.surface.profile import Profile
+from patchfem.surface import Profile, average_at_nodes, place_over_patch
+from patchfem.surface.nodes import AS_LONG
 
 HALF = 6.35e-3
 EVEN = np.linspace(-HALF, HALF, 201)

@@ -13,7 +13,8 @@ from traces import UM, bumpy
 
 from patchfem.core import PatchfemError
 from patchfem.formatting import format_length
-from patchfem.surface.profile import SPIKE_DEVIATIONS, Profile, clean, find_spikes, level
+from patchfem.surface import Profile, clean, level
+from patchfem.surface.profile import SPIKE_DEVIATIONS, find_spikes
 
 
 def rough(count=4000, seed=0) -> Profile:

@@ -10,9 +10,9 @@ from wear_forms import even_wear_pressure, worn_crown_half_width, worn_pad_fract
 
 from patchfem.closed_forms.contact import hertz_half_width
 from patchfem.contact.unilateral import solve_forces
-from patchfem.elasticity.elasticity import interface_compliance, make_piece
-from patchfem.wear.depth import solve_jump, wear_rates
-from patchfem.wear.jumps import WearProblem, start_wear, take_jump
+from patchfem.elasticity import interface_compliance, make_piece
+from patchfem.wear import WearProblem, start_wear, take_jump, wear_rates
+from patchfem.wear.depth import solve_jump
 
 LOAD, KAPPA, PATH = 116.0, 1e-14, 40e-6
 

@@ -9,16 +9,16 @@ from command_line import cli
 
 import patchfem as pf
 from patchfem import SceneError, build, run
+from patchfem.campaigns import FitRequest, RowsOptions, fit_rows
 from patchfem.campaigns.rows.cells import read_readings
 from patchfem.campaigns.rows.computed import ModelReadings
-from patchfem.campaigns.rows.condition_models import ConditionModels, FitRequest
-from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
+from patchfem.campaigns.rows.condition_models import ConditionModels
+from patchfem.campaigns.rows.fit import SearchSettings
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits.rows import Starts, describe_answer
-from patchfem.runs.batch.watched import MotionObserver
-from patchfem.scene.ranges import read_ranges
-from patchfem.scene.scene import load, loads
+from patchfem.runs import MotionObserver
+from patchfem.scene import load, loads, read_ranges
 
 MIL = 25.4e-6
 LINEAR = """

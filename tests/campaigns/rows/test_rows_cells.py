@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patchfem.campaigns.rows.cells import MAX_LOG, MIN_DISPLACEMENT, read_readings, scores
-from patchfem.campaigns.rows.null_models import NULL_MODELS, fit_null_model
+from patchfem.campaigns import NULL_MODELS, scores
+from patchfem.campaigns.rows.cells import MAX_LOG, MIN_DISPLACEMENT, read_readings
+from patchfem.campaigns.rows.null_models import fit_null_model
 from patchfem.core import G_N, PatchfemError
 
 TABLE_1 = Path(__file__).parents[3] / "studies" / "rig" / "table1.csv"

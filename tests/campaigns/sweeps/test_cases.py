@@ -8,11 +8,9 @@ import pytest
 from scene_texts import BENCH, PATCH, SMALL_PATCH
 
 from patchfem import SceneError
-from patchfem.campaigns.sweeps.case_models import SweepScene
-from patchfem.campaigns.sweeps.cases import Cases, combine_cases
-from patchfem.campaigns.sweeps.parse_request import Request, read_cases
-from patchfem.scene.axes import read_axes
-from patchfem.scene.scene import loads
+from patchfem.campaigns import Cases, Request, SweepScene, read_cases
+from patchfem.campaigns.sweeps.cases import combine_cases
+from patchfem.scene import loads, read_axes
 
 THREE = ["normal.load=1 N,2 N", "friction.static=0.1,0.2,0.3", "slide.speed=1 mm/s,2 mm/s"]
 

@@ -11,13 +11,12 @@ import pytest
 from command_line import cli
 from scene_texts import BENCH
 
-from patchfem.campaigns.sweeps.case_models import SweepScene
-from patchfem.campaigns.sweeps.cases import Cases
+from patchfem.campaigns import Cases, SweepScene, Work, environment_versions
 from patchfem.campaigns.sweeps.executors import cluster
-from patchfem.campaigns.sweeps.executors.cluster import Cluster, _answer, environment_versions
-from patchfem.campaigns.sweeps.sweep import Work, compute_chunk
+from patchfem.campaigns.sweeps.executors.cluster import Cluster, _answer
+from patchfem.campaigns.sweeps.sweep import compute_chunk
 from patchfem.core import Missing
-from patchfem.scene.axes import read_axes
+from patchfem.scene import read_axes
 
 pytest.importorskip("distributed")
 BY_FILE = BENCH[: BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'

@@ -6,11 +6,10 @@ import pytest
 from scene_texts import BENCH, COULOMB, POINT, SHORT, SMALL_PATCH
 
 from patchfem import plan
-from patchfem.campaigns.sweeps.case_models import SweepScene
-from patchfem.campaigns.sweeps.estimate import SWEEP_SECONDS, estimate_sweep
+from patchfem.campaigns import Request, SweepScene, contradictions, estimate_sweep, read_cases
+from patchfem.campaigns.sweeps.estimate import SWEEP_SECONDS
 from patchfem.campaigns.sweeps.executors import LocalExecutor
-from patchfem.campaigns.sweeps.parse_request import Request, contradictions, read_cases
-from patchfem.export.sweeps.run import SweepTarget, sweep_into
+from patchfem.export import SweepTarget, sweep_into
 
 
 @pytest.mark.parametrize(

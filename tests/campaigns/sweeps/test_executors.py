@@ -13,18 +13,25 @@ from command_line import cli
 from deadly_cases import Deadly
 from scene_texts import BENCH, COULOMB, POINT, SHORT
 
+from patchfem.campaigns import (
+    Cases,
+    RemainingTime,
+    Request,
+    SweepScene,
+    Work,
+    iterate_chunks,
+    read_sweep,
+)
 from patchfem.campaigns.sweeps import executors
-from patchfem.campaigns.sweeps.case_models import SweepScene
-from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.parse_request import Request, read_sweep
-from patchfem.campaigns.sweeps.sweep import MAX_DEATHS, Chunks, RemainingTime, Work, iterate_chunks
+from patchfem.campaigns.sweeps.sweep import MAX_DEATHS, Chunks
 from patchfem.core import Missing, PatchfemError
-from patchfem.export.sweeps.run import SweepTarget, sweep_into
-from patchfem.runs.batch.case_results import FAILED_OUTCOME, CaseResults, join_case_results
-from patchfem.scene.axes import read_axes
+from patchfem.export import SweepTarget, sweep_into
+from patchfem.runs import FAILED_OUTCOME, CaseResults
+from patchfem.runs.batch.case_results import join_case_results
+from patchfem.scene import read_axes
 
 SUPPORT = Path(__file__).parents[2] / "support"
 RIG = POINT + COULOMB + SHORT

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, POINT, SECOND, SHEAR, friction_of
 
-from patchfem.campaigns.sweeps.case_models import SweepScene
+from patchfem.campaigns import SweepScene
 from patchfem.core import PatchfemError
-from patchfem.model.similar_models import collect_columns
+from patchfem.model import collect_columns
 from patchfem.runs.batch.lumped import columns, lane_numbers
 from patchfem.scene.overrides import PLAIN_KEYS
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from patchfem.campaigns.sweeps.ranking import compute_sobol_indices
+from patchfem.campaigns import compute_sobol_indices
 
 # Ishigami and Homma 1990, a = 7, b = 0.1: closed forms
 WHOLE = 0.1 * np.pi**4 / 5 + 0.01 * np.pi**8 / 18 + 0.5 + 49 / 8

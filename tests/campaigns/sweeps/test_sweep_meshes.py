@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from scene_texts import PATCH
 
-from patchfem.campaigns.sweeps.case_models import SweepScene
-from patchfem.campaigns.sweeps.cases import Cases
+from patchfem.campaigns import Cases, SweepScene, Work, iterate_chunks
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.sweep import Work, choose_meshes, iterate_chunks
+from patchfem.campaigns.sweeps.sweep import choose_meshes
 from patchfem.runs.batch.case_results import join_case_results
-from patchfem.scene.axes import read_axes
+from patchfem.scene import read_axes
 
 WORK = Work(
     SweepScene(Path("a.toml"), PATCH),

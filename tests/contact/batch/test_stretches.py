@@ -5,9 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchfem.contact import edges
-from patchfem.contact.batch.intervals import MIN_COARSE_NODES, Intervals
-from patchfem.contact.unilateral import press
+from patchfem.contact import Intervals, edges, press
+from patchfem.contact.batch.intervals import MIN_COARSE_NODES
 
 X = np.concatenate([np.linspace(-5e-3, 0, 40), np.linspace(0, 5e-3, 12)[1:]])
 

@@ -11,8 +11,8 @@ import pytest
 from event_reference import random_basis
 
 from patchfem.core import SineDrive
+from patchfem.dynamics import make_coulomb_elements, make_elements
 from patchfem.dynamics.events import cost, histories
-from patchfem.dynamics.events.elements import make_coulomb_elements, make_elements
 from patchfem.structure import drives
 
 SINE = SineDrive(1.0, 1.2)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.dynamics.events.elements import make_elements, merge_elements
+from patchfem.dynamics import make_elements, merge_elements
 from patchfem.friction.laws.iwan import slider_cells
 
 

@@ -13,8 +13,9 @@ from vibration_forms import sliding_amplitude
 from patchfem.core import DriveSegment, InitialState, ModalBasis, Outcome, PatchfemError, SineDrive
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.histories import evaluate_motion
-from patchfem.response.measures import energy_balance
-from patchfem.structure.drives import PiecewiseDrive, make_levels, make_release
+from patchfem.response import energy_balance
+from patchfem.structure import make_release
+from patchfem.structure.drives import PiecewiseDrive, make_levels
 
 
 def modes_of(omega=1.0, zeta=0.003, slide=1.0, base=1.0, output=1.0, mass=1.0):

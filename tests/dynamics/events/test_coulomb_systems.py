@@ -18,9 +18,10 @@ from patchfem.core import (
     PatchfemError,
     SineDrive,
 )
-from patchfem.dynamics.events.event_list import BORDER, RELEASE, STOP
+from patchfem.dynamics import BORDER
+from patchfem.dynamics.events.event_list import RELEASE, STOP
 from patchfem.dynamics.events.positions_kernels import N_COLUMNS, Column, Row
-from patchfem.response.measures import energy_balance
+from patchfem.response import energy_balance
 from patchfem.structure import drives
 
 

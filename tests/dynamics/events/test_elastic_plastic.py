@@ -5,9 +5,9 @@ import pytest
 from support.jenkins_reference import Reference
 
 from patchfem.core import ModalBasis, Outcome, SineDrive
-from patchfem.dynamics.events.elements import make_elements
+from patchfem.dynamics import make_elements
 from patchfem.dynamics.events.histories import simulate
-from patchfem.response.measures import energy_balance
+from patchfem.response import energy_balance
 from patchfem.structure.drives import RecordedDrive, SweepDrive
 
 

@@ -9,10 +9,10 @@ from scipy.optimize import fsolve
 from test_elastic_plastic import ONE, basis, random_rig
 
 from patchfem.core import NotConverged, PatchfemError, SineDrive
-from patchfem.dynamics.events.elements import make_elements
+from patchfem.dynamics import find_steady_state_from as settled
+from patchfem.dynamics import make_elements
 from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.events.period import PeriodMap
-from patchfem.dynamics.events.steady import find_steady_state_from as settled
 from patchfem.dynamics.events.steady import solve_steady as steady
 from patchfem.structure.drives import make_levels
 

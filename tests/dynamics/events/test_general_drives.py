@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patchfem.core import InitialState, Outcome
-from patchfem.dynamics.events.event_list import BORDER
-from patchfem.response.measures import energy_balance
+from patchfem.dynamics import BORDER
+from patchfem.response import energy_balance
 from patchfem.structure.drives import RecordedDrive, SweepDrive
 
 REACH, TERMS = 2.0, 27  # reach of a series times the rate of its drive, and its terms

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
+from patchfem.dynamics import make_elements
 from patchfem.dynamics.events import memory_kernels as kernels
 from patchfem.dynamics.events.elements import (
     element_stretches,
     make_element_table,
-    make_elements,
     unstretched_memory,
 )
 

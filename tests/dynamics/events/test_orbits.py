@@ -7,9 +7,8 @@ import pytest
 from test_elastic_plastic import basis, random_rig
 
 from patchfem.core import NotConverged, SineDrive
-from patchfem.dynamics.events.elements import make_elements
+from patchfem.dynamics import PeriodicMotionFinder, make_elements
 from patchfem.dynamics.events.histories import simulate
-from patchfem.dynamics.events.orbits import PeriodicMotionFinder
 from patchfem.dynamics.events.steady import solve_steady as steady
 from patchfem.dynamics.periodic import solve_linear
 

@@ -5,11 +5,9 @@ import pytest
 
 from patchfem.compiled.no_jit import load_uncompiled
 from patchfem.core import ModalBasis, SineDrive
+from patchfem.dynamics import InterfaceMeasure, RunMeasure, make_elements
 from patchfem.dynamics.events import histories
-from patchfem.dynamics.events.elements import make_elements
-from patchfem.dynamics.events.positions_kernels import InterfaceMeasure, RunMeasure
-from patchfem.response.loops import find_reversals, mean_half_range, secant_stiffness
-from patchfem.response.run_events import measure_rings
+from patchfem.response import find_reversals, mean_half_range, measure_rings, secant_stiffness
 
 read = load_uncompiled("patchfem.dynamics.events.read_kernels")
 PLACE, WEIGHT = np.polynomial.legendre.leggauss(16)

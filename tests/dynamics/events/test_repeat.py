@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from patchfem.core import ModalBasis, SineDrive
+from patchfem.dynamics import make_elements
 from patchfem.dynamics.events import histories
-from patchfem.dynamics.events.elements import make_elements
-from patchfem.response.measures import energy_balance
+from patchfem.response import energy_balance
 from patchfem.structure.drives import make_levels
 
 

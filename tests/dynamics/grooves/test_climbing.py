@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 
 from patchfem.core import InitialState, ModalBasis, Outcome, SineDrive
+from patchfem.dynamics import element_model, make_bonds_law, make_elastic_plastic_law, points_model
 from patchfem.dynamics.grooves.climbing import ClimbingModel
 from patchfem.dynamics.grooves.run import make_model
 from patchfem.dynamics.march.instances import follow_path
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import element_model, points_model
-from patchfem.dynamics.march.varying_load import make_bonds_law, make_elastic_plastic_law
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.recursion import FirstOrderBonds
-from patchfem.friction.grooves import Grooves
+from patchfem.friction import Bonds, FirstOrderBonds, Grooves
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.response.measures import energy_balance
+from patchfem.response import energy_balance
 
 LOAD, MU = 115.65, 0.4
 ONE = np.ones(1)

@@ -8,16 +8,15 @@ import pytest
 import patchfem as pf
 from patchfem import load
 from patchfem.core import ModalBasis, SineDrive
+from patchfem.dynamics import jenkins_model, make_bonds_law, make_elastic_plastic_law
 from patchfem.dynamics.grooves import climbing
 from patchfem.dynamics.grooves.climbing import ClimbingModel
 from patchfem.dynamics.march.instances import follow_path
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import jenkins_model
-from patchfem.dynamics.march.varying_load import make_bonds_law, make_elastic_plastic_law
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.grooves import Grooves
-from patchfem.response.measures import energy_balance
-from patchfem.slip.shear_modes import jenkins_set, shear_modes
+from patchfem.friction import Bonds, Grooves
+from patchfem.response import energy_balance
+from patchfem.slip import jenkins_set
+from patchfem.slip.shear_modes import shear_modes
 
 LOAD, MU, LENGTH, COUNT = 115.65, 0.4, 1e-6, 12
 PLACES = np.linspace(-1, 1, COUNT)

@@ -8,10 +8,11 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from patchfem.core import InitialState, ModalBasis, Outcome, PatchfemError, SineDrive
+from patchfem.dynamics import start_run
 from patchfem.dynamics.grooves.run import make_model
-from patchfem.dynamics.march.march import march, start_run
-from patchfem.friction.grooves import Grooves
-from patchfem.response.measures import energy_balance
+from patchfem.dynamics.march.march import march
+from patchfem.friction import Grooves
+from patchfem.response import energy_balance
 from patchfem.structure.drives import make_levels, make_step
 
 ONE = np.ones(1)

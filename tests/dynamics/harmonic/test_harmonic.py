@@ -7,24 +7,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patchfem.core import ModalBasis, NotConverged, PatchfemError, SineDrive
-from patchfem.dynamics.harmonic.balance import find_cycle_energies, make_cycle_response
-from patchfem.dynamics.harmonic.forces import LawGroup
-from patchfem.dynamics.harmonic.harmonic import (
-    Balance,
-    pack_harmonics,
-    solve_newton,
-    unpack_harmonics,
-)
-from patchfem.dynamics.harmonic.laws import (
+from patchfem.dynamics import (
     Interlock,
-    Jenkins,
-    SampledSlide,
+    LawGroup,
     Spring,
+    coulomb_model,
     evaluate_series,
+    find_cycle_energies,
+    find_point,
+    jenkins_model,
+    make_balance,
+    make_cycle_response,
+    pack_harmonics,
+    points_model,
 )
-from patchfem.dynamics.harmonic.point import find_point, make_balance, make_group
-from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.dynamics.harmonic.harmonic import Balance, solve_newton, unpack_harmonics
+from patchfem.dynamics.harmonic.laws import Jenkins, SampledSlide
+from patchfem.dynamics.harmonic.point import make_group
+from patchfem.friction import Bonds
 from patchfem.friction.bonds.recursion import advance_bonds
 
 DRIVE = SineDrive(1.0, 1.0)

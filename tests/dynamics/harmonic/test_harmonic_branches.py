@@ -8,20 +8,23 @@ from scipy.special import ellipk
 
 from patchfem import plan, run
 from patchfem.core import G_N, ModalBasis, NotConverged, PatchfemError, SineDrive
-from patchfem.dynamics.harmonic.backbone import FreeBalance, trace_free_motions
-from patchfem.dynamics.harmonic.balance import make_cycle_response
-from patchfem.dynamics.harmonic.branch import (
-    find_backbone,
+from patchfem.dynamics import (
+    FreeBalance,
+    LawGroup,
+    Spring,
+    add_stability,
+    evaluate_series,
     find_branches,
+    find_point,
+    make_cycle_response,
     trace_over_frequency,
-    trace_over_level,
 )
+from patchfem.dynamics.harmonic.backbone import trace_free_motions
+from patchfem.dynamics.harmonic.branch import find_backbone, trace_over_level
 from patchfem.dynamics.harmonic.continuation import PathSettings, follow_curve
-from patchfem.dynamics.harmonic.forces import LawGroup
 from patchfem.dynamics.harmonic.harmonic import Balance
-from patchfem.dynamics.harmonic.laws import Jenkins, Spring, evaluate_series
-from patchfem.dynamics.harmonic.point import find_point
-from patchfem.dynamics.harmonic.stability import add_stability, find_motion_monodromy
+from patchfem.dynamics.harmonic.laws import Jenkins
+from patchfem.dynamics.harmonic.stability import find_motion_monodromy
 from patchfem.dynamics.periodic import find_multipliers
 
 W = 2 * np.pi * 143

@@ -7,18 +7,20 @@ from scene_texts import NONLOCAL, POINT, STRUCTURE
 
 from patchfem import plan
 from patchfem.core import ModalBasis, NotConverged, SineDrive
-from patchfem.dynamics.harmonic.balance import find_regime, make_cycle_response
-from patchfem.dynamics.harmonic.branch import trace_over_frequency
-from patchfem.dynamics.harmonic.laws import Jenkins, Spring, evaluate_series
-from patchfem.dynamics.harmonic.point import find_point, make_group
-from patchfem.response.loops import interface_loop
-from patchfem.response.measures import (
-    compute_acceleration_peak,
-    compute_harmonic,
-    compute_slip_measures,
+from patchfem.dynamics import (
+    Spring,
+    evaluate_series,
+    find_point,
+    find_regime,
+    make_cycle_response,
+    trace_over_frequency,
 )
+from patchfem.dynamics.harmonic.laws import Jenkins
+from patchfem.dynamics.harmonic.point import make_group
+from patchfem.response import compute_acceleration_peak, compute_harmonic, interface_loop
+from patchfem.response.measures import compute_slip_measures
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 SCENE = (
     POINT

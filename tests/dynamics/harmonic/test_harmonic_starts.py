@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem.core import G_N, ModalBasis, SineDrive
-from patchfem.dynamics.harmonic.branch import find_branches
-from patchfem.dynamics.harmonic.laws import Jenkins, Spring
+from patchfem.dynamics import Spring, find_branches
+from patchfem.dynamics.harmonic.laws import Jenkins
 
 
 @pytest.mark.slow

@@ -5,13 +5,11 @@ import pytest
 from event_run import steady
 
 from patchfem.core import ModalBasis, SineDrive
+from patchfem.dynamics import element_model, start_run
 from patchfem.dynamics.grooves.run import make_model
 from patchfem.dynamics.harmonic import orbits
-from patchfem.dynamics.march.march import start_run
-from patchfem.dynamics.march.models import element_model
-from patchfem.friction.grooves import Grooves
-from patchfem.friction.laws.elastic_plastic import parallel_element
-from patchfem.response.measures import energy_balance
+from patchfem.friction import Grooves, parallel_element
+from patchfem.response import energy_balance
 
 ONE, OMEGA, ZETA = np.ones(1), 2 * np.pi * 143, 0.003
 BASIS = ModalBasis(("axial",), np.array([OMEGA]), np.array([ZETA]), ONE, ONE, ONE, 1.194)

@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import minimize
 
 from patchfem.core import ModalBasis, NotConverged, PatchfemError
+from patchfem.dynamics import LawGroup, Spring
 from patchfem.dynamics.harmonic import quasi_static
-from patchfem.dynamics.harmonic.forces import LawGroup
-from patchfem.dynamics.harmonic.laws import Jenkins, SpeedLaw, Spring
+from patchfem.dynamics.harmonic.laws import Jenkins, SpeedLaw
 from patchfem.friction.laws import tanh
 
 

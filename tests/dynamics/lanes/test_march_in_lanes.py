@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from patchfem.dynamics import Row
 from patchfem.dynamics.lanes import reading, run
 from patchfem.dynamics.lanes import rows_kernels as rows
-from patchfem.dynamics.lanes.rows_kernels import Row
-from patchfem.friction.laws.iwan import max_yield_displacement
+from patchfem.friction import max_yield_displacement
 
 FLOWS = tuple(f"friction.laws.{law}_kernels" for law in ("tanh", "stretch", "bouc_wen", "lugre"))
 LAWS = "rigid", "yielding", "masing", "table", *FLOWS

@@ -8,11 +8,10 @@ from march_paths import OMEGA, one_mode
 
 from patchfem import build
 from patchfem.core import Missing, SineDrive
+from patchfem.dynamics import JointsModel, bond_list_model, make_cubic_spring
 from patchfem.dynamics.march import capacity
-from patchfem.dynamics.march.joints import JointsModel, make_cubic_spring
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import bond_list_model
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction import Bonds
 from patchfem.runs.bench import bench
 
 LAWS = {

@@ -10,25 +10,20 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from patchfem.core import InitialState, ModalBasis, SineDrive
-from patchfem.dynamics.march.joints import (
-    Joint,
+from patchfem.dynamics import (
     JointsModel,
-    make_cubic_spring,
-    make_interlocking_spring,
-)
-from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import (
     bond_list_model,
     coulomb_model,
     jenkins_model,
+    make_cubic_spring,
+    make_interlocking_spring,
     points_model,
 )
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.laws.coulomb import Coulomb
+from patchfem.dynamics.march.joints import Joint
+from patchfem.dynamics.march.march import march
+from patchfem.friction import Bonds, Coulomb, TanhLaw, points_element
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.friction.laws.stretch import points_element
-from patchfem.friction.laws.tanh import TanhLaw
-from patchfem.structure.drives import make_release
+from patchfem.structure import make_release
 
 OMEGA = 2 * np.pi * 143
 DRIVE = SineDrive(49.0, OMEGA)

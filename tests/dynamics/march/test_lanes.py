@@ -6,10 +6,10 @@ from march_paths import OMEGA
 from test_march_loop import half_plane
 
 from patchfem.core import ModalBasis, Response, SineDrive
+from patchfem.dynamics import points_model
 from patchfem.dynamics.march import lanes
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import points_model
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction import Bonds
 from patchfem.response import loops, measures, spectrum
 from patchfem.runs.batch.samples import Samples
 from patchfem.slip.shear_modes import shear_modes

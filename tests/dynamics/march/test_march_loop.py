@@ -7,11 +7,10 @@ from march_paths import OMEGA, follow, one_mode
 from scipy.integrate import solve_ivp
 
 from patchfem.core import InitialState, ModalBasis, Outcome, SineDrive
-from patchfem.dynamics.march.march import march, start_run
-from patchfem.dynamics.march.models import bond_list_model, jenkins_model, points_model
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import FirstOrderBonds, advance_bonds
+from patchfem.dynamics import bond_list_model, jenkins_model, points_model, start_run
+from patchfem.dynamics.march.march import march
+from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
+from patchfem.friction.bonds.recursion import advance_bonds
 from patchfem.slip.shear_modes import shear_modes
 from patchfem.structure import drives
 

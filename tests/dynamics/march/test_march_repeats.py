@@ -11,13 +11,12 @@ from test_varying_shear import reduced
 from varying_load_cases import LAWS, crowned, modes
 
 from patchfem.core import ModalBasis, SineDrive
+from patchfem.dynamics import JointsModel, coulomb_model, jenkins_model, points_model
 from patchfem.dynamics.march import march as marching
 from patchfem.dynamics.march import run as marching_run
 from patchfem.dynamics.march import varying_load
-from patchfem.dynamics.march.joints import JointsModel
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction import Bonds
 from patchfem.slip.shear_modes import shear_modes
 
 PITCHES = modes([143.0], [1.0], [0.0], [20.0], 0.05)

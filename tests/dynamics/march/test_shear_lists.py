@@ -13,15 +13,14 @@ from scipy.special import gammainc
 from varying_load_cases import modes
 
 from patchfem.core import SineDrive
-from patchfem.dynamics.march import varying_load
-from patchfem.dynamics.march.models import (
+from patchfem.dynamics import (
     bond_list_model,
     load_instances,
     lower_pressure_fields,
     point_lists_model,
 )
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.dynamics.march import varying_load
+from patchfem.friction import Bonds, Quadrature
 
 LIMIT = np.array([0.7, 1.3, 2.0, 0.4])
 RIGID = SimpleNamespace(shape=np.zeros((4, 0)), stiffness=np.zeros(0), points=np.arange(4))

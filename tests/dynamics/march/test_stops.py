@@ -5,8 +5,8 @@ import pytest
 from event_run import simulate
 
 from patchfem.core import ModalBasis, SineDrive
+from patchfem.dynamics import coulomb_model
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import coulomb_model
 
 
 def one(zeta=0.02):

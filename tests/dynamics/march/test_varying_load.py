@@ -9,7 +9,7 @@ from varying_load_cases import LAWS, LOAD, MASS, STILL, balance, crowned, elasti
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import InitialState, ModalBasis, PatchfemError, SineDrive
 from patchfem.dynamics.march import varying_load
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction import Bonds
 from patchfem.model.structure import compute_strip_slides
 
 # one loop; that of Coulomb and that of tanh are others to compile

@@ -12,10 +12,11 @@ from patchfem.core import InitialState, PatchfemError, SineDrive
 from patchfem.dynamics.march import march as plain
 from patchfem.dynamics.march import models, varying_load
 from patchfem.dynamics.propagator import make_propagator
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.recursion import FirstOrderBonds, advance_bonds
+from patchfem.friction import Bonds, FirstOrderBonds
+from patchfem.friction.bonds.recursion import advance_bonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.slip.shear_modes import jenkins_set, shear_modes
+from patchfem.slip import jenkins_set
+from patchfem.slip.shear_modes import shear_modes
 
 SOFT = {"plastic": ElasticPlastic(0.3, 1e-6), "bonds": FirstOrderBonds(Bonds(0.3, 1e-6))}
 

@@ -12,9 +12,7 @@ from patchfem.core import InitialState, Response, SineDrive
 from patchfem.dynamics.smooth.arrays import NODE_FRACTIONS
 from patchfem.dynamics.smooth.reader import StepParts
 from patchfem.dynamics.smooth.run import Motion
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.laws.stretch import points_element
-from patchfem.friction.laws.tanh import TanhLaw
+from patchfem.friction import Bonds, TanhLaw, points_element
 
 PERIOD, CYCLES = 0.7, 3
 

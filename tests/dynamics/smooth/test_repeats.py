@@ -8,9 +8,8 @@ from test_smooth import MASS, element
 from patchfem.core import SineDrive
 from patchfem.dynamics.smooth.arrays import Counter
 from patchfem.dynamics.smooth.run import MAX_REPEAT_CHANGE, Motion, simulate
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction import Bonds, TanhLaw
 from patchfem.friction.laws.bouc_wen import BoucWen
-from patchfem.friction.laws.tanh import TanhLaw
 
 LAWS = {"tanh": TanhLaw(0.3, 5e-3), "bonds": Bonds(0.3, 5e-6), "bouc-wen": BoucWen(0.3, 5e-6)}
 MODES, SINE = one_mode(OMEGA, 0.02, MASS), SineDrive(49.0, OMEGA * 0.9)

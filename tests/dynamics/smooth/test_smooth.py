@@ -7,15 +7,12 @@ from march_paths import OMEGA, one_mode
 from scipy.integrate import simpson
 
 from patchfem.core import InitialState, ModalBasis, Outcome, SineDrive
+from patchfem.dynamics import points_model
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import points_model
 from patchfem.dynamics.smooth.arrays import Counter
 from patchfem.dynamics.smooth.run import Motion, simulate
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction import Bonds, LuGre, TanhLaw, points_element
 from patchfem.friction.laws.bouc_wen import BoucWen
-from patchfem.friction.laws.lugre import LuGre
-from patchfem.friction.laws.stretch import points_element
-from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.structure import drives
 
 LOAD, MASS = 115.65, 0.884

@@ -8,9 +8,7 @@ from test_smooth import ONE, element
 from patchfem.core import InitialState, Outcome, SineDrive
 from patchfem.dynamics.smooth.arrays import Counter
 from patchfem.dynamics.smooth.run import Motion
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.laws.stretch import points_element
-from patchfem.friction.laws.tanh import TanhLaw
+from patchfem.friction import Bonds, TanhLaw, points_element
 from patchfem.structure import drives
 
 RINGS = Bonds(0.3, 1e-6)

@@ -13,7 +13,7 @@ from scipy.io import loadmat
 from patchfem.core import PatchfemError
 from patchfem.export.lab.series import Column, Histories
 from patchfem.export.lab.universal import write_histories, write_sets
-from patchfem.inputs.loops import read_loop
+from patchfem.inputs import read_loop
 
 TWO_MODES = """\
 [normal]

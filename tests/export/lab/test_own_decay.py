@@ -5,8 +5,8 @@ import pytest
 from command_line import cli
 
 import patchfem as pf
-from patchfem.response.decay_curve import DecayCurve
-from patchfem.scene.starting import read_template
+from patchfem.response import DecayCurve
+from patchfem.scene import read_template
 
 MODE = """\
 [structure]

@@ -9,11 +9,11 @@ from page_data import swept_key, swept_measure, swept_table
 from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.campaigns.sweeps.ranking import SobolIndex
+from patchfem.export import summarise_sweep
 from patchfem.export.pages import limits, peaks, ranked
-from patchfem.export.pages.headline import summarise_sweep
 from patchfem.export.pages.sweep import page_html
 from patchfem.export.sweeps.page import read_table
-from patchfem.scene.starting import read_template
+from patchfem.scene import read_template
 
 RIG = POINT + COULOMB + SHORT
 

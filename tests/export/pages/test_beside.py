@@ -8,9 +8,10 @@ from page_data import charts_of, data_of
 
 import patchfem as pf
 from patchfem.core import Measure, PatchfemError
+from patchfem.export import write_json
 from patchfem.export.netcdf import run_contents, write_netcdf
 from patchfem.export.pages.several_runs import page_html, read_run
-from patchfem.export.summary import make_summary, write_json
+from patchfem.export.summary import make_summary
 
 SCENE = """[normal]
 load = "{load} N"

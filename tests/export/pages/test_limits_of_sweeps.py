@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from page_data import own_part, swept_key, swept_measure, swept_table
 
-from patchfem.export.pages.headline import summarise_sweep
+from patchfem.export import summarise_sweep
 from patchfem.export.pages.limits import find_limits, limits_json, limits_sentence, limits_table
 from patchfem.export.pages.sweep import page_html
 from patchfem.export.sweeps.answer import sweep_summary

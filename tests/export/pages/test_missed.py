@@ -6,7 +6,7 @@ from page_data import swept_key, swept_table
 from scene_texts import PIECE
 
 import patchfem as pf
-from patchfem.export.pages.headline import summarise_sweep
+from patchfem.export import summarise_sweep
 from patchfem.export.tolerance_misses import (
     count_over_tolerance,
     is_over_tolerance,

@@ -8,13 +8,12 @@ import pytest
 from command_line import cli
 
 import patchfem as pf
+from patchfem.export import describe_release, draw_charts, headline_sentence
 from patchfem.export.drawing.charts import history_charts
-from patchfem.export.drawing.pictures import draw_charts
 from patchfem.export.page_data import Motion, RunData, SceneText, Verdict
-from patchfem.export.pages.released import describe_release, describe_swing
-from patchfem.export.pages.sentences import headline_sentence
+from patchfem.export.pages.released import describe_swing
 from patchfem.export.report import find_picture
-from patchfem.scene.starting import read_template
+from patchfem.scene import read_template
 
 IWAN = """
 [structure]

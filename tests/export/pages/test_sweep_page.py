@@ -8,13 +8,13 @@ import pytest
 from chromium import LATER
 from page_data import data_of, own_part, swept_key, swept_measure, swept_table, unheard
 
+from patchfem.export import shorten_number
 from patchfem.export.pages import library
 from patchfem.export.pages.document import Section, document_html, figure_html, to_json
 from patchfem.export.pages.document import table_html as sheet
 from patchfem.export.pages.headline import span_sentence
 from patchfem.export.pages.sweep import page_html
 from patchfem.export.sweeps.page import join_tables, suits_log_axis
-from patchfem.export.written import shorten_number
 
 NAN = np.nan
 AMPLITUDE = "relative_displacement_amplitude"

@@ -14,8 +14,8 @@ from scene_texts import COULOMB, POINT, SHORT
 from patchfem.campaigns.sweeps import sweep
 from patchfem.export.sweeps import chunks
 from patchfem.export.sweeps.chunks import Chunks
+from patchfem.runs import CaseResults
 from patchfem.runs.batch import case_results as kept
-from patchfem.runs.batch.case_results import CaseResults
 
 RIG = POINT + COULOMB + SHORT
 OVER = ("--over", "drive.acceleration=1 g..5 g:10", "--over", "normal.load=10 N..200 N:10,-1 N")

@@ -10,9 +10,8 @@ from friction_paths import pulled, upper_pressure, walk
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.friction.bonds.parameters import Bonds, grow, growth_exponents
-from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import FirstOrderBonds
+from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
+from patchfem.friction.bonds.parameters import grow, growth_exponents
 
 ONE = upper_pressure([1.0])
 UNEVEN = np.array([0.0, 0.02, 0.5, 0.7, 1.0, 1.9, 2.0, 3.3, 4.0])

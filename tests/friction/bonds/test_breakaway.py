@@ -5,10 +5,8 @@ import numpy as np
 import pytest
 from friction_paths import random_walk, slides, triangle, upper_pressure, walk
 
-from patchfem.dynamics.march.models import load_instances, points_model
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import FirstOrderBonds
+from patchfem.dynamics import load_instances, points_model
+from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 
 ONE = upper_pressure([1.0])

@@ -10,20 +10,14 @@ from scene_texts import DRIVE, KILOGRAM
 
 from patchfem import build, plan
 from patchfem.core import SineDrive
+from patchfem.dynamics import bond_list_model, points_model
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import bond_list_model, points_model
-from patchfem.friction.bonds.engines import (
-    ENGINES,
-    RequestedEngine,
-    choose_engine,
-    unsupported_reason,
-)
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction import Bonds, Quadrature, RequestedEngine, choose_engine, unsupported_reason
+from patchfem.friction.bonds.engines import ENGINES
+from patchfem.runs import choose as settings_of
 from patchfem.runs.rig.interface import contact_model
 from patchfem.runs.rig.lists import choose_quadrature
 from patchfem.runs.rig.motion_warnings import created_warning
-from patchfem.runs.rig.numerics import choose as settings_of
 from patchfem.scene import scene
 from patchfem.scene.keys.tables import Accuracy
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from march_paths import follow
 
-from patchfem.dynamics.march.models import bond_list_model
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.dynamics import bond_list_model
+from patchfem.friction import Bonds
 from patchfem.friction.bonds.quadrature import cutoff_age
 
 ENGINES = {"direct": (0.0, 0.0), "truncated": (1e-6, 0.0), "merged": (1e-6, 0.02)}  # tail, merge

@@ -14,9 +14,7 @@ from friction_paths import (
 from list_paths import STATUS, follow_list
 from scipy.special import gammainc
 
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import FirstOrderBonds
+from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
 
 ONE = upper_pressure([1.0])
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}

@@ -7,9 +7,9 @@ from list_paths import STATUS, follow_list
 from march_paths import OMEGA, one_mode
 
 from patchfem.core import SineDrive
+from patchfem.dynamics import bond_list_model
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import bond_list_model
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction import Bonds
 from patchfem.friction.bonds.quadrature import cutoff_age
 
 GROWS = {"ratio": 0.5, "rest_growth": 0.3, "slip_growth": 0.05, "rest_speed": 1e-2}

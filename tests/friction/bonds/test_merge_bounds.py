@@ -6,8 +6,7 @@ import pytest
 from friction_paths import random_walk
 from list_paths import STATUS, follow_list
 
-from patchfem.friction.bonds.engines import RequestedEngine, choose_engine
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction import Bonds, RequestedEngine, choose_engine
 
 MERGED = RequestedEngine("merged")
 GROWN = {"ratio": 0.54, "rest_growth": 0.145, "slip_growth": 7.64, "rest_speed": 4.55e-4}

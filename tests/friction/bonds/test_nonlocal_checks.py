@@ -15,11 +15,11 @@ from vibration_forms import sliding_amplitude
 
 from patchfem import build
 from patchfem.core import ModalBasis, SineDrive
+from patchfem.dynamics import points_model
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import points_model
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import Quadrature, cutoff_age
-from patchfem.friction.bonds.recursion import BondState, FirstOrderBonds
+from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
+from patchfem.friction.bonds.quadrature import cutoff_age
+from patchfem.friction.bonds.recursion import BondState
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene

@@ -14,9 +14,7 @@ from scipy.integrate import quad
 from scipy.special import gamma
 
 from patchfem.core import PatchfemError
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import FirstOrderBonds
+from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
 
 ONE = np.ones(1)
 GROWING = Bonds(0.7, 1.0, 1.0, "stretch", 0.6, 2.0, 0.3, 1e-3, 0.8)

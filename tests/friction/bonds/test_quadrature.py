@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from friction_paths import lower_pressure, pulled, sum_by_hand, triangle, upper_pressure, walk
 
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction import Bonds, Quadrature
 from patchfem.friction.bonds.strips import Strips
 
 ONE = upper_pressure([1.0, 0.25])

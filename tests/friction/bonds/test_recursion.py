@@ -6,9 +6,8 @@ from friction_paths import lower_pressure, sum_by_hand, upper_pressure, walk
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import FirstOrderBonds, advance_bonds
+from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
+from patchfem.friction.bonds.recursion import advance_bonds
 
 GROWTH = [{}, {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 1e-2}]
 X = np.linspace(-3, 3, 7)

@@ -6,10 +6,10 @@ from scene_texts import NONLOCAL, POINT, SHEAR, SHORT, SMALL_PATCH, TRIANGLE
 from scipy.integrate import dblquad
 
 from patchfem import SceneError, build, plan
-from patchfem.friction.bonds.spread import carried_fraction
+from patchfem.friction import carried_fraction
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 LONGER = NONLOCAL.replace("1 um", "2 um")
 SPREAD = ["friction.spread=4 mm"]
@@ -52,7 +52,7 @@ def test_exact_every_force_of_a_bench_shrinks_by_the_factor(law):
 def patch_of(text):
     if text != SMALL_PATCH:
         return None
-    from patchfem.runs.patch.ladder import solve_all
+    from patchfem.runs import solve_all
 
     return solve_all(build(loads(SMALL_PATCH + LONGER + TRIANGLE)).patch, 1e-3, False)[0]
 

@@ -11,12 +11,11 @@ from scipy.special import erfc
 
 from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.recursion import FirstOrderBonds
-from patchfem.friction.bonds.temperature import growth_at_temperature, surface_temperature_rise
+from patchfem.friction import Bonds, FirstOrderBonds, surface_temperature_rise
+from patchfem.friction.bonds.temperature import growth_at_temperature
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 WARM = """[friction.temperature]
 surface = "393.15 K"

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from patchfem.friction.laws.bouc_wen import loop_from_keys
-from patchfem.scene.keys.tables import Friction
+from patchfem.scene import Friction
 
 LAW = 'law = "bouc-wen"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\n'
 LIMIT, EPS = 0.31 * LOAD, 0.31 * LOAD / 1.3e7

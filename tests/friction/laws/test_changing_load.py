@@ -9,15 +9,11 @@ from scipy.special import gammainc
 
 from patchfem import build, plan
 from patchfem.core import Missing
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import FirstOrderBonds
-from patchfem.friction.laws.coulomb import Coulomb
+from patchfem.friction import Bonds, Coulomb, FirstOrderBonds, Quadrature, TanhLaw
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.runs.bench import bench as law_bench
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 GROWTH = {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 0.01}
 

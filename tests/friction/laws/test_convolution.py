@@ -13,15 +13,12 @@ from scipy.special import gamma
 
 from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import FirstOrderBonds
+from patchfem.friction import Bonds, Coulomb, FirstOrderBonds, Quadrature
 from patchfem.friction.laws.convolution import Convolution, average_pressure, sliding_limits
-from patchfem.friction.laws.coulomb import Coulomb
+from patchfem.runs import solve_all
 from patchfem.runs.bench import bench
-from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene import loads
 
 AVERAGED = '[friction]\nlaw = "convolution"\nstatic = 0.3\nbond_length = "1 mm"\n'
 FLAT = SMALL_PATCH.split("[contact.tilt]")[0]

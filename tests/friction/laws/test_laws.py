@@ -7,9 +7,8 @@ from friction_paths import triangle, upper_pressure, walk
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.friction.laws.coulomb import Coulomb
+from patchfem.friction import Coulomb, TanhLaw
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.friction.laws.tanh import TanhLaw
 
 ONE = upper_pressure([1.0, 0.5])
 PRESSURE = st.just(0.0) | st.floats(1e-6, 4)

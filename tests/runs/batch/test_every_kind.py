@@ -5,8 +5,8 @@ import pytest
 from scene_texts import COATED, MODE, PLASTIC, SHEAR, SLIDE
 
 import patchfem as pf
+from patchfem.runs import with_shared_meshes
 from patchfem.runs.batch import batches, one_by_one
-from patchfem.runs.batch.meshes import with_shared_meshes
 from patchfem.runs.patch import store
 
 PATCH = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n'

@@ -7,8 +7,8 @@ import numpy as np
 from scene_texts import COATED, MODE, SECOND, SHEAR
 
 import patchfem as pf
+from patchfem.runs import with_shared_meshes
 from patchfem.runs.batch import batches, gathered, one_by_one
-from patchfem.runs.batch.meshes import with_shared_meshes
 
 BONDS = '[friction]\nlaw = "nonlocal"\nreading = "stretch"\nstatic = 0.3\nkinetic = 0.3\nbond_length = "1 um"\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'

@@ -8,8 +8,8 @@ import pytest
 from lane_cases import LAWS, SCENE, draw_points, rows
 
 from patchfem.api import build, get_base_scene, load, run_many
+from patchfem.runs import CaseResults
 from patchfem.runs.batch import batches, one_by_one
-from patchfem.runs.batch.case_results import CaseResults
 from patchfem.runs.batch.lumped import (
     lane_check,
     lane_numbers,
@@ -17,7 +17,7 @@ from patchfem.runs.batch.lumped import (
     lane_runs,
     lumped,
 )
-from patchfem.scene.sets import format_assignments
+from patchfem.scene import format_assignments
 
 # beside others, without an exact batch, stand single runs
 EXACT = (

@@ -6,10 +6,10 @@ from batch_beside import held_against
 from scene_texts import MODE
 
 from patchfem.api import build, get_base_scene, load
+from patchfem.runs import CaseResults
 from patchfem.runs.batch import one_by_one
-from patchfem.runs.batch.case_results import CaseResults
 from patchfem.runs.batch.lumped import lumped
-from patchfem.scene.sets import format_assignments
+from patchfem.scene import format_assignments
 
 DRIVE = '[drive]\nkind = "{kind}"\n{kind_size}\nfrequency = "140 Hz"\ncycles = 40\n'
 SCENE = '[normal]\nload = "30 N"\n[friction]\n{law}\n' + MODE + DRIVE

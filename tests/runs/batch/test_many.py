@@ -6,8 +6,8 @@ from scene_texts import BENCH, COULOMB, PLASTIC, POINT, SHORT
 
 import patchfem as pf
 from patchfem.core import PatchfemError
+from patchfem.runs import FAILED_OUTCOME, CaseResults
 from patchfem.runs.batch import batches
-from patchfem.runs.batch.case_results import FAILED_OUTCOME, CaseResults
 
 RIG = POINT + COULOMB + SHORT
 

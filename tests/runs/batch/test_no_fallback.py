@@ -7,9 +7,9 @@ from lane_cases import draw_patches, draw_points
 from scene_texts import BENCH, SMALL_PATCH
 
 import patchfem as pf
+from patchfem.runs import with_shared_meshes
 from patchfem.runs.batch import batches, gathered, one_by_one
 from patchfem.runs.batch.lumped import lane_runs, lumped, sheared
-from patchfem.runs.batch.meshes import with_shared_meshes
 
 STUDIES = Path(__file__).parents[3] / "studies"
 SHEARED_BENCH = """[contact]

@@ -7,16 +7,13 @@ import pytest
 from scene_texts import COATING, PIECE
 
 from patchfem import build
-from patchfem.campaigns.sweeps.case_models import SweepScene
-from patchfem.campaigns.sweeps.cases import Cases
+from patchfem.campaigns import Cases, SweepScene
 from patchfem.campaigns.sweeps.executors import LocalExecutor
-from patchfem.export.sweeps.run import compute_in_memory
+from patchfem.export import compute_in_memory
+from patchfem.runs import solve_all, with_shared_meshes
 from patchfem.runs.batch import batches, one_by_one, patches
-from patchfem.runs.batch.meshes import with_shared_meshes
 from patchfem.runs.patch.grids import contact_extent
-from patchfem.runs.patch.ladder import solve_all
-from patchfem.scene import scene
-from patchfem.scene.axes import make_axis
+from patchfem.scene import make_axis, scene
 
 TEXT = (
     PIECE

@@ -6,8 +6,8 @@ from batch_beside import held_against
 from scene_texts import COATED, MODE, PLASTIC, SHEAR
 
 import patchfem as pf
+from patchfem.runs import with_shared_meshes
 from patchfem.runs.batch import batches, one_by_one
-from patchfem.runs.batch.meshes import with_shared_meshes
 
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 30\n'
 SCENE = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n' + SHEAR + PLASTIC + MODE + DRIVE

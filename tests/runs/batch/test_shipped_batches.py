@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import patchfem as pf
+from patchfem.runs import with_shared_meshes
 from patchfem.runs.batch import batches, one_by_one
-from patchfem.runs.batch.meshes import with_shared_meshes
 
 RIG = (Path(__file__).parents[3] / "studies/rig/rig.toml").read_text().split("[measured]")[0]
 CLOSE = "[accuracy]\ntolerance = 1e-3\n"

@@ -11,7 +11,7 @@ import patchfem as pf
 from patchfem.api import get_base_scene
 from patchfem.runs.batch import batches, meshes
 from patchfem.runs.batch.lumped import sheared, tabled
-from patchfem.scene.sets import format_assignments
+from patchfem.scene import format_assignments
 
 
 def missed(family: str, seed: int, count: int) -> tuple:

@@ -5,15 +5,14 @@ from pathlib import Path
 from typing import Literal, get_args, get_origin
 
 from patchfem.effects import EFFECTS, WAVEFORMS
-from patchfem.scene.keys.contact import Coating, Material
+from patchfem.scene import UNIT_FACTORS, Coating, Material, Tables, find_meaning
 from patchfem.scene.keys.lookup import is_table_or_value
-from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES, UNIT_FACTORS
-from patchfem.scene.keys.tables import Interface, Tables
+from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES
+from patchfem.scene.keys.tables import Interface
 from patchfem.scene.keys.types import (
     attributes_by_key,
     find_inner_table,
     find_key_record,
-    find_meaning,
     find_quantity_kind,
     iterate_annotation_parts,
 )

@@ -2,7 +2,7 @@
 
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
-from patchfem.scene.keys.materials import MATERIALS, THERMAL_PROPERTIES, YIELD_STRENGTHS
+from patchfem.scene import MATERIALS, THERMAL_PROPERTIES, YIELD_STRENGTHS
 
 from .keys import FOLDER, grid
 

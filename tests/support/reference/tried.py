@@ -5,8 +5,8 @@ from functools import cache
 from typing import NamedTuple
 
 from patchfem.effects import LAWS
-from patchfem.scene.rules.limits import find_lateral_slide_obstacle
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene import find_lateral_slide_obstacle, loads
+from patchfem.scene.scene import SceneError
 
 PATCH = """\
 [contact]

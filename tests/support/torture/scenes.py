@@ -199,7 +199,7 @@ def _add(trial: Trial, tables: dict) -> None:
 
 def of_kind(trial: Trial, kind: str | None):
     """A value for a key: a quantity of its kind over thirty decades, else a number or a word."""
-    from patchfem.scene.keys.quantities import UNIT_FACTORS
+    from patchfem.scene import UNIT_FACTORS
 
     if kind is None:
         return trial.draw(

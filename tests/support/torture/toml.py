@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from patchfem.scene.keys.tables import Tables
+from patchfem.scene import Tables
 from patchfem.scene.keys.types import attributes_by_key, find_inner_table, find_quantity_kind
 
 

@@ -16,9 +16,9 @@ from functools import cache
 import numpy as np
 
 from patchfem.core import frozen_array
+from patchfem.surface import Profile
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.verdict import compose_verdict
-from patchfem.surface.profile import Profile
 
 UM, LENGTH, HELD_OUT = 1e-6, 6000.0, 8200
 KINDS = ("sine", "walk", "standard", "shallow", "vee", "wide")

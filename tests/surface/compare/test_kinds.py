@@ -13,11 +13,12 @@ from pairs import UM
 from worn_kinds import made
 
 from patchfem.core import frozen_array
+from patchfem.surface import Profile
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.section import sample_lengths
 from patchfem.surface.compare.verdict import GREW as EXCHANGED
 from patchfem.surface.compare.verdict import compose_verdict
-from patchfem.surface.profile import Profile, remove_spikes
+from patchfem.surface.profile import remove_spikes
 
 HELD_OUT = 52000
 # else 41000: what was read wrongly before, and what is found soon

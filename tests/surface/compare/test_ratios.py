@@ -6,6 +6,7 @@ from pairs import UM, pair
 from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
+from patchfem.surface import Profile, Quantity, divide_sizes, measure_size
 from patchfem.surface.areal import Areal
 from patchfem.surface.compare.compare import (
     compare_directions,
@@ -13,11 +14,9 @@ from patchfem.surface.compare.compare import (
     compare_waves,
     fill_scan,
 )
-from patchfem.surface.compare.ratios import Size, divide_sizes, measure_size
+from patchfem.surface.compare.ratios import Size
 from patchfem.surface.compare.sentences import compute_confidence, describe_ratio_change
 from patchfem.surface.compare.verdict import compose_verdict
-from patchfem.surface.profile import Profile
-from patchfem.surface.quantity import Quantity
 
 MANY = pytest.param(40, marks=pytest.mark.slow)
 

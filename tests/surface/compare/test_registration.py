@@ -10,12 +10,12 @@ from rubbing import rub
 from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
+from patchfem.surface import Profile, level
 from patchfem.surface.compare.alignment import align
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.model import Parameter
 from patchfem.surface.compare.search import search_shift
 from patchfem.surface.compare.verdict import compose_verdict
-from patchfem.surface.profile import Profile, level
 
 HELD_OUT = 80000
 

@@ -11,9 +11,9 @@ from pairs import UM
 from scipy.ndimage import gaussian_filter1d
 
 from patchfem.core import frozen_array
+from patchfem.surface import Profile
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.verdict import compose_verdict
-from patchfem.surface.profile import Profile
 
 HELD_OUT = 7002
 MM = 1e-3

@@ -5,10 +5,11 @@ import pytest
 from scars import HELD_OUT, KINDS, UM, compared, rough, score
 
 from patchfem.core import frozen_array
+from patchfem.surface import Profile
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.place import find_place
 from patchfem.surface.compare.verdict import compose_verdict
-from patchfem.surface.profile import Profile, remove_spikes
+from patchfem.surface.profile import remove_spikes
 
 COUNTS = pytest.mark.parametrize("count", [2, pytest.param(20, marks=pytest.mark.slow)])
 

@@ -9,9 +9,9 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from patchfem.core import frozen_array
+from patchfem.surface import Profile
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.verdict import compose_verdict
-from patchfem.surface.profile import Profile
 
 NOISE, COUNT, SHIFT = 5e-9, 3000, 40
 

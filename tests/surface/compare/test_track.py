@@ -10,11 +10,11 @@ import pytest
 from pairs import KINDS, UM, pair, track
 
 from patchfem.core import frozen_array
+from patchfem.surface import Profile, level
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.flanks import find_flanks
 from patchfem.surface.compare.section import Section, find_end, find_ends
 from patchfem.surface.compare.verdict import compose_verdict
-from patchfem.surface.profile import Profile, level
 
 HELD_OUT = 90000
 

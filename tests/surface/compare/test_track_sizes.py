@@ -8,10 +8,10 @@ from pairs import UM
 from scipy.special import ndtr
 
 from patchfem.core import frozen_array
+from patchfem.surface import Profile
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.section import noise_threshold
 from patchfem.surface.compare.verdict import compose_verdict
-from patchfem.surface.profile import Profile
 
 # base of a ridge [um], samples of 1 um; rules were tuned on 1000 to 1011
 RIDGE, COUNT, HELD_OUT = (

@@ -10,10 +10,9 @@ import surfaces as write
 from scipy.io import savemat
 
 from patchfem.core import Missing, PatchfemError
+from patchfem.surface import Profile, read_profile, read_surface
 from patchfem.surface.areal import Areal
 from patchfem.surface.files import instruments
-from patchfem.surface.files.read import read_profile, read_surface
-from patchfem.surface.profile import Profile
 
 Z = write.scan()
 HOLES = np.where(np.arange(24).reshape(4, 6) % 5 == 2, np.nan, Z)

@@ -11,11 +11,10 @@ import pytest
 import surfaces as write
 
 from patchfem.core import PatchfemError
+from patchfem.surface import Profile, read_surface
 from patchfem.surface.areal import Areal
 from patchfem.surface.files import instruments
 from patchfem.surface.files.raw import fetch
-from patchfem.surface.files.read import read_surface
-from patchfem.surface.profile import Profile
 
 Z = np.arange(1.0, 13.0).reshape(3, 4)
 ROWS = "1 2 3 4\n5 6 7 8\n9 10 11 12\n"

@@ -14,8 +14,8 @@ import pytest
 import surfaces as write
 
 from patchfem.core import Missing, PatchfemError
+from patchfem.surface import read_surface
 from patchfem.surface.areal import Areal
-from patchfem.surface.files.read import read_surface
 
 Z = np.where(np.arange(24).reshape(4, 6) == 9, np.nan, write.scan())
 POINTS = np.array([(x * 0.5, y * 0.75, Z[y, x] * 1e6) for y in range(4) for x in range(6)])

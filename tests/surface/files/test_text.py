@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from traces import UM, bumpy, text
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.scene.keys.quantities import UNIT_FACTORS
-from patchfem.surface.files.read import read_profile
+from patchfem.scene import UNIT_FACTORS
+from patchfem.surface import read_profile
 from patchfem.surface.files.units import UNITS
 
 

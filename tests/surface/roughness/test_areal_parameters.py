@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
+from patchfem.surface import make_report, mean_line
 from patchfem.surface.areal import Areal
 from patchfem.surface.roughness.areal import (
     Surface,
@@ -13,8 +14,7 @@ from patchfem.surface.roughness.areal import (
     developed_area_ratio,
     rms_gradient,
 )
-from patchfem.surface.roughness.filter import ALPHA, filter_scan, mean_line, mean_surface
-from patchfem.surface.roughness.report import make_report
+from patchfem.surface.roughness.filter import ALPHA, filter_scan, mean_surface
 from patchfem.surface.roughness.rows import AREAL
 
 UM = 1e-6

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from synthetic import sine
 
 from patchfem.core import PatchfemError
-from patchfem.surface.profile import Profile, level, resample_evenly
-from patchfem.surface.roughness.filter import ALPHA, filter_trace, mean_line
+from patchfem.surface import Profile, level, mean_line, resample_evenly
+from patchfem.surface.roughness.filter import ALPHA, filter_trace
 
 UM = 1e-6
 WAVE = 400 * UM

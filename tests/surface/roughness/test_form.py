@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
+from patchfem.surface import Profile, parse_form
 from patchfem.surface.areal import Areal, level
-from patchfem.surface.profile import Profile
-from patchfem.surface.roughness.form import parse_form, subtract_form
+from patchfem.surface.roughness.form import subtract_form
 
 UM, MM = 1e-6, 1e-3
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from ring_traces import traces
 
-from patchfem.surface.profile import Profile, level
+from patchfem.surface import Heights, Profile, level
 from patchfem.surface.roughness.filter import filter_trace
 from patchfem.surface.roughness.intervals import N_SIMULATED_TRACES, Intervals, simulate_traces
-from patchfem.surface.roughness.parameters import Heights, root_mean_square
+from patchfem.surface.roughness.parameters import root_mean_square
 from patchfem.surface.roughness.rows import PRIMARY, ROUGH, TABLE, WAVES
 from patchfem.surface.roughness.spectrum import band_amplitude, estimate_spectrum
 

@@ -10,11 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patchfem.surface.files.read import read_surface
-from patchfem.surface.profile import level
+from patchfem.surface import Heights, level, make_report, read_surface
 from patchfem.surface.roughness.filter import filter_trace
-from patchfem.surface.roughness.parameters import Heights, fit_core
-from patchfem.surface.roughness.report import make_report
+from patchfem.surface.roughness.parameters import fit_core
 from patchfem.surface.roughness.spectrum import estimate_spectrum
 
 pytestmark = pytest.mark.skipif(

@@ -13,15 +13,16 @@ from scipy.ndimage import gaussian_filter1d
 import patchfem as pf
 from patchfem import build
 from patchfem.core import PatchfemError
-from patchfem.scene.scene import loads
-from patchfem.surface.profile import Profile, level
-from patchfem.surface.roughness.peaks import (
+from patchfem.scene import loads
+from patchfem.surface import (
     Moments,
+    Profile,
     gaussian_peaks,
+    level,
     persson_stiffness,
-    rms_moments,
     trace_moments,
 )
+from patchfem.surface.roughness.peaks import rms_moments
 
 PATCH = (
     PIECE + 'load = "26 lbf"\nelement_size = "1 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'

@@ -11,9 +11,9 @@ from synthetic import sine
 
 from patchfem.core import PatchfemError
 from patchfem.export.surfaces.roughness import describe_surface
+from patchfem.surface import Profile, fitting_cutoff, make_report
 from patchfem.surface.areal import Areal
-from patchfem.surface.profile import Profile
-from patchfem.surface.roughness.report import crop, fitting_cutoff, make_report
+from patchfem.surface.roughness.report import crop
 
 UM = 1e-6
 

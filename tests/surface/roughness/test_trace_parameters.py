@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm
 
+from patchfem.surface import Heights, abbott_curve
 from patchfem.surface.roughness.parameters import (
-    Heights,
-    abbott_curve,
     find_crossings,
     fit_core,
     mean_element_height,

@@ -5,8 +5,8 @@ import pytest
 from synthetic import sine
 
 from patchfem.core import PatchfemError
-from patchfem.surface.profile import Profile, level
-from patchfem.surface.roughness.spectrum import BAND, band_amplitude, estimate_spectrum, refuse_band
+from patchfem.surface import BAND, Profile, level
+from patchfem.surface.roughness.spectrum import band_amplitude, estimate_spectrum, refuse_band
 
 UM = 1e-6
 

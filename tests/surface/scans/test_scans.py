@@ -11,8 +11,8 @@ from command_line import cli
 from patchfem.__main__ import main
 from patchfem.export.results import FILES
 from patchfem.export.surfaces.areal import write_x3p
+from patchfem.surface import read_surface
 from patchfem.surface.areal import Areal, fill_missing
-from patchfem.surface.files.read import read_surface
 from patchfem.surface.scans import change, search
 from patchfem.surface.scans.model import rotation
 from patchfem.surface.scans.search import transform_scan

@@ -1,0 +1,27 @@
+"""Each folder lists in PUBLIC the names that it offers to other folders."""
+
+import re
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+from import_graph import sources
+
+SOURCES = sources(Path(__file__).parents[1])
+FOLDERS = sorted({name.partition(".")[0] for name in SOURCES if "." in name})
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_always_a_folder_offers_names_that_other_folders_use(folder):
+    package = import_module(f"patchfem.{folder}")
+    text_of_others = "\n".join(
+        text for module, text in SOURCES.items() if module.partition(".")[0] != folder
+    )
+    words = set(re.findall(r"\w+", text_of_others))
+    names = [name for listed in package.PUBLIC.values() for name in listed]
+    assert len(names) == len(set(names))
+    assert set(names) - words == set()
+    for module, listed in package.PUBLIC.items():
+        for name in listed:
+            owner = import_module(f"patchfem.{folder}.{module}")
+            assert getattr(package, name) is getattr(owner, name)
