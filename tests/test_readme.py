@@ -18,11 +18,18 @@ import patchfem as pf
 from patchfem.core import G_N
 
 ROOT = Path(__file__).parents[1]
+GUIDE = ROOT / "patchfem" / "scene" / "guide"
 MIL = 25.4e-6  # m
 PAGES = (
     "README.md",
     "patchfem/CHANGES.md",
     "patchfem/scene/GUIDE.md",
+    "patchfem/scene/GLOSSARY.md",
+    "patchfem/scene/MESH.md",
+    "patchfem/scene/FILES.md",
+    "patchfem/scene/RECORDS.md",
+    "patchfem/scene/MATRICES.md",
+    *(f"patchfem/scene/guide/{path.name}" for path in sorted(GUIDE.glob("*.md"))),
     "patchfem/scene/README.md",
     "patchfem/scene/LIMITS.md",
     "patchfem/scene/MATERIALS.md",
@@ -199,7 +206,7 @@ def test_exact_the_sweep_of_a_patch_in_the_guide(tmp_path, monkeypatch):
     (tmp_path / "patch.toml").write_text(
         rig[rig.index("[contact]") : rig.index("[contact.shear]")], "utf-8"
     )
-    exec(re.search(r"```python\n(.*?)```", text("patchfem/scene/GUIDE.md"), re.S)[1], names)
+    exec(re.search(r"```python\n(.*?)```", text("patchfem/scene/guide/patch.md"), re.S)[1], names)
     fraction = names["answer"].contact_fraction.values
     peak = names["answer"].pressure_peak.values
     assert (
@@ -220,7 +227,7 @@ def test_always_the_python_of_the_guide_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
     exec(
-        re.search(r"## From Python\n```python\n(.*?)```", text("patchfem/scene/GUIDE.md"), re.S)[1],
+        re.search(r"```python\n(.*?)```", text("patchfem/scene/guide/python.md"), re.S)[1],
         names,
     )
     assert names["result"].measures.friction_ratio_peak.value == pytest.approx(0.4, rel=1e-6)

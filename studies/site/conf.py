@@ -35,6 +35,7 @@ include_patterns = [
     "README.md",
     "patchfem/*.md",
     "patchfem/scene/*.md",
+    "patchfem/scene/guide/*.md",
     "studies/README.md",
     "studies/*/README.md",
     "studies/report/*.md",

@@ -7,6 +7,7 @@ run. Out: Markdown and pictures in one folder, written anew at every build.
 import ast
 import contextlib
 import inspect
+import os
 import re
 import subprocess
 import sys
@@ -16,9 +17,9 @@ from pathlib import Path
 
 import examples
 import matplotlib
-import terms
 from matplotlib import pyplot
 from reference import keys as keys_page
+from reference import limits as limits_page
 from reference import tried
 
 import patchfem as pf
@@ -31,6 +32,7 @@ from patchfem.scene import find_meaning
 from patchfem.scene.keys.types import attributes_by_key
 
 ROOT = Path(__file__).parents[2]
+GLOSSARY = ROOT / "patchfem/scene/GLOSSARY.md"
 SHOWN_EFFECTS = [name for name in EFFECTS if not name.startswith("structure.interface.")]
 GROUPS = {
     "The patch": "contact",
@@ -55,7 +57,12 @@ def write(folder: Path) -> None:
     matplotlib.use("Agg")
     (folder / "effects").mkdir(parents=True, exist_ok=True)
     files = sorted(
-        [*(ROOT / "patchfem").rglob("*.py"), guide_file(), *Path(__file__).parent.glob("*.py")]
+        [
+            *(ROOT / "patchfem").rglob("*.py"),
+            *guide_files(),
+            GLOSSARY,
+            *Path(__file__).parent.glob("*.py"),
+        ]
     )
     state = sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
     kept = folder / "made_from"
@@ -65,6 +72,7 @@ def write(folder: Path) -> None:
         (folder / "effects" / name).write_text(text, "utf-8")
     pages = {
         "glossary": glossary(),
+        "messages": limits_page.messages(),
         "commands": commands(),
         "python": python(),
         "code": code(),
@@ -133,15 +141,15 @@ def about(effect: str) -> str:
     return f"One value of `{key}`: {find_meaning(TABLES[table], key)}."
 
 
-def guide_file() -> Path:
-    """The guide, whose tables have a sentence for each law, drive and method."""
-    return ROOT / "patchfem/scene/GUIDE.md"
+def guide_files() -> list:
+    """Return the pages of the guide, whose tables have a sentence for each law, drive and method."""
+    return sorted((ROOT / "patchfem/scene/guide").glob("*.md"))
 
 
 @cache
 def guide() -> str:
-    """The text of the guide."""
-    return guide_file().read_text("utf-8")
+    """Return the text of the guide."""
+    return "\n".join(page.read_text("utf-8") for page in guide_files())
 
 
 def remove_links(text: str) -> str:
@@ -347,7 +355,7 @@ def source(name: str) -> list:
 
 def glossary() -> str:
     """Every term and every measure in one alphabet."""
-    words = dict(terms.TERMS)
+    words = glossary_terms()
     for row in (*STATIC, *MOTION):
         text = f"{row.text[:1].upper()}{row.text[1:]} [{row.unit}]. A measure: `{row.name}` in `summary.json`."
         words.setdefault(row.name.replace("_", " "), text)
@@ -358,6 +366,19 @@ def glossary() -> str:
         f"# Glossary\n\nTerms as this program uses them, and every measure of a run.\n\n"
         f"{fence('{glossary}', body)}\n"
     )
+
+
+def glossary_terms() -> dict:
+    """Return {term: meaning} of the committed glossary, with links as the generated pages need them."""
+    table = GLOSSARY.read_text("utf-8").partition("\n## ")[0]
+    rows = re.findall(r"^\| ([^|]+) \| ([^|]+) \|$", table, re.M)[1:]
+    return {term: re.sub(r"(?<=\]\()[^)#]+", _move_link, meaning) for term, meaning in rows}
+
+
+def _move_link(link: re.Match) -> str:
+    """Return the target of a link of the glossary as a page in studies/site/made has to name it."""
+    target = GLOSSARY.parent / link[0]
+    return Path(os.path.relpath(target, Path(__file__).parent / "made")).as_posix()
 
 
 def commands() -> str:

@@ -17,7 +17,7 @@ from patchfem.export.surfaces import worn
 from patchfem.export.surfaces.worn_runs import hidden_line, hidden_plane
 
 ROOT = Path(__file__).parents[2]
-GUIDE = ROOT / "patchfem" / "scene" / "GUIDE.md"
+GUIDE = ROOT / "patchfem" / "scene" / "guide" / "wear.md"
 TILTED = """
 [contact]
 length = "12.7 mm"

@@ -357,7 +357,7 @@ class Contact(Table):
     )
     mesh: key(
         Text | None,
-        "file with a mesh of both pieces, which needs the tags listed in GUIDE.md; default: a mesh "
+        "file with a mesh of both pieces, which needs the tags listed in MESH.md; default: a mesh "
         "is made from the dimensions",
     ) = None
     coating: Coating | None = None

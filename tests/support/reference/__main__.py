@@ -8,6 +8,6 @@ if __name__ == "__main__":
 
 from reference import keys, limits, records
 
-for page in (keys, records.Measures, records.Materials, limits):
+for page in (keys, keys.Equations, records.Measures, records.Materials, limits):
     page.FILE.write_text(page.text(), encoding="utf-8")
     print(page.FILE)

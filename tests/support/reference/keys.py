@@ -33,8 +33,8 @@ with one number and one unit, such as `"12.7 mm"`; the last section lists the un
 takes part in the computation if the scene contains the table of this effect. The column "required" says "yes" or gives
 the condition under which the key is required. A number in brackets, such as (2.17), is an equation of the report.
 
-See also [the guide](GUIDE.md), [the measures of a run](MEASURES.md), [materials by name](MATERIALS.md) and
-[limits](LIMITS.md).
+See also [the guide](GUIDE.md), [the measures of a run](MEASURES.md), [materials by name](MATERIALS.md),
+[limits](LIMITS.md) and [the equations of all effects](../../studies/site/theory.md#equations-of-all-effects).
 """
 
 
@@ -48,8 +48,6 @@ def text() -> str:
         HEAD,
         "## Tables and keys",
         *_keys(),
-        "## Effects",
-        _effects(),
         "## Units",
         grid(("kind", "units, the first in SI", "example"), units),
     ]
@@ -203,7 +201,22 @@ def bounds() -> Iterator[tuple]:
                 yield f"{header.strip('[]')}.{key}".strip("."), said
 
 
-def _effects() -> str:
+class Equations:
+    """The table of the equations of all effects, inside the page of the theory."""
+
+    FILE = FOLDER.parents[1] / "studies" / "site" / "theory.md"
+    BEGIN, END = "<!-- effects -->\n", "<!-- end -->"
+
+    @classmethod
+    def text(cls) -> str:
+        """Return the page of the theory with its table of effects written anew."""
+        before, _, rest = cls.FILE.read_text("utf-8").partition(cls.BEGIN)
+        after = rest.partition(cls.END)[2]
+        return f"{before}{cls.BEGIN}\n{effects_table()}\n\n{cls.END}{after}"
+
+
+def effects_table() -> str:
+    """Return the table of all effects: the keys that they need and may have, and their equations."""
     rows = []
     for name, effect in EFFECTS.items():
         selector, _, value = name.partition("=")

@@ -1,6 +1,5 @@
 """The page of limits: what stands together, how large and how many, what the model leaves out."""
 
-import re
 from importlib import import_module
 
 from patchfem.runs.patch.result import MAX_SMALL_STRAIN, MIN_COUPLING_RATIO
@@ -15,8 +14,8 @@ HEAD = """\
 
 `python tests/support/reference` generates this page. Each cell of the first four tables is the result of checking one
 scene. "yes" means that the scene can run. "no" means that the scene is refused before the run, with a message that
-names the line, the key and an alternative. The numbers after "no" refer to the list of messages after the four tables.
-The last section says what the models neglect.
+names the line, the key and an alternative; `patchfem check SCENE` prints it. The last section says what the models
+neglect.
 """
 SIZES = {  # constant -> what it bounds and how it is written
     "scene.toml_text.MAX_BYTES": "bytes of a scene file",
@@ -63,8 +62,8 @@ inertia.
 
 **Pressure fixed to a piece.** The pressure distribution moves with the piece that has the tilt, crown, step or profile
 (key `on`). If the other piece slides beyond the pressed length, the overhanging part of this piece is not modelled. If
-the slide leaves the patch, the outcome is `leaves_contact`. The motion is still computed to its end as if the pressed
-length went on, so the measures of such a run are not those of a joint.
+the slide leaves the patch, the outcome is `leaves_contact`. The motion is computed as if the contact continued beyond
+the end, so the measures of such a run are not those of a joint.
 
 **Grooves.** The surfaces are assumed to stay in contact on the flanks. If the inertia force of the lifted mass cancels
 the whole load, the run ends with the outcome `leaves_grooves`. The upper piece is assumed to ride up all ridges at the
@@ -105,16 +104,21 @@ infinite; any computed value of this peak would depend on the mesh.
 """
 
 
+METHOD_COLUMNS = tuple(
+    Beside(f"`{method}`", POINT + RIG, (f"accuracy.method={method}",)) for method in METHODS
+)
+TABLES = (
+    ("Laws in a rig", RIGS),
+    ("Laws in a rig, continued", MORE),
+    ("Laws on a bench", BENCHES),
+)
+
+
 def text() -> str:
-    """The whole page of patchfem/scene/LIMITS.md: scenes are put together and checked, nothing is run."""
-    notes = {}
+    """Return the page of patchfem/scene/LIMITS.md: scenes are put together and checked, nothing is run."""
     body = []
-    for title, columns in (
-        ("Laws in a rig", RIGS),
-        ("Laws in a rig, continued", MORE),
-        ("Laws on a bench", BENCHES),
-    ):
-        body += [f"## {title}", _against(columns, notes)]
+    for title, columns in TABLES:
+        body += [f"## {title}", _compatibility_table(columns)]
     body += [
         "On a bench, the prescribed slide can be two-dimensional under these laws: "
         + _listed(name for name, one in laws().items() if not across(one))
@@ -124,9 +128,7 @@ def text() -> str:
         "## Methods",
         "In this table each scene is a rig with a single contact point under a sine drive. The "
         "heading of a column is the value of `accuracy.method`; `auto` chooses a method that supports the law.",
-        _methods(notes),
-        "### Messages",
-        _said(notes),
+        _compatibility_table(METHOD_COLUMNS),
         "## Numbers",
         f"The magnitude of a quantity must be at most {MAX_MAGNITUDE:g} in SI units. If the quantity is of a kind by "
         "which the program divides ("
@@ -144,42 +146,41 @@ def text() -> str:
     return "\n\n".join([HEAD.strip(), *body]) + "\n"
 
 
-def _against(columns: tuple, notes: dict) -> str:
-    rows = [
-        (name, *(_cell(refused(keys_of, one), notes, name) for one in columns))
-        for name, keys_of in laws().items()
+def messages() -> str:
+    """Return the page of the messages with which the scenes of the tables of limits are refused."""
+    parts = [
+        "# Messages of unsupported combinations",
+        "[Limits](../../../patchfem/scene/LIMITS.md) shows which friction law goes with which table. The "
+        "tables below give the message for each combination that is refused.",
     ]
-    return grid(("law", *(one.words for one in columns)), rows)
+    for title, columns in (*TABLES, ("Methods", METHOD_COLUMNS)):
+        rows = [
+            (law, words, "; ".join(sentences))
+            for (law, words), sentences in refusals(columns).items()
+        ]
+        parts += [f"## {title}", grid(("law", "with", "message"), rows)]
+    return "\n\n".join(parts) + "\n"
 
 
-def _methods(notes: dict) -> str:
-    one = Beside("", POINT + RIG)
+def refusals(columns: tuple) -> dict:
+    """Return {(law, heading of a column): sentences} of the combinations that are refused."""
+    rows = {}
+    for law, keys in laws().items():
+        for column in columns:
+            if sentences := refused(keys, column):
+                rows[law, column.words] = sentences
+    return rows
+
+
+def _compatibility_table(columns: tuple) -> str:
+    rows = refusals(columns)
     return grid(
-        ("law", *(f"`{method}`" for method in METHODS)),
+        ("law", *(column.words for column in columns)),
         [
-            (name, *(_cell(refused(keys_of, one, method), notes, name) for method in METHODS))
-            for name, keys_of in laws().items()
+            (name, *("no" if (name, column.words) in rows else "yes" for column in columns))
+            for name in laws()
         ],
     )
-
-
-def _cell(sentences: tuple, notes: dict, law: str) -> str:
-    """yes, or the numbers of the sentences with which it is refused."""
-    if not sentences:
-        return "yes"
-    return "no " + " ".join(
-        str(notes.setdefault(_plain(one, law), len(notes) + 1)) for one in sentences
-    )
-
-
-def _plain(sentence: str, law: str) -> str:
-    """A sentence without the name of the law that was tried."""
-    form = rf"(?:law )?'{law.partition(',')[0]}'(?: of (?:order [\d.]+|reading '\w+'))?(?=[ :;,]|$)"
-    return re.sub(form, "the friction law of this row", sentence, count=1)
-
-
-def _said(notes: dict) -> str:
-    return "\n".join(f"{number}. {sentence}" for sentence, number in notes.items())
 
 
 def _listed(names) -> str:

@@ -147,7 +147,7 @@ def laws() -> dict:
 
 
 @cache
-def refused(keys: str, beside: Beside, method: str = "") -> tuple:
+def refused(keys: str, beside: Beside) -> tuple:
     """Sentences with which a scene is refused, without their places; () where it is read without a mistake."""
     if "masses" in beside.text:
         own = 'load = "100 N"\n'
@@ -161,9 +161,8 @@ def refused(keys: str, beside: Beside, method: str = "") -> tuple:
         )
     else:
         text = beside.text + f"[friction]\n{keys}"
-    sets = (*beside.sets, *([f"accuracy.method={method}"] if method else ()))
     try:
-        loads(text, sets=sets)
+        loads(text, sets=beside.sets)
     except SceneError as error:
         return tuple(re.sub(r"^[^:]*(?::\d+)?: ", "", line) for line in error.mistakes)
     return ()
