@@ -19,31 +19,33 @@ from .patch import faces, ladder, press
 from .results import notes, patch_rows
 from .rig import costs, engines
 
-MAX_EXCESS = 1e9  # error over the allowed error; a larger ratio belongs to a value that is zero
-# proposed tolerance over that of the scene; a tenth gives at least one more halving of the mesh
+MAX_EXCESS = (
+    1e9  # cap on the ratio of error to allowed error; a larger ratio indicates a value of zero
+)
+# ratio of proposed to present tolerance; a tenth gives at least one more halving of the mesh
 PROPOSED_TOLERANCE_RATIO = 0.1
-# halvings of the steps up to which an order that was observed over two halvings is used
+# largest number of halvings of the steps to which the order observed over two halvings is extrapolated
 MAX_HALVINGS = 4
-# fraction of the allowed error that is left for the steps if other causes use up all of it
+# fraction of the allowed error that the steps may have if other causes use up all of it
 MIN_STEP_SHARE = 0.2
 # largest number of strips that is proposed; four times the strips take about twenty times as long
 MAX_STRIPS = 64
-# measures that converge with the first power of the strips
+# measures whose error falls with the first power of the number of strips
 FIRST_ORDER = (
     "pressure_peak",
     "loaded_fraction",
 )
-# measures that come from samples, for any number of harmonics
+# measures from samples, which more harmonics do not make more accurate
 SAMPLED_MEASURES = (
     "stick_fraction",
     "slip_start_phase",
 )
-RING = "ring_"  # prefix of the measures of ringing, which an engine without steps need not have
+RING = "ring_"  # prefix of the measures of ringing, which an engine without steps may lack
 STEADY = "relative_displacement_amplitude_steady"
 USE_ERROR = "use the value with its stated error"
 NO_REMEDY = f"no known setting makes this value more accurate; {USE_ERROR}"
 ELEMENT_SIZE = "contact.element_size"
-# main measures of a run: those that exceed the tolerance are named first
+# main measures of a run, which a warning names before all others
 MAIN = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
@@ -55,7 +57,7 @@ MAIN = (
 
 
 class Finding(NamedTuple):
-    """Part of a result on which the warnings depend.
+    """Measures and settings of a run on which the accuracy warnings depend.
 
     Attributes
     ----------
@@ -78,7 +80,7 @@ class Finding(NamedTuple):
 
 
 def tolerance_warnings(finding: Finding, coarse=(), still=()) -> list[str]:
-    """Return warnings about measures, static and of the motion, that miss the tolerance.
+    """Return the warnings on measures whose errors exceed the tolerance.
 
     Parameters
     ----------
@@ -107,7 +109,7 @@ def tolerance_warnings(finding: Finding, coarse=(), still=()) -> list[str]:
     if has_faces:
 
         def warn_of_face(face) -> list:
-            """Return the warnings on the patch of an interface."""
+            """Return the accuracy warnings on the patch of one interface."""
             return tolerance_warnings(_select_interface_measures(finding, face), face.patches[1:])
 
         warnings = faces.merge_sentences(model, warn_of_face)
@@ -127,7 +129,7 @@ def tolerance_warnings(finding: Finding, coarse=(), still=()) -> list[str]:
 
 
 def _select_interface_measures(finding: Finding, face) -> Finding:
-    """Return the static measures of the patch of an interface, without numbers in their names."""
+    """Return the static measures of one interface patch, without interface numbers."""
     measures = {}
     for name in patch_rows.TABLE:
         numbered = rows.add_interface_number(name, face.number)
@@ -137,10 +139,10 @@ def _select_interface_measures(finding: Finding, face) -> Finding:
 
 
 def _named_measures(finding: Finding, excess: dict) -> list[str]:
-    """Return the names of the measures that a warning mentions.
+    """Return the names of the measures that an accuracy warning mentions.
 
-    They are the main measures with an excess that are not zero within their error, else the measure
-    with the largest excess.
+    These are the inaccurate main measures that are not zero within their error, else the measure with
+    the largest error over the allowed error.
     """
     known = finding.measures
     main = [name for name in MAIN if name in excess and known[name].error < abs(known[name].value)]
@@ -149,7 +151,7 @@ def _named_measures(finding: Finding, excess: dict) -> list[str]:
 
 
 def _warning(finding: Finding, excess: dict, remedy: str) -> str:
-    """Return the warning with the errors of the main measures, the tolerance and the remedy."""
+    """Return an accuracy warning with errors, tolerance and remedy."""
     names = _named_measures(finding, excess)
     first, *more = (f"of {_error_words(finding.measures[name])}" for name in names)
     listed = "".join(f", {name} {words}" for name, words in zip(names[1:], more, strict=True))
@@ -169,7 +171,7 @@ def _error_words(measure) -> str:
 
 
 def _static_remedy(finding: Finding, excess: dict, coarse) -> str:
-    """Return the remedy for static measures: more strips, or a finer mesh."""
+    """Return the remedy for inaccurate static measures: more strips, or a finer mesh."""
     patch_model = finding.model.patch
     peak = finding.measures.get("pressure_peak")
     is_wear_unbounded = (
@@ -192,7 +194,7 @@ def _static_remedy(finding: Finding, excess: dict, coarse) -> str:
 
 
 def _strip_remedy(patch_model, excess: dict) -> str:
-    """Return the number of strips that meets the tolerance.
+    """Return the advice to use the number of strips that meets the tolerance.
 
     The peak of the outermost strip is computed at its centre, so that its error is of first order
     in the width of a strip. The errors of all other measures are of second order, like those of the
@@ -208,7 +210,7 @@ def _strip_remedy(patch_model, excess: dict) -> str:
 
 
 def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
-    """Return the remedy that refines meshes.
+    """Return the advice to refine the meshes of patches.
 
     Parameters
     ----------
@@ -240,9 +242,10 @@ def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
 
 
 def _refining_tolerance(finding: Finding, coarse) -> float | None:
-    """Return the tolerance for which a patch gets a finer mesh; None if its ladder has ended.
+    """Return the tolerance for which a patch gets a finer mesh, or None.
 
-    If the coarser meshes are not at hand, it is the tolerance for one more halving.
+    The result is None if the ladder of meshes has ended. If the coarser meshes are not at hand, it is the
+    tolerance for one more halving.
     """
     patch_model = finding.model.patch
     tolerance = finding.model.accuracy.tolerance
@@ -259,9 +262,10 @@ def _refining_tolerance(finding: Finding, coarse) -> float | None:
 
 
 def _motion_remedy(finding: Finding, excess: dict, coarse) -> str:
-    """Return the remedy for the main measure of a motion, by the largest part of its error.
+    """Return the remedy for the least accurate main measure of a motion.
 
-    A looser tolerance is no remedy: it chooses coarser steps and meshes.
+    The remedy depends on the largest part of the error. A looser tolerance is no remedy: it chooses
+    coarser steps and meshes.
     """
     model = finding.model
     extra = finding.extra
@@ -279,7 +283,9 @@ def _motion_remedy(finding: Finding, excess: dict, coarse) -> str:
         return _mesh_remedy(
             model, [(_select_interface_measures(finding, face), face.patches[1:]) for face in soft]
         )
-    if cause == "reduced":  # the error falls with the square of the number of modes
+    if (
+        cause == "reduced"
+    ):  # the error falls with the square of the number of modes of a reduced structure
         ratio = min(max(2.0, excess[name] ** 0.5), 16.0)
         n_modes = ceil(model.rig.modes.omega.size * ratio)
         return f"set structure.reduced.modes = {min(n_modes, model.rig.structure.max_modes)}"
@@ -291,7 +297,7 @@ def _motion_remedy(finding: Finding, excess: dict, coarse) -> str:
             return " and ".join(f"leave out accuracy.{key}" for key in pinned)
         proposed = PROPOSED_TOLERANCE_RATIO * model.accuracy.tolerance
         return f"set accuracy.tolerance = {proposed:.3g} to refine the sum over bonds"
-    if name == STEADY:  # the transient decays in a longer run
+    if name == STEADY:  # in a longer run the transient decays further
         return "more drive cycles make this value more accurate; raise drive.cycles"
     if extra.get("harmonics") is None or name.startswith(SAMPLED_MEASURES):
         return NO_REMEDY
@@ -299,20 +305,20 @@ def _motion_remedy(finding: Finding, excess: dict, coarse) -> str:
 
 
 def _main_cause(finding: Finding, name: str) -> str:
-    """Return the largest part of the error of a measure, a kind of `response.coarser.find_open_kinds`."""
+    """Return the kind of the largest contribution to the error of a measure."""
     parts = finding.extra.get("left_open")
     if parts is not None:
         return max(
             parts["parts"], key=lambda kind: parts["parts"][kind].get(name, 0.0), default="own"
         )
-    # results of a batch, or of a run without an estimate, have no parts
+    # the results of a batch, or of a run without error estimate, state no parts of their errors
     if finding.extra.get("steps_per_cycle") or finding.extra.get("steps"):
         return "steps"
     return "own" if finding.patch is None else "mesh"
 
 
 def _step_remedy(finding: Finding, name: str, excess: dict, steps: int) -> str:
-    """Return the steps per cycle that the order of convergence requires, or another remedy."""
+    """Return the advice to use the steps per cycle that the order of convergence requires."""
     model = finding.model
     parts = finding.extra.get("left_open") or {
         "parts": {"steps": {name: 1.0}},
@@ -341,7 +347,7 @@ def _step_remedy(finding: Finding, name: str, excess: dict, steps: int) -> str:
 
 
 def _no_order(name: str, steps: int) -> str:
-    """Return the sentence that a measure does not converge with the steps."""
+    """Return the clause that a measure does not converge with the steps."""
     return (
         f"the steps per cycle were doubled twice, up to {steps}, and the second doubling changed "
         f"{name} at least as much as the first"
@@ -366,11 +372,10 @@ def _remedy_without_order(model, steps: int, excess: dict, exact: str) -> str:
 
 
 def _end_remedy(cycles: float, steps: int) -> str:
-    """Return the remedy for a run that ends between two samples.
+    """Return the advice to use steps per cycle with which a run ends at a sample.
 
-    It proposes the steps per cycle, up to twice as many, with which a run ends closest to the
-    requested end. They are a multiple of four, so that there are runs with half and a quarter of
-    them.
+    At most twice as many steps are proposed. They are a multiple of four, so that there are runs with
+    half and a quarter of them.
     """
     counts = range(4 * ceil(steps / 4), 2 * steps + 4, 4)
     best = min(counts, key=lambda count: abs(cycles * count - round(cycles * count)))
@@ -381,9 +386,9 @@ def _end_remedy(cycles: float, steps: int) -> str:
 
 
 def _harmonics_of_friction(finding: Finding) -> float:
-    """Return the harmonics of a friction force that depends on the speed.
+    """Return the number of harmonics that a speed-dependent friction force needs.
 
-    They are the largest speed over the reference speed of the law; 0 for other laws.
+    The number is the largest speed over the reference speed of the law; 0 for other laws.
     """
     law = finding.model.friction
     slip = finding.measures.get("slip_amplitude")

@@ -10,13 +10,15 @@ from dataclasses import dataclass, field
 from operator import add
 from typing import NamedTuple
 
-# Name of the memory part of code to compile. A run with such a part also needs address space for
-# the compiler (`memory.free_bytes`).
+# Name of the memory part of code that has to be compiled. A run with such a part also needs address space
+# for the compiler (`memory.free_bytes`).
 CODE_TO_COMPILE = "compiled code"
 
 
 class MemoryPart(NamedTuple):
-    """Part of the memory of a run at its peak.
+    """Part of the memory of a run at its peak, with the key of the scene that sets its size.
+
+    key: "" if no key sets the size.
 
     key: the key of the scene that sets its size; "" if there is none.
     """
@@ -57,7 +59,7 @@ class Cost:
 
     @property
     def seconds(self) -> float:
-        """Total CPU seconds without compiling."""
+        """Total CPU time [s] without compiling."""
         return sum(self.times.values())
 
     @property
@@ -67,7 +69,7 @@ class Cost:
 
     def __add__(self, other: Cost) -> Cost:
         def merge(first: dict, second: dict) -> dict:
-            """Return the sum of two dicts of numbers by name."""
+            """Add two dicts of numbers by name."""
             return first | {name: first.get(name, 0) + value for name, value in second.items()}
 
         summed = map(
@@ -83,7 +85,7 @@ class Cost:
 
 
 class EngineCode(NamedTuple):
-    """Cost of the compiled code of an engine.
+    """Memory and CPU time of the compiled code of an engine.
 
     - bytes: memory of the code.
     - seconds: CPU seconds of loading it.
@@ -95,17 +97,17 @@ class EngineCode(NamedTuple):
     compile: float = 0.0
 
     def cost(self) -> Cost:
-        """Return the cost of loading the code."""
+        """Return the cost of loading the compiled code."""
         part = MemoryPart(self.bytes, CODE_TO_COMPILE if self.compile else "code")
         return Cost({"code": self.seconds}, (part,), compile_seconds=self.compile)
 
 
 NO_CODE = EngineCode(0.0, 0.0)
-# linear motion in closed form: the LLVM library is loaded
+# A linear motion in closed form loads the LLVM library, but no kernels.
 LINEAR_CODE = EngineCode(58e6, 0.0)
-SHORT_CODE = EngineCode(58e6, 0.15, 2.0)  # slide of a bench, which has few kernels
+SHORT_CODE = EngineCode(58e6, 0.15, 2.0)  # for the slide of a bench, which has few kernels
 MARCH_CODE = EngineCode(58e6, 0.15, 3.5)
-SHEAR_MARCH_CODE = EngineCode(58e6, 0.15, 7.0)  # march with shear modes of a patch
+SHEAR_MARCH_CODE = EngineCode(58e6, 0.15, 7.0)  # for a march with shear modes of a patch
 SMOOTH_CODE = EngineCode(74e6, 0.15, 9.0)
-EVENT_CODE = EngineCode(82e6, 0.15, 12.0)  # engines that solve from event to event
+EVENT_CODE = EngineCode(82e6, 0.15, 12.0)  # for the event-driven engines
 BALANCE_CODE = EngineCode(1e8, 0.3, 3.0)

@@ -18,7 +18,9 @@ from .patch.jenkins_elements import elements, strip_elements
 
 
 def remove_joint(model: Model, patch=None) -> Model:
-    """Return the model with the modes without the joint; any other model unchanged.
+    """Remove the joint from the modes of a rig that were measured with it.
+
+    Any other model is returned unchanged.
 
     Parameters
     ----------
@@ -41,7 +43,7 @@ def remove_joint(model: Model, patch=None) -> Model:
 
 
 def patch_stiffness(model: Model, patch) -> float:
-    """Return the tangential stiffness [N/m] of a pressed patch with its law while nothing slips."""
+    """Return the tangential stiffness [N/m] of a pressed patch that sticks everywhere."""
     f = model.friction
     load = patch.pressure.load
     stiffness = record.stick_stiffness(f, load)
@@ -51,7 +53,9 @@ def patch_stiffness(model: Model, patch) -> float:
         stiffness = compute_sticking_stiffness(model.rig.friction.interfaces[0], load)
     if not model.partial_slip:
         return stiffness
-    length = f.static * load / stiffness  # 0 for a law that is rigid in stick
+    length = (
+        f.static * load / stiffness
+    )  # the yield displacement is 0 for a law that is rigid in stick
     if patch.strips is not None:
         return float(
             sum(strip_element[0].sum() for strip_element in strip_elements(patch, f.static, length))
@@ -60,7 +64,7 @@ def patch_stiffness(model: Model, patch) -> float:
 
 
 def stuck_patch_stiffness(model: Model, patch, apart: tuple):
-    """Return the Measure of the stiffness [N/m] of a pressed Patch that sticks, or None.
+    """Return the tangential stiffness [N/m] of a sticking patch with its error, or None.
 
     It is the value that its run prints, extrapolated over the meshes, and exists only if the pieces
     alone are compliant.

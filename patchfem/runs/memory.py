@@ -10,9 +10,9 @@ from pathlib import Path
 from ..core import Missing
 from .cost import CODE_TO_COMPILE
 
-MAPPED_BYTES = 60e6  # bytes of address space of the packages in addition to the memory in use
-COMPILER_BYTES = 150e6  # bytes of address space of the compiler library
-MIN_NAMED_FRACTION = 0.3  # fraction of the memory from which a plan names the largest part
+MAPPED_BYTES = 60e6  # address space [bytes] that the packages map in addition to the memory in use
+COMPILER_BYTES = 150e6  # address space [bytes] of the compiler library
+MIN_NAMED_FRACTION = 0.3  # fraction of the total memory from which a plan names the largest part
 CURES = {
     "contact.element_size": "make contact.element_size larger",
     "contact.mesh": "give contact.mesh fewer nodes on the interface",
@@ -24,9 +24,9 @@ CURES = {
 
 
 def describe_largest_part(parts: tuple) -> str:
-    """Return a sentence on the largest memory part that a key of the scene sets, with this key.
+    """Describe the largest memory part of a run and the key that sets its size.
 
-    It is "" if this part is small.
+    The sentence is "" if this part is small, or if no key sets its size.
     """
     largest = next((part for part in parts if part.key), None)
     if largest is None or largest.bytes < MIN_NAMED_FRACTION * sum(part.bytes for part in parts):
@@ -49,7 +49,7 @@ def free_bytes(*, needs_compiler: bool = False) -> float:
 
 
 def process_bytes(status: Path = Path("/proc/self/statm")) -> tuple:
-    """Return memory in use and address space of this process [bytes]; zeros if not known."""
+    """Return the memory in use and the address space of this process [bytes]."""
     try:
         size, resident = map(int, status.read_text("ascii").split()[:2])
     except (OSError, ValueError):
@@ -59,7 +59,7 @@ def process_bytes(status: Path = Path("/proc/self/statm")) -> tuple:
 
 
 def _available() -> float:
-    """Return the available memory of the system [bytes]; inf if not known."""
+    """Return the available memory of the system [bytes]; inf if unknown."""
     try:
         with open("/proc/meminfo", encoding="ascii") as file:
             known = dict(line.split(":", 1) for line in file)
@@ -69,7 +69,7 @@ def _available() -> float:
 
 
 def _limits() -> list:
-    """Return the limits of address space and data of this process [bytes]; inf without a limit."""
+    """Return the limits on address space and data of this process [bytes]; inf if unlimited."""
     try:
         import resource
     except ImportError:
@@ -81,9 +81,9 @@ def _limits() -> list:
 def free_in_control_group(
     used: float, groups: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")
 ) -> float:
-    """Return the memory [bytes] that the control groups leave to this process.
+    """Return the memory [bytes] that the control groups of this process leave to it.
 
-    It contains the memory that the process already uses.
+    The result contains the memory that the process already uses.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def free_in_control_group(
 
 
 def _remaining_bytes(folder: Path, limit: str, usage: str) -> float:
-    """Return limit minus usage of one group [bytes]; inf without a limit.
+    """Return the memory [bytes] that one control group leaves; inf if unlimited.
 
     Inactive cached files count as free.
     """
@@ -131,7 +131,7 @@ def _remaining_bytes(folder: Path, limit: str, usage: str) -> float:
         used_bytes = int((folder / usage).read_text("ascii"))
         lines = (folder / "memory.stat").read_text("ascii").splitlines()
         known = dict(line.split() for line in lines)
-    except (OSError, ValueError):  # the limit is "max", or a file is missing
+    except (OSError, ValueError):  # the limit is "max", i.e. there is none, or a file is missing
         return float("inf")
     return float(
         max_bytes
@@ -141,7 +141,7 @@ def _remaining_bytes(folder: Path, limit: str, usage: str) -> float:
 
 
 def reason_of_refusal(parts: tuple, free: float | None = None) -> str:
-    """Return why a run with these memory parts is impossible; "" if it is possible.
+    """Return why a run needs more memory than is free, or "".
 
     The sentence names the required and the free memory, and the largest part with its key.
     """
@@ -159,6 +159,6 @@ def reason_of_refusal(parts: tuple, free: float | None = None) -> str:
 
 
 def refuse(parts: tuple) -> None:
-    """Raise Missing if a run would need more memory than there is."""
+    """Raise Missing if a run would need more memory than is free."""
     if text := reason_of_refusal(parts):
         raise Missing(text, "")

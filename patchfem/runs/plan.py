@@ -27,14 +27,18 @@ from .tolerance_forecast import NOTHING_FORESEEN, Forecast, forecast_tolerance
 from .wear import plan as of_wear
 
 PACKAGE_BYTES = 80e6  # memory of the packages that every run imports [bytes]
-LONGEST = 1e6  # CPU seconds (twelve days) above which no run is started
-SKIPPING_ENGINES = ("march", "exact", "piecewise")  # they skip the cycles of a periodic motion
-MIN_SKIPPED_CYCLES = 100  # number of cycles from which a plan says so
+LONGEST = 1e6  # largest predicted CPU time [s] of a run that is started, twelve days
+SKIPPING_ENGINES = (
+    "march",
+    "exact",
+    "piecewise",
+)  # engines that skip the cycles of a periodic motion
+MIN_SKIPPED_CYCLES = 100  # number of cycles from which a plan says that cycles may be skipped
 UPPER_LIMIT_NOTE = (
     "the computing time is an upper limit: as soon as the motion repeats itself, the remaining cycles are not "
     "computed one by one"
 )
-GROUPS = {  # meaning and SI unit of each group
+GROUPS = {  # meaning and SI unit of each dimensionless group
     "D": (
         "D: friction limit (static, if there are two) divided by the largest force of the drive",
         "1",
@@ -64,7 +68,7 @@ GROUPS = {  # meaning and SI unit of each group
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Plan:
-    """Model with the engine that will run it, its sizes and its cost.
+    """Model with the engine that will run it, its sizes and its predicted cost.
 
     - model, kind: model and kind of its run.
     - effects: names of the effects in the scene.
@@ -101,7 +105,7 @@ class Plan:
 
     @property
     def steps(self) -> int:
-        """Steps of the time loop, including those of the coarse runs."""
+        """Number of time steps, including those of the coarse runs."""
         return self.cost.steps
 
     @property
@@ -127,7 +131,7 @@ class Plan:
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
 
     def modes(self, chain: dict) -> list:
-        """Return name, free and stuck frequency [Hz] of each mode for a chain; [] without a rig."""
+        """Return the name and the free and stuck frequencies [Hz] of each mode of a rig."""
         return of_rig.mode_frequencies(self.model.rig, chain) if self.model.rig is not None else []
 
     def as_json(self) -> dict:
@@ -152,12 +156,12 @@ class Plan:
 
 
 def compile_words(seconds: float) -> str:
-    """Return the words on the time of compiling; "" if nothing is compiled."""
+    """Return the words on the compile time, or "" if nothing is compiled."""
     return f" (and {seconds:.0f} s once for compiling)" if seconds else ""
 
 
 def plan(asked) -> Plan:
-    """Return the Plan of a Scene or a Model, without making a mesh or a solution.
+    """Plan a Scene or a Model without making a mesh or a solution.
 
     Parameters
     ----------
@@ -174,10 +178,10 @@ def plan(asked) -> Plan:
 
 
 def _make_plan(model: Model) -> Plan:
-    """Return the Plan of a Model."""
+    """Plan a Model."""
     if model.measured is not None:
         try:
-            # an invalid table is reported before anything runs
+            # an invalid table of measured responses is reported before anything runs
             measured.read_table(model.measured.path)
         except PatchfemError as error:
             error.key = error.key or "measured.file"
@@ -245,7 +249,10 @@ def _make_plan(model: Model) -> Plan:
 
 
 def _cost(model: Model) -> Cost:
-    """Return the cost of all steps of a run, its memory from the largest part to the smallest."""
+    """Return the predicted cost of all steps of a run.
+
+    The memory parts are ordered from the largest to the smallest.
+    """
     pressing = (
         patch_plan.cost(model) if model.patch is not None or model.has_interface_patches else Cost()
     )
@@ -270,7 +277,7 @@ def _cost(model: Model) -> Cost:
 
 
 def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
-    """Return the properties on which the compiled code of a run depends, as text.
+    """Return a text that identifies the compiled code of a run.
 
     Two runs of one kind run the same code.
 
@@ -306,7 +313,10 @@ def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
 
 
 def _verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
-    """Return the sentences of a plan; said: those on the motion, the patch and the friction law."""
+    """Return the verdict of a plan as sentences.
+
+    said: sentences on the motion, the patch and the friction law.
+    """
     sentences = list(said[0])
     if text := memory.reason_of_refusal(parts):
         sentences.append(f"`run` will refuse this scene: {text}")
@@ -331,7 +341,7 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
 
 
 def refuse_size(what: Plan) -> None:
-    """Raise Missing if a run needs too much memory, or more than LONGEST CPU seconds."""
+    """Raise Missing if a run needs too much memory or CPU time."""
     memory.refuse(what.cost.parts)
     if what.seconds > LONGEST:
         key = ""
@@ -349,7 +359,7 @@ def refuse_size(what: Plan) -> None:
 
 
 def _link(model: Model) -> dict:
-    """Return the last links of the stiffness chain: grooves, and the bonds of every interface."""
+    """Return the links of the stiffness chain at the interface: grooves and bonds."""
     load = model.nominal_load
     if not load > 0:
         return {}
@@ -365,7 +375,7 @@ def _link(model: Model) -> dict:
 
 
 def _law_link(law, load: float):
-    """Return the stiffness [N/m] of a friction law in stick under a load [N], or a text."""
+    """Return the stiffness [N/m] of a friction law in stick, or a text."""
     if law_has_trait(law.law, "creeps"):
         return "none: it creeps"
     stiffness = record.stick_stiffness(law, load)
@@ -373,7 +383,7 @@ def _law_link(law, load: float):
 
 
 def _law_groups(model: Model) -> dict:
-    """Return dimensionless groups of the friction law by name."""
+    """Return the dimensionless groups of the friction law."""
     if model.spread is None:
         return {}
 
@@ -381,7 +391,7 @@ def _law_groups(model: Model) -> dict:
 
 
 def _groove_words(model: Model) -> list:
-    """Return the sentence on the grooves that the load climbs, as a list; [] without grooves."""
+    """Return the sentence of a plan on the grooves that the load climbs."""
     load = model.nominal_load
     if model.grooves is None or not load > 0:
         return []

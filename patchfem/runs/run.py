@@ -35,7 +35,7 @@ AT_REST = "no motion was found; the measures are those of the pressed patch at r
 
 
 class StateFile(NamedTuple):
-    """File with the state of a long run.
+    """File with the state of a long run, from which the run can continue.
 
     - path: the file.
     - version: version of the program that the state must have.
@@ -48,7 +48,7 @@ class StateFile(NamedTuple):
 
 
 class PatchMeshes(NamedTuple):
-    """Pressed patch of [contact] on its meshes.
+    """Pressed patch of [contact] on several meshes.
 
     - patch: on the finest mesh; None without [contact].
     - coarse: on coarser meshes, fine to coarse; None for a missing one.
@@ -106,7 +106,7 @@ def run(
 def _run(
     what: Plan, say, progress, kept: StateFile | None, *, estimate: bool, fresh: bool
 ) -> Result:
-    """Run a plan whose size was accepted; the parameters are those of `run`."""
+    """Run a plan whose size was accepted."""
     begin = perf_counter()
     model = what.model
     seconds = {}
@@ -180,7 +180,7 @@ def _is_open(patch) -> bool:
 
 
 def _warn_of_patch(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list:
-    """Return the warnings on large strains, and on a mesh that shows no error."""
+    """Return the warnings on large strains of a patch, and on a mesh that shows no error."""
     patch = meshes.patch
     warnings = list(patch_result.warn_of_strains(model.patch, patch))
     if estimate and meshes.coarse[0] is None:
@@ -195,7 +195,7 @@ def _warn_of_patch(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list
 
 
 def _solve(inputs: RunInputs) -> Result:
-    """Run a plan by the function of its kind, whose module is loaded here."""
+    """Run a plan with the function for its kind of scene."""
     if inputs.plan.kind == "patch":
         return patch_result.static(inputs)
     if inputs.plan.kind == "bench":
@@ -229,7 +229,7 @@ def _result_without_load(inputs: RunInputs) -> Result:
 
 
 def _evolve(inputs: RunInputs, kept: StateFile | None):
-    """Return the patch after its wear, from a saved state if there is one."""
+    """Compute the wear of a patch, continuing from a saved state if there is one."""
     model = inputs.plan.model
     patch = inputs.patch
     key = kept and state_key(model, patch, kept.version)
@@ -237,7 +237,7 @@ def _evolve(inputs: RunInputs, kept: StateFile | None):
 
 
 def _worn_inputs(inputs: RunInputs, evolved) -> RunInputs:
-    """Return the inputs of the run of a worn patch, whose progress its wear has reported."""
+    """Return the inputs of the run of a worn patch."""
     plan_of_run = inputs.plan
     if evolved.state is not None:
         worn = evolve.worn_model(plan_of_run.model, evolved.patch, evolved.state.depth)
@@ -248,7 +248,7 @@ def _worn_inputs(inputs: RunInputs, evolved) -> RunInputs:
 
 
 def _add_static_measures(result: Result, model: Model, meshes: PatchMeshes) -> Result:
-    """Return the result of a motion with the measures of its pressed patches."""
+    """Add the measures of pressed patches to the result of a motion."""
     if meshes.patch is not None:
         motion = {name: m for name, m in result.measures.items() if name != "normal_load"}
         patch, *coarse = meshes.static or (meshes.patch, *meshes.coarse)
@@ -267,7 +267,7 @@ def _add_static_measures(result: Result, model: Model, meshes: PatchMeshes) -> R
 
 
 def _complete_result(result: Result, notes: list, begin: float, meshes: PatchMeshes) -> Result:
-    """Return the result with its total time, notes, tolerance warnings and meanings.
+    """Add total time, notes, accuracy warnings and meanings to a result.
 
     Parameters
     ----------
@@ -303,7 +303,7 @@ def _complete_result(result: Result, notes: list, begin: float, meshes: PatchMes
 
 
 def _yielding_faces(result: Result) -> dict:
-    """Return the notes on faces that yield even at the peak pressure minus its error."""
+    """Return the notes on surfaces that yield even at the peak pressure minus its error."""
     peak = result.measures.get("pressure_peak")
     patch_model = result.plan.model.patch
     if patch_model is None or result.patch is None or peak is None or peak.value is None:
@@ -312,7 +312,7 @@ def _yielding_faces(result: Result) -> dict:
 
 
 def _saving_context(kept: StateFile | None, what: Plan, patch):
-    """Return a context in which marches save their states, or an empty one.
+    """Return a context in which marches save their states, or an empty context.
 
     Raises
     ------
@@ -324,7 +324,7 @@ def _saving_context(kept: StateFile | None, what: Plan, patch):
         return nullcontext()
 
     def path_of_march(number: int) -> Path:
-        """Return the file of the state of a march."""
+        """Return the file for the state of a march."""
         return kept.path.parent / f"march_{number}.npz"
 
     if kept.resume and model.wear is None and not path_of_march(1).is_file():
@@ -337,10 +337,10 @@ def _saving_context(kept: StateFile | None, what: Plan, patch):
 
 
 def state_key(model, patch, version: str) -> str:
-    """Return the key of what a saved state belongs to.
+    """Return the key that identifies the run to which a saved state belongs.
 
-    It depends on the scene in SI units, the unworn gap on the nodes, a slide from a file, and the
-    version.
+    The key depends on the scene in SI units, the unworn gap on the nodes, a slide from a file, and the
+    version of the program.
 
     Parameters
     ----------

@@ -19,29 +19,32 @@ from .bench import engine as bench_engine
 from .patch import grids as patch_grids
 from .rig import costs, engines, lists, numerics
 
-# Steps per cycle over those that the tolerance requires, below which runs missed it: of 60 random
-# rigs and 30 benches with 50 to 6400 steps and tolerances of 0.1 to 1e-4, one in twenty met it
-# below these.
+# Ratio of present to required steps per cycle of a rig, below which runs missed the tolerance: of 60 random
+# rigs and 30 benches with 50 to 6400 steps and tolerances of 0.1 to 1e-4, one in twenty met it below
+# these ratios.
 FEWER_STEPS = 2 / 3
-# True: with a law of bonds, False: with any other law
+# The same ratio for a bench, by whether its law has bonds.
 FEWER_STEPS_OF_BENCH = {True: 1 / 3, False: 1 / 8}
-# steps over those that the tolerance requires with which all measures met it, not only the
-# displacement
+# Ratio of proposed to required steps per cycle of a rig, with which all measures met the tolerance, not
+# only the displacement.
 ENOUGH_STEPS = 4.0
-ENOUGH_STEPS_OF_BENCH = 2.0  # same for a bench: a triangle needs 1.1 times, a sine at most 1
-# relative error over (element size / length of the contact); equal elements had 0.2 to 7 (crowns,
-# tilts, flat ends)
+ENOUGH_STEPS_OF_BENCH = 2.0  # the same ratio for a bench: a triangle needs 1.1, a sine at most 1
+# Smallest ratio of the relative error of a patch to (element size / contact length); patches with equal
+# elements had 0.2 to 7 (crowns, tilts, flat ends).
 OF_ELEMENT = 0.2
-FINEST_PATCH = 1e-6  # relative error of the finest mesh of a static patch, which costs some CPU s
-# same for pieces that slip in part in a rig, whose mesh is coarser because of the time steps
+FINEST_PATCH = (
+    1e-6  # relative error on the finest mesh of a static patch, which takes some CPU seconds
+)
+# relative error on the finest mesh of a patch that slips in part in a rig, coarser because of the time
+# steps
 FINEST_MOTION = 3e-5
-SAFE_TOLERANCE = 1e-3  # tolerance that the meshes of patches meet
-STEPLESS = ("exact", "piecewise", "smooth")  # engines that need no steps per cycle
-MAX_CYCLES = 1e5  # largest number of drive cycles that is proposed
+SAFE_TOLERANCE = 1e-3  # tolerance that a cure proposes, because the meshes of all patches meet it
+STEPLESS = ("exact", "piecewise", "smooth")  # engines that choose their own steps
+MAX_CYCLES = 1e5  # largest number of drive cycles that a cure proposes
 
 
 class Cause(NamedTuple):
-    """Cause for which a tolerance will be missed, and its remedy.
+    """Cause for which a run will miss its tolerance, with the remedy.
 
     - words: the cause as the end of a sentence.
     - cure: {key: value to set, or None to leave the key out}.
@@ -52,27 +55,27 @@ class Cause(NamedTuple):
 
 
 class Forecast(NamedTuple):
-    """Requested tolerance, and the causes for which it will be missed."""
+    """Requested tolerance of a run, and the causes for which it will be missed."""
 
     asked: float
     causes: tuple
 
     def sentence(self) -> str:
-        """Return a sentence on the causes of missing the tolerance and the remedy, or ""."""
+        """Return a sentence on why the tolerance will be missed and on the remedy, or ""."""
         if not self.causes:
             return ""
         words = " and ".join(cause.words for cause in self.causes)
         return f"the tolerance {self.asked:g} will not be met {words}; {_cure_words(self.cure())}"
 
     def cure(self) -> dict:
-        """Return {key: value to set, or None to leave the key out} for all causes."""
+        """Return the keys to set or leave out (None) to remove all causes."""
         cure = {}
         for cause in self.causes:
             cure |= cause.cure
         return cure
 
     def as_json(self) -> dict:
-        """Return the object that `plan --json` has under "tolerance"."""
+        """Return the forecast as the object that `plan --json` has under "tolerance"."""
         return {
             "asked": self.asked,
             "missed": bool(self.causes),
@@ -85,7 +88,7 @@ NOTHING_FORESEEN = Forecast(0.0, ())
 
 
 def _cure_words(cure: dict) -> str:
-    """Return which keys to set and which to leave out, as text."""
+    """Return a text on the keys to set and to leave out."""
     dropped = [key for key, value in cure.items() if value is None]
     given = [f"{key} = {value:.15g}" for key, value in cure.items() if value is not None]
     parts = [f"leave out {' and '.join(dropped)}"] * bool(dropped) + [
@@ -95,7 +98,7 @@ def _cure_words(cure: dict) -> str:
 
 
 def forecast_tolerance(model: Model) -> Forecast:
-    """Predict whether a model will miss its tolerance, as a Forecast, before it is computed."""
+    """Predict whether a model will miss its tolerance, before anything is computed."""
     tolerance = model.accuracy.tolerance
     if cause := _mesh_cause(model, tolerance):
         return Forecast(tolerance, (cause,))
@@ -113,7 +116,7 @@ def _replace_accuracy(model: Model, **keys) -> Model:
 
 
 def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
-    """Return the Cause if no mesh of the pieces meets a tolerance in acceptable time."""
+    """Return the Cause if no mesh of the pieces meets the tolerance in acceptable time."""
     if model.kind == "patch" and model.patch.mesh.file is None and tolerance < FINEST_PATCH / 2:
         finest = FINEST_PATCH
     elif (
@@ -169,9 +172,9 @@ def _rig_steps_cause(model: Model) -> Cause | None:
 
 
 def _steps_cure(model: Model) -> dict:
-    """Return keys with which time steps no longer prevent the tolerance.
+    """Return the keys to set so that the time steps of a rig meet the tolerance.
 
-    They select an engine without steps if there is one, else more steps; {} if there are enough.
+    The keys select an engine without steps if there is one, else more steps; {} if there are enough.
     """
     accuracy = model.accuracy
     free = engines.choose_engine(_replace_accuracy(model, method="auto", steps_per_cycle=None))
@@ -188,14 +191,14 @@ def _steps_cure(model: Model) -> dict:
 def _rounded_steps(steps: float) -> int:
     """Return steps per cycle rounded up to two digits and to a multiple of four.
 
-    Half and a quarter of them are then whole numbers.
+    Half and a quarter of the steps are then whole numbers.
     """
     unit = 10 ** (floor(log10(steps)) - 1)
     return 4 * ceil(ceil(steps / unit) * unit / 4)
 
 
 def _more_cycles(model: Model) -> dict:
-    """Return the cycles in which the transient decays below the tolerance, as a dict by key.
+    """Return the number of cycles after which the transient is below the tolerance, by key.
 
     The slowest mode counts; {} if the scene has enough cycles.
     """
@@ -227,7 +230,7 @@ def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
 
 
 def _bench_steps_cause(model: Model) -> Cause | None:
-    """Return the Cause if a bench has too few steps."""
+    """Return the Cause if a bench has too few time steps."""
     if model.accuracy.steps_per_cycle is None or (
         law_has_trait(model.friction.law, "memoryless") and not model.partial_slip
     ):

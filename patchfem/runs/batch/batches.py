@@ -25,7 +25,7 @@ from .case_results import CaseResults
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Method that computes many models together, with a module of this folder.
+    """Method that computes many models together, implemented by a module of this folder.
 
     The module is imported when it is first needed. Its functions are the methods of this class.
 
@@ -49,11 +49,11 @@ class Batch:
 
     @property
     def _module(self):
-        """Module of the batch."""
+        """Module that implements the batch."""
         return import_module(f"patchfem.runs.batch.{self.name}")
 
     def refuses(self, model: Model) -> str:
-        """Return a sentence that says why the batch cannot compute a model; "" if it can."""
+        """Return the reason why the batch cannot compute a model, or ""."""
         if model.kind != self.kind:
             return f"it is a {model.kind}"
         return _why_run_singly(self.kind) or self._module.refuses(model)
@@ -63,14 +63,14 @@ class Batch:
         return self._module.group(model)
 
     def solve(self, models: Sequence[Model], say: Callable | None) -> CaseResults:
-        """Return the results of a group.
+        """Compute the results of a group of models.
 
         They equal those of single runs to 1e-12, errors included, whatever else is in the group.
         """
         return self._module.solve(models, say)
 
     def parts(self, models: Sequence) -> dict:
-        """Return {group: indices} of the models whose numbers the batch reads as columns."""
+        """Return the indices, by group, of the models whose numbers the batch reads as columns."""
         candidates = [models.first] if isinstance(models, SimilarModels) else models
         if not self.reads_columns or _why_run_singly(self.kind):
             return {}
@@ -81,7 +81,7 @@ class Batch:
 
 @cache
 def _why_run_singly(kind: str) -> str:
-    """Return why no batch takes cases of a kind, or "".
+    """Return why no batch computes cases of a kind of scene, or "".
 
     A measure that only single runs compute excludes all batches.
     """
@@ -89,12 +89,12 @@ def _why_run_singly(kind: str) -> str:
     return f"the measure {rows[0].name} is computed only by single runs" if rows else ""
 
 
-# note on a case whose batch failed, before the error
+# beginning of the note on a case whose batch failed
 BATCH_FAILED = (
     "this case was run by itself, because computing it together with other cases failed with an "
     "internal fault; its results are not affected, but please report it"
 )
-# the first batch that does not refuse a model takes it
+# batches in the order in which they are tried: the first that does not refuse a model computes it
 BATCHES: tuple[Batch, ...] = (
     Batch("patches", "patch", compile=6.0, reads_columns=True, together=2048),
     Batch("benches", "bench", share=0.4, together=64),
@@ -107,14 +107,14 @@ BATCHES: tuple[Batch, ...] = (
 
 
 def batch_compile_seconds(batch: Batch, model: Model) -> float:
-    """Return the CPU seconds of compiling for a model; 0 if one of its kind has been computed."""
+    """Return the CPU time [s] of compiling for a model, or 0 if code of its kind exists."""
     if batch.compile and not compiled.has_run(_compiled_kind(batch, model)):
         return batch.compile
     return 0.0
 
 
 def _compiled_kind(batch: Batch, model: Model) -> str:
-    """Return the properties on which the compiled code of a batch depends, as text."""
+    """Return a text that identifies the compiled code of a batch."""
     rig = model.rig
     if rig is None:
         return batch.name
@@ -123,7 +123,7 @@ def _compiled_kind(batch: Batch, model: Model) -> str:
 
 
 def choose_batch(model: Model, study: int = 1) -> Batch | None:
-    """Return the batch of a model in a study of `study` cases; None if it is run by itself."""
+    """Return the batch for a model of a study, or None if the model is run by itself."""
     for batch in BATCHES:
         if study >= batch.least and not batch.refuses(model):
             return batch
@@ -131,7 +131,7 @@ def choose_batch(model: Model, study: int = 1) -> Batch | None:
 
 
 class Assignment(NamedTuple):
-    """How a model is computed.
+    """Assignment of a model to a batch and a group, or to a single run.
 
     - batch, group: None if the model is run by itself.
     - failure: the batch and its error, if it failed to assign the model; else "".
@@ -149,7 +149,7 @@ def solve_models(
     estimate: bool = True,
     study: int = 0,
 ) -> CaseResults:
-    """Return the case results of models in their order.
+    """Compute the case results of many models, in their order.
 
     If a batch fails, its cases are run one by one. A note of each of them names the batch and the
     error, unless the error is that of a case (`one_by_one.CASE_ERRORS`).
@@ -193,7 +193,7 @@ def solve_models(
 
 
 def _model_without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
-    """Return a model whose modes do not contain the joint, or the error that there are none."""
+    """Remove the joint from the modes of a model, or return the error of this step."""
     if (
         isinstance(model, PatchfemError)
         or model.rig is None
@@ -207,9 +207,9 @@ def _model_without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
 
 
 def _assign_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
-    """Assign models to the batches that read their numbers as columns.
+    """Assign similar models to the batches that read their numbers as columns.
 
-    Return the indices of the models that are not assigned, and those of all others in a dict by
+    Returns the indices of the models that are not assigned, and a dict with those of all others by
     Assignment.
     """
     groups = {}
@@ -233,7 +233,7 @@ def _assign_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
 
 
 def _assign(model: Model, study: int) -> Assignment:
-    """Assign a model in a study of `study` cases to a batch and a group."""
+    """Assign a model of a study to a batch and a group."""
     batch = None
     try:
         batch = choose_batch(model, study)
@@ -245,20 +245,20 @@ def _assign(model: Model, study: int) -> Assignment:
 
 
 def _describe_failure(batch: Batch | None, error: Exception) -> str:
-    """Return the name of a batch, if it is known, and the error that it raised."""
+    """Describe the error of a batch, with the name of the batch if it is known."""
     name = "" if batch is None else f"{batch.name}: "
     return f"{name}{type(error).__name__}: {error}"
 
 
 def _keep_case(keep: Callable, cases: list, index: int, result) -> None:
-    """Call `keep` with a case, given by its index in `cases`, and its Result."""
+    """Pass a case and its Result to the callback of the caller."""
     keep(cases[index], result)
 
 
 def _solve_group(
     assignment: Assignment, models: Sequence[Model], run_singly: Callable, say: Callable | None
 ) -> CaseResults:
-    """Return the results of a group by its batch, or one by one if the batch fails."""
+    """Compute the results of a group by its batch, or one by one if the batch fails."""
     batch, _, failure = assignment
     if batch is not None:
         try:
@@ -266,7 +266,7 @@ def _solve_group(
             if batch.compile and batch_compile_seconds(batch, models[0]):
                 compiled.record_run(_compiled_kind(batch, models[0]))
             return results
-        except one_by_one.CASE_ERRORS:  # a single run names the case with the error
+        except one_by_one.CASE_ERRORS:  # a single run of the case reports its error
             pass
         except Exception as error:
             failure = _describe_failure(batch, error)

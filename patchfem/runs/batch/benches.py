@@ -10,11 +10,11 @@ from ..patch import static
 from . import one_by_one, patches
 from .case_results import CaseResults
 
-MAX_CASES_PER_CALL = 256  # cases whose patches are pressed in one call
+MAX_CASES_PER_CALL = 256  # largest number of patches that are pressed in one call
 
 
 def refuses(model: Model) -> str:
-    """Return why the patch of a bench is not pressed with others; "" if it is."""
+    """Return why the patch of a bench is not pressed together with others, or ""."""
     if (
         model.patch is None
         or model.load_varies
@@ -31,7 +31,7 @@ def group(model: Model) -> Hashable:
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Return the case results of models of a group."""
+    """Compute the case results of a group of benches."""
     return patches.pressed_first(
         models, MAX_CASES_PER_CALL, lambda part: one_by_one.solve(part, say)
     )

@@ -18,21 +18,20 @@ from ...core import Measure
 from ...inputs import measured
 from ...model.model import Model
 
-# number of cases from which columns may be on disk: those of a rig have 25 kB per 1000 cases and
-# measure
+# Number of cases above which columns may be on disk: the columns of a rig have 25 kB per 1000 cases and
+# measure.
 MIN_CASES_ON_DISK = 50_000
 FAILED_OUTCOME = "failed"  # outcome of a case that was refused or did not finish
 
 
 class OnDisk:
-    """Array of floats in a file.
+    """Array of floats in a file, which needs memory only while it is used.
 
-    It needs memory only while it is used: an access maps the file, and releases the map with the
-    result.
+    An access maps the file into memory, and releases the map with the result.
     """
 
     def __init__(self, file, shape: tuple, whole: OnDisk | None = None):
-        # the file is closed together with the array for which it was opened
+        # the original array is kept, because its file is closed together with it
         self.file = file
         self.shape = shape
         self.whole = whole
@@ -42,7 +41,7 @@ class OnDisk:
 
     @property
     def size(self) -> int:
-        """Number of floats."""
+        """Number of floats in the array."""
         return prod(self.shape)
 
     def __len__(self) -> int:
@@ -59,13 +58,13 @@ class OnDisk:
         np.asarray(self)[at] = values
 
     def reshape(self, shape: tuple) -> OnDisk:
-        """Return the same numbers in another shape."""
+        """Return an array with the same file in another shape."""
         return OnDisk(self.file, tuple(shape), self)
 
 
 @dataclass(eq=False, slots=True)
 class CaseResults:
-    """Results of n cases, in SI units.
+    """Results of n cases as columns, in SI units.
 
     - outcome (n,): names of `Outcome`, or FAILED_OUTCOME.
     - values, errors, floors: columns (n,) by measure. NaN means that a case does not have the
@@ -109,7 +108,7 @@ class CaseResults:
         return cls(np.full(count, "", object), room=room if count > MIN_CASES_ON_DISK else None)
 
     def measure(self, name: str, unit: str) -> None:
-        """Add columns of NaN for a measure, unless the results have this measure already."""
+        """Add columns of NaN for a measure, if there are none yet."""
         if name not in self.values:
             self.units[name] = unit
             for columns in self._columns:
@@ -123,12 +122,12 @@ class CaseResults:
         return OnDisk(TemporaryFile(dir=self.room), (len(self),))
 
     def fail(self, case: int, message: str) -> None:
-        """Mark a case as failed."""
+        """Mark a case as failed, with its error message."""
         self.outcome[case] = FAILED_OUTCOME
         self.messages[case] = message
 
     def put(self, case: int, outcome: str, measures: dict, seconds: float) -> None:
-        """Set the results of one case.
+        """Set outcome, measures and CPU time of one case.
 
         Parameters
         ----------
@@ -144,7 +143,10 @@ class CaseResults:
         self.fill(case, measures)
 
     def fill(self, case: int, measures: dict) -> None:
-        """Set measures of a case, replacing those it has; measures: core.Measure by name."""
+        """Set measures of a case, replacing existing ones.
+
+        measures: core.Measure by name.
+        """
         for name, measure in measures.items():
             self.measure(name, measure.unit)
             if measure.value is None:
@@ -155,16 +157,16 @@ class CaseResults:
 
     @property
     def _columns(self) -> tuple[dict, ...]:
-        """The dicts of columns by measure."""
+        """Dicts of values, errors and floors by measure."""
         return self.values, self.errors, self.floors
 
     @property
     def _texts(self) -> tuple[dict, ...]:
-        """The dicts with further results by case."""
+        """Dicts of messages, warnings, notes and settings by case."""
         return self.messages, self.warnings, self.notes, self.numerics
 
     def insert(self, cases: Sequence[int], part: CaseResults) -> None:
-        """Insert the results `part` of these cases, in their order."""
+        """Insert the results of some cases from other case results."""
         indices = np.asarray(cases, int)
         self.outcome[indices] = part.outcome
         self.seconds[indices] = part.seconds
@@ -179,7 +181,7 @@ class CaseResults:
             texts.update(_renumber(part_texts, numbers))
 
     def remove(self, cases: Sequence[int]) -> None:
-        """Remove the results of cases, and the measures that no other case has."""
+        """Remove the results of some cases, and measures that no other case has."""
         for columns in self._columns:
             for column in columns.values():
                 column[cases] = np.nan
@@ -203,7 +205,7 @@ class CaseResults:
         return results
 
     def known_measures(self, case: int) -> dict:
-        """Return the measures of a case whose errors are known, by name."""
+        """Return the measures of a case whose errors are known."""
         measures = {}
         for name, errors in self.errors.items():
             if not np.isnan(errors[case]):
@@ -213,19 +215,19 @@ class CaseResults:
         return measures
 
     def has(self, name: str, case: int) -> bool:
-        """Return whether a case has a value of a measure, or a reason why it has none."""
+        """Return whether a case has a value of a measure, or a reason for its absence."""
         return not np.isnan(self.values[name][case]) or case in self.reasons.get(name, ())
 
 
 def _renumber(texts: dict, numbers: dict) -> dict:
-    """Return a dict by case with other numbers of its cases, without those that have none."""
+    """Renumber the cases of a dict, and drop cases without a new number."""
     return {numbers[case]: text for case, text in texts.items() if case in numbers}
 
 
 def join_case_results(
     count: int, parts: Iterable[tuple[Sequence[int], CaseResults]]
 ) -> CaseResults:
-    """Return the results of `count` cases from parts, each with the indices of its cases."""
+    """Join case results of parts of a study, given the case indices of each part."""
     results = CaseResults.blank(count)
     for cases, part in parts:
         results.insert(cases, part)

@@ -39,24 +39,25 @@ from .lumped.columns import MAIN_MEASURE, Runs, assemble_results
 from .lumped.pieces import known_values
 from .samples import Samples, peaks
 
-MAX_CASES_PER_CALL = 256  # cases whose patches are pressed in one call
-# samples of all cases that march in one call and are kept: 200 MB with the evaluation
+MAX_CASES_PER_CALL = 256  # largest number of patches that are pressed in one call
+# largest number of kept samples of all cases in one call, which need 200 MB with their evaluation
 MAX_SAMPLES = 1_200_000
-MAX_TOTAL_STEPS = 1e7  # largest number of steps of a run whose steps are doubled
-# fraction of the tolerance by which modes, and points, may each miss the backbone of the patch
+MAX_TOTAL_STEPS = 1e7  # largest number of time steps of a run to which the steps are doubled
+# largest error of the backbone curve over the tolerance, for the reduction to few modes and for that to
+# few points
 REDUCTION_TOL_FRACTION = 3e-2
-# factor from the error of the backbone to that of a loop, which passes it twice
+# ratio of the error of a friction loop to that of the backbone curve, which the loop passes twice
 LOOP_ERROR_FACTOR = 2.0
-MAX_STICKING_SLIP = 1e-3  # slip in bond lengths up to which a case sticks
+MAX_STICKING_SLIP = 1e-3  # slip amplitude in bond lengths, up to which a case sticks
 RING_MEASURES = "ring_frequency", "ring_damping"
-# kinds of the errors of a case: steps, coarser mesh, few modes and points, and stated by the case
+# kinds of errors: time steps, mesh, few modes and points, and errors that the march itself states
 ERROR_KINDS = ("steps", "mesh", "modes", "own")
 
 
 def refuses(model: Model) -> str:
-    """Return why the batch does not take a model; "" if it does.
+    """Return why the batch of elastic patches with bonds refuses a model, or "".
 
-    It takes elastic patches with bonds under a constant load that are integrated in time.
+    The batch takes elastic patches with bonds under a constant load that are integrated in time.
     """
     if (
         model.patch is None
@@ -89,7 +90,7 @@ def group(model: Model) -> Hashable:
 
 
 def no_lanes(model: Model) -> str:
-    """Return why a model that is not refused does not march in a lane; "" if it may."""
+    """Return why a model cannot march side by side with others, or ""."""
     rig = model.rig
     law = model.bonds
     if (
@@ -133,14 +134,14 @@ def no_lanes(model: Model) -> str:
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Return the case results of models of a group."""
+    """Compute the case results of a group of elastic patches with bonds."""
     few = [replace(model, patch=model.patch.with_mesh(can_gather_points=True)) for model in models]
     batch = pressed.PatchBatch(MARCH.name, _gather_points, _move_cases, MAX_CASES_PER_CALL)
     return pressed.solve(few, batch, say)
 
 
 class _GatheredPoints(NamedTuple):
-    """Few points of a patch, with its pieces.
+    """Few contact points that represent a patch, with the error of this reduction.
 
     - case: as lanes march it.
     - error: error of this reduction as a fraction of the friction limit.
@@ -151,7 +152,7 @@ class _GatheredPoints(NamedTuple):
 
 
 def _gather_points(model: Model, numerics, patch) -> _GatheredPoints | None:
-    """Return a pressed patch on few points; None if the case runs by itself."""
+    """Reduce a pressed patch to a few contact points; None if the case is run by itself."""
     if no_lanes(model) or numerics.steps % 4:
         return None
     if choose_quadrature(model, numerics).engine != "recursion":
@@ -172,7 +173,7 @@ def _gather_points(model: Model, numerics, patch) -> _GatheredPoints | None:
 
 
 def _move_cases(models: list, cases: list, say) -> tuple[CaseResults, np.ndarray]:
-    """Return the results of pressed cases, and which (n,) must be run by themselves."""
+    """Compute the results of pressed cases, and which (n,) must be run by themselves."""
     results = CaseResults.blank(len(models))
     runs_singly = np.zeros(len(models), bool)
     all_steps = np.array([case.numerics.steps for case in cases])
@@ -186,10 +187,11 @@ def _move_cases(models: list, cases: list, say) -> tuple[CaseResults, np.ndarray
 
 
 def _march_side_by_side(models: list, cases: list, steps: int) -> tuple[CaseResults, np.ndarray]:
-    """Return the results of pressed cases, and which (n,) must be run by themselves.
+    """Compute the results of pressed cases by marches side by side.
 
-    They march with `steps` per cycle, or with twice as many if the displacement needs them and the
-    scene does not fix them. Cases with similar slides are neighbours.
+    The cases march with `steps` per cycle, or with twice as many if the displacement needs them and the
+    scene does not fix them. Cases with similar slides are neighbours. Returns also which cases (n,) must
+    be run by themselves.
     """
     results = CaseResults.blank(len(models))
     runs_singly = np.zeros(len(models), bool)
@@ -212,7 +214,7 @@ def _march_side_by_side(models: list, cases: list, steps: int) -> tuple[CaseResu
 
 
 class _MarchedCases(NamedTuple):
-    """Results of n cases that marched with the same steps.
+    """Results of n cases that marched side by side with the same steps.
 
     - results: CaseResults.
     - runs_singly: which cases (n,) must be run by themselves.
@@ -225,14 +227,14 @@ class _MarchedCases(NamedTuple):
 
 
 def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
-    """March pressed cases with `steps` per cycle, and their coarse runs."""
+    """March pressed cases side by side, with coarse runs for their errors."""
     rig = models[0].rig
     numerics = cases[0].numerics
     window = numerics.window
     cycles = int(rig.drive.cycles)
 
     def march(divisor: int, points: list, searched=None) -> _Evaluated:
-        """Evaluate a march of points with a fraction of the steps.
+        """March and evaluate the cases with a fraction of the steps.
 
         searched: which cases (n,) are searched for ringing; None: all.
         """
@@ -285,7 +287,7 @@ def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
 
 
 class _Evaluated(NamedTuple):
-    """Evaluation of a march of n cases.
+    """Evaluation of a march of n cases side by side.
 
     - values: measures (n,) by name.
     - energies: (n,) by name [J].
@@ -302,14 +304,14 @@ class _Evaluated(NamedTuple):
 
     @property
     def reach(self) -> np.ndarray:
-        """Largest slide (n,) [m]."""
+        """Largest slide (n,) [m] of each case."""
         return self.marched.reach
 
 
 def _evaluate(
     models: list, cases: list, marched: lanes.MarchedCases, steps: int, searched=None
 ) -> _Evaluated:
-    """Evaluate a march with `steps` per cycle.
+    """Compute measures, energies and ringing of cases from a march side by side.
 
     Parameters
     ----------
@@ -333,7 +335,7 @@ def _evaluate(
     with np.errstate(all="ignore"):
         stiffness = np.array([model.rig.first_mode.stiffness for model in models])
         values = samples.values(energies, stiffness * ~_has_other_modes(models[0], marched), load)
-        # upper bound of the natural frequencies [rad/s] of the rig, with its bonds as springs
+        # this upper bound of the natural frequencies [rad/s] of the rig takes the bonds as springs
         contact_stiffness = np.array([case.limit.sum() / case.length for case in points])
         fastest = np.sqrt(
             (modes.omega**2).max() + (modes.slide**2).sum() / modes.mass * contact_stiffness
@@ -361,14 +363,14 @@ def _evaluate(
 
 
 def _has_other_modes(model: Model, marched: lanes.MarchedCases) -> np.ndarray:
-    """Return whether modes other than the first contribute to the slide (n,)."""
+    """Return whether modes other than the first contribute to the slide of a case, (n,)."""
     fraction = model.rig.first_mode.fraction_of_other_modes
     motions = np.moveaxis(marched.z, 2, 0)
     return np.array([fraction(motion) > MAX_OTHER_MODES_FRACTION for motion in motions])
 
 
 def _runs_with_errors(models: list, cases: list, evaluated: tuple, steps: int) -> tuple[Runs, list]:
-    """Return the Runs with their errors, and the errors of each case by kind (ERROR_KINDS).
+    """Combine marches to Runs with errors, and the errors of each case by kind.
 
     Parameters
     ----------
@@ -422,7 +424,7 @@ def _runs_with_errors(models: list, cases: list, evaluated: tuple, steps: int) -
 
 
 def _reduction_errors(values: dict, points: _GatheredPoints, model: Model, work: float) -> dict:
-    """Return the errors of the measures due to the small number of modes and points, by name.
+    """Estimate the errors due to the small numbers of shear modes and points.
 
     Parameters
     ----------

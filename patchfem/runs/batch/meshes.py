@@ -14,7 +14,7 @@ from ..patch import meshes as patch_meshes
 
 
 class Shared:
-    """Shared meshes of a sweep by geometry and tolerance.
+    """Shared meshes of a sweep, by geometry of the patch and tolerance.
 
     They depend on all models that choose them, but not on their order. Therefore a sweep makes them
     once from its cases, before these are divided into chunks. `all_`: there are no other cases.
@@ -32,11 +32,11 @@ class Shared:
 
             try:
                 self.meshes[key] = patch_meshes.shared_meshes(patches, key[1], all_)
-            except PatchfemError:  # each case is run by itself, which reports its error
+            except PatchfemError:  # each case is run by itself, and reports its own error
                 continue
 
     def with_shared_meshes(self, model: Model | PatchfemError) -> Model | PatchfemError:
-        """Return the model with its shared meshes; the same model if it has none."""
+        """Return a model with its shared meshes, or the same model if it has none."""
         meshes = self.meshes.get(_key(model)) if self.meshes and _wants(model) else None
         if meshes is None:
             return model
@@ -44,7 +44,7 @@ class Shared:
 
 
 def with_shared_meshes(models: Sequence[Model | PatchfemError]) -> list:
-    """Return the models in their order, with shared meshes for those of one geometry.
+    """Return models with shared meshes for patches of the same geometry.
 
     A single patch of a geometry keeps the mesh that its own run chooses.
     """
@@ -53,10 +53,10 @@ def with_shared_meshes(models: Sequence[Model | PatchfemError]) -> list:
 
 
 def _wants(model: Model | PatchfemError) -> bool:
-    """Return whether a model may share its meshes."""
+    """Return whether a model may share its meshes with other models."""
     return isinstance(model, Model) and model.patch is not None and model.patch.mesh.shared is None
 
 
 def _key(model: Model) -> tuple:
-    """Return the key of the geometry and the tolerance of a model."""
+    """Return the key of a model for its patch geometry and tolerance."""
     return patch_meshes.geometry_key(model.patch), model.accuracy.tolerance

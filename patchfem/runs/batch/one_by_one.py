@@ -18,7 +18,7 @@ from ..results.result import choices
 from ..run import run
 from .case_results import CaseResults
 
-CASE_ERRORS = (PatchfemError, MemoryError)  # errors of a case itself, not faults of the program
+CASE_ERRORS = (PatchfemError, MemoryError)  # errors of a case, as opposed to faults of the program
 NO_MEMORY = "not enough memory; make contact.element_size larger, or make the run shorter"
 
 
@@ -28,7 +28,7 @@ def solve(
     keep: Callable | None = None,
     estimate: bool = True,
 ) -> CaseResults:
-    """Return the results of single runs of the models.
+    """Compute case results by single runs, one after the other.
 
     An error of one case becomes its message and does not stop the others.
 
@@ -51,7 +51,7 @@ def solve(
                 keep(case, result)
         except CASE_ERRORS as error:
             results.fail(case, str(error) or NO_MEMORY)
-        # a defect of one case must not lose the results of a thousand others
+        # a fault of the program in one case must not lose the results of a thousand others
         except Exception as error:
             results.fail(case, f"internal fault, please report it: {type(error).__name__}: {error}")
         else:

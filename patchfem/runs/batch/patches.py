@@ -26,18 +26,18 @@ from ..results.result import file_name_shortener, shorten_file_names
 from . import one_by_one
 from .case_results import CaseResults
 
-AT_ONCE = 2048  # cases whose forces are in memory at the same time
-TINY = 1e-300  # absolute error that is always allowed
+AT_ONCE = 2048  # largest number of cases whose nodal forces are in memory at the same time
+TINY = 1e-300  # absolute error that is always allowed, so that a value of 0 meets the tolerance
 
 
 class _Nodes(NamedTuple):
-    """Positions of the interface nodes [m], in place of a Patch."""
+    """Positions of interface nodes [m], which stand in for a Patch in a warning."""
 
     x: np.ndarray
 
 
 def refuses(model: Model) -> str:
-    """Return why a model is not pressed with others; "" if it may be."""
+    """Return why a static patch is not pressed together with others, or ""."""
     return (
         static.not_together(model.patch) if model.kind == "patch" else "the case is no static patch"
     )
@@ -49,7 +49,7 @@ def group(model: Model) -> Hashable:
 
 
 def parts(models: Sequence[Model]) -> dict:
-    """Return {group: indices} of models that differ in plain numbers only; {} for others."""
+    """Return the indices, by group, of models that differ in plain numbers only."""
     alike = (
         isinstance(models, SimilarModels)
         and models.first.kind == "patch"
@@ -59,7 +59,7 @@ def parts(models: Sequence[Model]) -> dict:
 
 
 def solved_together(models: Sequence[Model]) -> list[Model]:
-    """Return the models in their order, with the solution of patches that are pressed together.
+    """Return the models with the solutions of patches that are pressed together.
 
     Of patches that are equal, e.g. for several drive levels or friction laws, one is pressed for
     all, so that they share its shear modes.
@@ -80,7 +80,7 @@ def solved_together(models: Sequence[Model]) -> list[Model]:
 
 
 def pressed_first(models: Sequence[Model], together: int, solve: Callable) -> CaseResults:
-    """Return the results of models whose patches are pressed before `solve` computes the rest.
+    """Press the patches of models together, then compute the results of the models.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def pressed_first(models: Sequence[Model], together: int, solve: Callable) -> Ca
     """
     out = CaseResults.blank(len(models))
     for first in range(0, len(models), together):
-        # for these small systems several BLAS threads wait longer for each other than the solution takes
+        # in these small systems, BLAS threads wait longer for each other than the solution takes
         with one_thread():
             part = solved_together(models[first : first + together])
             out.insert(range(first, first + len(part)), solve(part))
@@ -100,7 +100,7 @@ def pressed_first(models: Sequence[Model], together: int, solve: Callable) -> Ca
 
 
 def solve(models: Sequence[Model], say: Callable | None = None) -> CaseResults:
-    """Return the case results of a group; cases not pressed together are run by themselves."""
+    """Compute the case results of a group of static patches."""
     out = CaseResults.blank(len(models))
     for start in range(0, len(models), AT_ONCE):
         cases = range(start, min(start + AT_ONCE, len(models)))
@@ -109,7 +109,7 @@ def solve(models: Sequence[Model], say: Callable | None = None) -> CaseResults:
 
 
 def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
-    """Return the case results of at most AT_ONCE models."""
+    """Compute the case results of static patches that fit in memory together."""
     begin = perf_counter()
     first = models[0]
     alike = isinstance(models, SimilarModels)

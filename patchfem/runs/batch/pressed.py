@@ -26,9 +26,9 @@ from .case_results import CaseResults
 
 
 class PressedCase(NamedTuple):
-    """Case whose patch is pressed.
+    """Case whose patch is pressed and whose motion is not computed yet.
 
-    - fine, coarse: contact on its mesh and on the coarser one, as the batch moves it.
+    - fine, coarse: contact model of the batch on the mesh of the patch and on the coarser one.
     - measures, warnings, notes: of its patch.
     - patch: the pressed Patch.
     - numerics: Numerics of its single run.
@@ -44,11 +44,11 @@ class PressedCase(NamedTuple):
 
 
 class PatchBatch(NamedTuple):
-    """Functions of a batch that moves pressed patches.
+    """Functions of a batch that computes the motion of pressed patches.
 
     - engine: name of the engine of a single run.
-    - make_contact: function (model, numerics, patch) -> contact as the batch moves it, or None if
-      the case is run by itself.
+    - make_contact: function (model, numerics, patch) -> contact model of the batch, or None if the
+      case is run by itself.
     - move: function (models, pressed cases, say) -> CaseResults, and which (n,) cases are run by
       themselves.
     - cases_per_call: number of cases that are in memory together.
@@ -61,7 +61,7 @@ class PatchBatch(NamedTuple):
 
 
 def solve(models: Sequence[Model], batch: PatchBatch, say: Callable | None = None) -> CaseResults:
-    """Return the case results of models of one group.
+    """Press the patches of a group of models, and compute their motions together.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def solve(models: Sequence[Model], batch: PatchBatch, say: Callable | None = Non
 
 
 def _solve_cases(models: list, batch: PatchBatch, say: Callable | None) -> CaseResults:
-    """Return the case results of models whose patches are pressed."""
+    """Compute the case results of models whose patches are pressed."""
     begin = perf_counter()
     results = CaseResults.blank(len(models))
     pressed_cases = {}
@@ -97,7 +97,7 @@ def _solve_cases(models: list, batch: PatchBatch, say: Callable | None) -> CaseR
 
 
 def _press_case(model: Model, batch: PatchBatch) -> PressedCase | None:
-    """Return a case with its pressed patch; None if it is run by itself."""
+    """Press the patch of a case and make its contact models; None for a single run."""
     try:
         with locate_errors(model.source):
             patch, *coarse = patch_result.solve_all(model.patch, model.accuracy.tolerance)
@@ -134,7 +134,7 @@ def add_patch_results(
     slide: float,
     extra: dict | None = None,
 ) -> None:
-    """Add measures of the patch, outcome, warnings and notes to a case, as in a single run.
+    """Add the results of the pressed patch to a case, as in a single run.
 
     Parameters
     ----------

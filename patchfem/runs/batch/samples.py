@@ -22,7 +22,7 @@ from ...response.spectrum import GAUSS_POINTS, GAUSS_WEIGHTS, distortion_ratio
 
 
 class Samples:
-    """Samples of the last `window` cycles of n runs.
+    """Samples of the last cycles of n marches under sinusoidal drive.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Samples:
         self.span = window * self.period
 
     def acceleration(self) -> np.ndarray:
-        """Return the absolute acceleration of the output (s, n) [m s-2]."""
+        """Compute the absolute acceleration of the output (s, n) [m s-2]."""
         modes = self.modes
         found = self.found
         out = np.multiply.outer(
@@ -68,7 +68,7 @@ class Samples:
         return out - modes.output @ modes.slide / modes.mass * found.force
 
     def values(self, book: dict, stiffness, load) -> dict:
-        """Return the measures (n,) by name; NaN for a run without the measure.
+        """Compute the measures (n,) of all runs from their samples.
 
         Parameters
         ----------
@@ -110,7 +110,7 @@ class Samples:
         return out | self.slips() | self.loops(first, stiffness)
 
     def harmonic(self, number: int) -> np.ndarray:
-        """Return the Fourier coefficients (m, n) [m] of the modes at a harmonic of the drive.
+        """Compute the Fourier coefficients (m, n) [m] of the modes at a harmonic of the drive.
 
         They are those of cubics, as in `spectrum.motion_harmonic`.
         """
@@ -138,11 +138,11 @@ class Samples:
         )
 
     def ends(self) -> tuple:
-        """Return the changes of motion and rate of the modes (m, n) over the window."""
+        """Return the changes of modal displacement and rate (m, n) over the window."""
         return self.found.z[-1] - self.found.z[0], self.found.rate[-1] - self.found.rate[0]
 
     def gain(self, row, first, number: int) -> np.ndarray:
-        """Return the Fourier coefficient (n,) of the second derivative of row . modes, by parts.
+        """Return the Fourier coefficient (n,) of the acceleration of a sum of modes, by parts.
 
         Parameters
         ----------
@@ -157,7 +157,7 @@ class Samples:
         return row @ (2 / self.span * (faster + 1j * omega * moved) - omega**2 * first)
 
     def loops(self, first, stiffness) -> dict:
-        """Return the measures of the loop (n,) by name.
+        """Compute the measures of the friction loop (n,).
 
         Parameters
         ----------
@@ -186,7 +186,7 @@ class Samples:
         ) | {"secant_stiffness": secant}
 
     def turns(self) -> list:
-        """Return the result of `loops.find_reversals` for each run."""
+        """Find the reversals of the slide of each run, as `loops.find_reversals` does."""
         steps = self.steps
         size = self.slide.shape[1]
         rows = np.arange(size)
@@ -213,7 +213,7 @@ class Samples:
         ]
         for run in np.flatnonzero(
             np.isnan(out[:, 1]).any(axis=(0, 1))
-        ):  # these runs have a reversal at an end of a cycle
+        ):  # runs with a reversal at an end of a cycle are evaluated one by one
             turn[run] = find_reversals(
                 time,
                 self.slide[:, run],
@@ -225,7 +225,7 @@ class Samples:
         return turn
 
     def drift(self) -> np.ndarray:
-        """Return the motion per cycle (n,) [m] as `loops.drift` does, for two cycles or more."""
+        """Return the drift of the mean slide per cycle (n,) [m]."""
         means = []
         h = self.dt
         for first in (0, (self.window - 1) * self.steps):
@@ -235,7 +235,7 @@ class Samples:
         return (means[1] - means[0]) / max(self.window - 1, 1)
 
     def slips(self) -> dict:
-        """Return the measures of the slip as `measures.compute_slip_measures` does for runs that slide."""
+        """Compute the measures of the slip of runs that slide."""
         slip = self.found.slip
         steps = np.abs(np.diff(self.slide, axis=0))
         still = steps <= COORDINATE_ROUND_OFF * np.abs(self.slide).max(axis=0)
@@ -262,7 +262,7 @@ class Samples:
         }
 
     def response(self, run: int, acceleration) -> Response:
-        """Return the samples of one run for the search for ringing.
+        """Return the samples of one run as a Response, for the search for ringing.
 
         acceleration: (s,) [m s-2].
         """
@@ -297,7 +297,7 @@ class Samples:
 
 
 def _project_motion(row, motion) -> np.ndarray:
-    """Return row . modes (s, n) of a motion (s, m, n)."""
+    """Return the projection (s, n) of modal motions (s, m, n) on a row of participations."""
     out = row[0] * motion[:, 0]
     for k in range(1, len(row)):
         out += row[k] * motion[:, k]
@@ -305,10 +305,10 @@ def _project_motion(row, motion) -> np.ndarray:
 
 
 def _largest_slides(slide, speed, force, rows, h: float) -> np.ndarray:
-    """Return the largest slide [m] and the force there [N] (2, n) of a cycle.
+    """Return the largest slide [m] of a cycle and the force there [N], (2, n).
 
-    As in `loops.find_reversals` with "slide"; the force is NaN if the slide is largest at an end of the
-    cycle.
+    The method is that of `loops.find_reversals` with "slide"; the force is NaN if the slide is largest
+    at an end of the cycle.
     """
     top = slide.argmax(axis=0)
     best = slide[top, rows]
@@ -341,9 +341,9 @@ def _largest_slides(slide, speed, force, rows, h: float) -> np.ndarray:
 
 
 def peaks(size) -> tuple:
-    """Return the largest values (n,) of samples (s, n), and by how much they may be too small.
+    """Return the peaks (n,) of samples (s, n), and by how much they may be too small.
 
-    As in `measures.compute_acceleration_peak` and `measures.peak_sampling_errors`.
+    The method is that of `measures.compute_acceleration_peak` and `measures.peak_sampling_errors`.
     """
     rows = np.arange(size.shape[1])
     top = size.argmax(axis=0)

@@ -25,7 +25,7 @@ from ..rig.numerics import choose
 from ..rig.steady import balance as rig_balance
 from ..rig.steady import maps
 
-SAMPLES = 400  # samples of a cycle without friction
+SAMPLES = 400  # number of samples of a cycle of a motion without friction
 UNBOUNDED_OUTCOMES = (
     Outcome.GROWS,
     Outcome.NOT_CONVERGED,
@@ -35,7 +35,7 @@ UNBOUNDED_OUTCOMES = (
 
 
 class ObservedMotion(NamedTuple):
-    """Last cycles of a rig.
+    """Last cycles of the motion of a rig, as its instruments measure it.
 
     - window: histories; None if the MotionObserver does not need them.
     - acceleration: largest absolute acceleration as a run measures it [m s-2].
@@ -53,7 +53,7 @@ class ObservedMotion(NamedTuple):
 
 
 class MotionObserver:
-    """Model of kind rig or linear that is evaluated at one drive after the other.
+    """Model of a rig that is evaluated at one drive after the other.
 
     A call with a drive (core.SineDrive), and with the `near` of another result, returns ObservedMotion;
     None if no bounded motion is found. Without a start, the result is that of `runs.run.run` to
@@ -90,7 +90,7 @@ class MotionObserver:
         self.before = before.made if before is not None else {}
 
     def __call__(self, drive, near=None) -> ObservedMotion | None:
-        """Return the motion under a drive, found from `near` or from rest; None if not found."""
+        """Compute the motion under a drive, starting from `near` or from rest."""
         try:
             return self._with_gauge_displacement(
                 {
@@ -106,7 +106,7 @@ class MotionObserver:
         return self(drive)
 
     def _with_gauge_displacement(self, seen: ObservedMotion | None) -> ObservedMotion | None:
-        """Return the result with the displacement of the gauge, if the rig has one."""
+        """Replace the displacement of a motion by that of the gauge, if the rig has one."""
         gauge = self.model.rig.modes.gauge
         if seen is None or gauge is None or seen.window is None:
             return seen
@@ -118,13 +118,13 @@ class MotionObserver:
         )
 
     def _get_or_make(self, name: str, make):
-        """Return the object of this name, made on the first call."""
+        """Return the object of a given name, made on the first call."""
         if name not in self.made:
             self.made[name] = make()
         return self.made[name]
 
     def _line(self, drive, near) -> ObservedMotion | None:
-        """Return the motion without friction: z = (Omega^2 - omega^2 + i omega D)^-1 (i a base)."""
+        """Compute the linear motion of a structure without friction in closed form."""
         modes = self.model.rig.modes
         omega = drive.omega
         found = harmonic.make_linear_part(modes, omega, 1)
@@ -156,7 +156,7 @@ class MotionObserver:
         )
 
     def _yields(self, drive, near) -> ObservedMotion:
-        """Return the motion of elastic-plastic elements, by their event map or harmonic balance."""
+        """Compute the motion of elastic-plastic elements by their event map or harmonic balance."""
         orbits = self._get_or_make("yields", self._orbits)
         try:
             seen = orbits(drive, near)
@@ -171,7 +171,7 @@ class MotionObserver:
         )
 
     def _orbits(self):
-        """Return the event map, in the workspace of an earlier MotionObserver if it fits."""
+        """Return the finder of periodic motions of elastic-plastic elements."""
         modes = self.model.rig.modes
         groups = pieces.YieldingElements(self.model, self.numerics, self.patch).groups
         finder = self.before.pop("yields", None)
@@ -180,7 +180,7 @@ class MotionObserver:
         return event_orbits.PeriodicMotionFinder(modes, groups)
 
     def _balance(self, drive, near) -> ObservedMotion:
-        """Return the motion by harmonic balance."""
+        """Compute the motion by harmonic balance."""
         one = self._get_or_make(
             "balance",
             lambda: rig_balance.BalanceFinder(self.model, self.numerics, self.patch, 0, self.say),
@@ -197,16 +197,16 @@ class MotionObserver:
         )
 
     def _events(self, drive, near) -> ObservedMotion | None:
-        """Return the motion of Coulomb interfaces by the event map."""
+        """Compute the motion of Coulomb interfaces by the event map."""
         one = self._get_or_make(
             "events", lambda: maps.EventFinder(self.model, self.numerics, self.patch, 0, self.say)
         )
         return _last_cycles(one.point(drive)[0])
 
     def _run(self, drive, near) -> ObservedMotion | None:
-        """Return the last cycles of a run."""
+        """Compute the last cycles of the motion by a run from rest."""
         model = replace(self.model, rig=self.model.rig.with_signal(drive))
-        # histories from before the window are not kept
+        # histories from before the evaluated window are not needed
         few = replace(self.numerics, whole=False)
         if ENGINES[self.numerics.engine] is not MARCH:
             return _last_cycles(solve.solve(model, few, self.patch, 0, self.say))
@@ -219,12 +219,12 @@ class MotionObserver:
 
 
 def _last_cycles(raw) -> ObservedMotion | None:
-    """Return the last cycles of a Solution; None if the motion is unbounded or was not found."""
+    """Convert a Solution to an ObservedMotion; None for an unbounded motion."""
     return None if raw.outcome in UNBOUNDED_OUTCOMES else _observe(raw.window, raw.values)
 
 
 def _observe(window: Response, values: dict) -> ObservedMotion:
-    """Return the last cycles of a window with its peak acceleration and its amplitude."""
+    """Return the motion in a window with its peak acceleration and its amplitude."""
     return ObservedMotion(
         window, values["absolute_acceleration_peak"], values["relative_displacement_amplitude"]
     )

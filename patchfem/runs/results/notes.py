@@ -12,22 +12,22 @@ from ...formatting import format_length
 from ...friction.bonds import parameters, temperature
 from ...scene.keys import materials
 
-# relative difference of the two values of the friction work, above which a warning is given
+# relative difference [1] of the friction work from samples and from energies, above which a run warns
 MAX_WORK_CHECK = 1e-3
-MAX_FORMING_RATIO = (
-    0.3  # slide during which bonds form over their length, above which a warning is given
+MAX_FORMING_RATIO = 0.3  # slip while a bond forms over the bond length, above which a run warns
+MIN_EXCESS_RATIO = (
+    1e-3  # excess of the friction force over mu_s N, relative to it, above which a run notes it
 )
-MIN_EXCESS_RATIO = 1e-3  # excess over mu_s N relative to it, above which a note is given
-FARTHEST = 8  # most halvings of the steps that a warning proposes
-HARMONICS_FACTOR = 4  # proposed harmonics over those of a balance
+FARTHEST = 8  # largest number of halvings of the steps that a warning proposes
+HARMONICS_FACTOR = 4  # ratio of proposed to present harmonics of a balance
 MIN_HARMONICS = 31  # smallest number of harmonics that is proposed
 MOST_HARMONICS = 500  # largest number of harmonics that is proposed for a sharp friction law
 
 
 def climbing_as_one(model, patch) -> list:
-    """Return the note on pieces with shear over grooves, as a list.
+    """Return the note on the slope of grooves under pieces that are compliant in shear.
 
-    It says how far a point may be from the position at which the slope is taken.
+    The note says how far a point may be from the position at which the slope is taken.
     """
     if model.grooves is None or not model.partial_slip:
         return []
@@ -43,9 +43,9 @@ def climbing_as_one(model, patch) -> list:
 
 
 def note_on_heating(model, patch, response, work: float | None = None) -> list:
-    """Return the line on the rise of the surface temperature, as a list.
+    """Return the note on the rise of the surface temperature in a run.
 
-    It is empty if the scene does not ask for it.
+    The list is empty if the scene does not ask for the note.
 
     Parameters
     ----------
@@ -66,14 +66,14 @@ def note_on_heating(model, patch, response, work: float | None = None) -> list:
 
 
 def warn_of_unformed_bonds(law, speed: float) -> list:
-    """Return a warning, as a list, if bonds of the printed law break before they are formed.
+    """Return a warning if bonds of the printed law break before they have formed.
 
     speed: peak speed [m/s].
     """
     a = parameters.growth_path_ratio(law, speed) if law.reading == "report" else 0.0
     if a <= MAX_FORMING_RATIO:
         return []
-    # with this growth path, growth_path_ratio(law, speed) = MAX_FORMING_RATIO
+    # at this growth path growth_path_ratio(law, speed) equals MAX_FORMING_RATIO
     least = law.ratio / (1 / (MAX_FORMING_RATIO * law.length) - law.rest_growth / speed**2)
     return [
         f"at the peak speed of {speed:.3g} m/s a bond slides by {a:.2g} of its length while it forms (limit "
@@ -84,9 +84,9 @@ def warn_of_unformed_bonds(law, speed: float) -> list:
 
 
 def warn_of_creep(law, outcome, measures: dict) -> list:
-    """Return a warning, as a list, of a bounded motion whose mean position drifts.
+    """Return a warning if the mean position of a bounded motion drifts (Dahl's creep).
 
-    This is Dahl's creep, not a property of the joint.
+    This creep is a property of the law, not of the joint.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def warn_of_creep(law, outcome, measures: dict) -> list:
 
 
 def unbounded_bonds(law) -> list:
-    """Return a warning, as a list, of initial bonds of negative order.
+    """Return a warning if initial bonds of negative order have an infinite traction.
 
     Their traction is infinite at the first instant. Bonds that form later are bounded: theirs is at
     most the fraction P(p + 1, R/eps_0) of mu_s N, grown or not.
@@ -122,7 +122,7 @@ def unbounded_bonds(law) -> list:
 
 
 def growth_notes(law, peak: float | None) -> list:
-    """Return notes, as a list, on the effects of growing bonds.
+    """Return the notes on the effects of growing bonds.
 
     peak: largest friction force of the run over mu_s N [1]; None if the load changes.
     """
@@ -152,10 +152,10 @@ def growth_notes(law, peak: float | None) -> list:
 
 
 def work_check_warning(values: dict, steps: int | None, harmonics: int | None = None) -> list:
-    """Return a warning, as a list, if the two values of the friction work differ.
+    """Return a warning if the friction work from samples and from energies differs.
 
-    They are those from the samples and from the energy balance. The trapezoidal rule is of second
-    order; a difference that is smaller than its error may be small by chance.
+    The trapezoidal rule for the samples is of second order; a difference that is smaller than its error
+    may be small by chance.
 
     Parameters
     ----------
@@ -168,8 +168,8 @@ def work_check_warning(values: dict, steps: int | None, harmonics: int | None = 
     if check is None or check.value is None or check.value <= MAX_WORK_CHECK:
         return []
     ratio = max(check.value, check.error or 0.0) / MAX_WORK_CHECK
-    # one more halving, because in a motion with stops the difference is of second order only on
-    # average
+    # one more halving is proposed, because in a motion with stops the difference is of second order
+    # only on average
     halvings = 1 + ceil(log2(ratio) / 2)
     if harmonics:
         remedy = more_harmonics(harmonics)
@@ -186,18 +186,18 @@ def work_check_warning(values: dict, steps: int | None, harmonics: int | None = 
 
 
 def more_harmonics(n_harmonics: int, sharp: float = 0.0) -> str:
-    """Return the remedy that proposes a larger number of harmonics than `found`.
+    """Return the advice to use more harmonics.
 
-    A balance with few harmonics says little about its convergence. sharp: number of harmonics that
-    the friction law itself needs.
+    A balance with few harmonics says little about its convergence, so that at least MIN_HARMONICS are
+    proposed. sharp: number of harmonics that the friction law itself needs.
     """
     return f"set accuracy.harmonics = {max(HARMONICS_FACTOR * n_harmonics, MIN_HARMONICS, min(ceil(sharp), MOST_HARMONICS))}"
 
 
 def heating_sentences(model, patch, work: float, duration: float) -> list:
-    """Return a line, as a list, on the rise of the surface temperature.
+    """Return the note on the rise of the surface temperature by friction.
 
-    It is empty if nothing is loaded or nothing moves. All heat is assumed to flow into one
+    The list is empty if nothing is loaded or nothing moves. All heat is assumed to flow into one
     half-space of the substrate through the loaded area: two alike pieces share it, and warm by half
     as much.
 
@@ -245,7 +245,7 @@ def heating_sentences(model, patch, work: float, duration: float) -> list:
 
 
 def _cycle(model) -> float | None:
-    """Return the period of the motion [s]; None if it does not repeat."""
+    """Return the period [s] of the prescribed motion, or None if it does not repeat."""
     if model.rig is not None:
         return 1 / model.rig.drive.frequency if model.rig.drive.frequency else None
     return model.slide.period

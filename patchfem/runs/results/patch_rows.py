@@ -164,13 +164,13 @@ ROWS = (
         group="patch",
     ),
 )
-# what computes a static measure, as `numerics.measures` in summary.json says
+# The following texts name the method that computed a static measure, in `numerics.measures` of summary.json.
 ON_FINEST_MESH = "finite elements, finest mesh"
-# or the value of a coarser mesh, whose error is smaller
+# The extrapolated value may be that of a coarser mesh, if its error is smaller.
 EXTRAPOLATED_SOURCE = "finite elements, extrapolated over nested meshes"
 ON_POINTS = "points on layered half-spaces"
 WORN_SOURCE = "wear in jumps of cycles"
-# measures whose errors choose the mesh
+# names of the measures whose errors choose the mesh of a patch
 DECISIVE = (
     "pressure_peak",
     "contact_fraction",
@@ -184,7 +184,7 @@ POSITIVE = tuple(name for name in DECISIVE if TABLE[name].minimum == 0.0)
 
 
 def minimum_value(name: str) -> float:
-    """Return the smallest value [SI] that a static measure can have; -inf without a bound.
+    """Return the smallest value [SI] that a static measure can have; -inf if unbounded.
 
     The name may have the number of an interface.
     """
@@ -193,7 +193,7 @@ def minimum_value(name: str) -> float:
 
 
 def unknown_measures(measures: dict) -> list:
-    """Return names of the decisive positive measures whose error is as large as their value."""
+    """Return the positive measures that choose the mesh and are not known, by their errors."""
     names = []
     for name in POSITIVE:
         measure = measures.get(name)

@@ -16,16 +16,16 @@ from ...formatting import rewrite_powers_of_ten
 from ...response import rows
 from . import patch_rows
 
-FRAMES = 16  # number of frames of the interface in the last cycle
+FRAMES = 16  # number of frames of the interface fields in the last cycle
 COUNTS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
 _FOLDER_OF_PATH = re.compile(
     r"/[^:]*/(?=[^/:]+: )"
-)  # folder of an absolute path at the start of a remark
+)  # pattern of the folder of an absolute path at the start of a remark
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RunInputs:
-    """Inputs of a run of any kind of scene.
+    """Inputs of a run: plan, pressed patch, callbacks and whether to estimate errors.
 
     - plan: Plan that is run.
     - patch: pressed patch of [contact], or None.
@@ -48,7 +48,7 @@ class RunInputs:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Result:
-    """Everything that a run computed.
+    """Result of a run: measures, histories, fields, warnings and settings.
 
     - plan: Plan that was run.
     - outcome: how the run ended.
@@ -82,12 +82,12 @@ class Result:
 
 
 def _count_words(count: int, word: str) -> str:
-    """Return a number of things as words."""
+    """Return a number with its noun, e.g. "no warnings" or "2 warnings"."""
     return f"{count or 'no'} {word}{'s' * (count != 1)}"
 
 
 def with_meanings(measures: dict, apart: str) -> dict:
-    """Return the measures by name, with their meanings.
+    """Return measures with their meanings as texts.
 
     apart: what a number after a name counts, "interface" or "strip".
     """
@@ -95,7 +95,7 @@ def with_meanings(measures: dict, apart: str) -> dict:
 
 
 def meaning(name: str, apart: str = "interface") -> str:
-    """Return the meaning of a measure by its name in a summary, one sentence without full stop.
+    """Return the meaning of a measure in one sentence without full stop.
 
     slip_amplitude_2 is the measure of the second interface, or of what `apart` names.
     """
@@ -108,16 +108,16 @@ def meaning(name: str, apart: str = "interface") -> str:
 
 
 def at_rest(patch) -> dict:
-    """Return the fields of the pressed patch without motion, (1, n) each.
+    """Return the fields of a pressed patch without motion, (1, n) each.
 
-    They are normal_stress [Pa], gap [m] and status of its finest solution, on the points of a
-    profile if it has these.
+    The fields are normal_stress [Pa], gap [m] and status of the finest solution, on the points of its
+    profile if there is one.
     """
     return _pressed_frame(patch.finest_surface)
 
 
 def _pressed_frame(surface) -> dict:
-    """Return the fields of a pressed Surface, (1, n) each."""
+    """Return pressure, gap and status (1, n) on the surface of a pressed patch."""
     return {
         "time": np.zeros(1),
         "normal_stress": surface.sigma_n[None],
@@ -127,9 +127,9 @@ def _pressed_frame(surface) -> dict:
 
 
 def patch_surface(patch, fields: dict):
-    """Return the Surface on whose points the fields of a pressed patch are given.
+    """Return the surface on whose points the fields of a pressed patch are given.
 
-    A motion moves the nodes of the mesh; without one the fields are those of `at_rest`. None
+    After a motion the points are the nodes of the mesh, otherwise those of `at_rest`. The result is None
     without a patch.
     """
     if patch is None:
@@ -138,7 +138,7 @@ def patch_surface(patch, fields: dict):
 
 
 def interface_frames(patch, time, tau, local, slide) -> dict:
-    """Return the frames of the interface by name: the pressed state, then the given ones.
+    """Return the fields of the interface, frame by frame, from tractions and slips.
 
     Parameters
     ----------
@@ -160,7 +160,9 @@ def interface_frames(patch, time, tau, local, slide) -> dict:
     tau = np.concatenate([np.zeros((1, tau.shape[1])), tau])
     slip = np.concatenate([np.zeros((1, tau.shape[1])), local])
     moved = np.abs(np.diff(slip, axis=0, prepend=slip[:1]))
-    moved[:2] = 0.0  # the first frame of the motion has no previous frame from which it could slip
+    moved[:2] = (
+        0.0  # the first frame of the motion has no predecessor, so that its nodes count as stuck
+    )
     status = np.where(
         patch.active, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0
     ).astype(np.int8)
@@ -197,17 +199,17 @@ def has_known_mesh_error(model, patch, coarse) -> bool:
 
 
 def remove_unknown_errors(found: dict, estimate: bool) -> dict:
-    """Return the measures, without their errors if none were estimated."""
+    """Return measures without errors if a run did not estimate them."""
     return found if estimate else {k: replace(m, error=None) for k, m in found.items()}
 
 
 def choices(result) -> dict:
-    """Return the numerical settings that a run used, by name; those it did not use are left out.
+    """Return the numerical settings that a run used.
 
-    They are engine, steps per cycle or those that a tolerance chose, cycles and window, shear modes
-    or elements of the pieces, the method of the sum over bonds, nodes and strips of the patch, and
-    the length [m] over which its profile is averaged. map: "events" or "yields", the map that found
-    a steady motion.
+    Settings that the run did not use are left out. The others are engine, steps per cycle or those that a
+    tolerance chose, cycles and window, shear modes or elements of the pieces, the method of the sum
+    over bonds, nodes and strips of the patch, and the length [m] over which its profile is averaged.
+    map: "events" or "yields", the map that found a steady motion.
     """
     extra = result.extra
     patch = result.patch
@@ -238,7 +240,7 @@ def choices(result) -> dict:
 
 
 def measure_engines(result) -> dict:
-    """Return what computed each measure that has a value, by name.
+    """Return the engine or method that computed each measure of a run.
 
     A static measure of a patch names how it was computed on the meshes of the patch (`patch_rows`);
     another measure has the engine of the run.
@@ -252,7 +254,7 @@ def measure_engines(result) -> dict:
 
 
 def shorten_file_names(texts, path: Path) -> list:
-    """Return remarks with absolute file names reduced to the file, and readable numbers.
+    """Shorten absolute file names and round numbers in remarks.
 
     path: of the scene, in whose folder the files are.
     """
@@ -260,12 +262,12 @@ def shorten_file_names(texts, path: Path) -> list:
 
 
 def file_name_shortener(path: Path) -> Callable[[Iterable[str]], list]:
-    """Return `shorten_file_names` for many remarks on scenes at one path."""
+    """Return a function that shortens the file names in remarks on scenes at one path."""
     folders = (path.parent, path.parent.absolute())
     prefixes = [f"{folder}/" for folder in folders if folder.is_absolute()]
 
     def shorten(texts) -> list:
-        """Return the remarks with shortened file names and rounded numbers."""
+        """Shorten absolute file names and round numbers in remarks."""
         short_texts = []
         for text in texts:
             for prefix in prefixes:

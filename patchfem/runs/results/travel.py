@@ -15,13 +15,13 @@ MAX_SLIDE_FRACTION = (
 
 
 def largest_slide(slide) -> float:
-    """Return the largest |slide| [m] of kept samples (k,) [m]; inf if the motion overflowed."""
+    """Return the largest |slide| [m] of samples (k,) [m]; inf if the motion overflowed."""
     largest = float(np.abs(slide).max(initial=0.0))
     return largest if np.isfinite(largest) else np.inf
 
 
 def contact_length(patch) -> float:
-    """Return the distance [m] between the ends of the contact, halfway between nodes."""
+    """Return the distance [m] between the ends of the contact of a patch."""
     touching = np.flatnonzero(patch.active)
     if not touching.size:
         return 0.0
@@ -31,7 +31,7 @@ def contact_length(patch) -> float:
 
 
 def warn_of_large_slide(patch, slide) -> list:
-    """Return a warning, as a list, if the slide (k,) [m] exceeds MAX_SLIDE_FRACTION of the contact length."""
+    """Return a warning if the slide (k,) [m] exceeds a fraction of the contact length."""
     largest = largest_slide(slide)
     contact = contact_length(patch)
     if not contact > 0 or largest < MAX_SLIDE_FRACTION * contact:

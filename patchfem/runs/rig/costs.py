@@ -41,45 +41,45 @@ MAX_EXACT_SECONDS_OVER_MARCH = (
     5.0  # CPU seconds that an exact solution may take if a march, which has errors, takes less
 )
 MAX_EXACT_SECONDS_UNRESOLVED = (
-    60.0  # CPU seconds that it may take if the finest march does not resolve the modes
+    60.0  # CPU seconds of an exact solution if no march resolves the modes
 )
 MAX_EXACT_SECONDS = 600.0  # CPU seconds of an exact solution above which it is refused
-MOST_STEPS = 6400  # steps per cycle of the finest automatic march
-# an element sticks for the fraction (friction limit / force of the drive)**STICKING_EXPONENT of the time
-# (measured: .01)
+MOST_STEPS = 6400  # largest number of steps per cycle that a march chooses by itself
+# Exponent of (friction limit / drive force), which gives the expected fraction of the time in stick: a
+# limit of half the force was measured to stick for 0.01 of the time.
 STICKING_EXPONENT = 6
 # Cells are merged in pairs at most this many times: 49 of 769 cells remain, with an error of 2e-4 of
 # the motion of a slipping joint.
 MAX_MERGES = 4
-MERGE_TOLERANCE = 1e-3  # tolerance from which on cells are merged MAX_MERGES times
-REACH = 2.0  # phase of the fastest rate in a piece [rad], as in `dynamics.events.series_kernels`
+MERGE_TOLERANCE = 1e-3  # cells are merged MAX_MERGES times at this or a larger tolerance
+REACH = 2.0  # phase [rad] of the fastest vibration in a time interval, as in `dynamics.events.series_kernels`
 MARCH_SETTINGS = (
     "steps_per_cycle",
     "tail",
     "merge",
     "shear_modes",
-)  # numerical settings of the march
-# decay times of the slowest mode after which a motion repeats to round-off
+)  # keys of [accuracy] that ask for a march instead of the smooth engine
+# number of decay times of the slowest mode after which a motion repeats to round-off (e^-30)
 REPEATS = 30.0
-# largest number of smooth steps over those of a march; with more, the march is preferred although
-# its steps cost more
+# Largest ratio of the steps of the smooth engine to those of a march: with a larger ratio a march is
+# preferred although each of its steps costs more.
 MAX_STEP_RATIO = 3.5
-# a law of the speed is stiff for the fraction exp(EASES (1 - r)) of the time: .5 at r = 1.07, .1 at
-# 1.26
+# A speed-dependent law is stiff for the fraction exp(EASES (1 - r)) of the time, where r is the drive
+# force over the friction limit: measured 0.5 at r = 1.07 and 0.1 at r = 1.26.
 EASES = 9.0
-STABLE = 3.0  # relaxation lengths of a state of the law that a stable step may cover
-# engines that keep SAMPLES samples of each of the last cycles instead of their steps
+STABLE = 3.0  # largest stable step, in relaxation lengths of a state of the friction law
+# engines that keep a fixed number of samples of each of the last cycles, independent of their steps
 RESAMPLING_ENGINES = (
     "exact",
     "piecewise",
     "smooth",
 )
-SAMPLES = 400  # samples of a kept cycle, as in `dynamics.events.histories` and `dynamics.smooth`
-TURNS = 4.0  # reversals per cycle that are kept from before the last cycles
+SAMPLES = 400  # number of samples of a kept cycle, as in `dynamics.events.histories` and `dynamics.smooth`
+TURNS = 4.0  # expected reversals per cycle, which are kept from before the last cycles
 
 
 class HistoryBytes(NamedTuple):
-    """Memory of the histories of an engine.
+    """Memory per sample, cycle and reversal of the histories that an engine keeps.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
 
 
 def steps_wanted(model: Model) -> int:
-    """Return the steps per cycle that a march needs for the tolerance, without upper bound."""
+    """Return the steps per cycle with which a march meets the tolerance, without upper bound."""
     accuracy = model.accuracy
     rig = model.rig
     quickest = max(
@@ -114,20 +114,20 @@ def steps_wanted(model: Model) -> int:
     )
     if model.load_varies:
         quickest = max(quickest, model.point.frequency * rig.drive.signal.period)
-    # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
+    # the error falls with the square of the step; 400 steps per cycle of the fastest motion give 1e-3
     return 2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * quickest)
 
 
 def steps_per_cycle(model: Model) -> int:
-    """Return the steps per cycle of a march, from the scene or else from the tolerance.
+    """Return the steps per cycle of a march, as set in the scene or as the tolerance requires.
 
-    Those from the tolerance lie between 100 and MOST_STEPS.
+    The tolerance chooses between 100 and MOST_STEPS steps.
     """
     return model.accuracy.steps_per_cycle or min(max(steps_wanted(model), 100), MOST_STEPS)
 
 
 def count_merges(model: Model) -> int:
-    """Return how often neighbouring cells of a density are merged in pairs in the first run.
+    """Return how often a first run merges neighbouring cells of a slider density in pairs.
 
     The error of cells falls with the square of their width. If the error of the run is too large,
     the run is repeated with more cells (`Numerics.finer`).
@@ -144,13 +144,13 @@ def count_merges(model: Model) -> int:
 
 
 def interface_load(model: Model, interface) -> float:
-    """Return the normal load [N] of an InterfaceLaw; by default that of the model."""
+    """Return the normal load [N] on an interface; by default the load of the model."""
     return model.nominal_load if interface.load is None else interface.load
 
 
 @lru_cache(8)
 def expected_elements(model: Model) -> tuple:
-    """Return the expected number of elements, and the stiffness [N/m] of the stiffest interface.
+    """Return the expected number of friction elements and the largest interface stiffness [N/m].
 
     A rigid element has no spring, and counts as stiffness 0.
     """
@@ -177,14 +177,14 @@ def expected_elements(model: Model) -> tuple:
 
 
 def pieces_per_cycle(model: Model) -> float:
-    """Return the largest number of intervals of the exact solution per cycle of the drive."""
+    """Return the largest number of time intervals of the exact solution per drive cycle."""
     return sum(ringing_and_events(model))
 
 
 def ringing_and_events(model: Model) -> tuple:
-    """Return the intervals of the exact solution per cycle that ringing and that events require.
+    """Return the intervals of the exact solution per cycle due to ringing and due to events.
 
-    Those of events include the rows of a recorded drive.
+    The intervals due to events include the rows of a recorded drive.
     """
     modes = model.rig.modes
     drive = model.rig.drive.signal
@@ -203,9 +203,9 @@ def ringing_and_events(model: Model) -> tuple:
 
 
 def seconds_of_pieces(model: Model) -> float:
-    """Return the largest CPU seconds of a run from event to event, for the choice of an engine.
+    """Estimate the maximum CPU time [s] of an event-driven run.
 
-    The elements are assumed to stick all the time.
+    The elements are assumed to stick all the time. The choice of an engine is based on this time.
     """
     cycles = model.rig.drive.cycles
     each = cost_model.MAX_PIECE_SECONDS + _size_seconds(model)
@@ -215,7 +215,7 @@ def seconds_of_pieces(model: Model) -> float:
 
 
 def _size_seconds(model: Model) -> float:
-    """Return the CPU seconds that further modes and interfaces add to an interval."""
+    """Return the CPU time [s] per interval that further modes and interfaces add."""
     modes = model.rig.modes
     return cost_model.PIECE_MODE_SECONDS * (
         modes.omega.size - 1
@@ -223,9 +223,9 @@ def _size_seconds(model: Model) -> float:
 
 
 def expected_seconds(model: Model) -> float:
-    """Estimate the CPU seconds of an event-driven run before it starts.
+    """Estimate the CPU time [s] of an event-driven run.
 
-    The intervals that ringing requires count for the fraction of the time in stick.
+    Intervals due to ringing count only for the expected fraction of the time in stick.
     """
     rig = model.rig
     count, stiff = expected_elements(model)
@@ -242,7 +242,7 @@ def expected_seconds(model: Model) -> float:
 
 
 def seconds_of_steps(model: Model) -> float:
-    """Return the expected CPU seconds of a march with the coarse runs of its error estimate."""
+    """Estimate the CPU time [s] of a march with the coarse runs of its error estimate."""
     count = expected_elements(model)[0]
     many = len(model.rig.friction.interfaces)
     step = cost_model.STEP_SECONDS + cost_model.STEP_ELEMENT_SECONDS * count
@@ -254,9 +254,10 @@ def seconds_of_steps(model: Model) -> float:
 
 
 def reason_to_march_events(model: Model) -> str:
-    """Return the reason to march instead of solving from event to event; "" if there is none.
+    """Return why a model is marched in time instead of solved from event to event.
 
-    Its events cost more than time steps, and more than an exact solution is worth.
+    The events cost more than time steps, and more than an exact solution is worth. The reason is ""
+    if the model is better solved from event to event.
     """
     if steps_wanted(model) > MOST_STEPS:
         max_seconds = MAX_EXACT_SECONDS_UNRESOLVED
@@ -268,9 +269,9 @@ def reason_to_march_events(model: Model) -> str:
 
 
 def reason_to_march_elements(model: Model) -> str:
-    """Return the reason to march with elements that stick or slip; "" if there is none.
+    """Return why a model with elements that stick or slip is marched in time, or "".
 
-    Either the scene prescribes the steps, or see `reason_to_march_events`.
+    The scene prescribes the steps, or the reason is that of `reason_to_march_events`.
     """
     if model.accuracy.steps_per_cycle is not None:
         return "accuracy.steps_per_cycle is set"
@@ -278,7 +279,7 @@ def reason_to_march_elements(model: Model) -> str:
 
 
 def refuse_endless(model: Model, numerics=None) -> None:
-    """Raise Missing if a run from event to event would take longer than MAX_EXACT_SECONDS CPU seconds."""
+    """Raise Missing if an event-driven run would take more CPU time than is allowed."""
     seconds = seconds_of_pieces(model)
     if seconds > MAX_EXACT_SECONDS:
         march = ', or use accuracy.method = "march"' * (seconds_of_steps(model) < seconds)
@@ -292,7 +293,7 @@ def refuse_endless(model: Model, numerics=None) -> None:
 
 
 def exact_cost(model: Model, numerics, points: int) -> Cost:
-    """Return the cost of a run from event to event.
+    """Return the predicted cost of an event-driven run.
 
     Parameters
     ----------
@@ -308,8 +309,8 @@ def exact_cost(model: Model, numerics, points: int) -> Cost:
     }
     code = EVENT_CODE if model.rig.friction.interfaces else LINEAR_CODE
     if _python_seconds(model) <= compiled.MAX_PYTHON_SECONDS:
-        # such a run takes 86 MB without machine code, and 152 MB with it, because it loads the LLVM
-        # library
+        # a run in interpreted Python takes 86 MB without machine code, and 152 MB with it, because
+        # machine code loads the LLVM library
         if not _is_loop_kept(model):
             code = code._replace(bytes=0.0)
         loading = replace(code.cost(), compile_seconds=0.0)
@@ -319,9 +320,9 @@ def exact_cost(model: Model, numerics, points: int) -> Cost:
 
 
 def _python_seconds(model: Model) -> float:
-    """Return the CPU seconds of a run from event to event in Python.
+    """Estimate the CPU time [s] of an event-driven run in interpreted Python.
 
-    The elements are those of all cells of a density.
+    Cells of a slider density are not merged.
     """
     count, stiffness = expected_elements(model)
     each = events_cost.python_seconds(
@@ -340,13 +341,13 @@ def _is_loop_kept(model: Model) -> bool:
 
 
 def kept_samples(numerics) -> float:
-    """Return how many samples of the last cycles a run keeps."""
+    """Return the number of samples of the last cycles that a run keeps."""
     each = SAMPLES if numerics.engine in RESAMPLING_ENGINES else numerics.steps
     return float(max(2, numerics.window) * each)
 
 
 def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
-    """Return the memory of the last cycles, and of the data kept from all other cycles.
+    """Return the memory of the histories that a run keeps.
 
     Parameters
     ----------
@@ -370,7 +371,7 @@ def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[Memory
 
 
 def exact_words(model: Model, engine: str) -> list:
-    """Return the sentence of a plan on the engine of the elements and on its cost, as a list."""
+    """Return the sentence of a plan on an engine for friction elements and its CPU time."""
     count = expected_elements(model)[0]
     exact = expected_seconds(model)
     march = seconds_of_steps(model)
@@ -381,7 +382,7 @@ def exact_words(model: Model, engine: str) -> list:
 
 
 def reason_to_march_smooth_law(model: Model) -> str:
-    """Return the reason to march a rig instead of integrating it at high order, or ""."""
+    """Return why a rig is marched instead of integrated at high order, or ""."""
     rig = model.rig
     accuracy = model.accuracy
     for key in MARCH_SETTINGS:
@@ -402,9 +403,10 @@ def reason_to_march_smooth_law(model: Model) -> str:
 
 
 def smooth_element(model: Model) -> "Element | None":
-    """Return the law of the interface as an Element for compiled code.
+    """Return the friction law of the interface as an Element for the smooth engine.
 
-    None if its bonds have no state, or if it depends on the pressure of each point.
+    The result is None if the bonds are summed in a list, or if the law averages the friction over
+    the pressure of all points.
     """
     f = model.friction
     load = model.nominal_load
@@ -418,10 +420,10 @@ def smooth_element(model: Model) -> "Element | None":
 
 
 def smooth_steps(model: Model, element: "Element") -> float:
-    """Return the expected steps per cycle of the smooth engine.
+    """Estimate the steps per cycle of the smooth engine.
 
-    They are proportional to the phase of the fastest motion, plus some at every reversal, plus
-    those that keep a state of the law with a short relaxation stable.
+    It is proportional to the phase of the fastest motion, plus steps at every reversal, plus the
+    steps that keep the states of a law with a short relaxation length stable.
     """
     rig = model.rig
     modes = model.rig.modes
@@ -447,10 +449,10 @@ def smooth_steps(model: Model, element: "Element") -> float:
 
 
 def stiff_fraction(model: Model, element: "Element") -> float:
-    """Return the fraction [1] of the time that a law of the speed spends in its stiff range.
+    """Return the fraction [1] of the time in which a speed-dependent law is stiff.
 
-    With a single mode it is 1 for a ratio r of the force to the limit up to 1, and less for larger
-    r.
+    With a single mode it is 1 up to a ratio 1 of the drive force to the friction limit, and less
+    above it; with several modes it is 1.
     """
     rig = model.rig
     modes = model.rig.modes
@@ -468,7 +470,7 @@ def stiff_fraction(model: Model, element: "Element") -> float:
 
 
 def smooth_cost(model: Model, numerics, points: int) -> Cost:
-    """Return the cost of all runs of high order.
+    """Return the predicted cost of a run of the smooth engine and of its coarse run.
 
     Parameters
     ----------
@@ -479,7 +481,7 @@ def smooth_cost(model: Model, numerics, points: int) -> Cost:
     """
     rig = model.rig
     cycles = model.rig.drive.cycles
-    # after this many cycles the motion repeats, and the other cycles are not computed
+    # the cycles after the motion has become periodic are not computed
     if (
         is_sinusoidal(rig.drive.signal)
         and (decay := find_min_decay_rate(rig.modes) * rig.drive.signal.period) > 0

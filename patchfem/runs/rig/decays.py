@@ -35,14 +35,15 @@ MOVING = (
 )
 NO_LOOP = "the hysteresis loop of this friction law is not known without a computation in time"
 NOT_STATIC = "no static curve of the mode was found at these amplitudes"
-MAX_POINT_ERROR = 0.5  # largest relative error of a point of the curve
-AMPLITUDES_PER_DECADE = 16  # amplitudes per decade at which the error of the mesh is computed
+MAX_POINT_ERROR = 0.5  # largest relative error [1] with which a point of a decay curve is kept
+AMPLITUDES_PER_DECADE = 16  # number of amplitudes at which the error due to the mesh is computed
 
 
 def compute_decay(raw: Solution) -> DecayCurve | None:
-    """Return the decay curve of the output of a release, with errors; None if it has no points.
+    """Return the amplitude decay curve of a released rig, with errors.
 
-    Points whose error exceeds MAX_POINT_ERROR of their value are left out. The errors are those of the
+    The result is None if the curve has no points. Points whose error exceeds MAX_POINT_ERROR of their
+    value are left out. The errors are those of the
     evaluation plus the changes in the coarse runs at the same amplitudes; they are infinite outside
     the range of a coarse run.
     """
@@ -57,7 +58,7 @@ def compute_decay(raw: Solution) -> DecayCurve | None:
 
 
 def _add_coarse_changes(curve: DecayCurve, raw: Solution) -> DecayCurve:
-    """Return the curve of a run with its differences from coarse runs added to the errors."""
+    """Add the differences between coarse runs to the errors of a decay curve."""
     for run, beside in raw.coarser:
         coarse = _read(run).interpolate(curve.amplitude)
         reference = curve if beside is None else _read(beside).interpolate(curve.amplitude)
@@ -66,11 +67,11 @@ def _add_coarse_changes(curve: DecayCurve, raw: Solution) -> DecayCurve:
 
 
 def _read(run: Solution) -> DecayCurve:
-    """Return the decay curve of a run from its half swings, as long as they decrease.
+    """Measure the decay curve of a run from its half cycles, as long as they decrease.
 
-    After the last slip, the curve is that of the strongest mode that rings, at each of its half
-    swings: other modes ring at the same time, so that the turning points of their sum belong to
-    none of them.
+    After the last slip, the curve is that of the strongest ringing mode, at each of its half
+    cycles: other modes ring at the same time, so that the reversals of their sum belong to none of
+    them.
     """
     motion = run.response
     mode = run.extra.get("tail")
@@ -89,7 +90,7 @@ def _read(run: Solution) -> DecayCurve:
 
 
 def laws_on(model, patch, meshed: tuple = ()):
-    """Return the `harmonic.forces.LawGroup` of a rig on one of its meshes.
+    """Return the friction laws of a rig on one of its meshes.
 
     Parameters
     ----------
@@ -116,7 +117,7 @@ def laws_on(model, patch, meshed: tuple = ()):
 
 
 def coarse_laws(model, coarse) -> list:
-    """Return a list of LawGroups, in each of which another patch has a coarser mesh.
+    """Return the friction laws of a rig with a coarser mesh of one patch at a time.
 
     coarse: Patch of its [contact] on a coarser mesh, or None.
     """
@@ -127,12 +128,12 @@ def coarse_laws(model, coarse) -> list:
 
 
 def with_automatic_method(model):
-    """Return the model with the automatic choice of the method."""
+    """Return the model with accuracy.method = "auto"."""
     return replace(model, accuracy=model.accuracy.model_copy(update={"method": "auto"}))
 
 
 def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarray:
-    """Return amplitude, frequency, damping and loss (4, k) of a mode by static loading.
+    """Compute amplitude, frequency, damping ratio and loss of a mode under static loading.
 
     Parameters
     ----------
@@ -162,7 +163,7 @@ def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarra
 
 
 def decay_rows(modes, motions: list) -> np.ndarray:
-    """Return output amplitude [m], frequency [Hz], damping and loss [J] (4, k) of `StaticMotion`s."""
+    """Return output amplitude, frequency, damping ratio and loss (4, k) of static motions."""
     amplitude = [abs(float(modes.output @ motion.z)) for motion in motions]
     frequency = [motion.omega / (2 * np.pi) for motion in motions]
     damping = [motion.zeta for motion in motions]
@@ -171,7 +172,7 @@ def decay_rows(modes, motions: list) -> np.ndarray:
 
 
 def mesh_error(fine, rough, read) -> np.ndarray:
-    """Return the error due to the mesh of the values that read(LawGroup) returns, for partial slip.
+    """Estimate the error of values computed from friction laws due to the mesh of patches.
 
     It follows from the change on a coarser mesh at second order. It is not less than the change if
     the elements are spread over the yield slides between the nodes (`slip.mesh_correction`): at a
@@ -193,13 +194,13 @@ def mesh_error(fine, rough, read) -> np.ndarray:
 
 
 def _spread(stiffness, slide) -> tuple:
-    """Return `slip.mesh_correction.spread_elements` of elements in any order."""
+    """Spread friction elements over the yield displacements between the nodes of a mesh."""
     order = np.argsort(slide, kind="stable")
     return spread_elements(stiffness[order], slide[order])
 
 
 def mesh_errors_of_decay(model, patch, coarse, amplitudes, mode) -> tuple:
-    """Return the errors of frequency [Hz] and damping due to the mesh at amplitudes of the output.
+    """Estimate the errors of modal frequency and damping ratio due to the mesh of patches.
 
     Parameters
     ----------
@@ -244,14 +245,14 @@ def mesh_errors_of_decay(model, patch, coarse, amplitudes, mode) -> tuple:
 
 
 def _interpolate_rows(amplitudes, known_amplitudes, rows) -> np.ndarray:
-    """Interpolate rows (r, k), given at known amplitudes (k,) [m], over the log of amplitudes."""
+    """Interpolate rows (r, k) of values over the logarithm of the amplitude."""
     at = np.log(amplitudes)
     known = np.log(known_amplitudes)
     return np.array([np.interp(at, known, row) for row in rows])
 
 
 def mesh_errors_of_stuck_mode(amplitude, frequency: float, model, patch, coarse) -> tuple:
-    """Return `mesh_errors_of_decay` at many amplitudes for the stuck mode nearest to a frequency.
+    """Estimate the mesh errors of frequency and damping of a mode with stuck interfaces.
 
     Parameters
     ----------
@@ -272,7 +273,7 @@ def mesh_errors_of_stuck_mode(amplitude, frequency: float, model, patch, coarse)
 
 
 def slip_sentences(reasons: dict, coarser_runs) -> list:
-    """Return sentences on errors to which `mesh_errors_of_decay` could not be added.
+    """Return the sentences on results whose error due to the mesh is unknown.
 
     Parameters
     ----------
@@ -295,7 +296,7 @@ def slip_sentences(reasons: dict, coarser_runs) -> list:
 
 
 def _find_mode(modes, laws, frequency: float) -> int:
-    """Return the index of the stuck mode that moves the output and is nearest to a frequency."""
+    """Return the index of the stuck mode that is nearest to a frequency and moves the output."""
     distances = np.full(modes.omega.size, np.inf)
     for k in range(modes.omega.size):
         omega, shape = modes.compute_stuck_mode(laws.rows, laws.stiffness(), k)

@@ -36,21 +36,23 @@ from .costs import (
     reason_to_march_smooth_law,
 )
 
-FINER = 0.5  # factor of the merge width in the coarse run that shows the error of merging
-# tail over the tolerance, above which a run with a smaller tail checks it; the automatic tail is a
-# tenth of this
+FINER = 0.5  # factor on the merge width of bonds in the run that shows the error of merging
+# Ratio of the neglected tail of a sum over bonds to the tolerance, above which a run with a smaller tail
+# checks its error; the automatic tail is a tenth of this.
 LOOSE = 1e-2
-LESS = 0.1  # factor of the tail in that run
-# most pieces per period with which a steady motion is found by the map of its yields
+LESS = 0.1  # factor on the neglected tail in the run that checks its error
+# largest number of time intervals per period with which the map of yields finds a steady motion
 MOST_PIECES = 1e5
 
 
-# largest error of an energy balance that is accurate to round-off: a billion steps have less
+# largest relative error of an energy balance with round-off only; a billion steps have less
 BALANCE_ROUND_OFF = 1e-8
 
 
 class Engine(NamedTuple):
-    """Engine of a rig; `scene.rules.methods.ENGINE_SUPPORT` says what it can compute.
+    """Engine of a rig: its name, its coarse runs and the limits of its errors.
+
+    `scene.rules.methods.ENGINE_SUPPORT` says what it can compute.
 
     - method: value of accuracy.method that selects it; "" if only "auto" does.
     - coarser_in_time: function (model, numerics) -> list of `CoarserRuns`.
@@ -79,9 +81,11 @@ class Engine(NamedTuple):
     finds_periodic_motion: bool = False
 
     def richer_in_modes(self, model: Model, numerics) -> list:
-        """Return the run with more modes of a reduced structure; [] if no mode is left out.
+        """Return the comparison run with more modes of a reduced structure.
 
-        For a march, it has a quarter of the steps.
+        The list is empty if no mode is left out.
+
+        For a march, the run has a quarter of the steps.
         """
         if model.rig.structure.richer_rig is None:
             return []
@@ -94,15 +98,15 @@ class Engine(NamedTuple):
         return [CoarserRuns((richer,), finer_errors, beside, "reduced")]
 
     def lacks(self, model: Model, *, steady: bool = False) -> str:
-        """Return the first property of a model that the engine cannot compute, as text; "" if none.
+        """Describe the first property of a model that this engine cannot compute, or return "".
 
-        steady: whether the drive is the sine of a curve instead of its own waveform.
+        steady: whether the drive is a sine of a curve of steady motions instead of its own waveform.
         """
         return methods.find_unsupported_feature(self.name, motion_properties(model, steady=steady))
 
 
 def reason_not_exact(model: Model, *, steady: bool = False) -> str:
-    """Return the reason why no engine of accuracy.method = "exact" can compute a model, or "".
+    """Return why no engine of accuracy.method = "exact" can compute a model, or "".
 
     steady: see `Engine.lacks`.
     """
@@ -134,7 +138,7 @@ def motion_properties(model: Model, *, steady: bool = False) -> methods.MotionFe
 
 
 class Finder(NamedTuple):
-    """Method that finds a steady motion.
+    """Method that finds a steady motion, with its text for a plan.
 
     - words: text of a plan.
     - engine: name of the engine whose code it runs and whose numerical settings apply.
@@ -178,7 +182,7 @@ def choose_steady_method(model: Model) -> Finder:
 
 
 def _none(*_) -> list:
-    """Return no coarse runs."""
+    """Return an empty list of coarse runs."""
     return []
 
 
@@ -190,15 +194,15 @@ LOOP_MEASURES = (
     "slip_amplitude",
     "friction_force_peak",
 )
-LOOP_SAMPLING_ERROR = 1e-4  # relative error of these measures from 400 samples per cycle
+LOOP_SAMPLING_ERROR = 1e-4  # relative error of loop measures from 400 samples per cycle
 INSTANT_SAMPLING_ERROR = (
-    0.005  # of the fraction in stick [1] and of the phase at which slip starts [rad]
+    0.005  # error of the stick fraction [1] and of the phase at slip start [rad] at 400 samples
 )
-MOTION_SAMPLING_ERROR = 1e-9  # relative error of all other measures
+MOTION_SAMPLING_ERROR = 1e-9  # relative error of all other measures, which are interpolated
 
 
 def sampling_errors(values: dict) -> dict:
-    """Return the errors of measures that are computed from 400 samples per cycle, by name."""
+    """Estimate the errors of measures computed from 400 samples per cycle, by name."""
     errors = {}
     for name, value in values.items():
         if name in LOOP_MEASURES:
@@ -211,9 +215,9 @@ def sampling_errors(values: dict) -> dict:
 
 
 def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """Return the coarse runs of the exact engine in space.
+    """Return the comparison runs on coarser meshes for the event-driven Coulomb engine.
 
-    They are those on the mesh if the loads of strips or the limit of an averaged law depend on it.
+    The mesh matters if the loads of strips or the limit of an averaged law depend on it.
     The measures of strips that slide independently also have the error of the trapezoidal rule with
     400 samples per cycle.
     """
@@ -226,7 +230,7 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """Return the coarse runs of the engine of yields: with coarser meshes, with fewer cells."""
+    """Return the comparison runs of elastic-plastic elements on coarser meshes and cells."""
     meshes = _numerics_of_meshes(model, numerics)
     if coarse is not None and model.partial_slip:
         meshes = [replace(numerics, coarse_patch=True), *meshes]
@@ -239,7 +243,7 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 def _numerics_of_meshes(model: Model, numerics) -> list:
-    """Return one Numerics per interface patch, in which only this patch has a coarser mesh."""
+    """Return settings in each of which one interface patch has a coarser mesh."""
     if not model.rig.friction.has_partial_slip:
         return []
     meshes = faces.interfaces_with_coarse_mesh(model)
@@ -247,27 +251,28 @@ def _numerics_of_meshes(model: Model, numerics) -> list:
 
 
 def _divide_steps(numerics, share: int):
-    """Return the Numerics of a run whose steps per cycle are divided by `share`."""
+    """Return numerical settings with the steps per cycle divided by an integer."""
     return replace(numerics, steps=max(1, numerics.steps // share))
 
 
 def _march_in_time(model: Model, numerics) -> list:
-    """Return the coarse runs of a march in time: with half and a quarter of the steps."""
+    """Return the comparison runs of a march with half and a quarter of its steps."""
     runs = (_divide_steps(numerics, 2), _divide_steps(numerics, 4))
     return [CoarserRuns(runs, partial(step_errors, steps=numerics.steps), of="steps")]
 
 
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """Return the coarse runs of a march in space, at a quarter of the steps.
+    """Return the comparison runs of a march with a coarser discretization in space.
 
-    They have a coarser mesh, another number of shear modes, or another sum over bonds.
+    These have a coarser mesh, another number of shear modes or another sum over bonds, and a quarter
+    of the steps.
     """
     quarter = _divide_steps(numerics, 4)
     varies = model.rig.friction.load_varies
     coarser_runs = []
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     if coarse is not None and (varies or model.partial_slip):
-        # the number of shear modes is fixed, so that only the mesh changes
+        # both runs have the same number of shear modes, so that only the mesh changes
         coarser = replace(quarter, coarse_patch=True)
         if shape is not None:
             coarser = replace(coarser, shear_modes=shape.size)
@@ -276,7 +281,7 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
         coarser_runs.append(make_coarser_space(coarser, quarter))
     climbs = model.grooves is not None
     gathers = model.patch is not None and model.patch.mesh.can_gather_points
-    # a reduction to few points states the error of its modes itself
+    # a patch reduced to few points states the error of its shear modes itself
     pointed = coarse is not None and not gathers
     if shape is not None and (
         varies or climbs or (pointed and law_has_trait(model.friction.law, "bonds"))
@@ -289,10 +294,11 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 def _coarse_sums(model: Model, quarter, patch, solution) -> list:
-    """Return the coarse runs of a list of bonds, at the steps of the Numerics `quarter`.
+    """Return the comparison runs for the error of the sum over a list of bonds.
 
-    They are its bound on forces and energies and, if it merges bonds or its tail is large, the
-    change of the motion with narrower strips and a smaller tail.
+    The first entry is the bound of the sum on forces and energies. If the sum merges bonds or neglects
+    a large tail, the second is the change of the motion with narrower strips and a smaller tail; its
+    runs have the settings `quarter`, with a quarter of the steps.
     """
     choice = solution.summed
     if choice is None or not choice.error:
@@ -311,7 +317,7 @@ def _coarse_sums(model: Model, quarter, patch, solution) -> list:
 
 
 def _sum_errors(model: Model, patch, fraction: float, values: dict, solution) -> dict:
-    """Return the errors of the measures due to the error `fraction` of a sum over bonds."""
+    """Estimate the errors of the measures due to the relative error of a sum over bonds."""
     friction = model.friction
     load = patch.pressure.load if patch is not None else model.point.load
     passed = np.abs(np.diff(solution.window.extra["ledger"][0])).sum()
@@ -330,28 +336,28 @@ def _sum_errors(model: Model, patch, fraction: float, values: dict, solution) ->
 def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
     """Return the errors that a run itself states, as `CoarserRuns` without runs.
 
-    They are the residual of a balance and its change at half the harmonics, or the error of the
-    samples.
+    For harmonic balance these are the residual and the change with twice the harmonics, for the
+    smooth engine the errors of the samples.
     """
     return [CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})]
 
 
 def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """Return the coarse runs of a steady motion on coarser meshes, and the errors it states."""
+    """Return the comparison runs of a steady motion on coarser meshes and its stated errors."""
     coarser_runs = _own_errors(model, numerics, patch, coarse, solution)
     if choose_steady_method(model).engine == PIECES.name:
         coarser_runs += _pieces_in_space(model, numerics, patch, coarse, solution)
     return coarser_runs
 
 
-COARSER = 30.0  # factor of the error of a step in the coarse run
+COARSER = 30.0  # factor on the tolerance of a smooth step in the coarse run
 WIDER_TOLERANCE = partial(coarser_errors, ratio=COARSER)
 
 
 def _smooth_in_time(model: Model, numerics) -> list:
-    """Return the coarse run of the smooth engine, whose steps may have COARSER times the error.
+    """Return the comparison run of the smooth engine with a larger tolerance of its steps.
 
-    The error of a run is proportional to that of its steps.
+    A step may have COARSER times the error; the error of a run is proportional to that of its steps.
     """
     wider = replace(numerics, local=numerics.local * COARSER)
     return [CoarserRuns((wider,), WIDER_TOLERANCE)]
@@ -398,11 +404,16 @@ HARMONIC = Engine(
     finds_periodic_motion=True,
 )
 ENGINES = {engine.name: engine for engine in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC)}
-AUTOMATIC = (EXACT, PIECES, SMOOTH, MARCH)  # engines in the order in which they are tried
+AUTOMATIC = (
+    EXACT,
+    PIECES,
+    SMOOTH,
+    MARCH,
+)  # engines in the order in which method = "auto" tries them
 
 
 def describe_balance_error(engine: Engine, measures: dict) -> str:
-    """Return the sentence on an energy balance with too large an error for the engine, or "".
+    """Describe an energy balance whose error is too large for its engine, or return "".
 
     measures: measures of the run by name, with their errors.
     """
@@ -412,7 +423,7 @@ def describe_balance_error(engine: Engine, measures: dict) -> str:
     limit = engine.max_balance_error
     if limit is None:
         limit = max(BALANCE_ROUND_OFF, balance.error or 0.0)
-    if not balance.value > limit:  # a motion that is not finite was detected before
+    if not balance.value > limit:  # motions that are not finite are detected earlier
         return ""
     return (
         f"the energy balance of engine {engine.name} has an error of {balance.value:.2g} of the energy exchanged, "
@@ -422,11 +433,11 @@ def describe_balance_error(engine: Engine, measures: dict) -> str:
 
 @lru_cache(8)
 def choose_engine(model: Model) -> Engine:
-    """Return the engine of a model.
+    """Choose the engine that computes a model.
 
-    It is the one that the scene names (of several with this name the first that can compute the
-    model), else the first of AUTOMATIC that can compute it and is not more expensive than the next
-    one.
+    A method named in the scene selects its engine (of several, the first that can compute the model).
+    Otherwise the engine is the first of AUTOMATIC that can compute the model and is not more expensive
+    than the next.
     """
     named = [engine for engine in ENGINES.values() if engine.method == model.accuracy.method]
     for engine in named[:-1]:
@@ -441,7 +452,7 @@ def choose_engine(model: Model) -> Engine:
 
 
 def unused_settings(model: Model, engine: str) -> list:
-    """Return sentences on the settings in [accuracy] of a rig that its engine does not use."""
+    """Return sentences on the settings in [accuracy] that the engine of a rig does not use."""
     used = engine
     if ENGINES[engine].finds_periodic_motion:
         used = choose_steady_method(model).engine

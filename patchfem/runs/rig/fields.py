@@ -16,7 +16,7 @@ from ..results.result import FRAMES, at_rest, interface_frames
 
 
 def collect_frames(model, numerics, patch, raw) -> dict:
-    """Return the frames of the interface in the last cycle by name.
+    """Return the fields of the interface in the last cycle, frame by frame.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def collect_frames(model, numerics, patch, raw) -> dict:
     """
     sigma = patch.pressure.sigma_n
     f = model.friction
-    # strips have no common shear stress
+    # strips that slide independently have no common shear stress
     if model.patch.mesh.can_gather_points or (model.partial_slip and patch.strips is not None):
         return at_rest(patch)
     if model.rig.friction.load_varies:
@@ -77,9 +77,9 @@ def collect_frames(model, numerics, patch, raw) -> dict:
 
 
 def _frames_under_changing_load(patch, raw) -> dict:
-    """Return interface frames (f, x) of a run with a varying load, the pressed state first.
+    """Return the interface fields of a run with a varying normal load, frame by frame.
 
-    Its status is 0 for open, 1 for stick and 2 for slip.
+    The first frame is the pressed state. The status is 0 for open, 1 for stick and 2 for slip.
     """
     law = raw.contact.law
     sets = raw.contact.sets
@@ -98,7 +98,9 @@ def _frames_under_changing_load(patch, raw) -> dict:
         tau[k], stretch = _shear(law, shot, nodal[k])
         local[k] = slide[k] - stretch - shot["bend"]
     moved = np.abs(np.diff(local, axis=0, prepend=local[:1]))
-    moved[:2] = 0.0  # the first frame of the motion has no previous frame from which it could slip
+    moved[:2] = (
+        0.0  # the first frame of the motion has no predecessor, so that its nodes count as stuck
+    )
     status = np.where(nodal > 0, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0).astype(
         np.int8
     )
@@ -114,7 +116,7 @@ def _frames_under_changing_load(patch, raw) -> dict:
 
 
 def _shear(law, shot, nodal) -> tuple:
-    """Return friction forces (m,) [N] and stretches (m,) [m] of the nodes in a snapshot."""
+    """Return friction forces (m,) [N] and elastic stretches (m,) [m] at the interface nodes."""
     top, bottom, _ = shot["memory"]
     if law.kind == varying_load.PLASTIC:
         return law.static * top, law.length * np.divide(

@@ -42,10 +42,10 @@ RIGID_LIMIT = "with rigid friction limit cycles cannot be computed if the rig ha
 
 
 def find_limit_cycles(run) -> tuple:
-    """Return the measures by name and the notes on unstable limit cycles of a `passes.Coupled`.
+    """Compute the largest unstable limit cycle of a self-excited rig.
 
-    The measure is the amplitude of the largest unstable limit cycle with its error, or the reason
-    why it is not known.
+    Returns the measure by name, i.e. the amplitude of this limit cycle with its error or the reason why
+    it is not known, and notes.
     """
     model = run.model
     unit = TABLE[NAME].unit
@@ -88,11 +88,11 @@ def find_limit_cycles(run) -> tuple:
 
 
 class LimitCycles(NamedTuple):
-    """Limit cycles of a rig.
+    """Limit cycles of a self-excited rig, with the reason if none is unstable.
 
-    - cycles: by increasing amplitude.
+    - cycles: limit cycles by increasing amplitude.
     - reason: reason why none of them is unstable.
-    - smallest_amplitude: of the search, at the output [m]; 0 if all amplitudes were searched.
+    - smallest_amplitude: smallest output amplitude of the search [m]; 0 if all were searched.
     """
 
     cycles: list
@@ -101,7 +101,7 @@ class LimitCycles(NamedTuple):
 
 
 def _find_cycles(model, numerics, patch) -> LimitCycles:
-    """Find the limit cycles of a rig with one interface."""
+    """Compute the limit cycles of a self-excited rig with one interface."""
     rig = model.rig
     f = model.friction
     if len(rig.friction.interfaces) != 1 or f is None:

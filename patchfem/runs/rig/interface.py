@@ -25,16 +25,16 @@ from . import strips, varying_load
 from .lists import choose_quadrature
 from .numerics import Numerics
 
-# fraction of the tolerance by which a small number of modes, and of points, may each miss the
-# backbone of the patch
+# largest error of the backbone curve over the tolerance, for the reduction to few modes and for that to
+# few points
 FEWER = 1e-3
 
 
 def make_contact(model: Model, numerics: Numerics, patch):
-    """Return the contact that a march moves.
+    """Return the contact model of all interfaces and nonlinear springs for a march.
 
-    It is a ContactModel, a JointsModel if there are several interfaces or nonlinear springs, or a
-    model of grooves.
+    The result is a ContactModel, a JointsModel for several interfaces or nonlinear springs, or a model
+    of grooves.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def make_contact(model: Model, numerics: Numerics, patch):
 
 
 def _elements_side_by_side(model: Model, numerics: Numerics, patch) -> list:
-    """Return the Elements of interfaces, or of the strips of a patch, that slide independently."""
+    """Return the friction elements of interfaces or strips that slide independently."""
     if patch is None:
         return own_elements(model, numerics.meshed)
     f = model.friction
@@ -91,7 +91,7 @@ def _elements_side_by_side(model: Model, numerics: Numerics, patch) -> list:
 
 
 def own_elements(model: Model, meshed: tuple) -> list:
-    """Return the Element of every interface under its own load.
+    """Return the friction elements of every interface under its own load.
 
     meshed: indices of interfaces whose patches are those on the coarser mesh.
     """
@@ -106,7 +106,7 @@ def own_elements(model: Model, meshed: tuple) -> list:
 
 
 def _climbing(model: Model, patch, count: int | None = None):
-    """Return the model of a rig whose load climbs grooves."""
+    """Return the contact model of a load that climbs grooves."""
     f = model.friction
     load = patch.pressure.load if patch is not None else model.point.load
     if model.partial_slip or not law_has_trait(f.law, "memoryless"):
@@ -135,7 +135,7 @@ def make_element(interface: InterfaceLaw, load: float, speed: float) -> Element:
 
 
 def contact_model(model: Model, numerics: Numerics, patch):
-    """Return the ContactModel of the single interface of a rig.
+    """Return the contact model of a rig with a single interface.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
     if not soft:
         return models.element_model(element)
 
-    if patch.strips is not None:  # all strips have the same slide
+    if patch.strips is not None:  # strips of a patch that does not yaw have the same slide
         strip_elements = jenkins_elements.strip_elements(patch, f.static, element.length)
         return models.jenkins_model(*map(np.concatenate, zip(*strip_elements)))
     elements = jenkins_elements.elements(patch, f.static, element.length)
@@ -173,9 +173,9 @@ def contact_model(model: Model, numerics: Numerics, patch):
 
 
 def _bonds(model: Model, numerics: Numerics, patch, load: float):
-    """Return the contact of a sum over bonds.
+    """Return the contact model of a law of bonds.
 
-    It is a list of bonds, points with shear modes, points of a field, or a single point.
+    The bonds are summed in a list, or at the points of shear modes, of a field or of a single point.
     """
     law = model.bonds
     choice = choose_quadrature(model, numerics)
@@ -207,9 +207,10 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
 
 
 def _shear_modes(patch, law, count: int | None, model) -> tuple:
-    """Return the shear modes and, for a reduction to few points, the forces (k,) [N] of these.
+    """Return the shear modes of a pressed patch and, for few points, their friction forces.
 
-    The forces are None for all points. They are computed once for all marches of a pressed patch.
+    The forces (k,) [N] are None if the modes have all points of the patch. Both are computed once for
+    all marches of a pressed patch.
     """
     made = _SHEAR_MODES.setdefault(patch, {})
     tolerance = model.accuracy.tolerance
@@ -228,7 +229,7 @@ def _shear_modes(patch, law, count: int | None, model) -> tuple:
 
 
 def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple | None:
-    """Return a reduction of a patch to few points with the fewest shear modes, or None.
+    """Reduce a patch to a few contact points with the fewest shear modes.
 
     Parameters
     ----------
@@ -263,5 +264,5 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
     return made[key]
 
 
-# shear modes of each Patch by their parameters, kept as long as the Patch lives
+# cache of shear modes by their parameters, which lasts as long as the Patch
 _SHEAR_MODES = WeakKeyDictionary()

@@ -23,17 +23,19 @@ from ...response.levels import (
 from ...response.rows import TABLE
 from ...structure.drive_sizes import find_drive_omega
 
-EXACT = 1e-9  # relative error of measures of a motion in closed form
-MAX_BISECTIONS = 40  # most bisections of the bracket of an onset
+EXACT = (
+    1e-9  # relative error of the measures of an event-driven run, whose motion has round-off only
+)
+MAX_BISECTIONS = 40  # largest number of bisections of an onset, to 1e-12 of its bracket
 
 
 def level_ends(rig) -> tuple:
-    """Return the cycles (l,) after which the levels of a drive end; () without levels."""
+    """Return the cycles (l,) after which the levels of a drive end."""
     return tuple(rig.drive.levels.cycles * (k + 1) for k in range(len(rig.drive.levels.amplitudes)))
 
 
 def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
-    """Return the levels with the errors from their coarse runs in addition to their own errors.
+    """Add the differences from coarse runs to the errors of every drive level.
 
     The error of a measure that a coarse run does not have is its absolute value.
 
@@ -63,15 +65,15 @@ def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
 
 
 def _values_at_level(solution, number: int) -> dict:
-    """Return the measures of a level of a run; {} if the run ended before it."""
+    """Return the measures of a run at one drive level, or {} if the run ended before it."""
     return solution.levels[number].values if number < len(solution.levels) else {}
 
 
 def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
-    """Return the onset [m s-2] and half its bracket, by bisection between two levels.
+    """Find the onset [m s-2] between two drive levels by bisection, with half its bracket.
 
-    They are the last level below the onset and the first one above it. The bisection ends when the
-    bracket is `tolerance` times the level; if all levels down to 0 are above the onset, times the
+    The bracket is the last level below the onset and the first level above it. The bisection ends when
+    the bracket is `tolerance` times the level; if all levels down to 0 are above the onset, times the
     first level above it. A law for which every level is above the onset (bonds that chatter) has no
     onset.
 
@@ -110,7 +112,7 @@ def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
 
 
 def drive_at_level(drive, number: int, level: float):
-    """Return the drive that ends with another level in place of one of its levels.
+    """Return a drive in levels that ends with another amplitude at one level.
 
     Parameters
     ----------
@@ -126,9 +128,9 @@ def drive_at_level(drive, number: int, level: float):
 
 
 def level_measures(rig, levels, probe, tolerance: float, *, has_friction: bool, coarser=()) -> dict:
-    """Return the measures over all levels, with a reason for those without a value.
+    """Compute onset, jump and hysteresis over all levels of a drive.
 
-    They are onset_level, jump_level and level_hysteresis.
+    These are onset_level, jump_level and level_hysteresis, with a reason if there is no value.
 
     Parameters
     ----------
@@ -168,7 +170,7 @@ def level_measures(rig, levels, probe, tolerance: float, *, has_friction: bool, 
             reason=make_no_onset_reason(*rig.drive.levels.onset),
         )
     if (leap := largest_jump(levels)) is not None:
-        width = size * float(leap[2])  # the jump lies between two levels
+        width = size * float(leap[2])  # the jump lies anywhere between two levels
         measures["jump_level"] = Measure(size * leap[0], unit, width, width)
     else:
         measures["jump_level"] = Measure(
@@ -185,24 +187,24 @@ def level_measures(rig, levels, probe, tolerance: float, *, has_friction: bool, 
 
 
 def in_scene_units(rig, levels) -> tuple:
-    """Return the levels in the units of the scene: of a force drive with the force [N]."""
+    """Convert drive levels to the unit of the scene, [m s-2] or [N]."""
     size = _size(rig)
     unit = _unit(rig)
     return tuple(replace(level, drive=size * level.drive, unit=unit) for level in levels)
 
 
 def _unit(rig) -> str:
-    """Return the unit of the levels in the scene."""
+    """Return the unit of the drive levels in the scene."""
     return "N" if rig.drive.kind == "force" else "m s-2"
 
 
 def _size(rig) -> float:
-    """Return the factor from a level of the drive [m s-2] to its unit in the scene."""
+    """Return the factor from a drive level [m s-2] to its unit in the scene."""
     return rig.modes.mass if rig.drive.kind == "force" else 1.0
 
 
 def run_levels(reader, integrate, state, end, progress=None) -> tuple:
-    """Run all levels of a drive, each from the state at the end of the previous one.
+    """Run all levels of a drive, each from the final state of the previous level.
 
     Parameters
     ----------
@@ -228,7 +230,7 @@ def run_levels(reader, integrate, state, end, progress=None) -> tuple:
     level_results = []
 
     def probe(number: int, level: float) -> Level:
-        """Run another level after the level of this index (-1: from the start)."""
+        """Run another level from the end of an earlier one; number -1 starts at rest."""
         sine = SineDrive(level, omega, moving)
         run = integrate(sine, states[number + 1], None, False)
         return reader.level(level, run, sine, EXACT)
@@ -251,12 +253,12 @@ def run_levels(reader, integrate, state, end, progress=None) -> tuple:
 
 
 def _report_fraction(progress, level: int, n_levels: int, fraction: float) -> None:
-    """Report the completed fraction of all levels from that of the level of an index."""
+    """Report the completed fraction of all drive levels."""
     progress((level + fraction) / n_levels)
 
 
 def remove_incomplete_cycle(done):
-    """Return the run without the extremes and the phasor of an incomplete last cycle."""
+    """Remove the extremes and the phasor of an incomplete last cycle from a run."""
     count = int(done.cycles_done + 1e-9)
     if not count or count >= len(done.amplitudes):
         return done
@@ -264,7 +266,7 @@ def remove_incomplete_cycle(done):
 
 
 def join_runs(runs: list, duration: float):
-    """Join successive runs of equal duration [s] to a single one.
+    """Join successive runs of equal duration [s] to a single run.
 
     Window and loop are those of the last run.
     """
@@ -286,13 +288,13 @@ def join_runs(runs: list, duration: float):
 
 
 def _join_histories(histories: list, shifts: list):
-    """Return the histories of successive runs as one; shifts: start of each run [s]."""
+    """Concatenate the histories of successive runs, shifted by their start times [s]."""
     last = histories[-1]
     # the last sample of a run is the first one of the next
     samples = [slice(None, -1)] * (len(histories) - 1) + [slice(None)]
 
     def join(arrays) -> np.ndarray:
-        """Return the concatenation of one history of all runs."""
+        """Concatenate one history of all runs without duplicate samples."""
         return np.concatenate([array[part] for array, part in zip(arrays, samples)])
 
     columns = {}
@@ -311,7 +313,7 @@ def _join_histories(histories: list, shifts: list):
 
 
 def _shift_times(time, shift: float):
-    """Return times shifted by `shift` [s], with the two sides of an event still distinct."""
+    """Shift times by `shift` [s] and keep both sides of each event distinct."""
     moved = time + shift
     before = np.flatnonzero(moved[1:] <= moved[:-1])
     moved[before] = np.nextafter(moved[before], -np.inf)

@@ -28,35 +28,36 @@ from ...structure.drive_sizes import (
 from ..bench import engine as bench_engine
 from .numerics import Numerics
 
-# fraction of the first stroke of a released motion that the sum over its bonds resolves
+# fraction of the first stroke of a released motion that the sum over its bonds has to resolve
 DECAYED_FRACTION = 1e-2
-# stroke of a block that the printed law keeps from sliding, over the stroke of the drive (measured:
-# 1e-2 to 1e-4)
+# assumed ratio of the stroke of a block that the printed law stops to that of the drive (measured: 1e-2
+# to 1e-4)
 STICKING_STROKE_RATIO = 1e-4
-# CPU seconds per step and strip of a list that grows with every step (measured: 8e-8 to 4e-6)
+# CPU seconds per step and strip of a list of bonds that grows every step (measured: 8e-8 to 4e-6)
 GROWING_STEP = 1e-6
-# limit over drive force (D) from which a block is stuck: 0.6 and more strips per step, against 0.06
-# at D = 1.06 and 0.28 at D = 1.4
+# Ratio of friction limit to drive force (D) from which a block is stuck: then 0.6 and more strips are
+# left per step, against 0.06 at D = 1.06 and 0.28 at D = 1.4.
 MIN_STUCK_RATIO = 2.0
-# strips per step; a list with more has reversals in every few steps, so that shorter steps would
-# only make it longer
+# Strips per step above which the motion reverses in every few steps, so that shorter steps would only
+# make the list of bonds longer.
 TURNING = 0.1
-# strips of a list, about one per step, above which steps are not halved again, at four times the
-# cost
+# Strips of a list of bonds with about one strip per step, above which steps are not halved again,
+# because each halving costs four times as much.
 MOST_CROWDED = 500
-MIN_SLIP_LENGTHS = 1e-3  # bond lengths of slip above which a block moves
-MAX_HALVINGS = 2  # most halvings of the steps (0 to 3 were observed)
-# lists of a patch with shear compliance, times the passes of Newton's method over those of secants
+MIN_SLIP_LENGTHS = 1e-3  # slip in bond lengths, below which the motion of a block is elastic
+MAX_HALVINGS = 2  # largest number of halvings of the step (0 to 3 were observed)
+# cost of a patch with shear compliance over that of one list: its lists, times the larger number of
+# iterations of Newton's method
 SHEAR_COST_FACTOR = 256.0
-MOST_SWING = 2.0  # largest phase of the vibration of the block on its bonds in a step [rad]
+MOST_SWING = 2.0  # largest phase [rad] in a step of the vibration of the block on its bonds
 
 
 @lru_cache(maxsize=8)
 def choose_quadrature(model: Model, numerics: Numerics):
-    """Choose the engine that sums over the bonds of a nonlocal law, as an EngineChoice.
+    """Choose how the forces of the bonds of a nonlocal law are summed.
 
     The stroke is taken as four times the amplitude that follows from speed over frequency of the
-    drive, or from the stiffness of the bonds of a block that they hold. The stroke of a motion that
+    drive, or from the stiffness of the bonds if they stop the block. The stroke of a motion that
     is released, or excited once, decreases, and a list of all its bonds would need too much memory:
     it is taken as DECAYED_FRACTION of that of the start. That of a block that the printed law keeps
     from sliding is STICKING_STROKE_RATIO times that of the drive.
@@ -77,7 +78,7 @@ def has_list(model: Model, numerics: Numerics) -> bool:
 
 
 def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine: str):
-    """Return the EngineChoice of `choose_quadrature` for a requested engine, or "auto".
+    """Choose the sum over bonds for a requested engine, or "auto".
 
     stretch: bond lengths by which a block moves on its bonds.
     """
@@ -97,11 +98,10 @@ def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine:
 
 
 def _stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
-    """Return the displacement of a driven block on the stiffness of its bonds, in bond lengths.
+    """Return the displacement of a stuck, driven block over the bond length.
 
-    The stiffness is mu_s N/eps_0. The result is inf if the bonds do not hold the block, i.e. if
-    their limit is below `least` times the required force, or if the printed law gives them no
-    stiffness.
+    The stiffness is mu_s N/eps_0. The result is inf if the bonds do not stop the block, i.e. if their
+    limit is below `least` times the required force, or if the printed law gives them no stiffness.
     """
     f = model.friction
     rig = model.rig
@@ -113,10 +113,10 @@ def _stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
 
 
 def halvings(model: Model) -> int:
-    """Return how often automatic steps will be halved for a block that its bonds hold.
+    """Return how often the automatic time step is halved for a block stuck on its bonds.
 
-    Such a block vibrates on its bonds faster than its modes and its drive. The steps are halved
-    until this vibration has as many steps as those would have, MAX_HALVINGS times at most. If the
+    A stuck block vibrates on its bonds faster than its modes and its drive. The steps are halved until
+    a period of this vibration has as many steps as one of the modes or the drive, MAX_HALVINGS times at most. If the
     slip, half the square of the stretch, is below MIN_SLIP_LENGTHS bond lengths, the motion is elastic and no
     halving is needed.
     """
@@ -145,7 +145,7 @@ def _bond_swing(model: Model) -> float:
 
 
 def held_by_bonds(model: Model, push: float | None = None) -> float:
-    """Return the friction limit of bonds without stiffness over the force that holds the block.
+    """Return the ratio of friction limit to holding force for bonds without stiffness.
 
     It is 0 for other bonds. The printed law reaches its limit at any stroke, so that its stiffness
     mu_s N/stroke is unbounded; bonds of order 0 have the same force at any stretch. A released
@@ -174,7 +174,7 @@ def held_by_bonds(model: Model, push: float | None = None) -> float:
 
 
 def least_held(model: Model) -> float:
-    """Return the value of `held_by_bonds` from which a list grows with every step.
+    """Return the ratio of limit to holding force from which a list of bonds grows every step.
 
     It is 1 for a driven block if each step leaves a strip that no path erases, i.e. for bonds that
     grow or that have no stiffness by their order; else MIN_STUCK_RATIO.
@@ -184,7 +184,7 @@ def least_held(model: Model) -> float:
 
 
 def chatters(model: Model) -> bool:
-    """Return whether the printed law keeps a driven block from sliding.
+    """Return whether the printed law prevents a driven block from sliding.
 
     The block then reverses in almost every step, and each reversal adds a strip to its list.
     """
@@ -197,12 +197,12 @@ def chatters(model: Model) -> bool:
 
 
 def is_stuck_after_release(model: Model) -> bool:
-    """Return whether growing bonds of the printed law hold a released block from its start on."""
+    """Return whether growing bonds of the printed law stop a released block from the start."""
     return model.rig.drive.kind == "free" and held_by_bonds(model) >= MIN_STUCK_RATIO
 
 
 def is_held_without_stiffness(model: Model) -> bool:
-    """Return whether bonds of order 0 hold the block."""
+    """Return whether bonds of order 0, which have no stiffness, stop the block."""
     return lists_grow(model) and model.friction.reading != "report"
 
 
@@ -220,7 +220,7 @@ def lists_grow(model: Model) -> bool:
 
 
 def find_min_drive(rig) -> float:
-    """Return the acceleration [m s-2] of the lowest level of the drive of a Rig.
+    """Return the acceleration [m s-2] of the lowest level of a drive.
 
     For a drive in levels it is the smaller of the lowest level and half the first one, where the
     bisection of the onset starts. Without levels it is the largest acceleration of the drive.
@@ -246,7 +246,7 @@ def force_that_holds(rig, push: float | None = None) -> float:
 
 
 def _held_with(rig, omega: float, push, slides) -> float:
-    """Return the magnitude of the force [N] on the first interface that prescribes all slides.
+    """Return the force amplitude [N] on the first interface for prescribed displacements.
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ def _held_with(rig, omega: float, push, slides) -> float:
 
 
 def is_list_too_long(model: Model, numerics: Numerics, book: dict) -> bool:
-    """Return whether the list of bonds of the printed law is too long to halve the time step.
+    """Return whether the list of bonds is too long to halve the time step again.
 
     It is too long if it grows by a strip in every few steps. Bonds that grow leave a strip in each
     step of any stroke; for these the block has to be held.
@@ -296,7 +296,7 @@ def is_list_too_long(model: Model, numerics: Numerics, book: dict) -> bool:
 
 
 def doubling_does_not_help(book: dict, errors: list) -> bool:
-    """Return whether two doublings of the steps have not reduced the error of a list of bonds.
+    """Return whether two doublings of the steps have not reduced the error of a bond list.
 
     The list of a released block that reverses in almost every step is different for any step
     (errors of 71, 509, 139, 39 and 97 times the tolerance were observed), and the next doublings
@@ -313,14 +313,14 @@ def doubling_does_not_help(book: dict, errors: list) -> bool:
 
 
 class ListCost(NamedTuple):
-    """Expected strips of a list of bonds, and CPU seconds of a run with it."""
+    """Expected number of strips of a list of bonds, and CPU time [s] of a run with it."""
 
     strips: float
     seconds: float
 
 
 def list_cost(model: Model, numerics: Numerics) -> ListCost:
-    """Return the expected strips of a list of bonds and the CPU seconds of a run with it.
+    """Estimate the strips of a list of bonds and the CPU time [s] of a run with it.
 
     A list that grows with every step is expected to contain all strips; its seconds are known
     within a factor of about 12, because the increments that a step tries depend on the motion.
@@ -342,7 +342,7 @@ def list_cost(model: Model, numerics: Numerics) -> ListCost:
 
 
 class ListGuard:
-    """Progress callback of a march with a list of bonds, which stops a march that is too long.
+    """Progress callback that stops a march whose list of bonds takes too long.
 
     A list grows or keeps its length. Therefore all steps together take at least the time of the
     completed steps divided by their fraction.
@@ -350,11 +350,11 @@ class ListGuard:
 
     def __init__(self, progress=None):
         self.progress = progress
-        # CPU seconds and fraction at the first call, so that compiling does not count
+        # CPU seconds and completed fraction at the first call, so that compiling does not count
         self.start = None
 
     def __call__(self, fraction: float) -> None:
-        """Report the completed fraction of the steps.
+        """Report the completed fraction of the steps, and stop a march that takes too long.
 
         Raises
         ------
@@ -373,7 +373,7 @@ class ListGuard:
 
 
 def _too_long(seconds: float, entries: float | None = None) -> str:
-    """Return the refusal of a run whose list of bonds takes too long."""
+    """Return the message that refuses a run whose list of bonds takes too long."""
     length = "" if entries is None else f" (about {entries:.0f} entries)"
     return (
         f"the sum over the list of bonds{length} would need a computing time of about {seconds:.0f} s, more than "
@@ -383,9 +383,9 @@ def _too_long(seconds: float, entries: float | None = None) -> str:
 
 
 def refuse_unresolved(model: Model, numerics: Numerics) -> None:
-    """Raise Missing if a step does not resolve the vibration of the block on its bonds.
+    """Raise Missing if the time step does not resolve the vibration of the block on its bonds.
 
-    The limit is sqrt(k_t/m) dt > MOST_SWING. Otherwise the computed motion would be meaningless,
+    The step is too long if sqrt(k_t/m) dt > MOST_SWING. The computed motion would be meaningless then,
     and every step would leave permanent bonds: the list would grow, and the run time with its
     square.
     """
@@ -404,10 +404,9 @@ def refuse_unresolved(model: Model, numerics: Numerics) -> None:
 
 
 def refuse_long_list(model: Model, numerics: Numerics) -> None:
-    """Raise Missing if the list of bonds of a coupled run would take too long.
+    """Raise Missing if the sum over a list of bonds would take too long.
 
-    The seconds of a list that grows are uncertain: its run is stopped when it turns out to be too
-    long.
+    The CPU time of a growing list is uncertain: its run is stopped only when it turns out too long.
     """
     if not has_list(model, numerics):
         return

@@ -32,14 +32,14 @@ from .reading import Reader
 from .solution import CycleLoop, Solution, normal_load, sampled_loop
 
 END_ERROR_FACTOR = (
-    1.5  # factor on the first-order change due to an end that is not the requested one
+    1.5  # safety factor on the first-order error of a run that ends beside its requested end
 )
 
 
 class March(NamedTuple):
-    """Finished march of a rig.
+    """Finished march of a rig, with its contact model and CPU time.
 
-    - contact: contact that was moved.
+    - contact: contact model of the march.
     - result: MarchResult.
     - seconds: CPU seconds of the march.
     - prepare: CPU seconds of its preparation by name.
@@ -52,7 +52,7 @@ class March(NamedTuple):
 
 
 def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """March with numerics.steps steps per cycle, and return the Solution.
+    """March a rig in time and evaluate its measures.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) 
 
 
 def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None) -> March:
-    """March with numerics.steps steps per cycle, without reading the measures.
+    """March a rig in time without evaluating its measures.
 
     Parameters
     ----------
@@ -84,10 +84,10 @@ def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None
     engine.warm_up(rig.modes, rig.drive.signal, contact, say)
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
-    # strips have no common shear stress, so no frames are kept
+    # strips that slide independently have no common shear stress, so that no frames are kept
     frames = 0 if rig.friction.strips_slide_apart else frames
     progress = ListGuard(progress) if has_list(model, numerics) else progress
-    # the histories of a run for gathered points are not used
+    # the histories of a patch reduced to few points are not used
     keeps_extremes = model.patch is not None and model.patch.mesh.can_gather_points
     done = engine.march(
         rig.modes,
@@ -112,7 +112,7 @@ def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None
 
 
 class MarchReader(Reader):
-    """Reader of a finished march."""
+    """Evaluator of a march in time."""
 
     def __init__(self, model, numerics, patch, contact):
         held = 0.0
@@ -124,14 +124,14 @@ class MarchReader(Reader):
         super().__init__(model, numerics, patch, contact, held)
 
     def solution_fields(self, run, drive) -> dict:
-        """Return the levels, the sum over bonds, and the errors due to the end of the run."""
+        """Return the drive levels, the sum over bonds and the errors due to the end of the run."""
         fields = {"summed": self.choose_bond_sum(), "extra": {"late": self.late(run.window)}}
         if self.model.rig.drive.levels.amplitudes:
             fields["levels"], fields["probe"] = self._levels(run)
         return fields
 
     def stated_errors(self, run, drive, values: dict) -> dict:
-        """Return the errors due to peaks between samples and due to the end of the run, by name.
+        """Return the errors due to peaks between samples and due to the end of the run.
 
         Parameters
         ----------
@@ -143,31 +143,31 @@ class MarchReader(Reader):
         return {name: late.get(name, 0.0) + between.get(name, 0.0) for name in late | between}
 
     def peak_excesses(self, window) -> dict:
-        """Return by how much the peaks of a run may exceed its samples, by measure name."""
+        """Estimate how far the peaks of a motion exceed its samples, by measure."""
         return peak_sampling_errors(window, self.model.grooves is not None)
 
     def late(self, window) -> dict:
-        """Return the errors due to an end at a sample next to the requested end, by name."""
+        """Estimate the errors due to a run that ends at a sample beside the requested end."""
         steps = self.numerics.cycles * self.numerics.steps
         period = self.model.rig.drive.signal.period
         changes = estimate_window_error(window, period, steps - round(steps))
         return {name: END_ERROR_FACTOR * change for name, change in changes.items()}
 
     def choose_bond_sum(self):
-        """Return the EngineChoice of the sum over bonds; None for laws without bonds."""
+        """Choose how the forces of bonds are summed; None for a law without bonds."""
         friction = self.model.friction
         if friction is None or not law_has_trait(friction.law, "bonds"):
             return None
         return choose_quadrature(self.model, self.numerics)
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
-        """Return the two values of the friction work, both of which a march integrates."""
+        """Return the friction work of a run from its samples and from its energy balance."""
         return IntegratedMeasures(
             friction_works=tuple(run.ledger[name] for name in ("sampled", "booked", "passed"))
         )
 
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return the loop and, if an interface with a set-valued law sticks, its known measures.
+        """Return the friction loop and the measures of a stuck interface for the evaluation.
 
         Parameters
         ----------
@@ -188,16 +188,16 @@ class MarchReader(Reader):
             return fields
         # the energies of a stuck interface are round-off of the kinetic energy
         moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
-        # the remaining motion is round-off, not slip
+        # the remaining motion of the interface is round-off, not slip
         return fields | {
             "book": run.ledger | {"power": run.ledger["power"] + moving},
             "known": {"slip_start_phase": None, "stick_fraction": 1.0},
         }
 
     def inside_steps(self, window, number: int):
-        """Return the window of an interface, with samples inside the steps if its force needs them.
+        """Add samples within the time steps to the window of a law that overshoots.
 
-        They are added for laws whose force exceeds its limit within a step.
+        Samples are added for laws whose force exceeds its limit within a step.
 
         Parameters
         ----------
@@ -219,7 +219,7 @@ class MarchReader(Reader):
         return motion_inside_steps(window, make_law(interface.numbers, load), load)
 
     def _loop(self, part, drive) -> CycleLoop | None:
-        """Return harmonics of slide and force, and work per cycle, of an interface or all strips.
+        """Compute the first harmonics of the friction loop and the friction work per cycle.
 
         If no other forces act besides drive and friction, the harmonics of the force come from the
         motion (`friction_harmonic`).
@@ -229,9 +229,9 @@ class MarchReader(Reader):
         rig = self.model.rig
         work = getattr(part, "window_work", None)
         work = part.work if work is None else work
-        # the yaw of strips contributes work as well
+        # strips that yaw do more work than their mean slide
         together = self.contact.set_valued and not rig.friction.strips_slide_apart
-        # work of this interface only, without the impacts at stops
+        # the work of this interface excludes other interfaces and impacts at stops
         if len(rig.friction.names) > 1 or together:
             work = float(part.step_force @ np.diff(window.slide)) + lateral_work(window, 0)
         span = window.time[-1] - window.time[0]
@@ -251,12 +251,12 @@ class MarchReader(Reader):
         return sampled_loop(window, drive, work, force)
 
     def _levels(self, done) -> tuple:
-        """Return the levels of the drive, and the probe of `levels.onset`."""
+        """Return the drive levels of a run, and the function that runs another level."""
         rig = self.model.rig
         numerics = self.numerics
 
         def probe(number, level):
-            """Run another level after the level of this index, and return its Level."""
+            """Run another level from the end of an earlier one; number -1 starts at rest."""
             other = rig_levels.drive_at_level(rig.drive.signal, number + 1, level)
             if number >= 0:
                 run = done.marks[number].after.fork(other)

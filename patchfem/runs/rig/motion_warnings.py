@@ -26,10 +26,10 @@ from .costs import reason_to_march_elements
 from .engines import ENGINES, PIECES
 from .solution import normal_load
 
-# relative excess of the largest motion in the window over the amplitude, from which the motion
-# decays
+# a release still decays if its largest motion in the last cycles exceeds the amplitude of its last cycle by
+# this fraction
 DECAYS = 1e-3
-AT = 1e-9  # relative difference of two equal frequencies
+AT = 1e-9  # relative difference up to which two frequencies are equal
 AS_ONE_POINT = (
     "the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
     "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
@@ -38,7 +38,7 @@ AS_ONE_POINT = (
 
 
 def collect_warnings(run) -> list:
-    """Return the warnings of a `passes.Coupled`."""
+    """Return the warnings of a coupled run on its law, load and engine."""
     model = run.model
     patch = run.patch
     solution = run.solution
@@ -95,13 +95,13 @@ def collect_warnings(run) -> list:
 
 
 def _face_warnings(face, response) -> list:
-    """Return the warnings on the patch of an interface."""
+    """Return the warnings on the patch of one interface."""
     warnings = [] if face.partial_slip else [AS_ONE_POINT]
     return [*warnings, *warn_of_large_slide(face.patch, face.slide(response))]
 
 
 def peak_at_an_end(run, modes) -> list:
-    """Return the sentence, in a list, on a sweep whose largest response is at one of its ends.
+    """Return the warning on a sweep whose largest response is at one of its ends.
 
     Parameters
     ----------
@@ -132,12 +132,12 @@ def peak_at_an_end(run, modes) -> list:
 
 
 def nearest_sweep_end(frequency: float, *ends: float) -> float | None:
-    """Return the end of a sweep that equals a frequency, all in [Hz]; None if there is none."""
+    """Return the end [Hz] of a sweep that equals a frequency [Hz], or None."""
     return next((end for end in ends if abs(frequency - end) <= AT * end), None)
 
 
 def _nearest_resonance(modes: list, at: float, *, upper: bool) -> str:
-    """Return a phrase on the mode whose resonance is nearest to a frequency, or "".
+    """Describe the mode whose resonance is nearest to a frequency on one side, or return "".
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def _nearest_resonance(modes: list, at: float, *, upper: bool) -> str:
 
 
 def collect_notes(run) -> list:
-    """Return the notes of a `passes.Coupled` on its law, engine, fields and the end of its motion."""
+    """Return the notes of a coupled run on its law, engine, fields and the end of its motion."""
     model = run.model
     solution = run.solution
     rig = run.model.rig
@@ -197,7 +197,7 @@ def collect_notes(run) -> list:
 
 
 def _release_sentence(run) -> list:
-    """Return the sentence on the time span of the measures of a release that still decays."""
+    """Return the note on the time span of the measures of a decaying release."""
     rig = run.model.rig
     window = run.solution.window
     main = run.measures["relative_displacement_amplitude"]
@@ -216,7 +216,7 @@ def _release_sentence(run) -> list:
 
 
 def _lateral_motion_sentence(run) -> list:
-    """Return the sentence on the neglected lateral motion of strips that yaw."""
+    """Return the note on the neglected lateral motion of strips that yaw."""
     if (
         not run.model.rig.friction.strips_slide_apart
         or run.patch.strips.offsets.size < 2
@@ -236,7 +236,7 @@ def _lateral_motion_sentence(run) -> list:
 
 
 def creeping_note(friction) -> list:
-    """Return the sentence on a law that never sticks."""
+    """Return the note on a friction law that never sticks."""
     if friction is None or not law_has_trait(friction.law, "creeps"):
         return []
     return [
@@ -247,7 +247,7 @@ def creeping_note(friction) -> list:
 
 
 def _as_one_point(model, patch, numerics) -> list:
-    """Return the sentence, in a list, on a patch that moves exactly as one point."""
+    """Return the warning on a patch that moves exactly like a single point."""
     f = model.friction
     moves = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart
     if (
@@ -263,7 +263,7 @@ def _as_one_point(model, patch, numerics) -> list:
 
 
 def _bond_notes(model, patch, solution) -> list:
-    """Return notes, as a list, on bonds that grow."""
+    """Return the notes on bonds that grow."""
     f = model.friction
     if f is None or not law_has_trait(f.law, "bonds"):
         return []
@@ -275,7 +275,7 @@ def _bond_notes(model, patch, solution) -> list:
 
 
 def _engine_notes(run) -> list:
-    """Return the note on a march, or on a steady motion, of elements that stick or slip."""
+    """Return the note on how the motion of elements that stick or slip is computed."""
     if PIECES.lacks(run.model):
         return []
     if run.numerics.engine == "march":
@@ -286,7 +286,7 @@ def _engine_notes(run) -> list:
 
 
 def _note_marched_elements(run) -> list:
-    """Return the note on a march of elements with too many yields for the exact engine."""
+    """Return the note on elements that are marched because they yield too often."""
     model = run.model
     if model.accuracy.method != "auto" or "steps_per_cycle" in run.numerics.pinned:
         return []
@@ -298,7 +298,7 @@ def _note_marched_elements(run) -> list:
 
 
 def _note_unmoved_elements(run) -> list:
-    """Return the note on a steady motion with elements that never slip."""
+    """Return the note on a steady motion in which some elements never slip."""
     if run.solution.outcome not in (Outcome.STEADY, Outcome.STUCK):
         return []
     window = run.solution.window
@@ -339,9 +339,9 @@ def law_warnings(model, outcome, measures, peak: float) -> list:
 
 
 def created_warning(model, book: dict, cycles: float) -> list:
-    """Return a sentence, in a list, on energy that the printed law created.
+    """Return the warning on energy that the printed law created.
 
-    It creates energy in steps in which it returns more than it had stored.
+    The law creates energy in steps in which it returns more than it had stored.
 
     Parameters
     ----------
@@ -365,7 +365,7 @@ def created_warning(model, book: dict, cycles: float) -> list:
 
 
 def modes_note(model, kept: int, nodes: int) -> list:
-    """Return the sentence on the shear modes of a patch whose normal force changes.
+    """Return the note on the shear modes of a patch whose normal force changes.
 
     Parameters
     ----------

@@ -14,15 +14,16 @@ from ...structure.drive_sizes import count_repeat_cycles, find_min_decay_rate, i
 from .costs import MARCH_SETTINGS, count_merges, steps_per_cycle
 from .engines import MARCH, PIECES, SMOOTH, choose_engine
 
-# fraction of a cycle by which a run may differ from whole cycles: a record of 30 periods has 30
+# fraction of a cycle by which a whole number of cycles may be missed by round-off, so that a record of 30
+# periods has 30 cycles
 WHOLE_CYCLE_TOL = 1e-6
-N_DECAY_TIMES = 3.0  # decay times after which the mean square of the transient is e^-6 of its start
-LEAST_KEPT = 100  # smallest number of samples of a run without cycles
+N_DECAY_TIMES = 3.0  # decay times of a transient, which reduce its mean square to e^-6
+LEAST_KEPT = 100  # smallest number of samples of a run whose drive is not sinusoidal
 
 
 @dataclass(frozen=True, slots=True)
 class Numerics:
-    """Numerical settings of a run.
+    """Numerical settings of a coupled run.
 
     - engine: name of the engine.
     - steps: time steps per cycle.
@@ -31,8 +32,7 @@ class Numerics:
     - per_point: whether bonds are followed at every node.
     - pinned: settings that the scene fixed.
     - choice: method of the sum over bonds; None: by the tolerance and the steps.
-    - whole: whether the run keeps its histories from before the window, which a coarse run need not
-      do.
+    - whole: whether the run keeps its histories from before the window; a coarse run need not.
     - local: relative error that a step of the smooth engine may have.
     - pairs: how often neighbouring cells of a density are merged in pairs.
     - joined: (number of cells that a coarse run merges into one, first cell of the merging); () for
@@ -61,8 +61,8 @@ class Numerics:
     def finer(self):
         """Return finer settings for the next run.
 
-        They have four times as many cells if cells are merged; else a hundredth of the error of a
-        step of the smooth engine, or twice as many steps.
+        The next run has four times as many cells if cells are merged; else a hundredth of the error
+        of a step of the smooth engine, or twice as many steps.
         """
         if self.pairs:
             return replace(self, pairs=max(0, self.pairs - 2))
@@ -72,7 +72,7 @@ class Numerics:
 
 
 def choose(model: Model) -> Numerics:
-    """Return engine and numerical settings of a coupled run, from the scene or its tolerance.
+    """Choose the engine and the numerical settings of a coupled run.
 
     Parameters
     ----------
@@ -87,13 +87,13 @@ def choose(model: Model) -> Numerics:
     rig = model.rig
     engine = choose_engine(model)
     window = int(max(1, min(10, (rig.drive.cycles + WHOLE_CYCLE_TOL) // 10)))
-    # the window is the whole record except the transient at its start
+    # under a random drive, the evaluated window is the whole record except the transient at its start
     if rig.drive.waveform.is_random:
         rate = find_min_decay_rate(rig.modes) * rig.drive.signal.period
         start = min(rig.drive.cycles / 4, N_DECAY_TIMES / rate if rate else np.inf)
         window = int(max(1, rig.drive.cycles - start + WHOLE_CYCLE_TOL))
     beat = count_repeat_cycles(rig.drive.signal) or 0.0
-    if 1 < beat <= rig.drive.cycles:  # the window contains whole beats
+    if 1 < beat <= rig.drive.cycles:  # the evaluated window contains whole periods of the beat
         window = int(beat * max(1, min(10, rig.drive.cycles // (10 * beat))) + WHOLE_CYCLE_TOL)
     if rig.drive.levels.amplitudes:
         window = min(window, int(rig.drive.levels.cycles + WHOLE_CYCLE_TOL))
@@ -115,14 +115,14 @@ def choose(model: Model) -> Numerics:
     if engine is PIECES:
         return replace(numerics, pairs=count_merges(model))
     if engine is MARCH and accuracy.steps_per_cycle is None:
-        # the solution is unique, and the last step ends where the run ends
+        # the steps are short enough for a unique solution, and the last step ends where the run ends
         steps = ending(max(steps, unique_steps(model)), rig.drive.cycles)
         return replace(numerics, steps=steps)
     return numerics
 
 
 def step_tolerance(tolerance: float) -> float:
-    """Return the relative error of a step of the smooth engine.
+    """Return the relative error that a step of the smooth engine may have.
 
     The energy balance requires 1e-9 if the tolerance does not require less.
     """
@@ -130,9 +130,9 @@ def step_tolerance(tolerance: float) -> float:
 
 
 def ending(steps: int, cycles: float) -> int:
-    """Return the steps per cycle >= `steps` with which a run ends nearest to the requested time.
+    """Return steps per cycle >= `steps` with which a run ends nearest to the requested time.
 
-    They are a multiple of 4, because runs with a half and a quarter of them show the order. A run
+    The steps are a multiple of 4, because runs with a half and a quarter of them show the order. A run
     ends at a sample, and the last of its `cycles` may be incomplete. An end that is wrong by half a
     step is an error of first order in all measures of the last cycles. Up to an eighth more steps
     are tried.
@@ -146,9 +146,9 @@ def ending(steps: int, cycles: float) -> int:
 
 
 def unique_steps(model: Model) -> int:
-    """Return the smallest even number of steps per cycle with a unique solution.
+    """Return the smallest even number of steps per cycle for which each step has one solution.
 
-    It is 0 except for bonds that weaken: dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, with k_t = mu_s
+    It is 0 except for bonds that weaken, which need dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, with k_t = mu_s
     N/eps_0 and the mass M that the interface moves.
     """
     f = model.friction

@@ -26,7 +26,7 @@ from .solution import Solution
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Coupled:
-    """Coupled run between two of its passes.
+    """Coupled run between two of the passes that complete its result.
 
     - inputs: plan and pressed patch.
     - numerics, solution: settings and Solution of the engine.
@@ -46,7 +46,7 @@ class Coupled:
 
     @property
     def model(self):
-        """Model that was solved."""
+        """Model that the run solved."""
         return self.inputs.plan.model
 
     @property
@@ -56,12 +56,12 @@ class Coupled:
 
     @property
     def drive(self):
-        """Drive of the motion that is shown."""
+        """Drive of the motion in the result."""
         return self.solution.extra.get("at", self.model.rig.drive.signal)
 
     @property
     def has_friction(self) -> bool:
-        """Whether friction acts."""
+        """Whether friction acts in the run."""
         return self.model.friction is not None
 
     @property
@@ -77,7 +77,7 @@ class Coupled:
 
 
 def add_level_measures(run: Coupled) -> Coupled:
-    """Return the run with the measures over all levels of its drive."""
+    """Add the measures over all drive levels to a run."""
     solution = run.solution
     model = run.model
     measures = levels.level_measures(
@@ -92,9 +92,9 @@ def add_level_measures(run: Coupled) -> Coupled:
 
 
 def add_outcome(run: Coupled) -> Coupled:
-    """Return the run with its outcome, and errors that include those the run itself states.
+    """Add the outcome and the stated errors to a run.
 
-    A run whose energy balance has too large an error has not converged.
+    A run whose energy balance has too large an error gets the outcome NOT_CONVERGED.
     """
     solution = run.solution
     if text := describe_balance_error(ENGINES[run.numerics.engine], run.measures):
@@ -113,7 +113,7 @@ def add_outcome(run: Coupled) -> Coupled:
         rig.drive.levels.cycles,
         find_decay_rate(rig.modes),
     )
-    # without a stop in the scene the limit of the motion is that of the program
+    # without a stop in the scene, only the largest motion that the program allows was exceeded
     if outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL:
         outcome = Outcome.GROWS
         measures = remove_errors(measures)
@@ -121,7 +121,7 @@ def add_outcome(run: Coupled) -> Coupled:
 
 
 def add_reasons(run: Coupled) -> Coupled:
-    """Return the run with a reason for each measure that lacks a value."""
+    """Add to a run the reason for each measure that lacks a value."""
     measures = run.measures
     window = run.solution.window
     model = run.model
@@ -141,10 +141,10 @@ def add_reasons(run: Coupled) -> Coupled:
 
 
 def add_decay(run: Coupled) -> Coupled:
-    """Return the run of a release with its decay curve, and errors not below those of the mesh.
+    """Add the decay curve of a release to its run, with the errors due to the mesh.
 
-    The ringing has the error at half the swing in the last stick interval. The notes say for which
-    errors the mesh is not included.
+    The ringing has the mesh error at its amplitude in the last stick interval. Notes name the results
+    whose errors exclude that of the mesh.
     """
     model = run.model
     solution = run.solution
@@ -185,7 +185,7 @@ def add_decay(run: Coupled) -> Coupled:
 
 
 def _half_swing_of_ringing(run: Coupled) -> float:
-    """Return half the swing [m] in the last stick interval; 0 if no ringing is measured in it."""
+    """Return half the range of the output [m] in the last stick interval with ringing."""
     solution = run.solution
     window = solution.window
     ring = run.measures.get("ring_frequency")
@@ -198,13 +198,13 @@ def _half_swing_of_ringing(run: Coupled) -> float:
 
 
 def add_limit_cycles(run: Coupled) -> Coupled:
-    """Return the run with the unstable limit cycle of a mode that gains energy."""
+    """Add the unstable limit cycle of a self-excited mode to a run."""
     measures, notes = flutter.find_limit_cycles(run)
     return replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
 
 
 def collect_warnings(run: Coupled) -> list:
-    """Return the warnings of a run."""
+    """Return the warnings of a coupled run."""
     plan = run.inputs.plan
     return [
         *motion_warnings.collect_warnings(run),
@@ -213,7 +213,7 @@ def collect_warnings(run: Coupled) -> list:
 
 
 def outcome_on_pieces(run: Coupled) -> Outcome:
-    """Return the outcome of a run; LEAVES_CONTACT if a piece slides off the other one."""
+    """Return the outcome of a run, or LEAVES_CONTACT if a piece slides off the other."""
     model = run.model
     response = run.solution.response
     outcome = outcome_on_piece(run.outcome, model.patch, run.patch, response.slide)
@@ -224,7 +224,7 @@ def outcome_on_pieces(run: Coupled) -> Outcome:
 
 
 def collect_extra(run: Coupled, measures: dict, notes: list) -> dict:
-    """Return the other data of a Result: settings, levels, events, energies and notes.
+    """Collect settings, levels, events, energies and notes of a run for its Result.
 
     Parameters
     ----------

@@ -35,20 +35,22 @@ from .levels import remove_incomplete_cycle, run_levels
 from .reading import Reader
 from .solution import Solution, mode_stiffness, normal_load
 
-# measures that are known without an interface
+# measures of the motion, which exist without an interface
 OF_MOTION = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
     "absolute_acceleration_fundamental",
     "acceleration_distortion",
 )
-MAX_CHANGE_RATIO = 1e-2  # fraction of the tolerance by which a settled motion may still change
-N_CHANGE_WINDOWS = 3  # last windows from which the change of the motion is estimated
-MIN_DECAY = 1e-6  # smallest fraction of a free motion that is assumed to decay in these windows
+MAX_CHANGE_RATIO = 1e-2  # largest relative change of a settled motion over the tolerance
+N_CHANGE_WINDOWS = 3  # number of last windows whose extremes show the change of the motion
+MIN_DECAY = (
+    1e-6  # lower bound [1] of the decay of a free motion in the last windows, for lack of damping
+)
 
 
 def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Solve a rig with Coulomb friction, or a structure without friction.
+    """Solve a rig with Coulomb friction, or without friction, from event to event.
 
     Parameters
     ----------
@@ -70,7 +72,7 @@ def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) 
 
 
 def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Solve a rig with elastic-plastic elements.
+    """Solve a rig with elastic-plastic elements from yield to yield.
 
     Parameters
     ----------
@@ -91,7 +93,7 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
 
 
 def _run(reader, frames: int, say, progress) -> Solution:
-    """Run the drive of a rig, level by level if it has levels, and return the Solution."""
+    """Run the drive of a rig from event to event, one level after the other."""
     rig = reader.model.rig
     numerics = reader.numerics
     begin = perf_counter()
@@ -101,7 +103,7 @@ def _run(reader, frames: int, say, progress) -> Solution:
     begin = perf_counter()
 
     def integrate(drive, state, watch, is_last, cycles: float = rig.drive.levels.cycles):
-        """Integrate a drive from a state, and return the run of the whole patch.
+        """Integrate the motion under a drive from a given state.
 
         Parameters
         ----------
@@ -138,7 +140,10 @@ def _run(reader, frames: int, say, progress) -> Solution:
 
 
 class PieceReader(Reader):
-    """Reader of a finished run from event to event; found: RigidElements or YieldingElements."""
+    """Evaluator of an event-driven run.
+
+    found: RigidElements or YieldingElements of the run.
+    """
 
     def __init__(self, model, numerics, patch, found):
         super().__init__(
@@ -150,7 +155,7 @@ class PieceReader(Reader):
         self.apart = found.rigid and model.rig.friction.strips_slide_apart
 
     def average_over_strips(self, run):
-        """Return the run with histories of the whole patch, if its strips slide independently."""
+        """Average the histories of strips that slide independently over the patch."""
         if not self.apart:
             return run
         loads = strips.strip_loads(self.patch)
@@ -162,7 +167,7 @@ class PieceReader(Reader):
         )
 
     def sticks(self, run) -> bool:
-        """Return whether the interface sticks, or all of its strips if they slide independently."""
+        """Return whether the interface sticks, or all its strips if they slide independently."""
         if self.apart and self.has_friction:
             return run_events.is_all_stuck(run.window, self.held)
         return super().sticks(run)
@@ -176,7 +181,7 @@ class PieceReader(Reader):
         return IntegratedMeasures(loops=(_strips_loop(run, drive),) if self.apart else run.loops)
 
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return the measures that the engine computes between events, as fields of `LastCycles`.
+        """Return the measures that the engine computes between events, for the evaluation.
 
         Rigid elements dissipate all work of friction, so that their ledger is known.
 
@@ -208,7 +213,7 @@ class PieceReader(Reader):
         }
 
     def rings(self, run, drive) -> tuple:
-        """Return the ringing during stick, and its errors.
+        """Compute frequency and damping of the ringing during stick, with errors.
 
         It is known in closed form for a single element, and if every interface sticks until the end
         of a run without a sine. For a periodic motion, the stick intervals of one cycle are used.
@@ -226,10 +231,10 @@ class PieceReader(Reader):
         )
 
     def held_modes(self, run, motion, drive) -> list:
-        """Return `ringing.held_modes` of a part of a run, or [].
+        """Return the modes that ring while every interface is held by a single spring.
 
-        It is [] unless only a constant force acts in this part, and every interface is a single
-        spring that sticks until the end.
+        The list is empty unless only a constant force acts in this part of the run, and every
+        interface is a single spring that sticks until the end.
 
         Parameters
         ----------
@@ -252,7 +257,7 @@ class PieceReader(Reader):
         return held_modes(self.model.rig.modes, np.concatenate(springs), motion)
 
     def tail(self, run, drive) -> dict:
-        """Return the ringing after the last slip of a release, for `Solution.extra`, or {}."""
+        """Return the mode that rings after the last slip of a release, or {}."""
         if (
             self.model.rig.drive.kind != "free"
             or run.response is None
@@ -265,7 +270,7 @@ class PieceReader(Reader):
         return {"tail": select_strongest(held, "displacement")} if held else {}
 
     def stated_errors(self, run, drive, values: dict) -> dict:
-        """Return the errors of measures that come from samples, and of the drift of rigid elements.
+        """Return the errors due to sampling and the error of the drift of rigid elements.
 
         The drift of rigid elements has the round-off of the difference of two means; below 1.5
         cycles there are no means, only the ends of the window. The means of independent strips are
@@ -290,7 +295,7 @@ class PieceReader(Reader):
         return left | {"drift_per_cycle": 1e-13 * faster * float(np.ptp(window.slide))}
 
     def solution_fields(self, run, drive) -> dict:
-        """Return the ringing of a release, and the steady motion if the windows still change."""
+        """Return the ringing of a release and, for a changing motion, the steady amplitude."""
         fields = {}
         if tail := self.tail(run, drive):
             fields["extra"] = tail
@@ -311,7 +316,7 @@ class PieceReader(Reader):
 
 
 def _strips_loop(run, drive) -> InterfaceLoop:
-    """Return the loop of strips averaged to one interface, from the samples of the window.
+    """Compute the friction loop of a patch from the samples of its independent strips.
 
     The samples are those on both sides of every event; the yaw does work in addition to the mean
     slide.
@@ -334,7 +339,7 @@ def _strips_loop(run, drive) -> InterfaceLoop:
 
 
 def still_changes(extremes, window: int, tolerance: float, decay: float) -> bool:
-    """Return whether a motion may still change by more than MAX_CHANGE_RATIO times the tolerance.
+    """Return whether a motion may still change by more than a fraction of the tolerance.
 
     It may if the run is too short, or if the extremes of its cycles have moved too much in the last
     N_CHANGE_WINDOWS windows, divided by the fraction of the slowest free motion that decays in this time.
@@ -359,7 +364,7 @@ def still_changes(extremes, window: int, tolerance: float, decay: float) -> bool
 
 
 def find_steady_motion(modes, drive, groups, done) -> tuple | None:
-    """Return the amplitude [m] and its error [m] of the stable motion that a run converges to.
+    """Compute the steady amplitude [m], with its error, to which a run converges.
 
     It is found by the map of the yields over a period.
 
@@ -396,7 +401,7 @@ def find_steady_motion(modes, drive, groups, done) -> tuple | None:
 
 
 def find_stable_amplitude(amplitude: float, residual: float, multipliers) -> tuple:
-    """Return the amplitude [m] of a stable periodic motion and its error [m]; NaN if unstable.
+    """Return the amplitude [m] and error of a periodic motion, or NaN if it is unstable.
 
     Parameters
     ----------
@@ -415,7 +420,7 @@ def find_stable_amplitude(amplitude: float, residual: float, multipliers) -> tup
 
 
 class YieldingElements:
-    """Elastic-plastic elements of every interface of a model.
+    """Elastic-plastic friction elements of all interfaces of a model.
 
     - groups: elements of each interface.
     - contact: ContactModel of a single interface.
@@ -449,7 +454,10 @@ class YieldingElements:
 
 
 class RigidElements:
-    """Rigid elements `groups` of every Coulomb interface of a model; any slip counts as slip."""
+    """Rigid friction elements of all Coulomb interfaces of a model.
+
+    Any slip counts as slip.
+    """
 
     rigid = True
     contact = None
@@ -462,7 +470,7 @@ class RigidElements:
 
 
 def coulomb_limits(model, patch) -> list:
-    """Return the static and kinetic friction limits [N] of every interface; 0 without friction."""
+    """Return the static and kinetic friction limits [N] of every Coulomb interface."""
     rig = model.rig
     friction = model.friction
     if rig.friction.strips_slide_apart:
@@ -482,7 +490,7 @@ def coulomb_limits(model, patch) -> list:
 
 
 def elements_of_law(element) -> elements.Elements:
-    """Return the Elements of an Element of form "parallel"."""
+    """Return the elastic-plastic elements of a law of parallel springs and sliders."""
     count = int(element.numbers[1])
     return elements.make_elements(
         element.numbers[2 : 2 + count], element.numbers[2 + count : 2 + 2 * count]
@@ -492,7 +500,7 @@ def elements_of_law(element) -> elements.Elements:
 def measures_from_reading(
     reading: Reading, book: dict, *, sine: bool, whole: bool, stiffness, size
 ) -> dict:
-    """Return measures of the first interface and the motion by name, of one run or (n,) of many.
+    """Return measures of the motion and the first interface of one or many event-driven runs.
 
     Parameters
     ----------
@@ -533,7 +541,7 @@ def measures_from_reading(
 
 
 def _loop_measures(reading: Reading, stiffness, *, sine: bool) -> dict:
-    """Return the measures of the loop of the first interface by name."""
+    """Return the measures of the friction loop of the first interface."""
     loop = reading.loop()
     moves = (
         reading.interface_value(InterfaceMeasure.MAX_SLIDE)
@@ -550,9 +558,9 @@ def _loop_measures(reading: Reading, stiffness, *, sine: bool) -> dict:
 
 
 def _work_check(reading: Reading, book: dict):
-    """Return the relative difference [1] of the friction work from samples and from the ledger.
+    """Return the relative difference [1] of friction work from samples and energy balance.
 
-    The samples are the ends of the pieces, with the trapezoidal rule.
+    The samples are the ends of the time intervals; their work follows from the trapezoidal rule.
     """
     sampled = reading.faces[..., InterfaceMeasure.END_WORK].sum(axis=-1)
     booked = reading.faces[..., InterfaceMeasure.WORK].sum(axis=-1)

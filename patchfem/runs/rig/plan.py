@@ -42,9 +42,9 @@ from .costs import (
 from .engines import ENGINES, PIECES, choose_steady_method
 from .numerics import choose
 
-# bytes per pair of coordinates: matrices, shapes and workspace of the eigenvalue solver
+# memory [bytes] per pair of modes: matrices, shapes and workspace of the eigenvalue solver
 MODE_PAIR = 125.0
-# bytes per pair of harmonics of a balance: Jacobian, and the factors for its error
+# memory [bytes] per pair of unknown harmonics: Jacobian of the balance, and the factors for its error
 HARMONIC_PAIR = 94.0
 MODE_NODE = 24.0  # memory per shear mode and node of the interface [bytes]
 DRIVE_ROW = 400.0  # memory per row of a recorded drive [bytes]
@@ -54,17 +54,17 @@ STEADY_CODES = {
     "harmonic": BALANCE_CODE,
     "march": None,
 }
-# points of a curve over frequency, including those at its bends and peak
-N_MAPPED_POINTS = 160  # points of a curve by maps of events or yields, or by marches
-N_BALANCE_POINTS = 250  # points of a curve by harmonic balance
-N_MARCHED_CYCLES = 400.0  # cycles of all marches until a motion repeats
+# expected points of a curve over frequency, including those at its bends and peak
+N_MAPPED_POINTS = 160  # by maps of events or yields, or by marches
+N_BALANCE_POINTS = 250  # by harmonic balance, which follows the folds of the curve
+N_MARCHED_CYCLES = 400.0  # expected cycles of all marches until a motion repeats
 # relative distance from the frequency of a mode within which a sine excites a resonance
 RESONANT = 0.02
-STIFF = 10.0  # stiffness over that of the mode, from which a link holds the block
+STIFF = 10.0  # ratio of link to modal stiffness, from which a link holds the block nearly at rest
 
 
 def chain(rig) -> dict:
-    """Return the stiffness [N/m] of the links of the stiffness chain of a Rig, by name."""
+    """Return the stiffness [N/m] of the structural links of the stiffness chain of a rig."""
     return {"mode": rig.first_mode.stiffness} | (
         {"bonded": rig.springs.bonded} if rig.springs.bonded is not None else {}
     )
@@ -73,7 +73,8 @@ def chain(rig) -> dict:
 def held_stiffness(chain: dict, number: int = 0) -> float:
     """Return the tangential stiffness [N/m] of an interface while it sticks.
 
-    It is that of its links in series; inf if all are rigid, 0 for a law that creeps.
+    The links of the interface act in series. The result is inf if all are rigid, and 0 for a law that
+    creeps.
 
     Parameters
     ----------
@@ -95,9 +96,9 @@ def held_stiffness(chain: dict, number: int = 0) -> float:
 
 
 def stuck_stiffness(rig, chain: dict) -> np.ndarray:
-    """Return `held_stiffness` (i,) of every slide of a Rig; inf without friction.
+    """Return the tangential stiffness (i,) [N/m] of all interfaces of a rig while they stick.
 
-    Strips have that of their patch.
+    Strips have the stiffness of their patch; without friction the stiffness is inf.
     """
     n_interfaces = len(rig.friction.interfaces)
     stiffness = np.full(len(rig.modes.interfaces), inf)
@@ -108,7 +109,7 @@ def stuck_stiffness(rig, chain: dict) -> np.ndarray:
 
 
 def remove_expected_joint(rig, links: dict):
-    """Return a Rig without the joint that was present when its modes were measured.
+    """Remove the joint that was present in the modal test from the modes of a rig.
 
     The patch that forms the joint is not pressed yet, so that its stiffness follows from the links
     of a chain. If these are stiffer than the modes allow, the Rig is unchanged.
@@ -122,7 +123,7 @@ def remove_expected_joint(rig, links: dict):
 
 
 def mode_frequencies(rig, chain: dict) -> list:
-    """Return name, free and stuck frequency [Hz] of each mode.
+    """Return the name and the free and stuck frequencies [Hz] of each mode.
 
     The stuck frequency is that with the contact held by the links of a chain; None if no link is
     compliant, and without friction.
@@ -148,7 +149,7 @@ def mode_frequencies(rig, chain: dict) -> list:
 
 
 def cost(model: Model, points: int) -> Cost:
-    """Return the cost of a coupled run.
+    """Return the predicted cost of a coupled run.
 
     Parameters
     ----------
@@ -173,14 +174,14 @@ def cost(model: Model, points: int) -> Cost:
 
 
 def _motion_sentences(model: Model, numerics) -> list:
-    """Return the sentences on how the motion of a rig with friction is computed."""
+    """Return the sentences of a plan on how the motion of a rig is computed."""
     if ENGINES[numerics.engine].finds_periodic_motion:
         return [f"the steady motion is found by {choose_steady_method(model).words}"]
     return bond_sum_sentences(model, numerics)
 
 
 def march_cost(model: Model, numerics, points: int) -> Cost:
-    """Return the cost of a march with its coarse runs.
+    """Return the predicted cost of a march with its coarse runs.
 
     Parameters
     ----------
@@ -215,7 +216,7 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
         )
     else:
         each = _step_without_modes(model, numerics, points, is_bonds=is_bonds)
-    # runs with a half and a quarter of the steps, and with each halving of the step
+    # the cost includes runs with a half and a quarter of the steps, and each halving of the step
     passes = 0.75 + 2 ** (lists.halvings(model) + 1) - 1
     times = {
         "motion": steps * passes * each,
@@ -226,12 +227,12 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
 
 
 def march_code(model: Model) -> EngineCode:
-    """Return the compiled code of a march."""
+    """Return the cost of the compiled code of a march."""
     return SHEAR_MARCH_CODE if model.partial_slip else MARCH_CODE
 
 
 def _step_without_modes(model: Model, numerics, points: int, *, is_bonds: bool) -> float:
-    """Return the CPU seconds of a step of a march without shear modes and list of bonds."""
+    """Return the CPU time [s] of a march step without shear modes and list of bonds."""
     rig = model.rig
     step = _step(model.rig, model.friction)
     if model.grooves is not None:
@@ -248,7 +249,7 @@ def _step_without_modes(model: Model, numerics, points: int, *, is_bonds: bool) 
 
 
 def _step(rig, friction) -> float:
-    """Return the CPU seconds of a step of a march.
+    """Return the CPU time [s] of a march step of interfaces without mesh.
 
     Growing bonds and several interfaces take longer than a single mode and interface.
     """
@@ -269,7 +270,7 @@ def _step(rig, friction) -> float:
 
 
 def groups(model: Model) -> dict:
-    """Return dimensionless groups of the motion by name, without those that have no meaning.
+    """Return the dimensionless groups of a motion that have a meaning, by name.
 
     - D: static friction limit over largest force of the drive, D of (2.3) at resonance.
     - D_kinetic: the same with the kinetic limit, if it differs.
@@ -301,7 +302,7 @@ def groups(model: Model) -> dict:
 
 
 def drive_and_knee(model: Model) -> dict:
-    """Return the drive and the drive above which friction does not limit the amplitude.
+    """Return the drive and the drive above which friction does not bound the resonance.
 
     Both are accelerations of the base [m s-2], "drive" and "knee", of a single mode that a sine
     excites at resonance; {} for another rig.
@@ -323,10 +324,10 @@ def drive_and_knee(model: Model) -> dict:
 
 
 def _lever(rig) -> float:
-    """Return slide_1/base_1: the effect of friction over that of the drive on the first mode.
+    """Return the ratio of slide to base participation of the first mode that is not rigid.
 
-    The mode is the first one that is not rigid. It is 1 if the scene lists no modes, or the drive
-    does not excite this mode.
+    This is the effect of friction over that of the drive. It is 1 if the scene lists no modes, or if
+    the drive does not excite the mode.
     """
     first = int(np.flatnonzero(rig.modes.omega > 0)[0]) if rig.first_mode.frequency else 0
     slide = abs(float(rig.modes.slide[first]))
@@ -335,9 +336,10 @@ def _lever(rig) -> float:
 
 
 def first_words(rig, sizes: dict, chain: dict) -> list:
-    """Return the sentence on D of a single mode, as a list.
+    """Return the sentence of a plan on whether friction stops a driven block.
 
-    It says whether the block sticks, and whether friction bounds its motion.
+    The sentence on D of a single mode says whether the block sticks, and whether friction bounds its
+    motion; there is none for other rigs.
 
     Parameters
     ----------
@@ -367,7 +369,7 @@ def first_words(rig, sizes: dict, chain: dict) -> list:
         ]
     if d >= 1:
         return [f"D = {d:.3g} >= 1: friction should hold the block, so that it sticks"]
-    if "D_kinetic" in sizes:  # the kinetic limit acts on a block that slides
+    if "D_kinetic" in sizes:  # the kinetic friction limit acts while the block slides
         sliding = sizes["D_kinetic"] * _lever(rig)
         return [
             f"D = {d:.3g} is below 1, so that the block slips; with the kinetic coefficient {_describe_sliding(sliding)}"
@@ -376,14 +378,17 @@ def first_words(rig, sizes: dict, chain: dict) -> list:
 
 
 def _describe_sliding(d: float) -> str:
-    """Return the sentence on a block that slips; d: D of equation (2.3), below 1."""
+    """Describe whether friction bounds the resonance of a block that slips.
+
+    d: D of equation (2.3), below 1.
+    """
     if d > pi / 4:
         return f"D = {d:.3g} lies between pi/4 and 1: at resonance the block alternates between stick and slip"
     return f"D = {d:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"
 
 
 def bond_sum_sentences(model: Model, numerics) -> list:
-    """Return sentences on the sum over bonds of law 'nonlocal', or on the engine of elements."""
+    """Return the sentences of a plan on the sum over bonds or the engine of elements."""
     if not law_has_trait(model.friction.law, "bonds"):
         return [] if PIECES.lacks(model) else exact_words(model, numerics.engine)
     choice = lists.choose_quadrature(model, numerics)
@@ -407,7 +412,7 @@ def bond_sum_sentences(model: Model, numerics) -> list:
 
 
 def _held_words(model: Model) -> str:
-    """Return how bonds hold the block whose list of bonds grows."""
+    """Describe how bonds stop a block whose list of bonds grows."""
     if lists.is_held_without_stiffness(model):
         held = "bonds of order 0 keep the block from sliding, but they have no stiffness"
     elif lists.is_stuck_after_release(model):
@@ -423,7 +428,7 @@ def _held_words(model: Model) -> str:
 
 
 def steady_cost(model: Model, numerics, points: int) -> Cost:
-    """Return the cost of a curve of steady motions, with its coarse runs.
+    """Return the predicted cost of a curve of steady motions with its coarse runs.
 
     Parameters
     ----------
@@ -441,7 +446,9 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
     if finder.name == "yields":
         laws = rig.friction.interfaces
         n_soft = sum(bool(law.partial_slip or model.partial_slip) for law in laws)
-    passes = 1.0 + 0.5 * n_soft  # the coarser mesh of each interface has half the elements
+    passes = (
+        1.0 + 0.5 * n_soft
+    )  # each interface adds a run on a coarser mesh with half the elements
     seconds = places * passes * _steady_point(model, finder.name)
     if rig.structure.richer_rig is not None:
         seconds += places * _steady_point(replace(model, rig=rig.structure.richer_rig), finder.name)
@@ -453,7 +460,10 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
 
 
 def _steady_point(model: Model, by: str) -> float:
-    """Return the CPU seconds per point of a curve of steady motions; by: name of the finder."""
+    """Estimate the CPU time [s] per point of a curve of steady motions.
+
+    by: name of the method that finds the motion.
+    """
     rig = model.rig
     if by == "balance":
         size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.friction.interfaces))
@@ -479,7 +489,7 @@ def _steady_point(model: Model, by: str) -> float:
 
 
 def _smooth_law_seconds(rig) -> float:
-    """Return the CPU seconds that smooth laws add to a point computed by harmonic balance.
+    """Estimate the CPU time [s] per point of a curve that smooth laws add to harmonic balance.
 
     Their slope changes during the whole cycle, whereas that of elements that stick and slip is
     constant for most of it.

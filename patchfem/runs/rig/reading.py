@@ -50,7 +50,7 @@ class Reader:
         self.contact = contact
         self.steps = steps or numerics.steps
         self.has_friction = model.friction is not None
-        # such a law never sticks
+        # a law that creeps never sticks
         self.creeps = self.has_friction and law_has_trait(model.friction.law, "creeps")
         self.held = 0.0 if self.creeps else held
 
@@ -59,7 +59,7 @@ class Reader:
         return IntegratedMeasures()
 
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return further fields of `response.rows.LastCycles` that the engine knows, by name.
+        """Return data that the engine knows better than its samples, as fields of `LastCycles`.
 
         Parameters
         ----------
@@ -73,7 +73,7 @@ class Reader:
         return {}
 
     def values(self, run, drive=None, ledger=None, *, stuck: bool = False) -> dict:
-        """Return the measures of the last cycles of a run, or of a mark of it, by name.
+        """Compute the measures of the last cycles of a run.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class Reader:
         return values
 
     def sticks(self, run) -> bool:
-        """Return whether no interface slips in the last cycles by more than `held` or round-off."""
+        """Return whether no interface slips in the last cycles of a run."""
         loops = self.integrated_measures(run, self.model.rig.drive.signal).loops
         if not self.has_friction or self.creeps:
             return False
@@ -124,7 +124,7 @@ class Reader:
         return run_events.is_all_stuck(run.window, self.held)
 
     def rings(self, run, drive) -> tuple:
-        """Return the measures of the ringing during stick by name, and their errors."""
+        """Measure frequency and damping of the ringing during stick, with errors."""
         if not self.has_friction or self.creeps:
             return {}, {}
         return run_events.measure_rings(
@@ -132,7 +132,7 @@ class Reader:
         )
 
     def stated_errors(self, run, drive, values: dict) -> dict:
-        """Return the errors that the run itself states, by name, except those of its ringing.
+        """Return the errors of the measures that the run itself states, except ringing.
 
         Parameters
         ----------
@@ -146,13 +146,13 @@ class Reader:
         return {}
 
     def with_half_the_samples(self, run):
-        """Return the run with every second one of its samples."""
+        """Return the run without every second of its samples."""
         return replace(run, window=thin_samples(run.window))
 
     def sampling_errors(self, run, drive, values: dict) -> dict:
-        """Estimate the sampling errors of the measures of an exact motion, by name.
+        """Estimate the errors of the measures of an exact motion due to sampling.
 
-        They follow from the change with every second sample. Measures that the engine integrated
+        The errors follow from the change with every second sample. Measures that the engine integrated
         have no such error.
 
         Parameters
@@ -177,7 +177,7 @@ class Reader:
         return errors
 
     def whole_run(self, run, drive):
-        """Return the histories of a run, or of a mark of it, from t = 0 on.
+        """Return the complete histories of a run, or None if they are not equally sampled.
 
         None if they are not kept at equal steps.
         """
@@ -190,7 +190,7 @@ class Reader:
         return histories if kept and histories.time.size and histories.time[0] == 0 else None
 
     def between_samples(self, run, drive, values: dict) -> dict:
-        """Estimate the sampling errors of the measures that use the whole run, by name.
+        """Estimate the sampling errors of the measures that need the whole run.
 
         The changes without the even and without the odd samples are added, because each reversal
         has neighbours of one kind.
@@ -217,11 +217,11 @@ class Reader:
         return errors
 
     def solution_fields(self, run, drive) -> dict:
-        """Return the fields of a Solution that only this engine has, by name."""
+        """Return the fields of a Solution that only this engine has."""
         return {}
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
-        """Return the Solution of a run.
+        """Evaluate a run of an engine as a Solution.
 
         Parameters
         ----------
@@ -265,7 +265,7 @@ class Reader:
         )
 
     def level(self, size: float, run, drive=None, relative_error: float = 0.0) -> Level:
-        """Return the Level of a run, or of a mark of it.
+        """Evaluate a run as a level of the drive.
 
         Parameters
         ----------
@@ -287,7 +287,7 @@ class Reader:
 
 
 def _between_reversals(histories, parity: int):
-    """Return histories thinned to samples of one parity, with both ends and all reversals kept.
+    """Remove every second sample of histories, except the ends and all reversals.
 
     parity: 0 or 1, remainder of the index of the samples that are kept on division by 2.
     """
@@ -299,7 +299,7 @@ def _between_reversals(histories, parity: int):
 
 
 def thin_samples(window):
-    """Return a window without every second one of its equally spaced samples.
+    """Remove every second of the equally spaced samples of a window.
 
     The last sample, and those of events between the others, are kept.
     """
@@ -311,10 +311,10 @@ def thin_samples(window):
 
 
 class FrictionWorks(NamedTuple):
-    """Friction work of a run, from two computations.
+    """Friction work of a run from its samples and from its energy balance.
 
     - sampled: from samples by the trapezoidal rule [J].
-    - booked: from the ledger of the energy balance [J].
+    - booked: from the energy balance [J].
     - exchanged: sum of |work| [J].
     """
 
@@ -324,7 +324,7 @@ class FrictionWorks(NamedTuple):
 
 
 def friction_works(response, work: float) -> FrictionWorks:
-    """Return the friction work from samples and from a ledger, and the exchanged work.
+    """Return the friction work of a run from samples and from its energy balance.
 
     Parameters
     ----------

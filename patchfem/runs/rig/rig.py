@@ -30,14 +30,14 @@ from .runner import Runner
 from .solution import Solution, curve_measures
 from .solve import refuse_long_run
 
-# outcomes of a run that ended early, which more steps do not change
+# outcomes of runs that ended early, whose outcome more steps do not change
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
-MAX_RUN_STEPS = 1e7  # steps of a whole run above which its steps per cycle are not doubled again
-MIN_STEP_ERROR = 1e-12  # error of a step [1] below which round-off dominates
+MAX_RUN_STEPS = 1e7  # largest number of time steps of a run to which the steps are doubled
+MIN_STEP_ERROR = 1e-12  # relative error of a step, below which round-off dominates
 
 
 class RefinedRun(NamedTuple):
-    """Run at the first settings whose displacement is known to the tolerance.
+    """Run at the first numerical settings whose displacement error meets the tolerance.
 
     - numerics, solution: the settings and the Solution of the engine.
     - measures: measures by name, with errors from coarser runs if they are estimated.
@@ -49,7 +49,7 @@ class RefinedRun(NamedTuple):
 
 
 def run_coupled(inputs: RunInputs) -> Result:
-    """Run a plan of kind rig or linear.
+    """Run the plan of a driven structure with or without friction.
 
     Parameters
     ----------
@@ -104,11 +104,11 @@ def run_coupled(inputs: RunInputs) -> Result:
 
 
 def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
-    """Run a rig at the first settings whose displacement is known to the tolerance.
+    """Run a rig with finer and finer settings until its displacement meets the tolerance.
 
-    Settings that the scene does not fix are refined from run to run. All coarser runs stand in
-    `Runner.solutions` by their settings. Those in space differ from a coarser run, not from the
-    finest one, so that they are not repeated.
+    Settings that the scene does not fix are refined from run to run. All coarser runs are kept in
+    `Runner.solutions` by their settings. Runs that are coarser in space are compared with a run that is
+    coarse in time, not with the finest one, so that they are not repeated.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         *engine.richer_in_modes(model, numerics),
     ]
     space_errors = runner.estimate(space_runs, solution)
-    displacement_errors = []  # [m] of each run
+    displacement_errors = []  # error of the displacement [m] of each run, from coarse to fine
     while True:
         time_runs = engine.coarser_in_time(model, numerics)
         errors = [*runner.estimate(time_runs, solution), *space_errors]
@@ -165,7 +165,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
 
 
 def _cycles_of_slip_period(model, numerics, solution) -> int:
-    """Return the cycles of a window that contains a whole stick-slip period of a belt.
+    """Return the number of cycles that contain a whole stick-slip period on a belt.
 
     No periodic drive sets the period of such a run. It is 0 if there is no period, or if the run is
     shorter than two windows.
@@ -179,12 +179,12 @@ def _cycles_of_slip_period(model, numerics, solution) -> int:
 
 
 def errors_met(measures: dict, tolerance: float) -> bool:
-    """Return whether the errors of all measures are within the tolerance, or their floors."""
+    """Return whether the errors of all measures are within the tolerance or their floors."""
     return all(measure.error_ratio(tolerance) <= 1 for measure in measures.values())
 
 
 def _cannot_refine(model, run: RefinedRun, displacement_errors: list) -> bool:
-    """Return whether the displacement is accurate enough, or no finer run can be made.
+    """Return whether the displacement is accurate enough, or no finer run is possible.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def _cannot_refine(model, run: RefinedRun, displacement_errors: list) -> bool:
 
 
 def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -> Solution:
-    """Return a run whose levels have errors from coarser runs, with the coarser runs of its decay.
+    """Add errors from coarser runs to the drive levels of a run, and the runs themselves.
 
     Parameters
     ----------
@@ -221,11 +221,11 @@ def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -
     solutions : dict
         Solution of each coarser run by its Numerics.
     """
-    # without coarser runs the levels have errors of their own
+    # an entry without coarser runs is left out if the levels already have its errors
     used = [kind for kind in coarser_runs if kind.runs or solution.errors is None]
     pairs = []
     for kind in used:
-        # a list of bonds has a bound of its error instead of a coarser run
+        # a run with another sum over bonds does not serve for the errors of decays and onsets
         if kind.runs and kind.runs[0].choice is None:
             pairs.append((solutions[kind.runs[0]], kind.beside and solutions[kind.beside]))
     level_results = ()
@@ -235,7 +235,7 @@ def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -
 
 
 def _error_parts(solution: Solution, coarser_runs: list, errors: list, solutions: dict) -> dict:
-    """Return the parts of the errors by kind, and the orders at which they fall with the steps.
+    """Return the contributions to the errors by cause, and the observed orders of convergence.
 
     Parameters
     ----------

@@ -20,12 +20,13 @@ from .solution import Solution
 from .solve import solve
 from .steady import curves
 
-# relative difference from the amplitude of a coarser run, above which it may belong to another peak
+# largest relative difference between the peak amplitudes of a run and its coarser run; above it, the
+# coarser run may have found another peak
 OTHER_PEAK_RATIO = 0.1
 
 
 class Runner:
-    """Solver of one rig at several numerical settings.
+    """Solver of one rig at several numerical settings, which keeps all coarser runs.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ class Runner:
         self.progress = RunProgress(inputs.progress, _expected_steps(inputs, numerics))
 
     def solve(self, numerics: Numerics, coarser_model=None) -> Solution:
-        """Return the Solution at given settings, and count its steps as completed.
+        """Solve the rig at given settings.
 
         Parameters
         ----------
@@ -72,7 +73,7 @@ class Runner:
         return solution
 
     def estimate(self, coarser_runs: list, solution: Solution) -> list:
-        """Return the errors of a run by measure name, one dict per entry of `coarser_runs`."""
+        """Estimate the errors of a run from coarser runs, one dict per kind of coarser run."""
         errors, seconds = estimate_errors(
             lambda numerics: self._solve_coarser(numerics, solution),
             solution.values,
@@ -83,19 +84,19 @@ class Runner:
         return errors
 
     def _solve_coarser(self, numerics: Numerics, fine: Solution) -> Solution:
-        """Return the Solution of a coarser run; that of a curve only around the peak of `fine`."""
+        """Solve the rig at coarser settings."""
         model = self.model
         if numerics.richer:
             model = replace(model, rig=model.rig.structure.richer_rig)
-        # the decay curve and some measures need the histories of the whole run
+        # the decay curve and some measures need histories from the start of the run
         needs_whole = self.model.rig.drive.kind == "free" or bool(NEEDS_RUN)
         numerics = replace(numerics, whole=needs_whole)
         return self._solve_around_peak(model, numerics, fine) or self.solve(numerics, model)
 
     def _solve_around_peak(self, model, numerics: Numerics, fine: Solution) -> Solution | None:
-        """Return the coarser run of a curve, computed only around its largest amplitude.
+        """Solve the coarser run of a curve only around its largest amplitude.
 
-        It is None if there is no curve, or if the run has its largest amplitude elsewhere.
+        The result is None if there is no curve, or if its largest amplitude is elsewhere.
         """
         rig = model.rig
         if "at_error" not in fine.extra or rig.drive.levels.amplitudes or rig.springs.is_nonlinear:
@@ -107,7 +108,9 @@ class Runner:
             return None
         try:
             solution = self.solve(numerics, replace(model, rig=rig.with_signal(drive)))
-        except NotConverged:  # the whole curve may start where a motion is found
+        except (
+            NotConverged
+        ):  # the complete curve may start at a frequency at which a motion is found
             return None
         name = "relative_displacement_amplitude"
         if "at" not in solution.extra or name not in solution.values:
@@ -120,7 +123,7 @@ class Runner:
 
 
 class RunProgress:
-    """Completed fraction of all runs, each weighted by its steps; it never decreases.
+    """Completed fraction of all runs of a rig, each weighted by its steps.
 
     Parameters
     ----------
@@ -142,12 +145,15 @@ class RunProgress:
         self.shown = 0.0
 
     def make_callback(self, steps: float):
-        """Return the callback of a run with this number of steps per cycle; None without one."""
+        """Return the progress callback of a run with a given number of steps per cycle.
+
+        It is None if the caller gave no callback. The reported fraction never decreases.
+        """
         if self.callback is None:
             return None
 
         def report(fraction: float) -> None:
-            """Report the completed fraction of this run."""
+            """Report the completed fraction of one run as that of all runs."""
             expected = max(self.expected_steps, self.done + steps)
             self.shown = max(self.shown, (self.done + fraction * steps) / expected)
             self.callback(self.shown)
@@ -156,7 +162,7 @@ class RunProgress:
 
 
 def _expected_steps(inputs: RunInputs, numerics: Numerics) -> float:
-    """Return the steps per cycle of a run and of its coarser runs together.
+    """Return the expected steps per cycle of a run and its coarser runs together.
 
     A run on a coarser mesh has the smallest number of steps.
     """

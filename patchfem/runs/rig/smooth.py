@@ -15,15 +15,15 @@ from .interface import make_contact
 from .reading import FrictionWorks, Reader, thin_samples
 from .solution import Solution
 
-# factor on the round-off of the slip, above which the fraction of slip is known inside a step
+# Smallest ratio of the slip to its round-off, with which the onset of slip is located within a step.
 MIN_SLIP_OVER_ROUND_OFF = 1e3
-# error of the instant at which this fraction crosses a limit: the extension of a step is less
-# accurate than its end
+# Error of the stick fraction [1] and of the phase at slip start [rad]: the dense output within a step is
+# less accurate than its end.
 CROSSING_FRACTION_ERROR = 1e-7
 
 
 def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Run with steps that meet numerics.local, and return the Solution with its errors.
+    """Solve a rig with a smooth friction law by steps of high order, with error control.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None)
 
 
 class SmoothReader(Reader):
-    """Reader of a finished run of high order; values of the integrator precede those of samples."""
+    """Evaluator of a run of the smooth engine, whose own integrals replace those of samples."""
 
     def __init__(self, model, numerics, patch, contact):
         super().__init__(
@@ -73,7 +73,7 @@ class SmoothReader(Reader):
         )
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
-        """Return the measures from the polynomials of the steps."""
+        """Return the measures integrated over the polynomials of the steps."""
         book = run.ledger
         integrated = run.integrated
         if not _has_clear_slip(run):
@@ -83,7 +83,7 @@ class SmoothReader(Reader):
         return replace(integrated, friction_works=works)
 
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return the samples including the reversals, and the equally spaced ones.
+        """Return the samples with and without the reversals, for the evaluation.
 
         Parameters
         ----------
@@ -93,15 +93,15 @@ class SmoothReader(Reader):
         return {"window": run.with_reversals, "even": run.window, "by": "rate"}
 
     def with_half_the_samples(self, run):
-        """Return the run with every second one of its samples."""
+        """Return the run without every second of its samples."""
         thinned = super().with_half_the_samples(run)
         return replace(thinned, with_reversals=thin_samples(run.with_reversals))
 
     def integration_errors(self, run, values: dict) -> dict:
-        """Return the errors of measures by name that a SmoothResult states itself.
+        """Estimate the errors of the measures of a smooth run, by name.
 
-        They are those of samples, of peaks, and of cycles that were skipped. values: measures by
-        name.
+        The errors are due to sampling, to peaks between samples, and to skipped cycles of a periodic
+        motion. values: measures by name.
         """
         sampling = self.sampling_errors(run, self.model.rig.drive.signal, values)
         for name in ("stick_fraction", "slip_start_phase"):
@@ -120,6 +120,6 @@ class SmoothReader(Reader):
 
 
 def _has_clear_slip(run) -> bool:
-    """Return whether the slip of a SmoothResult exceeds round-off."""
+    """Return whether the slip of a smooth run exceeds round-off."""
     slip_range = run.integrated.loops[0].slip_range
     return slip_range > MIN_SLIP_OVER_ROUND_OFF * slip_round_off(run.window)

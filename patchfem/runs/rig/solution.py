@@ -15,12 +15,14 @@ from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...structure.drive_sizes import find_drive_omega, has_full_cycle
 
 NO_PEAK = "the output does not move at any of the swept frequencies, so there is no peak"
-PEAK_SHIFT_FACTOR = 3.0  # factor on the shift of a peak by a coarser mesh or fewer modes
+PEAK_SHIFT_FACTOR = (
+    3.0  # safety factor on the frequency shift of a peak by a coarser mesh or fewer modes
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Solution:
-    """One run of an engine before its errors are known.
+    """Output of one run of an engine before its errors are known.
 
     - values: measures by name.
     - response, window: histories that are kept, and those of the last cycles.
@@ -30,7 +32,7 @@ class Solution:
     - snapshots: states of the interface in the last cycle.
     - book: energies [J] and counters by name.
     - seconds: CPU seconds of the run.
-    - contact: contact that was moved.
+    - contact: contact model of the run.
     - prepare: CPU seconds of the preparation by name.
     - message: reason of an early end.
     - levels, probe: levels of the drive, and the function that `levels.onset` calls.
@@ -86,7 +88,7 @@ class CycleLoop(NamedTuple):
 
 
 def seen_by_gauge(model, raw: Solution) -> Solution:
-    """Return the Solution as seen by a gauge that is not at the accelerometer.
+    """Return a Solution with the motion of a gauge instead of the accelerometer.
 
     Displacement and histories are those of the gauge. How the motion settles is judged at the
     accelerometer; the steady amplitude at the gauge is not known.
@@ -113,7 +115,10 @@ def seen_by_gauge(model, raw: Solution) -> Solution:
 
 
 def _histories_at_gauge(histories: Response, gauge) -> Response:
-    """Return histories whose output is that of a gauge; gauge: its participation (n,)."""
+    """Return histories with the motion of a gauge as their output.
+
+    gauge: participations (n,) of the modes in the motion of the gauge.
+    """
     sensor = {"sensor": histories.output, "sensor_rate": histories.output_rate}
     return replace(
         histories,
@@ -157,7 +162,7 @@ def mode_stiffness(model, window) -> float:
 
 
 def sampled_loop(window, drive, work: float, force: complex | None = None) -> CycleLoop | None:
-    """Return the loop of equally spaced samples by the trapezoidal rule.
+    """Compute the friction loop of equally spaced samples by the trapezoidal rule.
 
     Parameters
     ----------
@@ -185,7 +190,7 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> Cy
 
 
 def curve_measures(extra: dict, coarser=()) -> dict:
-    """Return the frequency [Hz] of the largest amplitude of a curve of steady motions, by name.
+    """Return the frequency [Hz] of the largest amplitude of a curve, with its error.
 
     It has no value if the amplitude is 0.
 

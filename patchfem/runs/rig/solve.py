@@ -10,7 +10,7 @@ from .steady import steady
 
 
 def solve(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Solve a rig, and return the Solution as its gauge sees it.
+    """Solve a rig with the engine of its settings, as measured by its gauge.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def solve(model, numerics, patch, frames: int = 0, say=None, progress=None) -> S
 
 
 def refuse_long_run(model, numerics) -> None:
-    """Raise Missing if the engine of the settings would take too long."""
+    """Raise Missing if the engine of a run would take too much CPU time."""
     if numerics.engine in ("exact", "piecewise"):
         costs.refuse_endless(model)
     elif numerics.engine == "march":

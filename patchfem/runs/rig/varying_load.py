@@ -12,7 +12,7 @@ from .numerics import Numerics
 
 
 def make_rubbing(model: Model, numerics: Numerics):
-    """Return the friction law of a model as a `dynamics.march.varying_load.VaryingLoadLaw`."""
+    """Return the friction law of a model for a contact with varying normal load."""
     f = model.friction
     if f.law == "coulomb":
         return march.make_coulomb_law(f.static, f.kinetic)
@@ -27,7 +27,7 @@ def make_rubbing(model: Model, numerics: Numerics):
 
 
 def varying_load_model(model: Model, numerics: Numerics, patch):
-    """Return the VaryingLoadModel of a rig whose load changes.
+    """Return the contact model of a rig whose normal load changes.
 
     Parameters
     ----------

@@ -47,18 +47,20 @@ from ...rig.engines import unused_settings
 from ...rig.motion_warnings import law_warnings
 from ..case_results import CaseResults
 
-N_FINAL_WINDOWS = 5  # last windows whose phasors determine a steady motion (response.settling)
+N_FINAL_WINDOWS = (
+    5  # number of last windows from which the steady motion is extrapolated (response.settling)
+)
 MAIN_MEASURE = "relative_displacement_amplitude"
 PHASE_MEASURE = "slip_start_phase"
 
 
 class Sizes(NamedTuple):
-    """Scales of n models from their scenes, (n,) each.
+    """Scales of n models for their errors and outcomes, (n,) each.
 
-    - tolerance: [1].
+    - tolerance: relative tolerance [1].
     - displacement: expected displacement [m].
     - acceleration: largest acceleration of the drive [m s-2].
-    - period: of the drive [s].
+    - period: period of the drive [s].
     - decay: smallest decay rate of a mode [1/s].
     """
 
@@ -70,7 +72,7 @@ class Sizes(NamedTuple):
 
 
 def collect_sizes(models) -> Sizes:
-    """Return the Sizes of models."""
+    """Return the scales of models as columns."""
     return Sizes(
         *collect_columns(
             models,
@@ -87,7 +89,7 @@ def collect_sizes(models) -> Sizes:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Runs:
-    """Output of an engine for n runs of `cycles` cycles; the last `window` are evaluated.
+    """Output of an engine for n runs, as columns.
 
     - values: measures (n,) by name; NaN for a run without the measure.
     - book: energies of the run (n,) by name [J].
@@ -126,13 +128,13 @@ class Runs:
 
     @property
     def amplitudes(self) -> np.ndarray:
-        """Half the range of the output in the last cycles (n,) [m]."""
+        """Amplitude of the output in the last cycles (n,) [m], half its range."""
         last = self.extremes[:, -self.window :]
         return (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
 
 
 class Assembled(NamedTuple):
-    """Case results of n runs.
+    """Case results of n runs, with the cases that need another run.
 
     - results: CaseResults.
     - runs_singly: which cases (n,) must be run by themselves.
@@ -148,7 +150,7 @@ class Assembled(NamedTuple):
 def assemble_results(
     models, runs: Runs, numerics: dict, is_repeated: Callable | None = None
 ) -> Assembled:
-    """Return the case results of models from their Runs.
+    """Evaluate the runs of models as case results.
 
     Parameters
     ----------
@@ -231,10 +233,10 @@ def _values_and_errors(runs: Runs) -> tuple[dict, dict]:
 
 
 def _insert_measures(results: CaseResults, values: dict, errors: dict, sizes: Sizes) -> tuple:
-    """Insert columns of measures, with their errors, in the results.
+    """Insert measures with their errors in case results.
 
-    Return which cases (n,) have all errors, except that of the steady estimate, within the
-    tolerance, and which have an error that a warning states.
+    Returns which cases (n,) have all errors, except that of the steady estimate, within the tolerance,
+    and which have an error that a warning states.
     """
     grows = results.outcome == str(Outcome.GROWS)
     is_resolved = np.ones(len(grows), bool)
@@ -260,7 +262,7 @@ def _insert_measures(results: CaseResults, values: dict, errors: dict, sizes: Si
 def _insert_warnings(
     models, results: CaseResults, outcomes: list, is_wide: np.ndarray, rings: dict
 ) -> None:
-    """Insert the warnings of all cases, as single runs give them.
+    """Insert the warnings of all cases in case results, as single runs give them.
 
     Parameters
     ----------
@@ -311,7 +313,7 @@ class _SteadyOutcomes(NamedTuple):
 
 
 def _judge_outcomes(sizes: Sizes, runs: Runs, drifts) -> _SteadyOutcomes:
-    """Return the outcomes of runs, and their steady amplitudes.
+    """Judge the outcomes of runs, and estimate their steady amplitudes.
 
     drifts: which motions (n,) have a midpoint that drifts, so that they are not steady.
     """
@@ -347,7 +349,7 @@ def _judge_outcomes(sizes: Sizes, runs: Runs, drifts) -> _SteadyOutcomes:
 
 
 def _rings(sizes: Sizes, runs: Runs, outcomes: list, amplitude) -> dict:
-    """Return the warnings of `warn_of_ringing` for the cases that stick but still vibrate, by case."""
+    """Return the warnings on cases that stick but still vibrate."""
     n = len(amplitude)
     floor = np.broadcast_to(error_floor(MAIN_MEASURE, sizes.displacement), n)
     decay = np.broadcast_to(sizes.decay * sizes.period, n)
@@ -386,13 +388,13 @@ def _remove_secant_of_rigid_stick(results: CaseResults) -> None:
 
 
 def _insert_reasons(models, sizes: Sizes, runs: Runs, results: CaseResults) -> None:
-    """Insert the reasons why measures of the cases lack a value."""
+    """Insert the reasons why measures of cases lack a value in case results."""
     names = [*CYCLE_MEASURES, PHASE_MEASURE]
     for name in names:
         results.measure(name, TABLE[name].unit)
     is_missing = np.array([np.isnan(results.values[name]) for name in names])
     stick_fraction = results.values.get("stick_fraction", np.zeros(len(models)))
-    # all properties on which a reason depends under a sine
+    # under sinusoidal drive, a reason depends on these properties only
     properties = np.array(
         [*is_missing, stick_fraction == 1, stick_fraction > 0, sizes.acceleration != 0]
     )
@@ -409,16 +411,16 @@ def _insert_reasons(models, sizes: Sizes, runs: Runs, results: CaseResults) -> N
 
 
 def _may_need_law_warnings(models: SimilarModels, results: CaseResults) -> np.ndarray:
-    """Return which cases (n,) may need a warning of `law_warnings`.
+    """Return which cases (n,) may need a warning on their friction law.
 
-    These have bonds that grow, are unbounded or creep.
+    These cases have bonds that grow, have an infinite traction or creep.
     """
     first = models.first
     if not law_has_trait(first.friction.law, "bonds"):
         return np.zeros(len(models), bool)
     if first.bonds.has_growth or first.bonds.order < 0 or first.bonds.reading != "stretch":
         return np.ones(len(models), bool)
-    if "drift_per_cycle" not in results.values:  # runs of less than a cycle have no drift
+    if "drift_per_cycle" not in results.values:  # runs that are shorter than a cycle have no drift
         return np.zeros(len(models), bool)
     drift = results.values["drift_per_cycle"]
     error = results.errors["drift_per_cycle"]

@@ -21,17 +21,19 @@ from .lane_numbers import LaneCases, lane_kind, select_rows
 from .lane_refinement import march_side_by_side
 from .lane_steps import STRETCH_STEPS
 
-CHECK_INTERVAL = 200  # one of this many cases is checked with the exact engine
-MIN_CHECKED = 2  # smallest number of cases of a batch that are checked
-N_MORE_CHECKED = 70  # further cases that are checked if one differs
-MAX_WRONG_FRACTION = 0.03  # if more of the checked cases differ, all are computed exactly
-# Factor on the errors of a single run of the Iwan law in a check: 1 of 590 random cases differed by
-# more than one error, by 1.9.
+CHECK_INTERVAL = 200  # number of cases per case that is checked with the exact engine
+MIN_CHECKED = 2  # smallest number of checked cases of a batch
+N_MORE_CHECKED = 70  # number of further cases that are checked if a checked case differs
+MAX_WRONG_FRACTION = (
+    0.03  # fraction of differing checked cases, above which all are computed exactly
+)
+# Factor on the errors of a single run of the Iwan law in a check: 1 of 590 random cases differed by more
+# than its error, by 1.9 times as much.
 IWAN_ERROR_FACTOR = 2.0
 
 
 class CheckedCases(NamedTuple):
-    """Results of n cases by lanes, of which a few were checked.
+    """Results of n cases by lanes, some of which were checked with the exact engine.
 
     - results: CaseResults.
     - is_exact: which cases (n,) were not computed by lanes.
@@ -46,9 +48,9 @@ class CheckedCases(NamedTuple):
 def solve_and_check(
     models: Sequence[Model], cases: LaneCases, steps, solve_exactly: Callable
 ) -> CheckedCases:
-    """Return the results of models by lanes, of which a few are checked with the exact engine.
+    """Compute cases by lanes, and check some of them with the exact engine.
 
-    If these differ, cases of a stretch law are marched with twice the steps, and more cases are
+    If checked cases differ, those of a stretch law are marched with twice the steps, and more cases are
     checked; if more than a few still differ, all cases are computed exactly.
 
     Parameters
@@ -78,7 +80,7 @@ def solve_and_check(
         results.remove(finer)
         results.insert(finer, refined.results)
         wrong = _find_differences(results, exact_results, checked, is_exact, factor)
-    if wrong:  # more checks show whether these differences are exceptions
+    if wrong:  # more checked cases show whether the differing ones are exceptions
         is_free = ~is_exact
         is_free[checked] = False
         more = select_checked_cases(numbers, is_free, N_MORE_CHECKED)
@@ -111,9 +113,9 @@ def solve_and_check(
 
 
 def select_checked_cases(numbers, is_free, min_count: int = MIN_CHECKED) -> list:
-    """Return the indices of the cases that the exact engine checks.
+    """Select the cases that are checked with the exact engine, by a hash of their numbers.
 
-    They are chosen by a hash of each case, so that the choice does not depend on other cases.
+    The hash makes the choice of a case independent of other cases.
 
     Parameters
     ----------
@@ -133,9 +135,9 @@ def select_checked_cases(numbers, is_free, min_count: int = MIN_CHECKED) -> list
 def _find_differences(
     results: CaseResults, exact_results: CaseResults | None, checked: list, is_exact, factor: float
 ) -> dict[int, str]:
-    """Return the first measure of each case that differs from its exact result, by case.
+    """Return, by case, the first measure that differs from its exact result.
 
-    It differs by more than the sum of both errors and the floor.
+    A measure differs if the difference exceeds the sum of both errors and the floor.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from ....model.model import Model
 from ....model.similar_models import collect_columns
 from ....structure.drive_sizes import find_max_acceleration
 
-# friction law in `dynamics.lanes` by the law of the scene
+# name of the friction law in `dynamics.lanes`, by the law of the scene
 KINDS = {
     "coulomb": "rigid",
     "elastic-plastic": "yielding",
@@ -26,11 +26,11 @@ KINDS = {
     "lugre": "friction.laws.lugre_kernels",
     "nonlocal": "friction.laws.stretch_kernels",
 }
-HELD_FRACTION = 1e-3  # slip over the length of a spring, below which its interface sticks
+HELD_FRACTION = 1e-3  # slip over the stretch at the friction limit, below which an interface sticks
 
 
 class Scales(NamedTuple):
-    """Numbers of n cases in SI units, (n,) each.
+    """Quantities of n cases in SI units, (n,) each.
 
     - omega: of the drive [rad/s].
     - energy: unit of the energies, over the squared unit of the slide [J m-2].
@@ -51,7 +51,7 @@ class Scales(NamedTuple):
 
 
 class LaneCases(NamedTuple):
-    """Cases of one friction law for lanes.
+    """Cases of one friction law that march in lanes, i.e. side by side.
 
     - cases, scales: of the cases.
     - coarse: (cases, scales) on a coarser mesh; None without a mesh.
@@ -63,7 +63,7 @@ class LaneCases(NamedTuple):
 
 
 def select_rows(values, indices):
-    """Return the rows of some cases from arrays in a dict or a tuple; other entries are common."""
+    """Select the rows of some cases from arrays in a dict or a tuple."""
     if isinstance(values, dict):
         return {name: select_rows(value, indices) for name, value in values.items()}
     if isinstance(values, tuple):
@@ -73,17 +73,17 @@ def select_rows(values, indices):
 
 
 def count_evaluated_cycles(cycles: int) -> int:
-    """Return the number of last cycles that are evaluated."""
+    """Return the number of last cycles of a run that are evaluated."""
     return min(10, cycles // 10)
 
 
 def lane_kind(model: Model) -> str:
-    """Return the law of a model in `dynamics.lanes`; for a patch, the table of its elements."""
+    """Return the friction law of a model in `dynamics.lanes`."""
     return KINDS[model.friction.law] if model.patch is None else "table"
 
 
 class StretchLaw(NamedTuple):
-    """Numbers of a law whose force follows from one stretch.
+    """Parameters of a friction law whose force follows from one elastic stretch.
 
     - numbers: parameters of its `rate_equation`.
     - length: stretch at the friction limit [m]; 0 for a law without one.
@@ -94,7 +94,7 @@ class StretchLaw(NamedTuple):
 
 
 def law_numbers(model: Model) -> StretchLaw:
-    """Return the numbers of a stretch law."""
+    """Return the parameters of a stretch law."""
     friction = model.friction
     load = model.point.load
     limit = model.friction_limits(load)[0]
@@ -119,7 +119,7 @@ def law_numbers(model: Model) -> StretchLaw:
 
 
 class ContactNumbers(NamedTuple):
-    """Contact of a point.
+    """Contact of a single point: stick stiffness, stretch and further parameters.
 
     - stiffness: in stick [N/m].
     - length: stretch at the friction limit [m].
@@ -132,13 +132,13 @@ class ContactNumbers(NamedTuple):
 
 
 def contact_of_point(model: Model) -> ContactNumbers:
-    """Return the contact of a model with a single point."""
+    """Return the contact parameters of a model with a single point."""
     friction = model.friction
     static = model.friction_limits(model.point.load)[0]
     if friction.law == "iwan":
         chi = friction.chi
         fraction = 1 / (1 + friction.beta)
-        # fraction of the friction that slips before the last slider does
+        # this fraction of the friction limit slips before the last slider does
         early_slip = fraction * (chi + 1) / (chi + 2 - fraction)
         half = np.minimum(1.0, (0.5 / early_slip) ** (1 / (chi + 2)))
         length = max_yield_displacement(static, friction.stiffness, chi, friction.beta)
@@ -159,14 +159,14 @@ def may_create_energy(model: Model):
         return np.not_equal(friction.breakaway or 0.0, 0.0) | np.not_equal(
             friction.initial_bonds, 1.0
         )
-    if friction.law == "lugre":  # from this damping on, its power may be negative
+    if friction.law == "lugre":  # with more damping, the power of the friction may be negative
         sliding_force = law_numbers(model).numbers[1]
         return np.greater(friction.micro_damping * model.rig.speed_scale, 4 * sliding_force)
     return np.less(friction.shape, 0.5) if friction.law == "bouc-wen" else False
 
 
 def make_cases(models: Sequence[Model], contacts=None) -> tuple[march.Cases, Scales]:
-    """Return the Cases of models and their Scales.
+    """Return the cases of models in units of their drives, and their scales in SI units.
 
     contacts: numbers (m, n) of the contacts as from `_contact_row`; None: those of single points.
     """
@@ -210,7 +210,7 @@ def make_cases(models: Sequence[Model], contacts=None) -> tuple[march.Cases, Sca
 
 
 class _RigNumbers(NamedTuple):
-    """Numbers of a rig with one mode under a sine, in SI units.
+    """Parameters of a rig with one mode under sinusoidal drive, in SI units.
 
     - mode_omega, damping: natural frequency and damping rate of its mode [rad/s].
     - slide, base, output, mass: participations of the mode, and its mass [kg].
@@ -236,7 +236,7 @@ class _RigNumbers(NamedTuple):
 
 
 def _rig_row(model: Model) -> _RigNumbers:
-    """Return the numbers of the rig of a model."""
+    """Return the parameters of the rig of a model."""
     modes = model.rig.modes
     drive = model.rig.drive.signal
     start = model.rig.start
@@ -258,7 +258,7 @@ def _rig_row(model: Model) -> _RigNumbers:
 
 
 def _contact_row(model: Model) -> list:
-    """Return the numbers of the contact of a model for `make_cases`.
+    """Return the friction limits, load and contact parameters of a model for `make_cases`.
 
     They are static and kinetic friction [N], load [N], and those of its ContactNumbers.
     """

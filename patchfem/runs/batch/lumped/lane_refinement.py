@@ -22,15 +22,15 @@ from .lane_runs import MeasuredMarch, march_and_measure
 from .lane_settling import SETTLING_LAWS
 from .lane_steps import POINT_STEPS, STRETCH_STEPS
 
-# relative to largest force times slide; a case with a smaller loop area sticks
+# loop area over (largest force times slide), below which a case sticks
 MIN_LOOP_AREA = 1e-6
-# Largest relative change of each measure on a coarser mesh that is fine enough; the loop of a small
-# slip may be completely uncertain.
+# Largest relative error of each measure due to the mesh, above which the mesh error is computed again with
+# more steps; the loop of a small slip may be completely uncertain.
 MAX_MESH_CHANGES = ((MAIN_MEASURE, 0.1), ("friction_force_peak", 0.1), ("loop_area", 10.0))
 
 
 class RefinedCases(NamedTuple):
-    """Results of n cases by lanes.
+    """Results of n cases by lanes, with their steps and those that need the exact engine.
 
     - results: CaseResults.
     - is_exact: which cases (n,) must be computed by the exact engine.
@@ -45,7 +45,7 @@ class RefinedCases(NamedTuple):
 
 
 def march_side_by_side(models: Sequence[Model], cases: LaneCases, steps) -> RefinedCases:
-    """March models side by side, and refine the steps until their errors meet the tolerance.
+    """March models side by side, and refine the steps until the errors meet the tolerance.
 
     All cases with the same steps march together, including those whose errors need these steps. If
     the difference from half the steps is too large with a stretch law, a quarter of them shows how
@@ -64,7 +64,7 @@ def march_side_by_side(models: Sequence[Model], cases: LaneCases, steps) -> Refi
 
 
 class _Refinement:
-    """Cases with the measures of all their marches; see `march_side_by_side`."""
+    """Cases with the measures of all their marches at several numbers of steps."""
 
     def __init__(self, models: Sequence[Model], cases: LaneCases, steps):
         n = len(models)
@@ -79,7 +79,7 @@ class _Refinement:
         self.is_exact = np.zeros(n, bool)
         self.reach = np.zeros(n)
         self.mesh_errors = {}
-        self.values = {}  # measures (n,) by name, by steps per cycle
+        self.values = {}  # measures (n,) by steps per cycle and name
 
     def refine(self) -> RefinedCases:
         """March with more and more steps until no case needs more."""
@@ -90,7 +90,7 @@ class _Refinement:
         return RefinedCases(self.results, self.is_exact, self.steps, self.reach)
 
     def _march(self, steps: int) -> None:
-        """March the cases that need this number of steps, finally or for their errors."""
+        """March the cases that need this number of steps per cycle."""
         marching = np.flatnonzero((self.min_steps <= steps) & (self.steps >= steps))
         if not marching.size:
             return
@@ -119,7 +119,7 @@ class _Refinement:
         return measured
 
     def _needs_mesh_errors(self, indices, values: dict) -> np.ndarray:
-        """Return which cases (n,) need the errors due to the mesh with more steps.
+        """Return which cases need the errors due to the mesh with more steps.
 
         values: their measures, (n,) by name.
         """
@@ -132,7 +132,7 @@ class _Refinement:
         return is_needed
 
     def _compute_mesh_errors(self, indices, values: dict, steps: int) -> None:
-        """Store the errors of some cases due to the mesh, from the change on a coarser one.
+        """Store the errors of some cases due to the mesh, from a march on a coarser mesh.
 
         The error of a measure that the coarser mesh does not have is its absolute value.
         """
@@ -145,7 +145,7 @@ class _Refinement:
             column[indices] = np.where(np.isnan(error), np.abs(values[name]), error)
 
     def _judge(self, indices, measured: MeasuredMarch) -> None:
-        """Store the results of some cases, and choose those that need more steps."""
+        """Store the results of some cases, and choose the cases that need more steps."""
         steps = measured.steps
         is_wide = self._evaluate(indices, measured, [steps // 2])
         if self.has_one_stretch and is_wide.any():
@@ -163,7 +163,7 @@ class _Refinement:
         self.is_exact[indices[is_wide]] = ~is_refined[is_wide]
 
     def _evaluate(self, indices, measured: MeasuredMarch, coarser_steps: list) -> np.ndarray:
-        """Store the results of some cases; return which have too large errors.
+        """Store the results of some cases, and return which have too large errors.
 
         coarser_steps: steps per cycle of the marches that show the errors.
         """
@@ -189,7 +189,7 @@ class _Refinement:
         }
         results.numerics.update(dict.fromkeys(range(len(models)), lane_numerics))
         self.is_exact[indices] = is_exact | (results.outcome == "grows")
-        self.results.remove(indices)  # the results with fewer steps are replaced
+        self.results.remove(indices)  # the results with fewer steps per cycle are replaced
         self.results.insert(indices, results)
         return is_wide(results) | needs_more_steps | assembled.runs_singly
 
@@ -197,7 +197,7 @@ class _Refinement:
 def has_large_error(
     models: Sequence[Model], results: CaseResults, mesh_errors: dict | None = None
 ) -> np.ndarray:
-    """Return whether an error of a case exceeds its tolerance, (n,).
+    """Return which cases (n,) have an error above their tolerance.
 
     The tolerance applies to a measure or to the larger terms of which it is the difference. The
     errors due to the mesh are not counted, because no other engine reduces them.
@@ -212,14 +212,14 @@ def has_large_error(
     tolerance = collect_columns(models, lambda model: (model.accuracy.tolerance,))[0]
     is_large = np.zeros(len(models), bool)
     for name, values in results.values.items():
-        if name in RINGING_MEASURES:  # the fit of a single run is no more accurate
+        if name in RINGING_MEASURES:  # a fit of the ringing in a single run is no more accurate
             continue
         if name.endswith("_steady") and lane_kind(models[0]) not in SETTLING_LAWS:
             # an extrapolation has the same error with finer steps, and with the exact engine
             continue
         mesh_error = (mesh_errors or {}).get(name.removesuffix("_steady"), 0.0)
         floors = np.fmax(results.floors[name], tolerance * larger_term(name, results.values))
-        # it is the loop area over an energy, and not more accurate than this area
+        # the equivalent damping is the loop area over an energy, and not more accurate than the area
         if name == "equivalent_damping" and "loop_area" in results.values:
             floors = np.fmax(floors, results.floors["loop_area"] * _damping_per_area(results))
         is_large |= results.errors[name] - mesh_error > tolerance * np.abs(values) + floors
@@ -227,7 +227,7 @@ def has_large_error(
 
 
 def _damping_per_area(results: CaseResults) -> np.ndarray:
-    """Return equivalent_damping over loop_area (n,) [1/J]; 0 without a loop."""
+    """Return the ratio (n,) [1/J] of equivalent damping to loop area; 0 without a loop."""
     area = np.abs(results.values["loop_area"])
     damping = np.abs(results.values["equivalent_damping"])
     return np.divide(damping, area, out=0 * area, where=area != 0)

@@ -19,22 +19,22 @@ from ....response.ringing import (
 from .lane_numbers import Scales, select_rows
 
 RINGING_MEASURES = ("ring_frequency", "ring_damping")
-# steps per cycle under a stretch law with which a ringing that is not found does not exist
+# smallest number of steps per cycle of a stretch law with which no ringing is missed
 MIN_RINGING_STEPS = 512
-# factor on the error of the fit of a ringing, because the march causes similar errors in all of its
-# samples
+# factor on the error of the fit of a ringing, because a march causes correlated errors in its samples
 FIT_ERROR_FACTOR = 5.0
-# phase of the free vibration in a stick interval [rad], from which on ringing is searched for
+# smallest phase [rad] of the free vibration in a stick interval in which ringing is searched for
 MIN_STICK_PHASE = 0.9 * 3 * np.pi
-# phase of a vibration [rad] that its measurement in closed form needs, three half periods
+# smallest phase [rad] of a vibration that counts as ringing in closed form, three half periods
 MIN_FREE_PHASE = 3 * np.pi
-# damping ratio and distance from a harmonic of the drive, below which a vibration is forced
+# damping ratio, and distance from a harmonic of the drive over its frequency, below which a vibration
+# counts as forced
 FORCED_DAMPING = 1e-3
 FORCED_DISTANCE = 1e-2
 
 
 class LaneRinging(NamedTuple):
-    """Ringing of n cases.
+    """Ringing of n cases during stick, and which cases need another run.
 
     - values, errors: ring_frequency [Hz] and ring_damping [1] by name, (n,) each.
     - needs_single_run: which cases (n,) may ring, but lanes cannot tell.
@@ -48,7 +48,7 @@ class LaneRinging(NamedTuple):
 
 
 def find_ringing(law: str, cases, scales: Scales, measured, is_stuck) -> LaneRinging:
-    """Return the ringing of cases, and which cases need another run.
+    """Find the ringing of cases during stick, and which cases need another run.
 
     Parameters
     ----------
@@ -88,16 +88,16 @@ def find_ringing(law: str, cases, scales: Scales, measured, is_stuck) -> LaneRin
 
 
 def has_long_stick(cases, marched) -> np.ndarray:
-    """Return whether a stick interval of the last cycles is long enough for ringing, (n,)."""
+    """Return which cases (n,) have a stick interval that is long enough for ringing."""
     omega = np.sqrt(np.maximum(cases.stiffness + cases.spring - cases.damping**2 / 4, 0.0))
     return marched.reading("LONGEST_STICK") * omega >= MIN_STICK_PHASE
 
 
 def may_contain_transient(cases, marched) -> np.ndarray:
-    """Return whether a transient or ringing may remain at the end of a run, (n,).
+    """Return which runs (n,) may still contain a transient or ringing at their end.
 
-    What remains is at most the change between the last two cycles over the fraction that the damper
-    removes in one cycle.
+    The remaining transient is at most the change between the last two cycles over the fraction that the
+    damper removes in one cycle.
     """
     last = marched.history[:, -2:, :2]
     change = np.abs(last[:, 1] - last[:, 0]).max(axis=1) / np.maximum(
@@ -108,13 +108,13 @@ def may_contain_transient(cases, marched) -> np.ndarray:
 
 
 def _fit_ringing(law: str, cases, scales: Scales, measured, fitted, ringing: LaneRinging) -> None:
-    """Fit the ringing of the cases with the indices `fitted`, and store it in `ringing`."""
+    """Fit the ringing of some cases to samples of their acceleration."""
     if not fitted.size:
         return
     steps = measured.steps
     omega = np.sqrt(np.maximum(cases.stiffness + cases.spring, 1.0))
     strides = np.maximum(steps / (SAMPLES_PER_PERIOD * omega), 1.0)
-    # the stride of a case does not depend on other cases
+    # the stride is a power of 2, so that it does not depend on other cases
     strides = 2 ** np.log2(strides).astype(int)
     start = measured.marched.observed_start[fitted]
     signals = march.output_accelerations(
@@ -125,7 +125,7 @@ def _fit_ringing(law: str, cases, scales: Scales, measured, fitted, ringing: Lan
         samples = signal[:: strides[case]]
         time = np.linspace(0, 2 * np.pi * measured.window / omega, len(samples))
         values, errors = measure_ringing(time, samples, [(0.0, time[-1])], omega)
-        # with so few steps, a ringing may be missed
+        # a ringing that is not found with so few steps may have been missed
         ringing.needs_more_steps[case] = (
             not values and march.has_one_stretch(law) and steps < MIN_RINGING_STEPS
         )
@@ -135,20 +135,21 @@ def _fit_ringing(law: str, cases, scales: Scales, measured, fitted, ringing: Lan
 
 
 def _ring_on_springs(cases, scales: Scales, marched, is_held, ringing: LaneRinging) -> None:
-    """Compute the ringing of the cases (n,) that a spring holds in all evaluated cycles.
+    """Compute in closed form the ringing of cases that a spring holds in stick.
 
-    It is known in closed form, with the criteria of `response.ringing`, and stored in `ringing`.
+    The spring holds the cases `is_held` (n,) in all evaluated cycles. The results are accepted by the
+    criteria of `response.ringing`, and stored in `ringing`.
     """
     stiffness = cases.stiffness + cases.spring
     half_damping = cases.damping / 2
     omega = np.sqrt(np.maximum(stiffness - half_damping**2, 0.0))
-    # the dynamic stiffness at the drive is detuning + i damping
+    # the dynamic stiffness at the drive frequency is detuning + i damping
     detuning = stiffness - 1
     squared = detuning**2 + cases.damping**2
     start = marched.observed_start
     phase = 2 * np.pi * marched.n_observed * omega
     with np.errstate(all="ignore"):
-        # the motion without that of the sine and without the stretch of the spring
+        # the free motion is the motion without the forced part and without the stretch of the spring
         displacement = (
             start[:, Row.SLIDE]
             - cases.spring * start[:, Row.MEMORY] / stiffness

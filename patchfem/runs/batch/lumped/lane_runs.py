@@ -24,15 +24,15 @@ from .lane_numbers import Scales, count_evaluated_cycles, lane_kind
 from .lane_ringing import find_ringing
 from .lane_settling import SETTLING_LAWS, march_until_settled
 
-# smallest relative error, a hundredth of the smallest tolerance: both marches may miss the same
-# event
+# smallest relative error of a measure, a hundredth of the smallest tolerance, because both marches may
+# miss the same event
 MIN_RELATIVE_ERROR = 1e-6
-# fraction of a loop by which a loop that is forgotten for lack of memory may be larger
+# largest gap of a friction loop, over the loop, that is dropped for lack of memory of loops
 DROPPED_LOOP_RATIO = 1e-2
 
 
 class MeasuredMarch(NamedTuple):
-    """March of n cases with the same steps.
+    """March of n cases in lanes with the same steps, and its measures.
 
     - steps, cycles, window: steps per cycle, cycles, and those at the end that are evaluated.
     - values: measures (n,) by name.
@@ -53,7 +53,7 @@ class MeasuredMarch(NamedTuple):
 
 
 class LaneRuns(NamedTuple):
-    """Runs of n cases by lanes.
+    """Runs of n cases by lanes, and which cases need another run.
 
     - runs: Runs with their errors.
     - is_exact: which cases (n,) must be computed by the exact engine.
@@ -66,7 +66,7 @@ class LaneRuns(NamedTuple):
 
 
 def march_and_measure(law: str, cases, scales: Scales, cycles: int, steps: int) -> MeasuredMarch:
-    """March cases, and evaluate the last cycles.
+    """March cases in lanes, and evaluate the last cycles.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def march_and_measure(law: str, cases, scales: Scales, cycles: int, steps: int) 
 
 
 def step_errors(values: dict, coarser: list) -> dict:
-    """Return the error (n,) of each measure from its values at half and a quarter of the steps.
+    """Estimate the error (n,) of each measure from marches with half and a quarter of the steps.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def collect_runs(
     coarser: list,
     mesh_errors: dict,
 ) -> LaneRuns:
-    """Return the runs of models of a group from their march.
+    """Combine the marches of models of a group to runs with errors.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def collect_runs(
     round_off = SUM_ROUND_OFF * np.abs(marched.history[:, :, :2]).max(axis=(1, 2))
     is_stuck = slips / 2 <= np.maximum(scales.held, round_off)
     is_stuck &= (cases.spring > 0) | (law == "rigid")
-    # a measure that only one of both marches has
+    # a case is computed exactly if only one of both marches has a measure
     has_other_measures = [np.isnan(values[name]) != np.isnan(coarser[0][name]) for name in values]
     is_exact = np.any(has_other_measures, axis=0)
     ringing = find_ringing(law, cases, scales, measured, is_stuck)
@@ -182,7 +182,7 @@ def collect_runs(
         measured.extremes,
         phasors[:, ends],
         is_stuck,
-        np.zeros(len(models), bool),  # lost cases are returned separately
+        np.zeros(len(models), bool),  # lost cases are returned in needs_more_steps
         errors | ringing.errors,
         MIN_RELATIVE_ERROR,
         np.inf,

@@ -13,17 +13,20 @@ from ....response.settling import extrapolate_steady_amplitudes
 from ...rig.pieces import MAX_CHANGE_RATIO
 from .lane_numbers import count_evaluated_cycles, select_rows
 
-SETTLING_LAWS = ("yielding", *march.MASING)  # laws whose motion is marched on until it is steady
+SETTLING_LAWS = (
+    "yielding",
+    *march.MASING,
+)  # laws whose marches are continued until the motion is steady
 MIN_TOLERANCE = 1e-4  # smallest tolerance that lanes can meet
-# Factor from the cycles of a case to the most cycles that it marches until it settles.
+# largest ratio of the cycles of a continued march to those of the case
 MAX_EXTENSION = 10
-# fractions of its cycles after which it is tested whether a case has settled; those that settle
-# soon cost little
+# Lengths of the continued marches over that of the case, after each of which the settling is tested; they
+# begin with short ones, so that cases that settle soon cost little.
 EXTENSIONS = (0.25, 0.25, 0.5, *(MAX_EXTENSION - 1) * (1.0,))
-SETTLED_TOL = 1e-5  # largest remaining change over a tenth of the cycles of a steady motion [1]
+SETTLED_TOL = 1e-5  # largest relative change of a steady motion over the cycles of the case [1]
 LATE_FACTOR = 100  # factor on SETTLED_TOL at the end of the march
-# Error of an extrapolated range over the error that the extrapolation states, and its minimum over
-# the range: 1 of 571 random cases erred more.
+# Ratio of the error of an extrapolated range to the error that the extrapolation states, and smallest error
+# over the range: 1 of 571 random cases erred more.
 EXTRAPOLATION_ERROR_FACTOR = 2.5
 MIN_EXTRAPOLATION_ERROR = 7e-6
 
@@ -42,7 +45,7 @@ class SettledRanges(NamedTuple):
 
 
 def march_until_settled(law: str, cases, measured, amplitudes, is_free) -> SettledRanges:
-    """March cases on until they settle.
+    """Continue the marches of cases until their motions are steady.
 
     Parameters
     ----------
@@ -94,7 +97,7 @@ def march_until_settled(law: str, cases, measured, amplitudes, is_free) -> Settl
 
 
 def _slips_until_steady(ranges, length, value, error) -> np.ndarray:
-    """Return whether a motion slips in all cycles up to its steady state, or in none, (n,).
+    """Return which motions slip in all cycles up to the steady state, or in none, (n,).
 
     If the slip ceases before the steady state, the free motion decays differently from then on.
 
@@ -115,8 +118,8 @@ def _slips_until_steady(ranges, length, value, error) -> np.ndarray:
 def _bound_free_motion(cases, before, motion, cycles: int) -> np.ndarray:
     """Return an upper bound of the remaining free motion (n,) [m].
 
-    It follows from the change in `cycles` cycles, and from the smallest decay by the damper in
-    them: with a slow beat, the extremes hardly change while it is largest.
+    The bound follows from the change in `cycles` cycles and the smallest decay by the damper in these
+    cycles: the extremes of a slow beat hardly change while it is largest.
     """
     omega = np.sqrt(cases.stiffness + cases.spring)
     half_damping = cases.damping / 2
@@ -130,11 +133,11 @@ def _bound_free_motion(cases, before, motion, cycles: int) -> np.ndarray:
 
 
 def _steady_half_range(history, cycles: int, free_motion, tolerance: float) -> tuple:
-    """Return half the range of the slide in the steady state and its error, (n,) each [m].
+    """Estimate half the range of the slide in the steady state and its error, (n,) each [m].
 
-    It is the last range if it hardly changes in `cycles` cycles, not more than in those before, and
+    The result is the last range if it hardly changes in `cycles` cycles, not more than in those before, and
     if the remaining free motion is below the fraction `tolerance` of it; else an extrapolation of
-    windows, at last of windows of `cycles` cycles. It is NaN if it is not known.
+    windows, at last of windows of `cycles` cycles. NaN means that it is unknown.
 
     Parameters
     ----------

@@ -15,15 +15,15 @@ from .lane_numbers import KINDS, contact_of_point, may_create_energy
 
 STRETCH_STEPS = (128, 256, 512, 1024, 2048)  # steps per cycle under a stretch law
 MAX_STEP_PHASE = 0.5  # largest phase of the fastest rate of a stretch law in a step [rad]
-# fraction of the relaxation rate of the speed in the layer of tanh, from which the errors need more
-# steps
+# Fraction of the relaxation rate at the speeds around 0, where tanh regularises the friction, that the steps
+# have to resolve.
 LAYER_RATE_FRACTION = 0.5
-# rate of the force peak of LuGre over (acceleration / Stribeck speed), the inverse time of a
-# reversal to pass this speed
+# Rate of the force peak of LuGre over (acceleration / Stribeck speed), i.e. over the inverse of the time in
+# which a reversal passes this speed.
 STRIBECK_RATE_FACTOR = 0.75
-# fastest rate over that of the drive, and the steps per cycle that it needs
+# largest ratio of the fastest rate of a single point to that of the drive, and the steps per cycle for it
 POINT_STEPS = ((5.0, 96), (10.0, 192), (20.0, 384))
-# the same for a patch, represented by sliders
+# largest ratio of the fastest rate of a patch of sliders to that of the drive, and the steps per cycle for it
 PATCH_STEPS = ((10.0, 96), (20.0, 192), (40.0, 384), (80.0, 768))
 
 
@@ -45,7 +45,7 @@ def steps_at_rate(rates, ends) -> np.ndarray:
 
 
 def fastest_rate(model: Model, stiffness):
-    """Return the fastest rate of a model with a contact stiffness [N/m], over that of its drive."""
+    """Return the fastest rate of a rig in stick over the drive frequency."""
     modes = model.rig.modes
     rate = np.sqrt(modes.omega[0] ** 2 + stiffness * modes.slide[0] ** 2 / modes.mass)
     return (rate + modes.damping_matrix[0, 0]) / model.rig.drive.signal.omega
@@ -66,7 +66,7 @@ def _relative_rate(model: Model):
         rate = limit / friction.reference_speed * scale + rate
         max_rate = MAX_STEP_PHASE * STRETCH_STEPS[-1] / (2 * np.pi) * omega
         rate = np.where(rate > max_rate, np.inf, LAYER_RATE_FRACTION * rate)
-    # its force peak during a reversal lasts as long as the speed is below the Stribeck speed
+    # the force peak of LuGre in a reversal lasts as long as the speed is below the Stribeck speed
     if friction.law == "lugre":
         acceleration = np.abs(modes.slide[0] * modes.base[0]) * find_max_acceleration(
             model.rig.drive.signal

@@ -37,12 +37,12 @@ from .lane_settling import MIN_TOLERANCE
 from .lane_steps import steps_per_cycle
 from .pieces import MAX_CYCLES, MIN_CYCLES
 
-MAX_CASES_PER_CALL = 4096  # number of cases in one compiled call
-N_FINER_CELLS = 2  # how often the cells of the Iwan law are doubled in the exact engine of a check
+MAX_CASES_PER_CALL = 4096  # largest number of cases in one compiled call
+N_FINER_CELLS = 2  # number of doublings of the cells of the Iwan law in the exact engine of a check
 
 
 def refuses(model: Model) -> str:
-    """Return why lanes do not take a model; "" if they do."""
+    """Return why a model cannot march in lanes, or ""."""
     if why := why_no_lanes(model):
         return why
     if not steps_per_cycle([model])[0]:
@@ -51,7 +51,7 @@ def refuses(model: Model) -> str:
 
 
 def why_no_lanes(model: Model) -> str:
-    """Return why lanes take no model with the options of this one, whatever its numbers, or ""."""
+    """Return why a model cannot march in lanes because of its options, or ""."""
     friction = model.friction
     if why := lumped.not_one_point(model):
         return why
@@ -67,7 +67,7 @@ def why_no_lanes(model: Model) -> str:
 
 
 def needs_other_accuracy(model: Model) -> str:
-    """Return why the requested accuracy of a model exceeds that of lanes; "" if it does not."""
+    """Return why the requested method or accuracy of a model excludes lanes, or ""."""
     if (
         model.accuracy.method != "auto"
         or list_fixed_settings(model.accuracy)
@@ -83,7 +83,7 @@ def group(model: Model) -> tuple:
 
 
 def parts(models: Sequence) -> dict[tuple, list]:
-    """Return the indices of the models that lanes take, by group."""
+    """Return the indices of the models that can march in lanes, by group."""
     groups: dict = {}
     if isinstance(models, SimilarModels):
         if not why_no_lanes(models.first):
@@ -101,7 +101,7 @@ def parts(models: Sequence) -> dict[tuple, list]:
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Return the case results of models of one group."""
+    """Compute the case results of a group of models by lanes."""
     results = CaseResults.blank(len(models))
     for first in range(0, len(models), MAX_CASES_PER_CALL):
         cases = range(first, min(first + MAX_CASES_PER_CALL, len(models)))
@@ -110,7 +110,7 @@ def solve(models: Sequence[Model], say=None) -> CaseResults:
 
 
 def _solve_cases(models: Sequence[Model], say) -> CaseResults:
-    """Return the case results of models, with the notes of law 'tanh'."""
+    """Compute the case results of the models of one compiled call."""
     checked = solve_and_check(
         models,
         LaneCases(*make_cases(models)),
@@ -133,7 +133,7 @@ def _solve_cases(models: Sequence[Model], say) -> CaseResults:
 
 
 def _solve_exactly(models: Sequence[Model], say, indices: list, is_check: bool) -> CaseResults:
-    """Return the results of some cases by the exact batch, or else by single runs."""
+    """Compute the results of some cases by the exact batch, or else by single runs."""
     some_models = list(select_models(models, indices))
     is_check = is_check and models[0].friction.law == "iwan"
     results = CaseResults.blank(len(some_models))

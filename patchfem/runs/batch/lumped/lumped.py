@@ -16,16 +16,18 @@ from ..case_results import CaseResults, has_unreadable_table
 from . import pieces
 from .columns import assemble_results
 
-MAX_CASES_PER_CALL = 1024  # cases of one compiled call, which limits the memory of their histories
+MAX_CASES_PER_CALL = (
+    1024  # largest number of cases in one compiled call, to limit the memory of histories
+)
 
 
 def refuses(model: Model) -> str:
-    """Return why the batch does not take a model; "" if it does."""
+    """Return why the batch of event-driven single points refuses a model, or ""."""
     return not_one_point(model) or pieces.refuses(model)
 
 
 def not_one_point(model: Model) -> str:
-    """Return why a model is not one mode under a sine with one constantly loaded point, or ""."""
+    """Return why a model is not one mode with one constantly loaded point, or ""."""
     rig = model.rig
     if (
         model.kind != "rig"
@@ -47,7 +49,7 @@ def not_one_point(model: Model) -> str:
 
 
 def not_one_sine(rig) -> str:
-    """Return why a rig is not one mode under a sine with one accelerometer; "" if it is."""
+    """Return why a rig is not one mode with one accelerometer under sinusoidal drive, or ""."""
     if rig.modes.gauge is not None:
         return "the gauge and the accelerometer of the case move differently"
     if rig.structure.richer_rig is not None:
@@ -76,7 +78,7 @@ def group(model: Model) -> tuple[int, str, int]:
 
 
 def solve(models: Sequence[Model], say=None, n_finer: int = 0) -> CaseResults:
-    """Return the case results of models of one group; cases that need it are run by themselves.
+    """Compute the case results of a group of event-driven single points.
 
     Parameters
     ----------
@@ -97,7 +99,7 @@ def solve(models: Sequence[Model], say=None, n_finer: int = 0) -> CaseResults:
 
 
 def _solve_cases(models, say, n_merges: int, is_check: bool = False) -> CaseResults:
-    """Return the case results of at most MAX_CASES_PER_CALL models."""
+    """Compute the case results of the models of one compiled call."""
     begin = perf_counter()
     cycles = int(models[0].rig.drive.cycles)
     window = min(10, cycles // 10)

@@ -32,15 +32,17 @@ from ...rig.pieces import (
 from .columns import MAIN_MEASURE, N_FINAL_WINDOWS, Runs
 from .threads import in_threads
 
-STICK_CYCLES = 3  # cycles that contain each stick interval of a cycle completely
+STICK_CYCLES = (
+    3  # number of cycles that contain every stick interval of a periodic motion completely
+)
 MIN_CYCLES = 20  # smallest number of cycles of a run
 MAX_CYCLES = 4000  # largest number of cycles of a run, whose extremes are all kept
-# relative to the largest slide; the drift of rigid elements has the round-off of two means
+# error of the drift of rigid elements over the largest slide, the round-off of two means
 DRIFT_ROUND_OFF = 1e-14
 
 
 class Case(NamedTuple):
-    """Run of the batch.
+    """Case of an event-driven run, with its friction elements and load.
 
     - model: its Model.
     - groups: Elements of its interface.
@@ -80,12 +82,12 @@ def is_rigid_law(model) -> bool:
 
 
 def count_first_merges(model) -> int:
-    """Return how often neighbouring cells are merged in pairs in a first run."""
+    """Return how often a first run merges neighbouring cells of a density in pairs."""
     return 0 if is_rigid_law(model) else count_merges(model)
 
 
 def make_case(model, n_merges: int = 0) -> Case:
-    """Return the Case of a model with a single point, whose cells are merged `n_merges` times."""
+    """Return the event-driven case of a model with a single point."""
     if is_rigid_law(model):
         return Case(model, RigidElements(model, None, None).groups, 0.0, model.point.load)
     element = make_law(model.friction, model.point.load).element(model.point.load)
@@ -96,7 +98,7 @@ def make_case(model, n_merges: int = 0) -> Case:
 
 
 def run_pieces(models, cycles: int, window: int, say=None, n_merges: int = 0) -> Runs:
-    """Run models of this kind, each for `cycles` cycles from its initial state.
+    """Run models from event to event, with coarse runs for the error of their cells.
 
     Parameters
     ----------
@@ -125,7 +127,7 @@ def run_pieces(models, cycles: int, window: int, say=None, n_merges: int = 0) ->
 def runs_of_cases(
     cases: list, cycles: int, window: int, say=None, least: int = 0, steady: bool = True
 ) -> Runs:
-    """Run cases without histories.
+    """Run cases from event to event without histories.
 
     Parameters
     ----------
@@ -147,7 +149,7 @@ def runs_of_cases(
     finished = [None] * len(cases)
 
     def simulate(part: slice) -> None:
-        """Run the cases of a slice, and store their runs in `finished`."""
+        """Run a slice of the cases, and store their runs."""
         rigs = [(case.model.rig, case.groups) for case in cases[part]]
         finished[part] = histories.simulate_batch(
             ((rig.modes, rig.drive.signal, groups, rig.start) for rig, groups in rigs),
@@ -160,7 +162,7 @@ def runs_of_cases(
 
 
 def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bool) -> Runs:
-    """Return the Runs of finished runs, either all of rigid elements or none.
+    """Evaluate finished event-driven runs as columns.
 
     Work on rigid elements is all dissipated. They keep a single mode at rest during stick, so that
     nothing rings, and their drift has the round-off of two means.
@@ -239,18 +241,18 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
 
 
 def _find_ring(case: Case, run, steady: bool) -> dict | None:
-    """Return the ringing of a run: {} for none, None if a single run is needed.
+    """Find the ringing of a run: {} for none, None if a single run is needed.
 
-    It is that of the run itself or, if `steady`, of a few more cycles with samples.
+    The ringing is that of the run itself or, if `steady`, of a few more cycles with samples.
     """
     if run.ring is not None:
         return make_ring(*run.ring, run.acceleration)
-    if not steady or not run.slips:  # without stick nothing rings
+    if not steady or not run.slips:  # an interface that never slips as a whole excites no ringing
         return {}
     modes = case.model.rig.modes
     drive = case.model.rig.drive.signal
     is_stuck = run.reading.loop().stuck_time >= run.reading.span * (1 - 1e-12)
-    if run.repeats and is_stuck:  # in a periodic motion that sticks the ringing has decayed
+    if run.repeats and is_stuck:  # in a periodic motion that always sticks, the ringing has decayed
         return {}
     if not run.repeats:
         return None
@@ -263,7 +265,7 @@ def _find_ring(case: Case, run, steady: bool) -> dict | None:
 
 
 def with_coarser_errors(fine: Runs, coarse_runs: list, estimate: Callable) -> Runs:
-    """Return Runs with the errors that follow from coarse Runs.
+    """Add the errors that follow from coarse runs to runs.
 
     Parameters
     ----------
@@ -288,6 +290,6 @@ def with_coarser_errors(fine: Runs, coarse_runs: list, estimate: Callable) -> Ru
 
 
 def known_values(measures: dict, case: int) -> dict:
-    """Return the values of a case that are known, by name, from columns by name."""
+    """Return the values of one case that are known, from columns by name."""
     values = {name: float(column[case]) for name, column in measures.items()}
     return {name: value for name, value in values.items() if not np.isnan(value)}

@@ -20,14 +20,14 @@ from . import pieces
 from .columns import assemble_results
 from .lumped import not_one_sine
 
-# cases of one compiled call, whose elements and histories of cycles are in memory together
+# largest number of cases in one compiled call, whose elements and cycle extremes are in memory together
 MAX_CASES_PER_CALL = 128
-# cases of a thread: a single one takes as long as hundreds of single points
+# smallest number of cases of a thread: a patch takes as long as hundreds of single points
 MIN_CASES_PER_THREAD = 2
 
 
 def refuses(model: Model) -> str:
-    """Return why the batch does not take a model; "" if it does."""
+    """Return why the batch of patches that slip in part refuses a model, or ""."""
     if (
         model.patch is None
         or not model.partial_slip
@@ -54,7 +54,7 @@ def group(model: Model) -> tuple:
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Return the case results of models of one group; cases that need it are run by themselves."""
+    """Compute the case results of a group of patches that slip in part."""
     batch = pressed.PatchBatch(PIECES.name, YieldingElements, move_cases, MAX_CASES_PER_CALL)
     return pressed.solve(models, batch, say)
 
@@ -62,7 +62,7 @@ def solve(models: Sequence[Model], say=None) -> CaseResults:
 def move_cases(
     models: Sequence[Model], pressed_cases: list, say=None
 ) -> tuple[CaseResults, np.ndarray]:
-    """Return the results of pressed cases, and which (n,) must be run by themselves.
+    """Compute the motions of pressed patches, and which (n,) must be run by themselves.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def move_cases(
 
 
 def describe_sizes(case: pressed.PressedCase) -> dict:
-    """Return the numbers of elements and of interface nodes of a case, by name."""
+    """Return the numbers of elements and interface nodes of a case."""
     return {
         "elements": int(case.fine.contact.reduction.stiffness.size),
         "interface_nodes": int(case.patch.x.size),
@@ -109,7 +109,7 @@ def describe_sizes(case: pressed.PressedCase) -> dict:
 def add_patch_results(
     results: CaseResults, case: int, model: Model, pressed_case: pressed.PressedCase, reach: float
 ) -> None:
-    """Add the results of the patch to a case (`pressed.add_patch_results`).
+    """Add the results of the pressed patch to a case.
 
     Parameters
     ----------

@@ -19,11 +19,13 @@ from .. import one_by_one, pressed
 from ..case_results import CaseResults
 from . import lane_check, lane_numbers, lane_steps, lanes, sheared
 
-MAX_CASES_PER_CALL = 512  # cases of one compiled call, whose tables are in memory together
+MAX_CASES_PER_CALL = (
+    512  # largest number of cases in one compiled call, whose tables are in memory together
+)
 
 
 def refuses(model: Model) -> str:
-    """Return why lanes do not take a model; "" if they do."""
+    """Return why a patch that slips in part cannot march in lanes, or ""."""
     return sheared.refuses(model) or lanes.needs_other_accuracy(model)
 
 
@@ -33,7 +35,7 @@ def group(model: Model) -> tuple:
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Return the case results of models of one group."""
+    """Compute the case results of a group of patches that slip in part, by lanes."""
     batch = pressed.PatchBatch(PIECES.name, YieldingElements, move_cases, MAX_CASES_PER_CALL)
     return pressed.solve(models, batch, say)
 
@@ -41,7 +43,7 @@ def solve(models: Sequence[Model], say=None) -> CaseResults:
 def move_cases(
     models: Sequence[Model], pressed_cases: list, say=None
 ) -> tuple[CaseResults, np.ndarray]:
-    """Return the results of pressed cases, and which (n,) must be run by themselves.
+    """Compute the motions of pressed patches by lanes, and which must be run by themselves.
 
     The parameters are those of `sheared.move_cases`.
     """
@@ -58,7 +60,7 @@ def move_cases(
     results = CaseResults.blank(len(models))
 
     def solve_exactly(cases: list, is_check: bool = False) -> CaseResults:
-        """Return the results of some cases by the exact batch or by single runs."""
+        """Compute the results of some cases by the exact batch or by single runs."""
         some_models = [models[case] for case in cases]
         part, runs_singly = sheared.move_cases(
             some_models, [pressed_cases[case] for case in cases], say
@@ -100,7 +102,7 @@ def move_cases(
 
 
 def _contact_numbers(elements: list, pressed_cases: list) -> np.ndarray:
-    """Return the numbers (m, n) of the contacts of patches, as `lane_numbers.make_cases` takes them."""
+    """Return the contact parameters (m, n) of patches, as `lane_numbers.make_cases` takes them."""
     rows = [
         (
             group.limit,

@@ -11,11 +11,13 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
 
-MIN_CASES_PER_THREAD = 32  # cases of a thread: fewer are finished before a thread has started
+MIN_CASES_PER_THREAD = (
+    32  # smallest number of cases of a thread: fewer end before the thread has started
+)
 
 
 def in_threads(work: Callable[[slice], None], count: int, least: int = 0) -> None:
-    """Call work(part) for parts of range(count), in parallel threads if there are cores.
+    """Apply a function to slices of the cases, in parallel threads if there are free cores.
 
     Parameters
     ----------
@@ -33,9 +35,9 @@ def in_threads(work: Callable[[slice], None], count: int, least: int = 0) -> Non
 
 
 def cores() -> int:
-    """Return how many cores this process may use for itself.
+    """Return the number of processor cores that this process may use.
 
-    It is 1 in a worker of another process, and at most OMP_NUM_THREADS.
+    The number is 1 in a worker of another process, and at most OMP_NUM_THREADS.
     """
     if multiprocessing.parent_process() is not None:
         return 1

@@ -30,16 +30,21 @@ from ..reading import Reader, friction_works
 from ..solution import Solution, sampled_loop
 from .curves import COLUMN_MEASURES, HARMONIC_ROUND_OFF, CurvePoint, describe_instability
 
-SAMPLES = 4096  # samples of the cycle from which measures are computed
+SAMPLES = (
+    4096  # number of samples of a cycle from which the measures of a steady motion are computed
+)
 
 
 class Balanced(Reader):
-    """Reader of one cycle of a harmonic balance; turns: `SteadyMotion.turns` of this cycle."""
+    """Evaluator of one cycle of a motion found by harmonic balance.
+
+    turns: reversals of this cycle, see `SteadyMotion.turns`.
+    """
 
     turns: tuple = ()
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
-        """Return the two values of the friction work, and the reversals.
+        """Return the friction work from samples and from the balance, and the reversals.
 
         A periodic motion has no drift.
         """
@@ -50,7 +55,7 @@ class Balanced(Reader):
         )
 
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return the loop, computed by the trapezoidal rule, and the peaks of force and slip.
+        """Return the friction loop and the peaks of force and slip, for the evaluation.
 
         Parameters
         ----------
@@ -71,7 +76,7 @@ class Balanced(Reader):
 
 
 class CycleMeasures(NamedTuple):
-    """Measures of one cycle of a balance.
+    """Measures, histories and energies of one cycle of a motion found by harmonic balance.
 
     - values: measures by name.
     - response: Response of the cycle.
@@ -84,7 +89,7 @@ class CycleMeasures(NamedTuple):
 
 
 class StableMotion(NamedTuple):
-    """Motion that is shown, its stability, and notes on others.
+    """Steady motion that is shown, its stability, and notes on other motions.
 
     - motion, stability: SteadyMotion without and with its multipliers.
     - notes: sentences on other motions at the same drive.
@@ -96,7 +101,7 @@ class StableMotion(NamedTuple):
 
 
 class BalanceFinder:
-    """Finder of steady motions by harmonic balance, for laws with memory and nonlinear springs.
+    """Finder of steady motions by harmonic balance, for laws with memory or nonlinear springs.
 
     It starts near the point of a curve that it gets, if there are several motions.
     """
@@ -123,7 +128,7 @@ class BalanceFinder:
         self.tolerance = model.accuracy.tolerance
 
     def point(self, drive, near=None) -> tuple:
-        """Return the Solution of the steady motion under a sine, and its SteadyMotion.
+        """Find the steady motion under sinusoidal drive, with errors.
 
         The errors come from twice as many harmonics and from twice as many samples.
 
@@ -181,9 +186,9 @@ class BalanceFinder:
         ), motion
 
     def _errors(self, values: dict, motion, drive, read) -> dict:
-        """Return errors of the measures of a SteadyMotion by name.
+        """Estimate the errors of the measures of a steady motion from more harmonics.
 
-        If no finer SteadyMotion converges, they are the error of the balance itself.
+        If no motion with more harmonics converges, the errors are those that the balance states.
 
         Parameters
         ----------
@@ -206,9 +211,9 @@ class BalanceFinder:
         return errors
 
     def _find_stable(self, drive, motion) -> StableMotion:
-        """Return a SteadyMotion, or the smallest stable one under the same drive if it is unstable.
+        """Return a steady motion, or the smallest stable one under the same drive.
 
-        If none is stable, the one that was given is returned.
+        If none of the motions is stable, the given motion is returned.
         """
         stability = add_stability(motion, self.modes)
         if stability.stable:
@@ -234,14 +239,14 @@ class BalanceFinder:
         return StableMotion(motion, add_stability(motion, self.modes), (note,))
 
     def curve_point(self, drive, near=None) -> CurvePoint:
-        """Return a point of a curve without its errors."""
+        """Find a point of a curve of steady motions, without errors."""
         motion = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
         )
         return self._curve_point(add_stability(motion, self.modes))
 
     def _curve_point(self, motion) -> CurvePoint:
-        """Return a SteadyMotion, whose multipliers are known, as a point of a curve."""
+        """Convert a steady motion with known stability to a point of a curve."""
         kind = balanced_regime(motion)[0]
         stable = bool(motion.stable)
         drive = SineDrive(motion.level, motion.omega, self.model.rig.drive.signal.moving)
@@ -257,7 +262,7 @@ class BalanceFinder:
         )
 
     def _read(self, motion, drive) -> dict:
-        """Return the measures of a curve, by name."""
+        """Return the measures of a point of a curve of steady motions."""
         response = make_cycle_response(motion, self.modes, drive, SAMPLES)
         row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {
@@ -268,7 +273,7 @@ class BalanceFinder:
         return {name: value for name, value in values.items() if value is not None}
 
     def _compute_measures(self, motion, drive, samples: int = SAMPLES) -> CycleMeasures:
-        """Compute the measures of a cycle of a SteadyMotion from samples."""
+        """Compute the measures of a steady motion from samples of its cycle."""
         response = make_cycle_response(motion, self.modes, drive, samples)
         book = find_cycle_energies(motion, self.modes) | {
             "stored": 0.0,
@@ -288,7 +293,7 @@ class BalanceFinder:
         return CycleMeasures(reader.values(run, drive), response, book)
 
     def curve(self, drive) -> tuple:
-        """Return the points of the curve over frequency, through its folds, and the folds [Hz]."""
+        """Trace the curve of steady motions over frequency through its folds [Hz]."""
         first = SineDrive(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
         branch = branches.trace_over_frequency(
             self.modes,
@@ -302,16 +307,16 @@ class BalanceFinder:
         return [self._point_of_branch(point, first) for point in branch.points], branch.folds
 
     def curve_distance(self, one: CurvePoint, other: CurvePoint) -> float:
-        """Return the arc length along a curve between two of its points.
+        """Return the arc length between two points of a curve of steady motions.
 
         The frequency is scaled by the swept range.
         """
         return branches.measure_distance(one.near, other.near, self._range)
 
     def point_between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
-        """Return the point of a curve at a fraction of the arc length between two of its points.
+        """Find the point of a curve at a fraction of the arc length between two points.
 
-        It is solved in the plane normal to the line between them.
+        The balance is solved in the plane normal to the line between these points.
 
         Parameters
         ----------
@@ -327,12 +332,12 @@ class BalanceFinder:
 
     @property
     def _range(self) -> float:
-        """Width of the swept range [rad/s]."""
+        """Width of the swept frequency range [rad/s]."""
         drive = self.model.rig.drive.signal
         return 2 * np.pi * abs(drive.high - drive.low)
 
     def _point_of_branch(self, motion, drive) -> CurvePoint:
-        """Return a SteadyMotion of a branch as a point of a curve with its errors."""
+        """Convert a steady motion of a branch to a point of a curve with errors."""
         motion = add_stability(motion, self.modes) if motion.stable is None else motion
         point = self._curve_point(motion)._replace(regime="stable" if motion.stable else "unstable")
         errors = self._errors(point.values, point.near, point.drive, self._read)

@@ -14,35 +14,38 @@ from ....dynamics.curve_points import sample_adaptively
 from ....response.levels import LEVEL_MEASURES, Level
 from ..solution import seen_by_gauge
 
-# measure of each column of a curve
+# name of the measure in each column of a curve of steady motions
 COLUMN_MEASURES = {
     "amplitude": "relative_displacement_amplitude",
     "acceleration_peak": "absolute_acceleration_peak",
     "acceleration_fundamental": "absolute_acceleration_fundamental",
     "acceleration_distortion": "acceleration_distortion",
 }
-# relative error of the measures of a motion that an exact engine integrates from a given state
+# relative error of the measures of an event-driven motion from a given state, which has round-off only
 READ = 1e-9
 HARMONIC_ROUND_OFF = (
     1e-12  # round-off of the third harmonic of the acceleration relative to the first
 )
-POINTS = 121  # points of a curve over frequency before its refinement
-# The neighbourhood of a peak ends at this fraction of the peak, and no other peak may be higher.
+POINTS = 121  # number of points of a curve over frequency before its refinement
+# The neighbourhood of a peak ends where the curve falls below this fraction of the peak; no other peak may
+# exceed this fraction.
 PEAK_END_RATIO = 0.8
-MAX_PEAK_FRACTION = 0.75  # largest fraction of the curve that is computed as a neighbourhood alone
-N_START_POINTS = 7  # points with which the curve of a neighbourhood starts
+MAX_PEAK_FRACTION = (
+    0.75  # largest width of a neighbourhood over that of the sweep; a wider one is not used
+)
+N_START_POINTS = 7  # number of points of the curve in a neighbourhood before its refinement
 SHARE = 0.01  # largest relative error of the linear interpolation between the points of a curve
 
 
 class CurvePoint(NamedTuple):
-    """Point of a curve.
+    """Point of a curve of steady motions.
 
-    - drive: its sine.
+    - drive: sinusoidal drive of the motion.
     - values, errors: measures and their errors by name; {} if there is no bounded motion.
     - regime: kind of the motion.
     - multiplier: largest |Floquet multiplier|.
     - stable: whether a disturbance decays.
-    - outcome.
+    - outcome: how the motion was judged.
     - near: initial guess for a motion nearby.
     """
 
@@ -57,7 +60,7 @@ class CurvePoint(NamedTuple):
 
     @property
     def level(self) -> Level:
-        """The point as a Level of the drive; its amplitude is NaN without a bounded motion."""
+        """Steady motion of the point as a level of the drive; NaN for an unbounded motion."""
         values = {COLUMN_MEASURES["amplitude"]: np.nan}
         if self.values:
             values = {name: self.values.get(name) for name in LEVEL_MEASURES}
@@ -73,7 +76,7 @@ class CurvePoint(NamedTuple):
 
 
 def exact_errors(values: dict, residual: float) -> dict:
-    """Return the errors of a motion that repeats up to the relative error `residual`, by name."""
+    """Estimate the errors of an event-driven steady motion from its residual over a period."""
     errors = {}
     for name, value in values.items():
         if value is not None:
@@ -83,7 +86,10 @@ def exact_errors(values: dict, residual: float) -> dict:
 
 
 def describe_instability(multipliers) -> str:
-    """Return the sentence on an unstable steady motion; multipliers: Floquet multipliers (m,)."""
+    """Return the sentence on an unstable steady motion.
+
+    multipliers: Floquet multipliers (m,).
+    """
     size = np.abs(multipliers).max()
     return (
         f"the steady motion that was found is unstable: a disturbance grows by the factor {size:.3g} per cycle; "
@@ -92,7 +98,7 @@ def describe_instability(multipliers) -> str:
 
 
 def curve_point(drive, raw, near=None) -> CurvePoint:
-    """Return the Solution of a steady motion as a point of a curve.
+    """Convert the Solution of a steady motion to a point of a curve.
 
     Parameters
     ----------
@@ -116,12 +122,14 @@ def curve_point(drive, raw, near=None) -> CurvePoint:
 
 
 def make_missing_point(drive) -> CurvePoint:
-    """Return a point at which no steady motion was found."""
+    """Return a curve point for a drive at which no steady motion was found."""
     return CurvePoint(drive, {}, {}, "not found", np.nan, False, Outcome.NOT_CONVERGED)
 
 
 class Followed:
-    """Curve over frequency whose points the method `shown` computes.
+    """Curve of steady motions over frequency, whose points a subclass computes.
+
+    leaves: see `top.refine_peak`.
 
     leaves: see `top.refine_peak`.
     """
@@ -129,11 +137,11 @@ class Followed:
     leaves = 1e-2, 0.1
 
     def curve_distance(self, one: CurvePoint, other: CurvePoint) -> float:
-        """Return the distance [rad/s] of two points along the curve."""
+        """Return the distance [rad/s] between two points of the curve."""
         return abs(other.drive.omega - one.drive.omega)
 
     def point_between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
-        """Return the point of the curve at a fraction of the distance between two of its points.
+        """Find the point of the curve at a fraction of the distance between two points.
 
         Parameters
         ----------
@@ -146,7 +154,7 @@ class Followed:
 
 
 def trace_curve(modes, drive, find) -> list:
-    """Return the points of the curve of a sweep, refined where it bends.
+    """Compute the curve of steady motions of a sweep, refined where it bends.
 
     The curve starts with POINTS frequencies and those of the modes, and is refined until linear
     interpolation between its points has an error of at most SHARE.
@@ -162,7 +170,7 @@ def trace_curve(modes, drive, find) -> list:
     """
 
     def sample(frequency, before):
-        """Return the amplitude [m] at a frequency [Hz], and the point."""
+        """Return the amplitude [m] at a frequency [Hz], and the curve point."""
         sine = SineDrive(drive.acceleration, 2 * np.pi * frequency, drive.moving)
         point = find(sine, before and before[1].near)
         return point.values.get(COLUMN_MEASURES["amplitude"], np.nan), point
@@ -174,8 +182,8 @@ def trace_curve(modes, drive, find) -> list:
 def start_frequencies(modes, drive) -> np.ndarray:
     """Return the frequencies [Hz] with which the curve of a sweep starts.
 
-    They are POINTS frequencies over the range, and the frequencies of the modes in it, where a peak
-    may be narrower than their spacing.
+        These are POINTS frequencies over the range, and the frequencies of the modes in it, where a peak may
+    be narrower than the spacing.
     """
     space = np.geomspace if drive.logarithmic else np.linspace
     ends = sorted((drive.low, drive.high))
@@ -188,7 +196,7 @@ def start_frequencies(modes, drive) -> np.ndarray:
 
 
 def sweep_around_peak(drive, curve: dict, at: float):
-    """Return a sweep over the neighbourhood of the largest amplitude of a curve.
+    """Return a sweep over the neighbourhood of the largest peak of a curve.
 
     The neighbourhood ends where the curve has fallen to PEAK_END_RATIO of the largest amplitude, plus a
     quarter of its width on both sides.
@@ -228,9 +236,9 @@ def sweep_around_peak(drive, curve: dict, at: float):
 
 
 def index_of_largest(points) -> int:
-    """Return the index of the point with the largest amplitude.
+    """Return the index of the curve point with the largest stable amplitude.
 
-    Only stable points count, if there are any.
+    If no point is stable, all points count.
     """
     sizes = np.array([point.values.get(COLUMN_MEASURES["amplitude"], -1.0) for point in points])
     lasting = np.array([point.stable for point in points])
@@ -238,9 +246,10 @@ def index_of_largest(points) -> int:
 
 
 def curve_columns(points, folds=()) -> dict:
-    """Return the columns (c,) of a curve by name; NaN where no bounded motion exists.
+    """Return the columns of a curve of steady motions by name; NaN for unbounded motions.
 
-    They are frequency [Hz], level [m s-2], regime, multiplier, and each of COLUMN_MEASURES with its error.
+    The columns are frequency [Hz], level [m s-2], regime, multiplier, and each of COLUMN_MEASURES with
+    its error.
     folds: frequencies [Hz] at which the curve turns back.
     """
     columns = {
@@ -258,7 +267,7 @@ def curve_columns(points, folds=()) -> dict:
 
 
 def motion_at_levels(finder, drive):
-    """Return the Solution of the largest level of a drive in levels.
+    """Find the steady motions at all levels of a drive, and return the largest.
 
     Each level starts from the motion at the previous one, as in a test. The Solution has the curve
     of all levels, the Level of each, and a probe for `levels.onset`. A level without a steady
@@ -288,10 +297,10 @@ def motion_at_levels(finder, drive):
             best = solution, sine
         failures += [solution.message] if solution.message else []
     if best is None:
-        raise failures[0]  # no level has a steady motion
+        raise failures[0]  # none of the drive levels has a steady motion
 
     def probe(number: int, level: float) -> Level:
-        """Return the Level at another level [m s-2], started from the motion at a known level."""
+        """Find the steady motion at another level [m s-2], starting from a known level."""
         sine = SineDrive(level, drive.segments[0].omega, drive.moving)
         return finder.curve_point(sine, points[number].near if number >= 0 else None).level
 

@@ -33,7 +33,7 @@ from .curves import (
 
 
 class PeriodicMotion(NamedTuple):
-    """Periodic motion that a map finds.
+    """Periodic motion found by the map of a period, with its stability.
 
     - start, memory: state and memory of the elements at phase 0 of the drive.
     - near: initial guess for a motion nearby.
@@ -43,7 +43,7 @@ class PeriodicMotion(NamedTuple):
     - error: relative error that follows from the residual.
     - iterations: number of iterations.
     - bounded: whether a bounded motion exists.
-    - lasting: whether it is stable.
+    - lasting: whether the motion is stable.
     """
 
     start: InitialState
@@ -59,17 +59,19 @@ class PeriodicMotion(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Regime, and whether the motion is unstable."""
+        """Regime of the motion, marked if the motion is unstable."""
         return self.regime if self.lasting else f"{self.regime}, unstable"
 
     @property
     def size(self) -> float:
-        """Largest |multiplier|."""
+        """Largest magnitude of the Floquet multipliers."""
         return float(np.abs(self.multipliers).max(initial=0.0))
 
 
 class Maps(Followed):
     """Finder of steady motions by the map of a period.
+
+    `repeating` finds a motion; it starts from `near` if there are several.
 
     `repeating` finds a motion; it starts from `near` if there are several.
     """
@@ -89,11 +91,11 @@ class Maps(Followed):
         self.groups = self.contact_elements.groups
 
     def repeating(self, drive, near) -> PeriodicMotion:
-        """Return the PeriodicMotion under a sine."""
+        """Find the periodic motion under sinusoidal drive."""
         raise NotImplementedError
 
     def point(self, drive, near=None) -> tuple:
-        """Return the Solution of two cycles of the steady motion, and a start for a motion nearby."""
+        """Find the steady motion under sinusoidal drive, and a guess for a motion nearby."""
         begin = perf_counter()
         motion = self.repeating(drive, near)
         numerics = replace(self.numerics, cycles=2.0, window=1)
@@ -138,11 +140,11 @@ class Maps(Followed):
         ), motion.near
 
     def start_memory(self, memory):
-        """Return the memory of elements at the start of a run, whose energies count from there."""
+        """Return the memory of the friction elements at the start of a run."""
         return memory
 
     def curve_point(self, drive, near=None) -> CurvePoint:
-        """Return a point of a curve."""
+        """Find a point of a curve of steady motions."""
         motion = self.repeating(drive, near)
         if not motion.bounded:
             return CurvePoint(drive, {}, {}, motion.words, motion.size, False, Outcome.GROWS)
@@ -173,7 +175,7 @@ class Maps(Followed):
         )
 
     def curve(self, drive) -> tuple:
-        """Return the points of the curve over frequency and no folds.
+        """Trace the curve of steady motions over frequency, which has no folds.
 
         Each point starts from the motion at the previous one.
         """
@@ -181,7 +183,7 @@ class Maps(Followed):
 
 
 def _curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
-    """Return the measures of a curve, by name."""
+    """Return the measures of a point of a curve of steady motions."""
     values = {
         COLUMN_MEASURES["amplitude"]: amplitude,
         COLUMN_MEASURES["acceleration_peak"]: acceleration,
@@ -201,11 +203,11 @@ class YieldFinder(Maps):
         self.tries_another = len(model.rig.friction.interfaces) == 1
 
     def start_memory(self, memory):
-        """Return the memory of elements with work and loss set to 0 (see `Maps.start_memory`)."""
+        """Return the memory of the friction elements with work and loss reset to 0."""
         return event_elements.reset_work(memory)
 
     def repeating(self, drive, near) -> PeriodicMotion:
-        """Return the PeriodicMotion under a sine, found from the Point `near` or from rest."""
+        """Find the periodic motion of elastic-plastic elements under sinusoidal drive."""
         state = steady.solve_steady(self.modes, drive, self.groups, near)
         return PeriodicMotion(
             start=state.start,
@@ -229,15 +231,15 @@ class EventFinder(Maps):
 
     @cached_property
     def forces(self) -> np.ndarray:
-        """Static and kinetic friction limits (2, i) [N]."""
+        """Static and kinetic friction limits (2, i) [N] of the interfaces."""
         return np.array([(group.static, group.kinetic) for group in self.groups]).T
 
     def repeating(self, drive, near) -> PeriodicMotion:
-        """Return the PeriodicMotion under a sine.
+        """Find the periodic motion of Coulomb interfaces under sinusoidal drive.
 
         If friction falls with the first slip, several motions exist, and the search starts from the
         state `near`. Multipliers of two simultaneous events hold for one order of these only, so
-        they are not used.
+        the search does not use them.
         """
         falls = bool(np.any(self.forces[0] > self.forces[1]))
         start = near if falls else None
@@ -257,9 +259,9 @@ class EventFinder(Maps):
         )
 
     def curve_point(self, drive, near=None) -> CurvePoint:
-        """Return a point of a curve; without friction it is known in closed form.
+        """Find a point of a curve; without friction the motion is known in closed form.
 
-        The exception is an undamped resonance.
+        An undamped resonance has no closed form.
         """
         if self.forces.any():
             return super().curve_point(drive, near)
@@ -285,7 +287,7 @@ class EventFinder(Maps):
 
     @cached_property
     def decay(self) -> float:
-        """Rate [1/s] of the slowest free motion of the modes alone, <= 0 for decay."""
+        """Rate [1/s] of the slowest free motion without friction; < 0 if it decays."""
         n = self.modes.omega.size
         state = np.block(
             [

@@ -21,21 +21,23 @@ from ..march import MarchReader
 from ..solution import Solution
 from .curves import CurvePoint, Followed, curve_point, describe_instability, trace_curve
 
-START_STEPS = 256  # steps per cycle of the first march
-MAX_STEPS = 4096  # largest number of steps per cycle
-EXACT = 1024  # samples per cycle for a law without memory, whose steps are chosen by their error
-LEAD = 30  # cycles after which a lifted mass counts as staying in its grooves
-READ = 1e-9  # relative error of the end of a step
-LOOSE = 1e-6  # largest change from cycle to cycle, over the amplitude, of a periodic motion
-# error of the Floquet multipliers due to the step length of a march; a motion is unstable only if a multiplier exceeds
-# 1 by more
+START_STEPS = 256  # steps per cycle of the first march of a law that is not set-valued
+MAX_STEPS = 4096  # largest number of steps per cycle to which a march is refined
+EXACT = 1024  # samples per cycle for a set-valued law, whose steps are chosen by their error
+LEAD = 30  # number of cycles from rest after which a lifted mass is assumed to stay in its grooves
+READ = 1e-9  # relative error of the measures due to round-off at the ends of steps
+LOOSE = (
+    1e-6  # largest change from cycle to cycle over the amplitude, up to which a motion is periodic
+)
+# Error of the Floquet multipliers due to the step length of a march; a motion is unstable only if a
+# multiplier exceeds 1 by more.
 ROUGH = 1e-2
 
 
 def solution_beyond_grooves(model, numerics, patch, drive, contact) -> Solution | None:
-    """Return the Solution of a motion whose lifted mass leaves its grooves; None if it does not.
+    """Return the Solution of a motion whose lifted mass leaves its grooves, or None.
 
-    It must leave them within LEAD cycles of a march from rest. The errors are the differences
+    The mass must leave the grooves within LEAD cycles of a march from rest. The errors are the differences
     from a march with half the steps.
 
     Parameters
@@ -70,7 +72,7 @@ def solution_beyond_grooves(model, numerics, patch, drive, contact) -> Solution 
 
 
 class CycleReading(NamedTuple):
-    """One cycle of a motion that repeats.
+    """Evaluation of one cycle of a periodic motion over grooves.
 
     - values: measures by name.
     - mark: Mark at its end.
@@ -87,7 +89,7 @@ class CycleReading(NamedTuple):
 class MarchFinder(Followed):
     """Finder of steady motions over grooves, by a march whose initial state is corrected."""
 
-    # the points have errors of the size of the tolerance
+    # the points of the curve have errors as large as the tolerance, so that a refined peak cannot be better
     tries_another = True
     leaves = (0.3, 30.0)
 
@@ -102,7 +104,7 @@ class MarchFinder(Followed):
         engine.warm_up(model.rig.modes, model.rig.drive.signal, self.contact, say)
 
     def _run(self, drive, near, steps: int):
-        """Return a Run that repeats, started from the Run `near` or from rest, and its residual."""
+        """March until the motion is periodic, and return the run with its residual."""
         run = engine.start_run(
             self.model.rig.modes, drive, self.contact, steps, self.model.rig.springs.travel
         )
@@ -122,7 +124,7 @@ class MarchFinder(Followed):
         return run, left
 
     def _read(self, run, steps: int, frames: int = 0) -> CycleReading:
-        """Read one cycle of a Run that repeats."""
+        """Evaluate one cycle of a periodic motion."""
         mark, snapshots = orbits.march_cycle(run, frames)
         numerics = replace(self.numerics, steps=steps)
         reader = MarchReader(self.model, numerics, self.patch, self.contact)
@@ -131,10 +133,10 @@ class MarchFinder(Followed):
         return CycleReading(values | {"drift_per_cycle": 0.0}, mark, snapshots, is_stuck)
 
     def point(self, drive, near=None) -> tuple:
-        """Return the Solution of the steady motion under a sine, and the Run that continues it.
+        """Find the steady motion under sinusoidal drive, and the run that continues it.
 
-        If there is none because the lifted mass leaves its grooves, the Solution of this motion and
-        None are returned.
+        If there is no steady motion because the lifted mass leaves its grooves, the Solution of the
+        motion that does and None are returned.
         """
         try:
             return self._point(drive, near)
@@ -148,7 +150,7 @@ class MarchFinder(Followed):
         return gone, None
 
     def _point(self, drive, near) -> tuple:
-        """Return the Solution of one cycle of the steady motion, and the Run that continues it.
+        """Find the steady motion with steps that meet the tolerance.
 
         The steps are doubled until the amplitude differs from that with half as many by less than
         the tolerance. The error of a measure contains its difference from half of the steps.
@@ -212,11 +214,11 @@ class MarchFinder(Followed):
         ), run
 
     def _rough(self, value: float, half: float) -> bool:
-        """Return whether the amplitude changes by more than the tolerance if the steps are halved."""
+        """Return whether the amplitude changes by more than the tolerance at half the steps."""
         return abs(value - half) > self.model.accuracy.tolerance * abs(value)
 
     def curve_point(self, drive, near=None) -> CurvePoint:
-        """Return a point of a curve, found from the state `near` or, if that fails, from rest."""
+        """Find a point of a curve, starting from a motion nearby or else from rest."""
         try:
             return curve_point(drive, *self.point(drive, near))
         except NotConverged:
@@ -225,7 +227,7 @@ class MarchFinder(Followed):
         return curve_point(drive, *self.point(drive))
 
     def curve(self, drive) -> tuple:
-        """Return the points of the curve over frequency and no folds.
+        """Trace the curve of steady motions over frequency, which has no folds.
 
         Each point starts from the motion at the previous one.
         """

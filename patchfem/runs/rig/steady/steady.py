@@ -16,9 +16,9 @@ from .top import solve_peak
 
 
 def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Solve the steady motion under a sine, or the largest one of a sweep or of levels.
+    """Find the steady motion under sinusoidal drive, or the largest one over a sweep or levels.
 
-    The sine of the largest motion is extra["at"]. If the map of yields does not converge, harmonic
+    The drive of the largest motion is extra["at"]. If the map of yields does not converge, harmonic
     balance is tried.
 
     Parameters
@@ -53,7 +53,7 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
 
 
 def _solve_drive(finder, model) -> Solution:
-    """Return the Solution of a finder under the drive of a model."""
+    """Find the steady motion, curve or levels for the drive of a model."""
     drive = model.rig.drive.signal
     if isinstance(drive, SineDrive):
         return finder.point(drive)[0]

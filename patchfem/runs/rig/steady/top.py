@@ -19,19 +19,20 @@ from ..solution import Solution, seen_by_gauge
 from .curves import COLUMN_MEASURES, curve_columns, index_of_largest
 
 AMPLITUDE = COLUMN_MEASURES["amplitude"]
-MAX_ADDED_POINTS = 40  # most points that are added
-# fraction of the largest amplitude above which the curve of a single mode is concave (from 0.816
-# on)
+MAX_ADDED_POINTS = 40  # largest number of points that refine a peak
+# Fraction of the largest amplitude above which a resonance curve is assumed concave; that of a single mode is
+# concave from 0.816 on.
 CAP = 0.8
-POSITION_TOL = 3e-4  # accuracy of the position of a peak that round-off allows, over its width
-NEAREST = 1e-9  # fraction of the length of the curve; closer points are identical
-TENTH = 0.9  # fraction of a peak at which its width is measured
-SHIFT = 10.0  # shift of a peak over (its width times the relative error of the heights):
-# errors that tilt a flat peak move it a tenth of its height down its flank
+POSITION_TOL = 3e-4  # error of the position of a peak due to round-off, over the width of the peak
+NEAREST = 1e-9  # distance over the length of the curve, below which two points are identical
+TENTH = 0.9  # fraction of the height of a peak at which its width is measured
+# Shift of a peak over (its width times the relative error of its height): the width is measured a tenth of
+# the height below the peak, so that an error of a tenth shifts the peak by its width.
+SHIFT = 10.0
 
 
 class RefinedPeak(NamedTuple):
-    """Refined curve and its largest point.
+    """Curve of steady motions refined around its largest point.
 
     - points: those of the curve and those added.
     - best: index of the largest stable point.
@@ -45,7 +46,7 @@ class RefinedPeak(NamedTuple):
 
 
 def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
-    """Find the largest amplitude of a curve by adding points that `finder` computes.
+    """Refine a curve of steady motions around its largest amplitude.
 
     Parameters
     ----------
@@ -73,7 +74,9 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
             return RefinedPeak(points, best, 0.0)
         if lasting.any():
             reach[~(lasting[:-1] | lasting[1:])] = 0.0
-            at[lasting[:-1] != lasting[1:]] = 0.5  # the limit of stability is found by bisection
+            at[lasting[:-1] != lasting[1:]] = (
+                0.5  # the limit of stability between two points is found by bisection
+            )
         if not np.isfinite(y[max(best - 1, 0) : best + 2]).all():
             return RefinedPeak(points, best, np.inf)
         above = max(float(reach.max()) - y[best], 0.0)
@@ -97,10 +100,10 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
 
 
 def _choose_added_point(s, y, best: int, share: float) -> tuple | None:
-    """Return where to add a point that brings a neighbour closer to the largest value, or None.
+    """Choose where to add a point beside the largest point of a curve.
 
-    None if both neighbours are closer than `share` times the width of the peak, or the largest
-    value is at an end. The point is the vertex of the parabola through the three points, or a tenth
+    The result is None if both neighbours are closer than `share` times the width of the peak, or if the
+    largest value is at an end. The point is the vertex of the parabola through the three points, or a tenth
     of the way to the farther neighbour.
 
     Returns the index of the interval and the fraction of it. s, y: positions along the curve, and
@@ -125,7 +128,7 @@ def _choose_added_point(s, y, best: int, share: float) -> tuple | None:
 
 
 def _width(y, away) -> float:
-    """Return the distance of the first value below TENTH of the first one, else of the last one.
+    """Return the distance from a peak at which the curve falls to a fraction of it.
 
     away: distances (k,) of the values y (k,).
     """
@@ -134,12 +137,12 @@ def _width(y, away) -> float:
 
 
 def _heights(points) -> np.ndarray:
-    """Return the amplitudes [m] of points; NaN without one."""
+    """Return the amplitudes [m] of curve points; NaN for unbounded motions."""
     return np.array([point.values.get(AMPLITUDE, np.nan) for point in points])
 
 
 def concave_bounds(s, y) -> tuple:
-    """Return the bound of a concave curve in each interval, and where in it the bound lies.
+    """Bound a concave curve in each interval by lines through the neighbouring points.
 
     A line from points below CAP of the larger end is not used, because a curve may be convex there;
     without any line, the bound is the larger end divided by CAP.
@@ -160,13 +163,13 @@ def concave_bounds(s, y) -> tuple:
     ends = np.maximum(y[:-1], y[1:])
     with np.errstate(all="ignore"):
         slope = np.diff(y) / h
-        # slopes of the lines from the left and from the right
+        # the lines through the two points on the left and on the right have these slopes
         rise, fall = np.full((2, h.size), np.nan)
         rise[1:] = np.where(y[:-2] >= CAP * ends[1:], slope[:-1], np.nan)
         fall[:-1] = np.where(y[2:] >= CAP * ends[:-1], slope[1:], np.nan)
         left = y[:-1] + rise * h
         right = y[1:] - fall * h
-        # intersection of both lines as a fraction of the interval
+        # both lines intersect at this fraction of the interval
         meet = (right - y[:-1]) / (rise - fall) / h
         inside = (meet > 0) & (meet < 1)
         reach = np.where(inside, y[:-1] + rise * meet * h, ends)
@@ -181,7 +184,7 @@ def concave_bounds(s, y) -> tuple:
 
 
 def solve_peak(points: list, folds, finder) -> Solution:
-    """Return the Solution of the largest motion of a curve, with the curve.
+    """Find the motion of largest amplitude of a curve, with the errors due to its position.
 
     Its errors include those by the position of the peak.
 
@@ -201,9 +204,9 @@ def solve_peak(points: list, folds, finder) -> Solution:
     height = top.values.get(AMPLITUDE, 0.0)
     y = _heights(points)
     if not height > 0 or AMPLITUDE not in raw.values:
-        # None means that there is no peak
+        # the error None means that the curve has no peak
         return replace(raw, extra=raw.extra | extra | {"at_error": None if height == 0 else 0.0})
-    # difference from the point of the curve, which is computed with fewer samples
+    # the point of the curve was computed with fewer samples, which adds this error
     missed = abs(seen_by_gauge(finder.model, raw).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
     places = np.array([point.drive.omega for point in points]) / (2 * np.pi)
@@ -214,7 +217,7 @@ def solve_peak(points: list, folds, finder) -> Solution:
         away = np.abs(places[best::direction] - places[best])
         if heights.size < 2:
             continue
-        # points at which the largest amplitude cannot be
+        # at these points the curve is certainly below its largest amplitude
         low = ~(heights >= height - min(above, height) - 2 * error)
         number = int(np.argmax(low)) if low.any() else heights.size - 1
         far = float(away[: number + 1].max())
@@ -228,7 +231,7 @@ def solve_peak(points: list, folds, finder) -> Solution:
 
 
 def _gaps(finder, beside, raw: Solution) -> dict:
-    """Return differences by name between the measures of a point of a curve and of a Solution."""
+    """Return the differences of all measures between a neighbouring point and a Solution."""
     try:
         other = finder.point(beside.drive, beside.near)[0]
     except NotConverged:
