@@ -88,7 +88,7 @@ VERB_GROUPS = {
     "Start": {
         "demo": (start, "run the bundled example rig", ""),
         "new": (start, "write a scene to start from", "joint -o joint.toml"),
-        "check": (scene, "name every mistake", "joint.toml"),
+        "check": (scene, "list every mistake in a scene", "joint.toml"),
         "plan": (scene, "size and cost of a run", "joint.toml"),
         "run": (run, "compute results and a page", "joint.toml"),
     },
@@ -108,9 +108,9 @@ VERB_GROUPS = {
     },
     "Files": {
         "report": (view_export, "several runs on one page", "out/a out/b -o both.html"),
-        "view": (view_export, "a picture or a film of the pieces", "out/joint -o joint.png"),
+        "view": (view_export, "image or animation of the pieces", "out/joint -o joint.png"),
         "export": (view_export, "fields for ParaView; histories", "out/joint -o play.py"),
-        "import": (import_, "records of a laboratory", "shaker.uff -o record.csv"),
+        "import": (import_, "convert laboratory records", "shaker.uff -o record.csv"),
         "mesh": (scene, "the mesh of the pieces", "joint.toml -o pieces.vtu"),
     },
     "About": {

@@ -211,16 +211,14 @@ def heating_sentences(model, patch, work: float, duration: float) -> list:
         Time in which it is done [s].
     """
     if patch is None:
-        return [
-            "the warming by friction is not estimated, because a contact given by [normal] has no area"
-        ]
+        return ["frictional heating is not estimated: a contact given by [normal] has no area"]
     kind = model.patch.pieces.substrate
     known = (
         materials.THERMAL_PROPERTIES.get(kind.name) if kind.name in materials.MATERIALS else None
     )
     if known is None:
         return [
-            "the warming by friction is not estimated, because the conductivity of contact.substrate is not "
+            "frictional heating is not estimated: the conductivity of contact.substrate is not "
             f"known; choose one of the materials {', '.join(materials.THERMAL_PROPERTIES)}"
         ]
 

@@ -210,8 +210,8 @@ def _release_sentence(run) -> list:
     span = format_quantity(float(window.time[-1] - window.time[0]), "s", 3)
     begin = format_quantity(float(window.time[0]), "s", 3)
     return [
-        f"relative_displacement_amplitude is that of the last whole cycle of the motion; peaks of acceleration and "
-        f"force, slip and stick are those of the last {span}, from {begin} on, in which the motion still decays"
+        f"relative_displacement_amplitude is that of the last whole cycle; peaks of acceleration and force, slip and "
+        f"stick cover the last {span}, from {begin} on, in which the motion still decays"
     ]
 
 
@@ -229,9 +229,8 @@ def _lateral_motion_sentence(run) -> list:
     computed = "friction is" if run.model.wear is None else "friction and the wear are"
     return [
         f"the yaw moves the ends of the patch by up to {format_length(swing)} across x, but the "
-        f"{computed} computed without this motion; "
-        f"with this motion the path of the slide in the last cycle would be {100 * share:.2g} % longer (mean over "
-        "the patch, weighted by the pressure)"
+        f"{computed} computed without this motion, which would lengthen the sliding path of the last cycle by "
+        f"{100 * share:.2g} % (mean over the patch, weighted by the pressure)"
     ]
 
 
@@ -292,7 +291,7 @@ def _note_marched_elements(run) -> list:
         return []
     pinned = run.patch is not None and not model.patch.mesh.is_automatic
     return [
-        f"the motion is computed in time steps, because {reason_to_march_elements(model)}; "
+        f"time stepping is used, because {reason_to_march_elements(model)}; "
         f'{"on a coarser mesh, or " * pinned}with accuracy.method = "exact" the motion is computed exactly'
     ]
 
