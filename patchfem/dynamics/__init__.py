@@ -35,7 +35,7 @@ PUBLIC = {
         "store_checkpoints",
     ),
     "curve_points": ("sample_adaptively",),
-    "events.cost": ("python_seconds",),
+    "events.cost": ("estimate_cycle_time",),
     "events.elements": (
         "CELL_MERGES",
         "Elements",
@@ -45,10 +45,10 @@ PUBLIC = {
         "merge_elements",
         "reset_work",
     ),
-    "events.event_list": ("BORDER",),
+    "events.event_list": ("DRIVE_CHANGE",),
     "events.histories": (
         "announce_runs",
-        "is_loop_kept",
+        "is_loop_cached",
         "load_event_kernels",
         "simulate_batch",
     ),

@@ -221,7 +221,13 @@ def join_logs(logs, shifts) -> object:
     first = logs[0]
     columns = {name: [] for name in ("time", "phase", "interface", "kind", "slide")}
     for number, (log, shift) in enumerate(zip(logs, shifts)):
-        border = {"time": shift, "phase": 0.0, "interface": -1, "kind": listed.BORDER, "slide": 0.0}
+        border = {
+            "time": shift,
+            "phase": 0.0,
+            "interface": -1,
+            "kind": listed.DRIVE_CHANGE,
+            "slide": 0.0,
+        }
         for name, parts in columns.items():
             if number:
                 parts.append([border[name]])

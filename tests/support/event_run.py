@@ -6,7 +6,7 @@ import numpy as np
 
 from patchfem.dynamics import make_coulomb_elements
 from patchfem.dynamics.events import histories, stick_steady
-from patchfem.dynamics.events.positions_kernels import BEGIN, Column
+from patchfem.dynamics.events.positions_kernels import ROW_BEGIN, Column
 
 
 def groups_of(modes, static, kinetic) -> list:
@@ -113,21 +113,21 @@ def rows_of(modes, drive, static, kinetic, cycles, start=None, begin=0) -> tuple
     one = histories.start_event_run(modes, drive, groups, cycles, int(cycles) + 2, start=start)
     one.time_state.now[0] = begin
     rows = []
-    one.run_to(cycles, one._collect_into(rows))
+    one.run_to(cycles, one._make_row_collector(rows))
     return one, np.concatenate(rows)
 
 
 def run(modes, drive, static, kinetic, duration, start=None) -> list:
     """The phases of a run up to `duration` [s]; the last one is cut there."""
     one, rows = rows_of(modes, drive, static, kinetic, duration / drive.period, start)
-    begins = np.flatnonzero(rows[:, 4] >= BEGIN.stick_or_slip)
+    begins = np.flatnonzero(rows[:, 4] >= ROW_BEGIN.stick_or_slip)
     n = len(modes.omega)
     i = len(one.groups)
     out = []
     for first, end in zip([0, *begins[begins > 0]], [*begins[begins > 0], len(rows)]):
         part = rows[first:end]
         ways = tuple(
-            int(part[0, one._column(f, Column.DIRECTION)]) if group.static else 1
+            int(part[0, one._column_index(f, Column.DIRECTION)]) if group.static else 1
             for f, group in enumerate(one.groups)
         )
         modal = [Signal(one, part, (k,), (n + k,), (1.0,)) for k in range(n)]
@@ -137,7 +137,7 @@ def run(modes, drive, static, kinetic, duration, start=None) -> list:
 
 
 def starts(done) -> np.ndarray:
-    """Phases modulo pi of the releases of the first interface in the window of a PieceRun."""
+    """Phases modulo pi of the releases of the first interface in the window of a EventRunResult."""
     log = done.log
     late = (log.interface == 0) & (np.abs(log.kind) == 1) & (log.time > done.window.time[0])
     return log.phase[late] % np.pi

@@ -15,7 +15,7 @@ coefficients prove that no earlier root exists (`search_kernels`). A rigid eleme
 constraint on the modes (`stick_kernels`).
 
 In: `core.ModalBasis`, a drive in closed form, `elements.Elements` of every interface. Out:
-`histories.PieceRun` with samples, extremes, energies and events, and the measures of the last
+`histories.EventRunResult` with samples, extremes, energies and events, and the measures of the last
 cycles (`reading`). It refuses friction laws that are not piecewise linear, because `runs` gives it
 none.
 

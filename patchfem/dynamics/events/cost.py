@@ -1,4 +1,4 @@
-"""Computing time of a run as interpreted Python.
+"""Estimates of the CPU time of the event engine as interpreted Python.
 
 The engine decides by it whether to compile its loop.
 
@@ -14,8 +14,8 @@ from ...cost_model import PYTHON_PIECE_SECONDS, PYTHON_SAMPLE_TIME_RATIO
 from ...structure.drive_sizes import find_max_frequency_ratio
 
 
-def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) -> float:
-    """Estimate the CPU seconds of a cycle of the drive as interpreted Python.
+def estimate_cycle_time(modes: ModalBasis, drive, stiffness: float, elements: int) -> float:
+    """Estimate the CPU time [s] of one drive cycle of the event engine in interpreted Python.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) ->
     return PYTHON_PIECE_SECONDS * (1 + modes.omega.size) * (1 + n_interfaces) * pieces
 
 
-def sample_seconds(modes: ModalBasis) -> float:
-    """Estimate the CPU seconds of a sample of the motion as interpreted Python."""
+def estimate_sample_time(modes: ModalBasis) -> float:
+    """Estimate the CPU time [s] of one sample of the motion in interpreted Python."""
     return (
         PYTHON_SAMPLE_TIME_RATIO
         * PYTHON_PIECE_SECONDS

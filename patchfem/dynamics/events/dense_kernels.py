@@ -1,11 +1,11 @@
-"""Motion of a run at any time, from the rows of its pieces, and its peaks (compiled)."""
+"""Motion of an event-driven run at arbitrary times, and its peak acceleration (compiled)."""
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_KERNEL
 from .drive_kernels import Instant, expand_drive
 from .memory_kernels import RIGID_STIFFNESS
 from .positions_kernels import N_COLUMNS, Column, ConstraintStatus, Row, Segment
-from .search_kernels import displacement_at, expand_speed
+from .search_kernels import expand_speed, integrate_speed
 from .series_kernels import (
     MotionSeries,
     MotionStart,
@@ -20,7 +20,7 @@ from .stick_kernels import constrain_slides
 
 @njit(**NJIT_KERNEL)
 def expand_row(row, h, run):
-    """Expand the piece of a row into the workspace.
+    """Expand the motion of a recorded time interval as power series into the workspace.
 
     The constraint is built again where other interfaces stick than in the row before;
     constraint.status[ConstraintStatus.N_STICKING] < 0 requests it.
@@ -77,7 +77,7 @@ def expand_row(row, h, run):
 
 @njit(cache=True, **NJIT_KERNEL)
 def evaluate_rows(rows, owner, tau, run, out):
-    """Evaluate the motion at times after the starts of rows.
+    """Evaluate the recorded motion of a run at given times.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def evaluate_rows(rows, owner, tau, run, out):
                 out[j, first + 4] = row[at + Column.WORK]
                 out[j, first + 5] = row[at + Column.LOSS]
                 continue
-            step = displacement_at(workspace.polynomials[f], top, u)
+            step = integrate_speed(workspace.polynomials[f], top, u)
             displacement = 0.0
             for i in range(n):
                 displacement += modal_system.interfaces[f, i] * out[j, i]
@@ -142,7 +142,7 @@ def evaluate_rows(rows, owner, tau, run, out):
 
 @njit(cache=True, **NJIT_KERNEL)
 def find_peaks(rows, base_moves, run, reactions):
-    """Return the largest acceleration [m s-2] of the output over the pieces of rows.
+    """Return the peak output acceleration [m s-2] over recorded time intervals.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Drive of a run over a short piece as a power series (compiled).
+"""Power series of the drive over a short time interval (compiled).
 
 A segment of the drive is a sine, a straight line, or a sweep with linear or logarithmic frequency;
 its numbers are named in `positions_kernels.Segment`.
@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE, NJIT_KERNEL
-from .positions_kernels import KIND, Segment, Time
-from .series_kernels import DOUBLE_INTEGRAL
+from .positions_kernels import SEGMENT_KIND, Segment, Time
+from .series_kernels import DOUBLE_INTEGRAL_FACTORS
 
 
 class Instant(NamedTuple):
-    """Number of a cycle, time since the cycle began [s], and duration of a cycle [s]."""
+    """Instant of a run: cycle number, time since the cycle began [s], and cycle duration [s]."""
 
     cycle: float
     offset: float
@@ -23,14 +23,14 @@ class Instant(NamedTuple):
 
 @njit(**NJIT_INLINE)
 def present_instant(time_state):
-    """Return the `Instant` of a `TimeState`."""
+    """Return the present instant of a run."""
     now = time_state.now
     return Instant(now[Time.CYCLE], now[Time.OFFSET], time_state.period[0])
 
 
 @njit(**NJIT_INLINE)
 def time_since_start(segment, instant):
-    """Return the time [s] since a segment began.
+    """Return the time [s] since a segment of the drive began.
 
     Parameters
     ----------
@@ -49,7 +49,9 @@ def time_since_start(segment, instant):
 
 @njit(**NJIT_INLINE)
 def fastest_drive_rate(time_state):
-    """Return the fastest rate [1/s] that the next piece must resolve: of the drive, and of its cycles.
+    """Return the fastest rate [1/s] of the drive that the next time interval must resolve.
+
+    It is the rate of the present segment, or that of a sine with the period of a cycle.
 
     The motion is integrated with sines and cosines of the cycle.
     """
@@ -59,7 +61,7 @@ def fastest_drive_rate(time_state):
 
 @njit(**NJIT_INLINE)
 def drive_phase(segment, instant):
-    """Return the phase of the drive [rad] in [0, 2 pi).
+    """Return the phase of the drive [rad] in [0, 2 pi) at an instant.
 
     Along a straight line it is the phase of the cycle.
 
@@ -74,18 +76,18 @@ def drive_phase(segment, instant):
     float
     """
     offset = instant.offset
-    if segment[Segment.KIND] == KIND.sine:
+    if segment[Segment.KIND] == SEGMENT_KIND.sine:
         theta = segment[Segment.PHASE] + segment[Segment.OMEGA] * offset
         cycles = instant.cycle - segment[Segment.CYCLE]
         if segment[Segment.TURNS] != 0.0:
             extra = cycles * segment[Segment.TURNS]
             theta += 2 * pi * (extra - floor(extra) + cycles * segment[Segment.TURNS_REMAINDER])
-        # takes a tenth of the time of the operator %
+        # The floor takes a tenth of the time of the operator %.
         return theta - 2 * pi * floor(theta / (2 * pi))
-    if segment[Segment.KIND] == KIND.line:
+    if segment[Segment.KIND] == SEGMENT_KIND.line:
         return 2 * pi * offset / instant.period
     time = time_since_start(segment, instant)
-    if segment[Segment.KIND] == KIND.chirp:
+    if segment[Segment.KIND] == SEGMENT_KIND.chirp:
         return (
             segment[Segment.PHASE]
             + time * (segment[Segment.OMEGA] + 0.5 * segment[Segment.SLOPE] * time)
@@ -98,15 +100,15 @@ def drive_phase(segment, instant):
 
 @njit(**NJIT_INLINE)
 def swept_frequency(segment, time):
-    """Return the angular frequency [rad/s] of a sweep at a time [s] since its segment began."""
-    if segment[Segment.KIND] == KIND.chirp:
+    """Return the angular frequency [rad/s] of a sweep, given the time [s] since its start."""
+    if segment[Segment.KIND] == SEGMENT_KIND.chirp:
         return segment[Segment.OMEGA] + segment[Segment.SLOPE] * time
     return segment[Segment.OMEGA] * exp(segment[Segment.SLOPE] * time)
 
 
 @njit(**NJIT_INLINE)
 def drive_value(segment, instant):
-    """Return the acceleration of a segment of the drive [m s-2].
+    """Return the drive acceleration [m s-2] of a segment at an instant.
 
     Parameters
     ----------
@@ -121,7 +123,7 @@ def drive_value(segment, instant):
     kind = segment[Segment.KIND]
     theta = drive_phase(segment, instant)
     time = time_since_start(segment, instant)
-    if kind == KIND.line:
+    if kind == SEGMENT_KIND.line:
         return segment[Segment.CONSTANT] + segment[Segment.SLOPE] * time
     size = segment[Segment.AMPLITUDE]
     if segment[Segment.IS_DISPLACEMENT] == 1.0:
@@ -132,7 +134,9 @@ def drive_value(segment, instant):
 
 @njit(**NJIT_KERNEL)
 def expand_drive(segment, instant, h, top, waves):
-    """Write the series of the drive [m s-2] over u = t/h into waves[0].
+    """Expand the drive acceleration [m s-2] of a time interval as a power series.
+
+    The series over u = t/h is written into waves[0].
 
     Parameters
     ----------
@@ -149,16 +153,16 @@ def expand_drive(segment, instant, h, top, waves):
     series = waves[0]
     kind = segment[Segment.KIND]
     theta = drive_phase(segment, instant)
-    if kind == KIND.sine:
+    if kind == SEGMENT_KIND.sine:
         angle = segment[Segment.OMEGA] * h
         series[0] = segment[Segment.AMPLITUDE] * sin(theta)
         series[1] = segment[Segment.AMPLITUDE] * cos(theta) * angle
         for k in range(2, top + 1):
-            series[k] = -series[k - 2] * (angle * angle * DOUBLE_INTEGRAL[k])
+            series[k] = -series[k - 2] * (angle * angle * DOUBLE_INTEGRAL_FACTORS[k])
         series[0] += segment[Segment.CONSTANT]
         return
     time = time_since_start(segment, instant)
-    if kind == KIND.line:
+    if kind == SEGMENT_KIND.line:
         for k in range(top + 1):
             series[k] = 0.0
         series[0] = segment[Segment.CONSTANT] + segment[Segment.SLOPE] * time
@@ -174,7 +178,9 @@ def expand_drive(segment, instant, h, top, waves):
 
 @njit(**NJIT_INLINE)
 def expand_sweep(kind, omega, theta, slope, h, top, waves):
-    """Write the series of the sine of a swept phase into waves[0].
+    """Expand the sine of the phase of a sweep as a power series.
+
+    The series is written into waves[0].
 
     The series of its frequency is left in waves[2].
 
@@ -183,7 +189,7 @@ def expand_sweep(kind, omega, theta, slope, h, top, waves):
     Parameters
     ----------
     kind : float
-        `KIND.chirp` or `KIND.log_chirp`.
+        `SEGMENT_KIND.chirp` or `SEGMENT_KIND.log_chirp`.
     omega, theta : float
         Angular frequency [rad/s] and phase [rad] at the start of the piece.
     slope : float
@@ -202,14 +208,14 @@ def expand_sweep(kind, omega, theta, slope, h, top, waves):
     cosine[0] = cos(theta)
     rate[0] = omega * h
     for k in range(1, top + 1):
-        if kind == KIND.log_chirp:
+        if kind == SEGMENT_KIND.log_chirp:
             rate[k] = rate[k - 1] * slope / k
         else:
             rate[k] = slope * h if k == 1 else 0.0
     for k in range(top):
         s = 0.0
         c = 0.0
-        for j in range(min(k + 1, 2) if kind == KIND.chirp else k + 1):
+        for j in range(min(k + 1, 2) if kind == SEGMENT_KIND.chirp else k + 1):
             s += rate[j] * cosine[k - j]
             c -= rate[j] * series[k - j]
         series[k + 1] = s / (k + 1)
@@ -218,7 +224,9 @@ def expand_sweep(kind, omega, theta, slope, h, top, waves):
 
 @njit(**NJIT_INLINE)
 def multiply_by_squared_frequency(kind, omega, slope, top, waves):
-    """Multiply waves[0] by the series of the squared frequency of a sweep.
+    """Multiply a power series of a sweep by that of its squared frequency.
+
+    The series is waves[0].
 
     Parameters
     ----------
@@ -229,8 +237,8 @@ def multiply_by_squared_frequency(kind, omega, slope, top, waves):
     square = waves[2]
     square[0] = omega * omega
     for k in range(1, top + 1):
-        square[k] = square[k - 1] * 2 * slope / k if kind == KIND.log_chirp else 0.0
-    if kind == KIND.chirp:
+        square[k] = square[k - 1] * 2 * slope / k if kind == SEGMENT_KIND.log_chirp else 0.0
+    if kind == SEGMENT_KIND.chirp:
         square[1] = 2 * omega * slope
         square[2] = slope * slope
     for k in range(top, -1, -1):

@@ -1,4 +1,4 @@
-"""Parallel elements of an interface, rigid (Coulomb) and elastic-plastic, and their memory.
+"""Parallel friction elements of interfaces, rigid and elastic-plastic, and their memory.
 
 All elements share the relative displacement of their interface. The elastic-plastic ones are
 sorted by yield slide, the stretch at which they slip.
@@ -11,15 +11,18 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 
-# (number of cells of a density that are merged into one, first cell) of the coarser runs that show the error of a density
+# Coarse runs that estimate the error of a discretized density of elements: (number of neighbouring cells that are
+# merged into one, first cell that is merged).
 CELL_MERGES = (4, 0), (4, 1), (4, 2), (4, 3)
-# relative difference of two yield slides below which they count as equal; it is round-off
+# Relative difference below which two yield displacements count as equal; it is above round-off.
 YIELD_TOL = 1e-14
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Elements:
-    """Elements of one interface: F = sum k_j e_j with stretches |e_j| <= y_j, and a rigid element.
+    """Parallel friction elements of one interface, with force F = sum k_j e_j.
+
+    The stretches obey |e_j| <= y_j. A rigid element (Coulomb friction) may act beside them.
 
     - stiffness: (t,) k_j [N/m]
     - yield_displacement: (t,) y_j [m], in increasing order
@@ -38,12 +41,14 @@ class Elements:
 
     @property
     def limit(self) -> float:
-        """Friction limit sum k_j y_j [N]."""
+        """Friction limit of the elastic-plastic elements, sum k_j y_j [N]."""
         return float(self.stiffness @ self.yield_displacement)
 
 
 def make_elements(stiffness, yield_displacement) -> Elements:
-    """Return elastic-plastic elements, sorted; those with equal yield slides become one.
+    """Return elastic-plastic elements in increasing order of their yield displacement.
+
+    Elements with equal yield displacements become one.
 
     Parameters
     ----------
@@ -65,7 +70,7 @@ def make_elements(stiffness, yield_displacement) -> Elements:
         raise PatchfemError(
             "friction: the stiffness and the yield slide of each element must be finite and >= 0"
         )
-    # one element is sorted; the general case takes 2.5 times as long
+    # A single element takes this short path, because the general case takes 2.5 times as long.
     if k.size == 1 and k[0] > 0 and y[0] > 0:
         return Elements(frozen_array(k), frozen_array(y), frozen_array([0], np.int64))
     order = np.flatnonzero((k > 0) & (y > 0))
@@ -82,7 +87,7 @@ def make_elements(stiffness, yield_displacement) -> Elements:
 
 
 def make_coulomb_elements(static: float, kinetic: float | None = None) -> Elements:
-    """Return the rigid element of Coulomb friction.
+    """Return the rigid element of Coulomb friction with static and kinetic limits.
 
     Parameters
     ----------
@@ -108,7 +113,7 @@ def make_coulomb_elements(static: float, kinetic: float | None = None) -> Elemen
 
 
 def merge_elements(elements: Elements, count: int = 2, first: int = 0) -> Elements:
-    """Return fewer elements, each of which has the total stiffness and limit of several given ones.
+    """Merge neighbouring friction elements into fewer ones with the same stiffness and limit.
 
     Parameters
     ----------
@@ -130,7 +135,7 @@ def merge_elements(elements: Elements, count: int = 2, first: int = 0) -> Elemen
     begins = np.r_[0, np.arange(first, k.size - n_last, count), [k.size - 1] * n_last]
     begins = np.unique(begins).astype(int)
     stiffness = np.add.reduceat(k, begins)
-    # each yield slide lies between those of the merged elements, so they are in increasing order
+    # The yield displacement of a merged element lies between those of its members, so the order stays increasing.
     yield_slide = np.add.reduceat(k * elements.yield_displacement, begins) / stiffness
     return Elements(
         frozen_array(stiffness),
@@ -140,7 +145,9 @@ def merge_elements(elements: Elements, count: int = 2, first: int = 0) -> Elemen
 
 
 def join_cells(count: int, first: int, stiffness, yield_displacement) -> tuple:
-    """Return stiffness [N/m] and yield slide [m] of merged elements, see `merge_elements`.
+    """Return stiffness [N/m] and yield displacement [m] of merged friction elements.
+
+    See `merge_elements`.
 
     Parameters
     ----------
@@ -159,7 +166,9 @@ def join_cells(count: int, first: int, stiffness, yield_displacement) -> tuple:
 
 
 class ElementTable(NamedTuple):
-    """Elements of all interfaces (i), padded to the longest list (t), as arrays for the kernels.
+    """Friction elements of all interfaces as padded arrays for the kernels.
+
+    Interfaces are counted by i, elements of the interface with most elements by t.
 
     - n_elements: (i,) number of elements
     - yield_slide: (i, t + 1) [m], infinite after the last element
@@ -178,7 +187,7 @@ class ElementTable(NamedTuple):
 
 
 def make_element_table(groups) -> ElementTable:
-    """Return the table of the Elements of every interface."""
+    """Return the padded arrays of the friction elements of all interfaces."""
     longest = max((group.stiffness.size for group in groups), default=0)
     yield_slide = np.full((len(groups), longest + 1), np.inf)
     sums = np.zeros((3, len(groups), longest + 1))
@@ -199,12 +208,14 @@ def make_element_table(groups) -> ElementTable:
 
 
 class Memory(NamedTuple):
-    """Memory of the elements of all interfaces (i).
+    """Hysteresis memory of the friction elements of all interfaces.
+
+    Interfaces are counted by i, elements by t.
 
     - slide: (i,) relative displacement [m]
     - n_slipping, direction: (i,) number of elements that slip, the first ones of the list, and the
       sign of their slip
-    - n_groups: (i,) groups of elements that stopped together at a turning point, the innermost
+    - n_groups: (i,) groups of elements that stopped together at a reversal, the innermost
       group last
     - group_end: (i, t + 2) end of a group in the list; it begins where the group inside it ends
     - group_slide, group_sign: (i, t + 2) relative displacement [m] at which a group stopped, and
@@ -231,7 +242,7 @@ class Memory(NamedTuple):
 
 
 def unstretched_memory(table: ElementTable, slide) -> Memory:
-    """Return the memory of unstretched elements at relative displacements (i,) [m]."""
+    """Return the memory of unstretched friction elements at relative displacements (i,) [m]."""
     n_interfaces, n_sums = table.stiffness_sum.shape
     shape = n_interfaces, n_sums + 1
     group_end = np.zeros(shape, np.int64)
@@ -255,12 +266,14 @@ def unstretched_memory(table: ElementTable, slide) -> Memory:
 
 
 def reset_work(memory: Memory) -> Memory:
-    """Return the memory with work and loss set to 0, for a run that begins here."""
+    """Return a copy of the memory in which friction work and loss are 0."""
     return memory._replace(work=np.zeros_like(memory.work), loss=np.zeros_like(memory.loss))
 
 
 def element_stretches(group: Elements, memory: Memory, interface: int) -> np.ndarray:
-    """Return the stretch (a,) [m] of every element in the order given to `make_elements`.
+    """Return the stretch (a,) [m] of every friction element of an interface in the given order.
+
+    The order is that of the arguments of `make_elements`.
 
     Parameters
     ----------
@@ -281,7 +294,7 @@ def element_stretches(group: Elements, memory: Memory, interface: int) -> np.nda
 
 
 def sorted_stretches(group: Elements, memory: Memory, interface: int) -> np.ndarray:
-    """Return the stretch (t,) [m] of every element in increasing order of the yield slide.
+    """Return the stretch (t,) [m] of every friction element in order of the yield displacement.
 
     Parameters
     ----------

@@ -1,25 +1,25 @@
-"""List of the events of a run: kind, interface, time and relative displacement of each."""
+"""Log of the events of a run: kind, interface, time and relative displacement."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-# kinds of events in `EventLog.kind`
+# Kinds of events in `EventLog.kind`: a slip ends, a slip starts, the slip changes its sign, the drive changes.
 STOP = 0
 RELEASE = 1
 REVERSAL = 2
-BORDER = 9
-# events that a log lists
+DRIVE_CHANGE = 9
+# Largest number of events in the log of a run; it bounds the memory and the file of a long run.
 MAX_EVENTS = 400_000
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EventLog:
-    """Events of a run in order of time, at most the last MAX_EVENTS.
+    """Log of the last MAX_EVENTS events of a run in order of time.
 
     - time, phase: (k,) time [s] and phase of the drive [rad]
     - interface: (k,) number of the interface, -1 for a border between two segments of the drive
-    - kind: (k,) STOP, +-RELEASE or +-REVERSAL with the sign of the slip that follows, or BORDER
+    - kind: (k,) STOP, +-RELEASE or +-REVERSAL with the sign of the slip that follows, or DRIVE_CHANGE
     - slide: (k,) relative displacement [m]
     - count: number of events of the run, with those that are not listed
     """

@@ -1,4 +1,4 @@
-"""A run of the event engine: samples, extremes, energies and events."""
+"""Run of the event engine, with samples, extremes, energies and events."""
 
 from dataclasses import dataclass, field, replace
 from math import ceil
@@ -17,29 +17,29 @@ from ...core import (
 )
 from ...cost_model import PYTHON_READ_TIME_RATIO
 from ...structure.drive_sizes import choose_samples_per_cycle
-from .cost import python_seconds, sample_seconds
+from .cost import estimate_cycle_time, estimate_sample_time
 from .elements import (
     element_stretches,
     make_coulomb_elements,
     make_element_table,
     unstretched_memory,
 )
-from .event_list import BORDER, MAX_EVENTS, RELEASE, REVERSAL, STOP, EventLog
+from .event_list import DRIVE_CHANGE, MAX_EVENTS, RELEASE, REVERSAL, STOP, EventLog
 from .modal_system import (
     RunArrays,
     clear_workspace,
     copy_into,
     make_modal_system,
+    make_previous_cycle,
+    make_run_sums,
+    make_time_state,
     make_workspace,
     split_time,
-    start_previous_cycle,
-    start_sums,
-    start_time_state,
 )
 from .positions_kernels import (
-    BEGIN,
+    MARCH_STATUS,
     N_COLUMNS,
-    STATUS,
+    ROW_BEGIN,
     Column,
     InterfaceMeasure,
     Ledger,
@@ -49,34 +49,34 @@ from .positions_kernels import (
     Segment,
     Time,
 )
-from .reading import Reading, find_sticking_ring
+from .reading import Reading, find_stick_vibration
 
-FOLDER = "dynamics.events"
-# samples of a cycle in the window
+PACKAGE = "dynamics.events"
+# Samples per cycle in the histories of the window.
 SAMPLES_PER_CYCLE = 400
-# samples of the window of a run that is shorter than a cycle
+# Minimum number of samples of the window, for a run that is shorter than a cycle.
 MIN_SAMPLES = 101
-# rows that one call of the march fills
+# Number of time intervals that one call of the march records.
 ROWS_PER_CALL = 4096
-# turning points that are kept from before the window
-MAX_TURNING_ROWS = 400_000
-# cycles of a motion that repeats whose turning points are kept
+# Maximum number of reversals and slip events from before the window whose rows are kept.
+MAX_REVERSAL_ROWS = 400_000
+# Maximum number of repeating cycles for which the reversals are stored.
 MAX_REPEATED_CYCLES = 1000
-# fraction of the sum of magnitudes of a velocity, below which it is round-off
+# Fraction of the sum of the magnitudes of its terms below which a velocity is round-off.
 REST_TOL = 64 * 2.0**-52
-# fraction of the friction limit; where more of it slips, the interface slips
+# Fraction of the friction limit; an interface slips where more than this fraction of it slips.
 SLIP_FRACTION = 0.5
-# cycles of a motion that repeats, which contain each stick of one of them as a whole
-MIN_CYCLES_READ = 3
-# fraction of a cycle within which a run ends at the end of the cycle
-WHOLE_CYCLES_TOL = 1e-9
-# fraction of a cycle within which two events are at the same time
+# Minimum number of cycles that are measured of a repeating motion; three contain every stick of a cycle completely.
+MIN_MEASURED_CYCLES = 3
+# A run that ends within this fraction of a cycle from the end of a cycle counts as ending there.
+CYCLE_END_TOL = 1e-9
+# Fraction of a cycle within which two events count as simultaneous.
 SAME_TIME_TOL = 1e-12
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class PieceRun:
-    """Result of a run of rigid and elastic-plastic elements.
+class EventRunResult:
+    """Result of an event-driven run of rigid and elastic-plastic friction elements.
 
     - amplitudes: (c, 2) smallest and largest output of every cycle [m]
     - phasors: (c,) output at the frequency of the drive in the last cycle of every window [m], 0 in
@@ -88,7 +88,7 @@ class PieceRun:
     - cycles_done: cycles that were computed
     - end: state and memory at the end, from which a run goes on
     - slips: whether an interface slipped as a whole at some time
-    - ring: see `reading.find_sticking_ring`, None also for other rigs
+    - ring: see `reading.find_stick_vibration`, None also for other rigs
     - repeats: whether all cycles of the window are the same to the last bit
     - response, window: histories of the run and of its last cycles, None in a run without them;
       their `extra` has "ledger" (4, k) [J] of all interfaces, and of several interfaces slides,
@@ -115,33 +115,33 @@ class PieceRun:
 
     @property
     def loops(self) -> tuple:
-        """InterfaceLoop of every interface in the window."""
+        """Friction loop in the window, for every interface."""
         return self.reading.loops
 
     @property
-    def swing(self) -> float:
-        """Half the range of the output in the window [m]."""
-        return float(self.reading.swing)
+    def output_amplitude(self) -> float:
+        """Output amplitude in the window, half of the peak-to-peak range [m]."""
+        return float(self.reading.output_amplitude)
 
     @property
     def acceleration(self) -> float:
-        """Largest absolute acceleration of the output in the window [m s-2]."""
+        """Peak magnitude of the output acceleration in the window [m s-2]."""
         return float(self.reading.acceleration)
 
 
 def load_event_kernels(say=None) -> tuple:
-    """Return the kernels that march, evaluate rows and read measures.
+    """Load the compiled functions that march, evaluate samples and measure cycles.
 
     say: is called before they are compiled.
     """
     set_compile_callback(say)
-    return tuple(load(f"{FOLDER}.{name}_kernels") for name in ("march", "dense", "read"))
+    return tuple(load(f"{PACKAGE}.{name}_kernels") for name in ("march", "dense", "read"))
 
 
 def announce_runs(
     modes: ModalBasis, drive, groups, cycles: float, window: int, runs: int = 1
 ) -> None:
-    """Announce runs to the kernels, which are compiled only if that pays.
+    """Announce the cost of coming runs to the kernels, which decide by it whether to compile.
 
     Parameters
     ----------
@@ -159,19 +159,19 @@ def announce_runs(
     march, dense, read = load_event_kernels()
     max_stiffness = max((float(group.stiffness.sum()) for group in groups), default=0.0)
     cycles_read = min(cycles, window)
-    seconds_per_cycle = python_seconds(
+    seconds_per_cycle = estimate_cycle_time(
         modes, drive, max_stiffness, sum(group.stiffness.size for group in groups)
     )
     march.march.add_python_cost(runs * cycles * seconds_per_cycle)
     march.stored_energy.add_python_cost(runs * seconds_per_cycle)
     dense.evaluate_rows.add_python_cost(
-        runs * cycles_read * SAMPLES_PER_CYCLE * sample_seconds(modes)
+        runs * cycles_read * SAMPLES_PER_CYCLE * estimate_sample_time(modes)
     )
     read.read_rows.add_python_cost(PYTHON_READ_TIME_RATIO * runs * cycles_read * seconds_per_cycle)
 
 
-def is_loop_kept(modes: ModalBasis, drive) -> bool:
-    """Return whether machine code of the loop from event to event is cached for these modes.
+def is_loop_cached(modes: ModalBasis, drive) -> bool:
+    """Return whether machine code of the event loop is cached for the given modes.
 
     The loop for one mode, whose squared frequency is a tuple, and that for several are compiled
     separately.
@@ -183,12 +183,12 @@ def is_loop_kept(modes: ModalBasis, drive) -> bool:
         table,
         np.zeros((2, modes.omega.size)),
         unstretched_memory(table, np.zeros(len(modal_system.interfaces))),
-        start_previous_cycle(modal_system, table),
-        start_time_state(drive, len(modal_system.interfaces)),
-        start_sums(1, np.zeros(1)),
+        make_previous_cycle(modal_system, table),
+        make_time_state(drive, len(modal_system.interfaces)),
+        make_run_sums(1, np.zeros(1)),
         make_workspace(modal_system),
     )
-    march = get_kernel_module(f"{FOLDER}.march_kernels").march
+    march = get_kernel_module(f"{PACKAGE}.march_kernels").march
     return march.is_stored((0.0, 0.0), arrays, np.zeros((1, 1)))
 
 
@@ -201,8 +201,8 @@ def start_event_run(
     travel: float = np.inf,
     start: InitialState | None = None,
     memory=None,
-) -> "_Run":
-    """Return a run at its start, before any motion is computed.
+) -> "_EventRun":
+    """Set up an event-driven run at its initial state without computing any motion.
 
     The parameters are those of `simulate`.
 
@@ -210,10 +210,10 @@ def start_event_run(
 
     Returns
     -------
-    _Run
+    _EventRun
     """
     announce_runs(modes, drive, groups, cycles, window)
-    return _Run(modes, drive, groups, cycles, window, travel, start, memory)
+    return _EventRun(modes, drive, groups, cycles, window, travel, start, memory)
 
 
 def simulate(
@@ -229,7 +229,7 @@ def simulate(
     memory=None,
     *,
     even: bool = False,
-) -> PieceRun:
+) -> EventRunResult:
     """Run the drive from rest or from a given state; keep the last cycles with all samples.
 
     Parameters
@@ -258,7 +258,7 @@ def simulate(
 
     Returns
     -------
-    PieceRun
+    EventRunResult
         Its outcome is set only where the output passed the travel.
 
     Raises
@@ -297,7 +297,7 @@ def simulate_batch(cases, cycles: int, window: int) -> list:
 
     Returns
     -------
-    list of PieceRun
+    list of EventRunResult
 
     Raises
     ------
@@ -307,7 +307,7 @@ def simulate_batch(cases, cycles: int, window: int) -> list:
     out = []
     run = None
     for modes, drive, groups, start in cases:
-        run = _Run(modes, drive, groups, cycles, window, np.inf, start, None, run)
+        run = _EventRun(modes, drive, groups, cycles, window, np.inf, start, None, run)
         out.append(run.run_without_histories())
     return out
 
@@ -331,7 +331,7 @@ def evaluate_motion(
     times = np.asarray(times, float)
     rows = []
     run = start_event_run(modes, drive, groups, cycles, start=start)
-    run.run_to(cycles, run._collect_into(rows))
+    run.run_to(cycles, run._make_row_collector(rows))
     rows = np.concatenate(rows)
     owner = np.clip(np.searchsorted(rows[:, Row.TIME], times, side="right") - 1, 0, len(rows) - 1)
     return run._make_response(
@@ -339,50 +339,58 @@ def evaluate_motion(
     )
 
 
-class _Run:
-    """A run in progress. It keeps only turning points and slips from before the window.
+class _EventRun:
+    """Event-driven run in progress.
 
-    like: a run that has ended, whose arrays may be reused.
+    It keeps only reversals and slip events from before the window.
+
+    template_run: a run that has ended, whose arrays may be reused.
     """
 
-    def __init__(self, modes, drive, groups, cycles, window, travel, start, memory, like=None):
+    def __init__(
+        self, modes, drive, groups, cycles, window, travel, start, memory, template_run=None
+    ):
         self.modes = modes
         self.drive = drive
         self.groups = tuple(groups)
         self.n_window = window
         self.kernels, self.dense, self.reader = load_event_kernels()
         self.modal_system = make_modal_system(modes)
-        old = (None,) * 5 if like is None else like.reusable_arrays
+        old = (None,) * 5 if template_run is None else template_run.reusable_arrays
         n = modes.omega.size
-        count = max(1, ceil(cycles - WHOLE_CYCLES_TOL))
+        count = max(1, ceil(cycles - CYCLE_END_TOL))
         table = make_element_table(self.groups)
         if np.any(~self.modal_system.interfaces.any(axis=1) & (table.static_limit > 0)):
             raise PatchfemError(
                 "structure.mode.slide: no mode moves the interface, so friction cannot act"
             )
         motion = np.zeros((2, n)) if start is None else np.array([start.z, start.v], float)
-        fresh = unstretched_memory(table, self.modal_system.interfaces @ motion[0])
-        memory = fresh if memory is None else type(fresh)(*(part.copy() for part in memory))
-        wanted = np.zeros(count)
-        # the last whole cycle of every window
-        wanted[max(0, int(cycles + WHOLE_CYCLES_TOL)) - 1 :: -window] = 1.0
+        unstretched_state = unstretched_memory(table, self.modal_system.interfaces @ motion[0])
+        memory = (
+            unstretched_state
+            if memory is None
+            else type(unstretched_state)(*(part.copy() for part in memory))
+        )
+        is_phasor_wanted = np.zeros(count)
+        # A phasor is computed in the last complete cycle of every window.
+        is_phasor_wanted[max(0, int(cycles + CYCLE_END_TOL)) - 1 :: -window] = 1.0
         new = (
             table,
             memory,
-            start_previous_cycle(self.modal_system, table),
-            start_time_state(drive, len(self.groups)),
-            start_sums(count, wanted, travel),
+            make_previous_cycle(self.modal_system, table),
+            make_time_state(drive, len(self.groups)),
+            make_run_sums(count, is_phasor_wanted, travel),
         )
         self.reusable_arrays = tuple(map(copy_into, old, new))
         self.table, self.memory, self.previous, self.time_state, self.run_sums = (
             self.reusable_arrays
         )
         if (
-            like is not None
-            and like.modal_system.interfaces.shape == self.modal_system.interfaces.shape
+            template_run is not None
+            and template_run.modal_system.interfaces.shape == self.modal_system.interfaces.shape
         ):
-            self.workspace = clear_workspace(like.workspace)
-            self.scratch = like.scratch
+            self.workspace = clear_workspace(template_run.workspace)
+            self.scratch = template_run.scratch
         else:
             self.workspace = make_workspace(self.modal_system)
             self.scratch = make_workspace(self.modal_system)
@@ -419,18 +427,21 @@ class _Run:
         self.start_energy = self.kernels.stored_energy(
             self.motion, self.modal_system, self.table, self.memory
         )
-        still = self.kernels.stored_energy(
+        energy_at_rest = self.kernels.stored_energy(
             np.zeros_like(self.motion), self.modal_system, self.table, self.memory
         )
-        # energy [J] of the stretched elements minus their work and loss so far, before the energy balance of the run begins
-        self.start_stretch_energy = still - float(np.sum(self.memory.work - self.memory.loss))
-        if like is not None and like.n_columns == self.n_columns:
-            self.rows = like.rows
+        # Energy [J] of the stretched elements minus their work and loss so far; the energy balance of the run begins
+        # with it.
+        self.start_stretch_energy = energy_at_rest - float(
+            np.sum(self.memory.work - self.memory.loss)
+        )
+        if template_run is not None and template_run.n_columns == self.n_columns:
+            self.rows = template_run.rows
         else:
             self.rows = np.empty((ROWS_PER_CALL, self.n_columns))
 
     def run_to(self, cycles: float, keep=None, progress=None) -> None:
-        """Run up to a time in cycles.
+        """March the run up to a time given in cycles.
 
         Where the motion repeats and the rows are not needed one by one, the last cycle is counted
         for the cycles that remain.
@@ -452,13 +463,13 @@ class _Run:
                 keep(done)
             if progress is not None:
                 progress(min(self.now / (self.cycles * self.period), 1.0))
-            if code == STATUS.repeats and keep in (None, self._keep_turning_rows):
+            if code == MARCH_STATUS.repeats and keep in (None, self._keep_reversal_rows):
                 self._skip_repeating_cycles(int(stop[0]), rows)
-            elif code == STATUS.done:
+            elif code == MARCH_STATUS.done:
                 break
 
     def _slip_signs(self, speeds, sizes) -> np.ndarray:
-        """Return the signs (i,) of the slip of rigid elements at speeds (i,) [m/s].
+        """Return the signs (i,) of the slip of the rigid elements at given velocities (i,) [m/s].
 
         sizes: (i,) magnitudes that the speeds are added from [m/s].
         """
@@ -469,7 +480,7 @@ class _Run:
         )
 
     def _march(self, stop, rows) -> tuple:
-        """Call the march; returns its status and the rows (k, w) that it filled.
+        """Call the compiled march; return its status and the rows (k, w) that it filled.
 
         Its sums are added to those of the run as a whole: added piece by piece, the energies of a
         million cycles of four pieces were wrong by 6e-11.
@@ -479,24 +490,24 @@ class _Run:
         sums[:] = 0.0
         code, used = self.kernels.march(stop, self.arrays, rows)
         sums += before
-        if code == STATUS.idle:
+        if code == MARCH_STATUS.idle:
             raise NotConverged(
                 f"dynamics: at t = {rows[max(used - 1, 0), Row.TIME]:.9g} s the contact changes between stick "
                 "and slip again and again without time passing"
             )
-        if code == STATUS.undetermined:
-            nearer = ""
+        if code == MARCH_STATUS.undetermined:
+            advice = ""
             if np.any(self.table.kinetic_limit < self.table.static_limit):
-                nearer = "bring friction.kinetic nearer to friction.static, or "
+                advice = "bring friction.kinetic nearer to friction.static, or "
             raise NotConverged(
                 "dynamics: after a change between stick and slip no state was found that satisfies the "
-                f'friction law; {nearer}use accuracy.method = "march"'
+                f'friction law; {advice}use accuracy.method = "march"'
             )
-        self.has_passed_travel = code == STATUS.travel
+        self.has_passed_travel = code == MARCH_STATUS.travel
         return code, rows[: 0 if self.has_passed_travel else used]
 
-    def _collect_into(self, out: list):
-        """Return a function that logs the events of rows and appends the rows to a list."""
+    def _make_row_collector(self, out: list):
+        """Return a callback that logs the events of rows and appends the rows to a list."""
 
         def keep(rows) -> None:
             self._log_events(rows)
@@ -504,17 +515,17 @@ class _Run:
 
         return keep
 
-    def _keep_turning_rows(self, rows) -> None:
-        """Keep the turning points and slips among rows from before the window."""
-        self.is_marked = self._log_events(rows) | (rows[:, Row.BEGIN] == BEGIN.reversal)
+    def _keep_reversal_rows(self, rows) -> None:
+        """Keep the rows that begin with a reversal or a slip event, from before the window."""
+        self.is_marked = self._log_events(rows) | (rows[:, Row.BEGIN] == ROW_BEGIN.reversal)
         if not self.n_kept and len(rows):
             self.is_marked[0] = True  # the first row is the start of the run
-        if self.n_kept < MAX_TURNING_ROWS:
+        if self.n_kept < MAX_REVERSAL_ROWS:
             self.early_rows.append(rows[self.is_marked])
             self.n_kept += int(self.is_marked.sum())
 
-    def _keep_equal_steps(self, step: float):
-        """Return a function that keeps samples at all multiples of a step [s].
+    def _make_equidistant_sampler(self, step: float):
+        """Return a callback that keeps samples at all multiples of a time step [s].
 
         It also keeps those of `sample_rows`.
         """
@@ -537,7 +548,10 @@ class _Run:
         return keep
 
     def _skip_repeating_cycles(self, end: int, rows) -> None:
-        """Compute one cycle of a motion that repeats, and count it for the cycles that follow.
+        """Compute one cycle of a repeating motion, and count it for the cycles that follow.
+
+        The last cycle is number `end`, or the one before the next segment of the drive. The
+        cycles are computed one by one where that cycle needs more than `rows`.
 
         The border is the cycle number `end`, or the next segment of the drive. The cycles are
         computed one by one where that cycle needs more than `rows`.
@@ -547,7 +561,7 @@ class _Run:
         k = int(self.time_state.now[Time.SEGMENT]) + 1
         if k < len(self.time_state.segments):
             end = min(end, int(self.time_state.segments[k, Segment.CYCLE]))
-        end -= 1  # the last cycle is marched, because it crosses the border
+        end -= 1  # The last cycle is marched, because it contains the end of the run or of the segment.
         n_skipped = end - begin - 1
         if n_skipped < 1:
             return
@@ -559,8 +573,8 @@ class _Run:
         status, cycle_rows = self._march((begin + 1.0, 0.0), rows)
         run_sums.is_phasor_wanted[begin] = is_phasor_wanted
         if len(rows):
-            self._keep_turning_rows(cycle_rows)
-        if status != STATUS.done:
+            self._keep_reversal_rows(cycle_rows)
+        if status != MARCH_STATUS.done:
             return
         values_before[0][[Ledger.MAX_STORED, Ledger.HAS_SLIPPED]] = run_sums.ledger[
             [Ledger.MAX_STORED, Ledger.HAS_SLIPPED]
@@ -577,33 +591,37 @@ class _Run:
                 cycle_rows, n_skipped, *events_before, [total / (n_skipped + 1) for total in gains]
             )
 
-    def _repeat_rows(self, rows, n_cycles: int, first: int, count: int, gained) -> None:
-        """Keep the rows (k, w) of a cycle and its events for `many` more cycles.
+    def _repeat_rows(
+        self, rows, n_cycles: int, first_event: int, n_earlier_events: int, gains
+    ) -> None:
+        """Append shifted copies of the rows (k, w) and events of a cycle for `n_cycles` more cycles.
 
-        first: number of its first event; count: events before it; gained: work and loss (i,) [J]
+        first_event: index of its first event array; n_earlier_events: events before it; gains: work and loss (i,) [J]
         of the elements in a cycle. Rows are kept for at most MAX_REPEATED_CYCLES cycles.
         """
-        turning_rows = rows[self.is_marked]
+        reversal_rows = rows[self.is_marked]
         cycles = np.unique(np.linspace(1, n_cycles, min(n_cycles, MAX_REPEATED_CYCLES)).round())
-        repeated_rows = _shift_rows(turning_rows, self.period * cycles)
-        for column, gain in zip((Column.WORK, Column.LOSS), gained):
+        repeated_rows = _shift_rows(reversal_rows, self.period * cycles)
+        for column, gain in zip((Column.WORK, Column.LOSS), gains):
             for f, interface_gain in enumerate(gain):
-                repeated_rows[:, self._column(f, column)] += np.repeat(
-                    cycles * interface_gain, len(turning_rows)
+                repeated_rows[:, self._column_index(f, column)] += np.repeat(
+                    cycles * interface_gain, len(reversal_rows)
                 )
         self.early_rows.append(repeated_rows)
         self.n_kept += len(repeated_rows)
-        cycle_events = np.concatenate([np.empty((0, 5)), *self.events[first:]])
+        cycle_events = np.concatenate([np.empty((0, 5)), *self.events[first_event:]])
         n_logged = min(n_cycles, -(-MAX_EVENTS // max(len(cycle_events), 1)))
         self.events.append(
             _shift_rows(
                 cycle_events, self.period * np.arange(n_cycles - n_logged + 1, n_cycles + 1)
             )
         )
-        self.n_events += n_cycles * (self.n_events - count)
+        self.n_events += n_cycles * (self.n_events - n_earlier_events)
 
     def _log_events(self, rows) -> np.ndarray:
-        """Log stops, releases, reversals and borders of the drive.
+        """Append stops, releases, reversals and drive changes to the event log.
+
+        Return which rows (k,) begin with one of them.
 
         Returns which rows (k,) begin with one.
         """
@@ -611,28 +629,28 @@ class _Run:
         if not len(rows):
             return is_event
         for f, interface in enumerate(self.modal_system.interfaces):
-            is_slipping = rows[:, self._column(f, Column.SLIPPING)] >= SLIP_FRACTION
-            direction = np.where(is_slipping, rows[:, self._column(f, Column.DIRECTION)], 0.0)
+            is_slipping = rows[:, self._column_index(f, Column.SLIPPING)] >= SLIP_FRACTION
+            direction = np.where(is_slipping, rows[:, self._column_index(f, Column.DIRECTION)], 0.0)
             before = np.concatenate([self.slip_signs[f : f + 1], direction[:-1]])
             self.slip_signs[f] = direction[-1]
             changed = np.flatnonzero(before != direction)
             start = np.where(before[changed] == 0, RELEASE, REVERSAL)
             kind = np.where(direction[changed] == 0, STOP, start * direction[changed])
             if self.has_rigid:
-                slide = rows[changed, self._column(f, Column.SLIDE)]
+                slide = rows[changed, self._column_index(f, Column.SLIDE)]
             else:
                 z = rows[changed, Row.MOTION : Row.MOTION + self.modes.omega.size]
                 slide = z @ interface
             self._add_events(rows[changed], f, kind, slide)
             is_event[changed] = True
         if self.has_rigid:
-            borders = np.flatnonzero(rows[:, Row.BEGIN] == BEGIN.drive_border)
-            self._add_events(rows[borders], -1, BORDER, 0.0)
+            borders = np.flatnonzero(rows[:, Row.BEGIN] == ROW_BEGIN.drive_change)
+            self._add_events(rows[borders], -1, DRIVE_CHANGE, 0.0)
             is_event[borders] = True
         return is_event
 
     def _add_events(self, rows, interface: int, kind, slide) -> None:
-        """Add events that begin rows (k, w) to the log."""
+        """Append the events with which rows (k, w) begin to the log."""
         if not len(rows):
             return
         events = np.empty((len(rows), 5))
@@ -644,12 +662,15 @@ class _Run:
         self.events.append(events)
         self.n_events += len(events)
 
-    def _column(self, interface: int, column: int) -> int:
-        """Return the position in a row of a column of an interface, see `Column`."""
+    def _column_index(self, interface: int, column: int) -> int:
+        """Return the index in a row of a quantity of an interface.
+
+        `column` is a member of `Column`.
+        """
         return Row.MOTION + 2 * self.modes.omega.size + N_COLUMNS * interface + column
 
-    def run(self, frames: int, progress, *, even: bool = False) -> PieceRun | None:
-        """Run to the end.
+    def run(self, frames: int, progress, *, even: bool = False) -> EventRunResult | None:
+        """March the run to its end and return the result with histories.
 
         Returns None where the output passed the travel. The parameters are those of `simulate`.
         """
@@ -663,27 +684,29 @@ class _Run:
         if sampled_start > 0:
             self.run_to(
                 sampled_start,
-                self._keep_equal_steps(self.period / even) if even else self._keep_turning_rows,
+                self._make_equidistant_sampler(self.period / even)
+                if even
+                else self._keep_reversal_rows,
                 progress,
             )
         if window_start > sampled_start:
-            self.run_to(window_start, self._collect_into(early_rows), progress)
+            self.run_to(window_start, self._make_row_collector(early_rows), progress)
         self.is_repeating = bool(self.previous.status[PreviousStatus.REPEATS])
         for stop in self._cycle_ends(window_start, last_cycle_start):
-            self.run_to(stop, self._collect_into(window_rows), progress)
+            self.run_to(stop, self._make_row_collector(window_rows), progress)
         for k in range(frames):
             self.run_to(
                 last_cycle_start + (end - last_cycle_start) * (k + 1) / frames,
-                self._collect_into(window_rows),
+                self._make_row_collector(window_rows),
             )
             self.snapshots.append(self._snapshot())
-        self.run_to(end, self._collect_into(window_rows), progress)
+        self.run_to(end, self._make_row_collector(window_rows), progress)
         if self.has_passed_travel:
             return None
-        return self._make_result(early_rows, self._close_rows(window_rows))
+        return self._make_result(early_rows, self._append_end_row(window_rows))
 
-    def run_without_histories(self) -> PieceRun:
-        """Run to the end without histories and events.
+    def run_without_histories(self) -> EventRunResult:
+        """March the run to its end and return the result without histories and events.
 
         Few cycles are read where the motion repeats.
         """
@@ -692,19 +715,19 @@ class _Run:
         self.run_to(end - self.n_window)
         self.is_repeating = bool(self.previous.status[PreviousStatus.REPEATS])
         if self.is_repeating:
-            self.run_to(end - min(MIN_CYCLES_READ, self.n_window))
+            self.run_to(end - min(MIN_MEASURED_CYCLES, self.n_window))
         self.run_to(end, lambda rows: window_rows.append(rows.copy()))
-        return self._summarise(self._close_rows(window_rows))
+        return self._summarise(self._append_end_row(window_rows))
 
     def _cycle_ends(self, first: float, last: float) -> list:
-        """Return the ends of the cycles of the window, for a run that ends within a cycle."""
-        if abs(self.cycles - round(self.cycles)) < WHOLE_CYCLES_TOL:
+        """Return the ends of the cycles in the window, for a run that ends within a cycle."""
+        if abs(self.cycles - round(self.cycles)) < CYCLE_END_TOL:
             return []
         ends = self.cycles - np.arange(self.n_window, 0, -1)
         return [end for end in ends if first < end <= last]
 
-    def _close_rows(self, window_rows) -> np.ndarray:
-        """Return the rows (k + 1, w) of the window and one without duration for its end."""
+    def _append_end_row(self, window_rows) -> np.ndarray:
+        """Return the rows (k + 1, w) of the window, followed by a row for its end."""
         n = self.modes.omega.size
         memory = self.memory
         row = np.zeros(self.n_columns)
@@ -720,23 +743,23 @@ class _Run:
             (Column.LOSS, memory.loss),
             (Column.SLIDE, memory.slide),
         ):
-            row[self._column(0, column) :: N_COLUMNS] = values
+            row[self._column_index(0, column) :: N_COLUMNS] = values
         rows = np.concatenate([*window_rows, row[None]])
         if self.has_rigid:
-            # an event within round-off of the start of the window counts as before it
+            # An event within round-off of the start of the window counts as before it.
             is_long = rows[:, Row.DURATION] > SAME_TIME_TOL * self.period
             rows = rows[min(int(np.argmax(is_long)), len(rows) - 2) :]
         return rows
 
     @property
     def now(self) -> float:
-        """Time [s] of the run."""
+        """Present time of the run [s]."""
         return float(
             self.time_state.now[Time.CYCLE] * self.period + self.time_state.now[Time.OFFSET]
         )
 
     def _snapshot(self) -> dict:
-        """Return time, motion and stretches of the elements at the present time."""
+        """Return time, motion and stretches of the friction elements at the present time."""
         faces = []
         for k, group in enumerate(self.groups):
             faces.append((float(self.memory.slide[k]), element_stretches(group, self.memory, k)))
@@ -750,8 +773,8 @@ class _Run:
             "faces": faces,
         }
 
-    def _summarise(self, rows) -> PieceRun:
-        """Return the result without histories, from the rows of the window."""
+    def _summarise(self, rows) -> EventRunResult:
+        """Return the result of the run without histories, measured from the rows of the window."""
         start_time = rows[0, Row.TIME]
         end_time = rows[-1, Row.TIME]
         n_interfaces = len(self.groups)
@@ -762,7 +785,7 @@ class _Run:
             rows, cycles, float(self.drive.moving), self.evaluation_arrays, *measures
         )
         reading = Reading(*measures, float(span), self.period)
-        cycles_done = slice(0, max(1, ceil(end_time / self.period - WHOLE_CYCLES_TOL)))
+        cycles_done = slice(0, max(1, ceil(end_time / self.period - CYCLE_END_TOL)))
         names = ("work_in", "viscous", "power")
         energies = dict(zip(names, map(float, self.run_sums.ledger[:3]))) | {
             "friction": float(self.run_sums.ledger[Ledger.FRICTION_LOSS])
@@ -779,7 +802,9 @@ class _Run:
             and not self.has_rigid
         )
         ring = (
-            find_sticking_ring(self.modal_system, self.table, reading) if has_closed_form else None
+            find_stick_vibration(self.modal_system, self.table, reading)
+            if has_closed_form
+            else None
         )
         end = (
             InitialState(*self.motion.copy()),
@@ -787,7 +812,7 @@ class _Run:
         )
         ledger = self.run_sums.ledger
         phasors = self.run_sums.phasors[cycles_done] @ [1, 1j]
-        return PieceRun(
+        return EventRunResult(
             self.run_sums.extremes[cycles_done].copy(),
             phasors,
             energies,
@@ -801,16 +826,16 @@ class _Run:
             self.is_repeating,
         )
 
-    def _make_result(self, early_rows, rows) -> PieceRun:
-        """Return the result with histories.
+    def _make_result(self, early_rows, rows) -> EventRunResult:
+        """Return the result of the run with histories.
 
-        wide, rows: rows before the window and of the window.
+        early_rows, rows: rows before the window, as a list of arrays, and rows of the window.
         """
         no_rows = np.empty((0, self.n_columns))
         window_rows = rows[:-1]
         start_time = rows[0, Row.TIME]
         end_time = rows[-1, Row.TIME]
-        turning_rows = np.concatenate([no_rows, *self.early_rows])
+        reversal_rows = np.concatenate([no_rows, *self.early_rows])
         early_rows = np.concatenate([no_rows, *early_rows])
         n_samples_in_window = max(
             MIN_SAMPLES, round((end_time - start_time) / self.period * SAMPLES_PER_CYCLE) + 1
@@ -818,11 +843,11 @@ class _Run:
         window = self.sample_rows(
             window_rows, np.linspace(start_time, end_time, n_samples_in_window)
         )
-        if len(turning_rows):
-            at_start = np.zeros(len(turning_rows))
-            time = turning_rows[:, Row.TIME]
+        if len(reversal_rows):
+            at_start = np.zeros(len(reversal_rows))
+            time = reversal_rows[:, Row.TIME]
             parts = [
-                self._make_response(turning_rows, np.arange(len(turning_rows)), at_start, time)
+                self._make_response(reversal_rows, np.arange(len(reversal_rows)), at_start, time)
             ]
         else:
             end = (early_rows if len(early_rows) else rows)[0, Row.TIME]
@@ -841,33 +866,33 @@ class _Run:
         )
 
     def event_log(self) -> EventLog:
-        """Return the last events."""
+        """Return the log of the last events of the run."""
         rows = np.concatenate([np.empty((0, 5)), *self.events])
         rows = rows[np.argsort(rows[:, Row.TIME], kind="stable")][-MAX_EVENTS:]
-        time, phase, interface, what, slide = rows.T
+        time, phase, interface, kind, slide = rows.T
         return EventLog(
             frozen_array(time),
             frozen_array(phase),
             frozen_array(interface, np.int64),
-            frozen_array(what, np.int64),
+            frozen_array(kind, np.int64),
             frozen_array(slide),
             self.n_events,
         )
 
     def sample_rows(self, rows, grid) -> Response:
-        """Return histories on a grid (k,) [s] and at turning points, stops and releases.
+        """Return histories on a time grid (k,) [s] and at reversals, stops and releases.
 
         The force of rigid elements jumps, so there are samples on both sides of their events.
         """
-        slipping = rows[:, self._column(0, Column.SLIPPING) :: N_COLUMNS] >= SLIP_FRACTION
-        is_jump = (rows[:, Row.BEGIN] > BEGIN.reversal) & self.has_rigid
-        is_reversal = rows[:, Row.BEGIN] == BEGIN.reversal
+        slipping = rows[:, self._column_index(0, Column.SLIPPING) :: N_COLUMNS] >= SLIP_FRACTION
+        is_jump = (rows[:, Row.BEGIN] > ROW_BEGIN.reversal) & self.has_rigid
+        is_reversal = rows[:, Row.BEGIN] == ROW_BEGIN.reversal
         is_sampled = (
             is_jump | is_reversal | np.any(np.diff(slipping, axis=0, prepend=slipping[:1]), axis=1)
         )
         if np.count_nonzero(rows[:, Row.BEGIN]) <= 2 * grid.size:
-            # the force has a kink at a yield, so a sample there closes the energy balance of the samples
-            is_sampled |= rows[:, Row.BEGIN] == BEGIN.yielding
+            # The force has a kink at a yield, so a sample there closes the energy balance of the samples.
+            is_sampled |= rows[:, Row.BEGIN] == ROW_BEGIN.yielding
         is_jump = rows[is_jump & (rows[:, Row.TIME] > grid[0]), Row.TIME]
         time = np.unique(
             np.concatenate([grid, rows[is_sampled, Row.TIME], np.nextafter(is_jump, -np.inf)])
@@ -880,7 +905,7 @@ class _Run:
         )
 
     def evaluate_rows(self, rows, owner, tau) -> np.ndarray:
-        """Evaluate the motion at times after the starts of rows.
+        """Evaluate the recorded motion of the run at given times.
 
         Parameters
         ----------
@@ -901,7 +926,7 @@ class _Run:
         return out
 
     def _make_response(self, rows, owner, tau, time) -> Response:
-        """Return histories at times (k,) [s], tau (k,) [s] after the starts of rows (k,)."""
+        """Return histories at times (k,) [s], given the row and the time since its start."""
         return self._response_from_columns(self.evaluate_rows(rows, owner, tau), time)
 
     def _response_from_columns(self, columns, time) -> Response:
@@ -948,15 +973,15 @@ class _Run:
         )
 
 
-def _shift_rows(rows, times) -> np.ndarray:
-    """Return rows (k, w), which begin with a time [s], for each of some delays (m,) [s]."""
-    out = np.tile(rows, (len(times), 1))
-    out[:, 0] += np.repeat(times, len(rows))
+def _shift_rows(rows, delays) -> np.ndarray:
+    """Return copies of rows (k, w) shifted by each of several delays (m,) [s]."""
+    out = np.tile(rows, (len(delays), 1))
+    out[:, 0] += np.repeat(delays, len(rows))
     return out
 
 
-# fields of a Response that are histories
-_COLUMNS = (
+# Fields of a Response that are histories, in the order of its constructor.
+_HISTORY_FIELDS = (
     "time",
     "modal",
     "modal_rate",
@@ -971,21 +996,21 @@ _COLUMNS = (
 )
 
 
-def _select_samples(response: Response, which) -> Response:
-    """Return the samples of a Response that an index or a mask selects."""
-    columns = [getattr(response, name)[which] for name in _COLUMNS]
+def _select_samples(response: Response, selection) -> Response:
+    """Return the samples of histories that an index or a mask selects."""
+    columns = [getattr(response, name)[selection] for name in _HISTORY_FIELDS]
     extra = {}
     for name, values in response.extra.items():
-        extra[name] = values[:, which] if name == "ledger" else values[which]
+        extra[name] = values[:, selection] if name == "ledger" else values[selection]
     return Response(*columns, extra)
 
 
 def _join_responses(responses) -> Response:
-    """Join Responses to one whose times increase."""
+    """Join histories in order of time to one with strictly increasing times."""
     if len(responses) == 1:
         return responses[0]
     columns = []
-    for name in _COLUMNS:
+    for name in _HISTORY_FIELDS:
         columns.append(np.concatenate([getattr(response, name) for response in responses]))
     extra = {}
     for name in responses[0].extra:

@@ -1,8 +1,8 @@
-"""March from event to event of modes behind rigid and elastic-plastic elements (compiled).
+"""March from event to event of modes with rigid and elastic-plastic friction (compiled).
 
 The loop `march` does five things for every piece: it chooses the length of the piece, expands the
 motion, searches for the first event, moves the state to it, and changes the elements as the event
-asks. An event is a yield, the release of an interface that a rigid element holds, a turning point
+asks. An event is a yield, the release of an interface that a rigid element holds, a reversal
 of an interface or of the output (`search_kernels`), or a border of the drive.
 """
 
@@ -25,14 +25,14 @@ from .memory_kernels import (
     is_sticking,
     next_yield_slide,
     release_next_element,
-    store_turning_point,
+    store_reversal,
 )
 from .positions_kernels import (
-    BEGIN,
-    EVENT,
-    KIND,
+    EVENT_KIND,
+    MARCH_STATUS,
     N_COLUMNS,
-    STATUS,
+    ROW_BEGIN,
+    SEGMENT_KIND,
     Column,
     Ledger,
     Limit,
@@ -40,13 +40,13 @@ from .positions_kernels import (
     Segment,
     Time,
 )
-from .repeat_kernels import detect_repeat, forget_previous
+from .repeat_kernels import clear_previous_cycle, detect_repeat
 from .search_kernels import (
     NextEvent,
-    displacement_at,
     expand_speed,
     find_crossing,
     find_next_event,
+    integrate_speed,
 )
 from .series_kernels import (
     EPS,
@@ -61,30 +61,31 @@ from .series_kernels import (
     find_highest_power,
 )
 from .stick_kernels import (
-    MAX_ORDER,
+    MAX_DECIDING_ORDER,
     choose_sticks,
     correct_sticking_slides,
     find_resting_interfaces,
 )
 from .sum_kernels import add_piece_sums
 
-# fraction of a piece within which an interface that was at rest at a turning point still rests, so that no second
-# reversal is found there
+# Fraction of a time interval; an interface that was at rest at a reversal still counts as resting until then, so that
+# no second reversal is found there.
 MIN_MOVING_FRACTION = 1e-12
-# largest number of successive events without progress in time; more count as an endless sequence
+# Maximum number of successive events without progress in time; more count as an endless sequence of events.
 MAX_IDLE_EVENTS = 1000.0
-# a piece is longer by this factor than the predicted time to the next yield, which should lie in it
-YIELD_MARGIN = 1.3
-# fraction of the longest piece that a piece takes at least where a yield is near
-MIN_FRACTION = 0.02
-# fraction of the sum of magnitudes of a velocity, below which it is round-off
+# Ratio of the duration of a time interval to the predicted time to the next yield; with a margin of 30 % the yield
+# mostly lies inside the interval.
+YIELD_MARGIN_FACTOR = 1.3
+# Minimum duration of a time interval over the longest possible one, where a yield is near.
+MIN_DURATION_FRACTION = 0.02
+# Fraction of the sum of the magnitudes of its terms below which a velocity is round-off.
 REST_TOL = 64 * EPS
-# progress in time as a fraction of a cycle, below which an event counts as idle
+# Progress in time as a fraction of a cycle, below which an event counts as idle.
 MIN_PROGRESS = 1e-13
 
 
 class Piece(NamedTuple):
-    """A piece of the motion, whose series is in the workspace.
+    """Time interval of the march, over which the workspace holds the power series of the motion.
 
     - duration: [s]
     - rate: fastest rate [1/s], by which the duration was chosen
@@ -99,8 +100,10 @@ class Piece(NamedTuple):
 
 
 @njit(**NJIT_INLINE)
-def time_to_border(time_state, stop):
-    """Return the time [s] to the next border.
+def time_to_breakpoint(time_state, stop):
+    """Return the time [s] to the next end of a cycle, of a drive segment or of the march.
+
+    `stop` is the cycle and the offset [s] at which the march ends.
 
     Borders are the end of the cycle, the next segment of the drive, and `stop` (cycle, offset).
     """
@@ -119,8 +122,8 @@ def time_to_border(time_state, stop):
 
 
 @njit(**NJIT_KERNEL)
-def step_to_border(time_state, stop, remaining):
-    """Move the time to the next border.
+def step_to_breakpoint(time_state, stop, remaining):
+    """Advance the time to the next end of a cycle, of a drive segment or of the march.
 
     Parameters
     ----------
@@ -135,19 +138,19 @@ def step_to_border(time_state, stop, remaining):
     bool
         Whether the drive changes there, from one sine to another or by a jump.
     """
-    before = int(time_state.now[Time.SEGMENT])
+    segment_before = int(time_state.now[Time.SEGMENT])
     cycle = time_state.now[Time.CYCLE]
     offset = time_state.now[Time.OFFSET] + remaining
     drive_changes = False
     now = time_state.now
     period = time_state.period[0]
     k = int(now[Time.SEGMENT]) + 1
-    after = (
+    enters_segment = (
         k < time_state.segments.shape[0]
         and time_state.segments[k, Segment.CYCLE] == now[Time.CYCLE]
         and time_state.segments[k, Segment.OFFSET] - now[Time.OFFSET] <= remaining
     )
-    if after:
+    if enters_segment:
         now[Time.OFFSET] = time_state.segments[k, Segment.OFFSET]
         now[Time.SEGMENT] = k
     elif stop[0] == now[Time.CYCLE] and stop[1] - now[Time.OFFSET] <= remaining:
@@ -165,20 +168,24 @@ def step_to_border(time_state, stop, remaining):
         and time_state.segments[k, Segment.OFFSET] <= now[Time.OFFSET]
     ):
         now[Time.SEGMENT] = k
-    if int(now[Time.SEGMENT]) != before:
+    if int(now[Time.SEGMENT]) != segment_before:
         segment = time_state.segments[int(now[Time.SEGMENT])]
-        old = drive_value(time_state.segments[before], Instant(cycle, offset, period))
-        new = drive_value(segment, present_instant(time_state))
+        old_acceleration = drive_value(
+            time_state.segments[segment_before], Instant(cycle, offset, period)
+        )
+        new_acceleration = drive_value(segment, present_instant(time_state))
         drive_changes = (
-            segment[Segment.KIND] == KIND.sine
-            and time_state.segments[before, Segment.KIND] == KIND.sine
-        ) or abs(new - old) > 1e-12 * max(abs(old), abs(new))
+            segment[Segment.KIND] == SEGMENT_KIND.sine
+            and time_state.segments[segment_before, Segment.KIND] == SEGMENT_KIND.sine
+        ) or abs(new_acceleration - old_acceleration) > 1e-12 * max(
+            abs(old_acceleration), abs(new_acceleration)
+        )
     return drive_changes
 
 
 @njit(**NJIT_INLINE)
 def write_row(row, duration, phase, begin, run):
-    """Write the row of a piece as it begins.
+    """Write the state at the start of a time interval into its row.
 
     Parameters
     ----------
@@ -210,25 +217,27 @@ def write_row(row, duration, phase, begin, run):
         row[Row.MOTION + i] = motion[0, i]
         row[Row.MOTION + n + i] = motion[1, i]
     for f in range(len(modal_system.inverse_mass)):
-        at = Row.MOTION + 2 * n + N_COLUMNS * f
+        column = Row.MOTION + 2 * n + N_COLUMNS * f
         tangent = find_tangent(f, table, memory)
-        row[at + Column.FORCE] = memory.force[f]
-        row[at + Column.STIFFNESS] = tangent.stiffness
-        row[at + Column.SLIPPING] = tangent.slipping
-        row[at + Column.LIMIT] = tangent.limit
-        row[at + Column.SLIP] = memory.slip[f]
-        row[at + Column.WORK] = memory.work[f]
-        row[at + Column.LOSS] = memory.loss[f]
+        row[column + Column.FORCE] = memory.force[f]
+        row[column + Column.STIFFNESS] = tangent.stiffness
+        row[column + Column.SLIPPING] = tangent.slipping
+        row[column + Column.LIMIT] = tangent.limit
+        row[column + Column.SLIP] = memory.slip[f]
+        row[column + Column.WORK] = memory.work[f]
+        row[column + Column.LOSS] = memory.loss[f]
         direction = memory.direction[f]
         if table.static_limit[f] > 0.0:
             direction = memory.rigid_state[f] if abs(memory.rigid_state[f]) < 2.0 else 0.0
-        row[at + Column.DIRECTION] = direction
-        row[at + Column.SLIDE] = memory.slide[f]
+        row[column + Column.DIRECTION] = direction
+        row[column + Column.SLIDE] = memory.slide[f]
 
 
 @njit(**NJIT_INLINE)
 def move_state(u, piece, run):
-    """Move coordinates, interfaces and elements over a piece up to u, and add their energies.
+    """Advance modes, interfaces and friction elements over part of a time interval.
+
+    Their energies are added to the sums of the run.
 
     Parameters
     ----------
@@ -252,7 +261,7 @@ def move_state(u, piece, run):
             memory.force[f] = evaluate_polynomial(workspace.constraint.reactions[f], 0, top - 2, u)
             continue
         stiffness, slipping, limit = find_tangent(f, table, memory)
-        step = displacement_at(workspace.polynomials[f], top, u)
+        step = integrate_speed(workspace.polynomials[f], top, u)
         work = (memory.force[f] + 0.5 * stiffness * step) * step
         memory.work[f] += work
         memory.loss[f] += limit * abs(step)
@@ -262,30 +271,30 @@ def move_state(u, piece, run):
         ledger[Ledger.FRICTION_LOSS] += limit * abs(step)
         if slipping >= 0.5:
             ledger[Ledger.HAS_SLIPPED] = 1.0
-    out = 0.0
+    output = 0.0
     for i in range(n):
-        place = coefs[top, i]
+        displacement = coefs[top, i]
         rate = top * coefs[top, i]
         for k in range(top - 1, 0, -1):
-            place = place * u + coefs[k, i]
+            displacement = displacement * u + coefs[k, i]
             rate = rate * u + k * coefs[k, i]
-        motion[0, i] += u * place
+        motion[0, i] += u * displacement
         motion[1, i] = rate / piece.duration
-        out += modal_system.output[i] * motion[0, i]
+        output += modal_system.output[i] * motion[0, i]
     for f in range(n_interfaces):
         if is_sticking(f, table, memory):
             continue
-        place = 0.0
+        displacement = 0.0
         for i in range(n):
-            place += modal_system.interfaces[f, i] * motion[0, i]
-        memory.slide[f] = place
+            displacement += modal_system.interfaces[f, i] * motion[0, i]
+        memory.slide[f] = displacement
     correct_sticking_slides(run)
-    widen_extremes(out, run)
+    widen_extremes(output, run)
 
 
 @njit(**NJIT_INLINE)
 def widen_extremes(out, run):
-    """Include a value of the output in the extremes of the present cycle.
+    """Include an output displacement in the extremes of the present cycle.
 
     Parameters
     ----------
@@ -301,7 +310,7 @@ def widen_extremes(out, run):
 
 @njit(cache=True, **NJIT_INLINE)
 def stored_energy(motion, modal_system, table, memory):
-    """Return the energy of the modes and of the elements [J].
+    """Return the energy stored in the modes and in the friction elements [J].
 
     Parameters
     ----------
@@ -315,13 +324,13 @@ def stored_energy(motion, modal_system, table, memory):
     -------
     float
     """
-    out = 0.0
+    energy = 0.0
     for i in range(len(modal_system.omega_squared)):
-        out += motion[1, i] ** 2 + modal_system.omega_squared[i] * motion[0, i] ** 2
-    out *= 0.5 * modal_system.mass
+        energy += motion[1, i] ** 2 + modal_system.omega_squared[i] * motion[0, i] ** 2
+    energy *= 0.5 * modal_system.mass
     for f in range(len(modal_system.inverse_mass)):
-        out += find_force_and_energy(f, table, memory)[1]
-    return out
+        energy += find_force_and_energy(f, table, memory)[1]
+    return energy
 
 
 @njit(**NJIT_KERNEL)
@@ -350,7 +359,7 @@ def choose_current_sticks(run):
         bound_fastest_rate(modal_system, workspace.stiffness),
         fastest_drive_rate(time_state),
     )
-    expand_drive(segment, present_instant(time_state), h, MAX_ORDER + 1, workspace.drive)
+    expand_drive(segment, present_instant(time_state), h, MAX_DECIDING_ORDER + 1, workspace.drive)
     return choose_sticks(h, run)
 
 
@@ -399,7 +408,9 @@ def choose_initial_sticks(run):
 
 @njit(**NJIT_INLINE)
 def estimate_time_to_yield(run):
-    """Estimate the time to the next yield [s] from the present speeds.
+    """Estimate the time until the next friction element yields, from the present velocities.
+
+    The estimate is a time [s] multiplied by YIELD_MARGIN_FACTOR/MAX_RATE_TIME.
 
     Parameters
     ----------
@@ -419,22 +430,22 @@ def estimate_time_to_yield(run):
         gap = next_yield_slide(f, 1.0 if speed > 0 else -1.0, run.table, memory) - memory.slide[f]
         if speed * gap > 0:
             time = min(time, gap / speed)
-    return YIELD_MARGIN / MAX_RATE_TIME * time
+    return YIELD_MARGIN_FACTOR / MAX_RATE_TIME * time
 
 
 @njit(**NJIT_INLINE)
 def output_displacement(run):
-    """Return the displacement of the output [m]."""
+    """Return the present displacement of the output [m]."""
     modal_system = run.modal_system
-    out = 0.0
+    displacement = 0.0
     for i in range(len(modal_system.omega_squared)):
-        out += modal_system.output[i] * run.motion[0, i]
-    return out
+        displacement += modal_system.output[i] * run.motion[0, i]
+    return displacement
 
 
 @njit(**NJIT_INLINE)
 def apply_event(event, run):
-    """Apply an event to the elements, and record which interfaces are at rest.
+    """Update the friction elements after an event, and mark the interfaces that are at rest.
 
     Parameters
     ----------
@@ -447,22 +458,24 @@ def apply_event(event, run):
     time_state = run.time_state
     kind = event.kind
     interface = event.interface
-    if kind == EVENT.yielding:
+    if kind == EVENT_KIND.yielding:
         release_next_element(interface, event.sign, table, memory)
-    elif kind == EVENT.reversal:
-        store_turning_point(interface, memory)
-        time_state.is_at_turn[interface] = 1.0
+    elif kind == EVENT_KIND.reversal:
+        store_reversal(interface, memory)
+        time_state.is_at_reversal[interface] = 1.0
         if modal_system.output_interface == interface:
-            time_state.is_at_turn[len(modal_system.inverse_mass)] = 1.0
-    elif kind == EVENT.output_reversal:
-        time_state.is_at_turn[interface] = 1.0
-    if (kind == EVENT.yielding or kind == EVENT.reversal) and table.static_limit[interface] == 0.0:
+            time_state.is_at_reversal[len(modal_system.inverse_mass)] = 1.0
+    elif kind == EVENT_KIND.output_reversal:
+        time_state.is_at_reversal[interface] = 1.0
+    if (kind == EVENT_KIND.yielding or kind == EVENT_KIND.reversal) and table.static_limit[
+        interface
+    ] == 0.0:
         memory.force[interface] = find_force_and_energy(interface, table, memory)[0]
 
 
 @njit(**NJIT_INLINE)
 def expand_piece(h, rate, run):
-    """Expand the motion over a piece.
+    """Expand the motion over a time interval as a power series in time.
 
     Parameters
     ----------
@@ -490,7 +503,7 @@ def expand_piece(h, rate, run):
 
 @njit(**NJIT_INLINE)
 def find_travel_crossing(travel, u, top, run):
-    """Return the fraction of a piece at which the output passes +-travel.
+    """Return the fraction of a time interval at which the output reaches its travel limit.
 
     Parameters
     ----------
@@ -514,21 +527,25 @@ def find_travel_crossing(travel, u, top, run):
     expand_speed(
         modal_system.output, len(modal_system.omega_squared), workspace.coefficients, top, poly
     )
-    here = output_displacement(run)
-    step = displacement_at(poly, top, u)
-    if abs(here + step) <= travel or step == 0.0:
+    present_output = output_displacement(run)
+    step = integrate_speed(poly, top, u)
+    if abs(present_output + step) <= travel or step == 0.0:
         return NO_ROOT
     return find_crossing(
-        poly, top, (travel if step > 0 else -travel) - here, u, workspace.polynomials[n_interfaces]
+        poly,
+        top,
+        (travel if step > 0 else -travel) - present_output,
+        u,
+        workspace.polynomials[n_interfaces],
     )
 
 
 @njit(**NJIT_INLINE)
-def choose_length(rate, remaining, run):
-    """Return the duration of the next piece [s].
+def choose_duration(rate, remaining, run):
+    """Return the duration of the next time interval of the march [s].
 
     The piece ends just after the next yield that the present speeds predict, but lasts at least
-    MIN_FRACTION of the longest piece.
+    MIN_DURATION_FRACTION of the longest piece.
 
     Parameters
     ----------
@@ -543,12 +560,12 @@ def choose_length(rate, remaining, run):
     float
     """
     to_yield = rate * estimate_time_to_yield(run)
-    return min(MAX_RATE_TIME / rate * min(1.0, max(to_yield, MIN_FRACTION)), remaining)
+    return min(MAX_RATE_TIME / rate * min(1.0, max(to_yield, MIN_DURATION_FRACTION)), remaining)
 
 
 @njit(**NJIT_INLINE)
 def start_piece(remaining, run):
-    """Choose the length of the next piece and expand the motion over it.
+    """Choose the duration of the next time interval and expand the motion over it.
 
     Parameters
     ----------
@@ -570,7 +587,7 @@ def start_piece(remaining, run):
         workspace.stiffness[f] = find_tangent(f, table, memory).stiffness
     modal_rate = bound_modal_rate(modal_system, workspace)
     rate = max(modal_rate, fastest_drive_rate(time_state))
-    h = choose_length(rate, remaining, run)
+    h = choose_duration(rate, remaining, run)
     top = expand_piece(h, rate, run)
     for f in range(n_interfaces):
         if is_sticking(f, table, memory):
@@ -580,7 +597,7 @@ def start_piece(remaining, run):
 
 @njit(**NJIT_INLINE)
 def find_piece_end(top, run):
-    """Find the first event of a piece, including the end of the travel of the output.
+    """Find the first event in a time interval, including the travel limit of the output.
 
     Parameters
     ----------
@@ -597,13 +614,13 @@ def find_piece_end(top, run):
     if travel < 1e300 and event.u > 0:
         root = find_travel_crossing(travel, event.u, top, run)
         if root <= event.u:
-            return NextEvent(root, EVENT.travel, event.interface, event.sign)
+            return NextEvent(root, EVENT_KIND.travel, event.interface, event.sign)
     return event
 
 
 @njit(**NJIT_INLINE)
-def reaches_border(piece, u, now):
-    """Return whether a motion up to u of a piece reaches the border, to round-off.
+def reaches_breakpoint(piece, u, now):
+    """Return whether the end of a cycle, drive segment or march is reached, within round-off.
 
     Parameters
     ----------
@@ -625,7 +642,7 @@ def reaches_border(piece, u, now):
 
 @njit(**NJIT_INLINE)
 def reset_forces(run):
-    """Compute the forces of all interfaces from their memory, without accumulated round-off.
+    """Recompute the friction forces of all interfaces from their memory, without round-off sums.
 
     Parameters
     ----------
@@ -637,8 +654,8 @@ def reset_forces(run):
 
 
 @njit(**NJIT_INLINE)
-def cross_border(kind, remaining, stop, run):
-    """Pass the end of a cycle or of a segment of the drive.
+def cross_breakpoint(kind, remaining, stop, run):
+    """Pass the end of a cycle, of a drive segment or of the march.
 
     Parameters
     ----------
@@ -657,27 +674,31 @@ def cross_border(kind, remaining, stop, run):
         Whether the motion repeats from here on.
     """
     time_state = run.time_state
-    drive_changes = step_to_border(time_state, stop, remaining)
+    drive_changes = step_to_breakpoint(time_state, stop, remaining)
     repeats = False
-    if time_state.now[Time.OFFSET] == 0.0 and kind == EVENT.none:
+    if time_state.now[Time.OFFSET] == 0.0 and kind == EVENT_KIND.none:
         repeats = detect_repeat(run)
     elif time_state.now[Time.OFFSET] == 0.0:
-        forget_previous(run.previous)
-    # at every border, so that a run in parts gives the same result as a single run
+        clear_previous_cycle(run.previous)
+    # The forces are reset at every end, so that a run in parts gives the same result as a single run.
     reset_forces(run)
     return drive_changes, repeats
 
 
 @njit(**NJIT_INLINE)
-def clear_rests(u, time_state):
-    """Clear the marks of interfaces that rested at a turning point, after a motion up to u."""
+def clear_reversal_marks(u, time_state):
+    """Clear the marks of resting interfaces once the motion has left the reversal.
+
+    It has left it after more than MIN_MOVING_FRACTION of the time interval; u is the fraction
+    that has passed.
+    """
     if u > MIN_MOVING_FRACTION:
-        time_state.is_at_turn[:] = 0.0
+        time_state.is_at_reversal[:] = 0.0
 
 
 @njit(**NJIT_INLINE)
 def is_before(now, stop):
-    """Return whether the time lies before `stop` (cycle, offset [s])."""
+    """Return whether the present time lies before a stop time (cycle, offset [s])."""
     if now[Time.CYCLE] == stop[0]:
         return now[Time.OFFSET] < stop[1]
     return now[Time.CYCLE] < stop[0]
@@ -685,7 +706,7 @@ def is_before(now, stop):
 
 @njit(**NJIT_INLINE)
 def is_idle(progress, run):
-    """Count events without progress in time, and return whether there are too many.
+    """Count successive events without progress in time, and report too many of them.
 
     Parameters
     ----------
@@ -707,8 +728,8 @@ def is_idle(progress, run):
 
 
 @njit(**NJIT_INLINE)
-def next_begin(kind, changes_stick, drive_changes):
-    """Return the reason for which a row begins after an event.
+def choose_row_begin(kind, changes_stick, drive_changes):
+    """Return the code of the reason for which a time interval begins after an event.
 
     Parameters
     ----------
@@ -725,19 +746,19 @@ def next_begin(kind, changes_stick, drive_changes):
         A number of `RowBegins`.
     """
     if changes_stick:
-        return float(BEGIN.stick_or_slip)
+        return float(ROW_BEGIN.stick_or_slip)
     if drive_changes:
-        return float(BEGIN.drive_border)
-    if kind == EVENT.yielding:
-        return float(BEGIN.yielding)
-    if kind == EVENT.reversal or kind == EVENT.output_reversal:
-        return float(BEGIN.reversal)
-    return float(BEGIN.none)
+        return float(ROW_BEGIN.drive_change)
+    if kind == EVENT_KIND.yielding:
+        return float(ROW_BEGIN.yielding)
+    if kind == EVENT_KIND.reversal or kind == EVENT_KIND.output_reversal:
+        return float(ROW_BEGIN.reversal)
+    return float(ROW_BEGIN.none)
 
 
 @njit(**NJIT_INLINE)
 def move_over_piece(piece, event, stop, run):
-    """Move motion, time and sums over a piece up to its event.
+    """Advance motion, time and sums over a time interval up to its event.
 
     Parameters
     ----------
@@ -761,11 +782,11 @@ def move_over_piece(piece, event, stop, run):
     drive_changes = False
     repeats = False
     add_piece_sums(u, piece, run)
-    clear_rests(u, time_state)
+    clear_reversal_marks(u, time_state)
     run.workspace.choice.orders[:] = 0.0
     move_state(u, piece, run)
-    if reaches_border(piece, u, now):
-        drive_changes, repeats = cross_border(event.kind, piece.remaining, stop, run)
+    if reaches_breakpoint(piece, u, now):
+        drive_changes, repeats = cross_breakpoint(event.kind, piece.remaining, stop, run)
     else:
         now[Time.OFFSET] += u * h
     ledger = run.sums.ledger
@@ -777,7 +798,7 @@ def move_over_piece(piece, event, stop, run):
 
 @njit(cache=True, **NJIT_KERNEL)
 def march(stop, run, rows):
-    """March from the present time to `stop` (cycle, offset [s]).
+    """March the motion from the present time to a stop time (cycle, offset [s]).
 
     Parameters
     ----------
@@ -799,29 +820,29 @@ def march(stop, run, rows):
     """
     time_state = run.time_state
     choice = run.workspace.choice
-    used = 0
+    n_rows = 0
     now = time_state.now
     repeats = False
-    begin = max(now[Time.BEGIN], float(BEGIN.yielding))
+    begin = max(now[Time.BEGIN], float(ROW_BEGIN.yielding))
     now[Time.BEGIN] = 0.0
     if choice.orders[0, 0] < 0.0 and not choose_initial_sticks(run):
-        return STATUS.undetermined, used
+        return MARCH_STATUS.undetermined, n_rows
     if now[Time.IS_PAUSED] == 0.0:
         reset_forces(run)
     now[Time.IS_PAUSED] = 0.0
     while is_before(now, stop):
-        if used == rows.shape[0] and used > 0:
-            # the forces continue unchanged
+        if n_rows == rows.shape[0] and n_rows > 0:
+            # After a pause the forces are not reset, because they continue unchanged.
             now[Time.BEGIN] = begin
             now[Time.IS_PAUSED] = 1.0
-            return STATUS.full, used
+            return MARCH_STATUS.full, n_rows
         segment = time_state.segments[int(now[Time.SEGMENT])]
         phase = drive_phase(segment, present_instant(time_state))
-        remaining = time_to_border(time_state, stop)
+        remaining = time_to_breakpoint(time_state, stop)
         piece = start_piece(remaining, run)
         event = find_piece_end(piece.top, run)
         changes_stick = False
-        if event.kind == EVENT.reversal or event.kind == EVENT.release:
+        if event.kind == EVENT_KIND.reversal or event.kind == EVENT_KIND.release:
             changes_stick = run.table.static_limit[event.interface] > 0.0
         drive_changes = False
         if changes_stick or piece.duration == remaining:
@@ -831,23 +852,25 @@ def march(stop, run, rows):
                 widen_extremes(output_displacement(run), run)
             if rows.shape[0] > 0:
                 duration = event.u * piece.duration
-                write_row(rows[used], duration, phase, begin, run)
-                used += 1
+                write_row(rows[n_rows], duration, phase, begin, run)
+                n_rows += 1
             drive_changes, repeats = move_over_piece(piece, event, stop, run)
         if is_idle(event.u * piece.duration, run):
-            return STATUS.idle, used
-        begin = next_begin(event.kind, changes_stick, drive_changes)
+            return MARCH_STATUS.idle, n_rows
+        begin = choose_row_begin(event.kind, changes_stick, drive_changes)
         apply_event(event, run)
         if changes_stick:
             choice.is_resting[event.interface] = 1.0
-            choice.slip_signs[event.interface] = event.sign if event.kind == EVENT.release else 0.0
+            choice.slip_signs[event.interface] = (
+                event.sign if event.kind == EVENT_KIND.release else 0.0
+            )
         if (changes_stick or drive_changes) and not choose_current_sticks(run):
-            return STATUS.undetermined, used
-        if event.kind == EVENT.travel:
+            return MARCH_STATUS.undetermined, n_rows
+        if event.kind == EVENT_KIND.travel:
             now[Time.BEGIN] = 0.0
-            return STATUS.travel, used
+            return MARCH_STATUS.travel, n_rows
         if repeats:
             now[Time.BEGIN] = begin
-            return STATUS.repeats, used
+            return MARCH_STATUS.repeats, n_rows
     now[Time.BEGIN] = begin
-    return STATUS.done, used
+    return MARCH_STATUS.done, n_rows

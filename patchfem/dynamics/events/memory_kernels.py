@@ -1,11 +1,11 @@
-"""Memory of elastic-plastic elements under one relative displacement (compiled).
+"""Hysteresis memory of elastic-plastic elements under a common displacement (compiled).
 
 The elements of an interface are sorted by yield slide, the relative displacement at which they
 yield. The elements that slip are always the first ones of the list: all were stretched by the same
 moves, so an element with a shorter yield slide yields before one with a longer one (Masing). At a
-turning point the elements that slip stop together, stretched to +-y, and stay a group: each slips
+reversal the elements that slip stop together, stretched to +-y, and stay a group: each slips
 again after 2 y in the other direction, or all of them where the relative displacement comes back to
-the turning point. A group that slips as a whole is forgotten. So every event costs the same,
+the reversal. A group that slips as a whole is forgotten. So every event costs the same,
 whatever the number of elements. The tests compare with elements that are followed one by one.
 
 A rigid element, Coulomb friction, may stand before the list. While it sticks the relative
@@ -19,14 +19,14 @@ from typing import NamedTuple
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE
 
-# [N/m] stiffness of an interface while its rigid element sticks
+# Stiffness [N/m] of an interface while its rigid element sticks.
 RIGID_STIFFNESS = inf
-# [m] yield slide of an interface whose elements all slip
+# Yield displacement [m] of an interface whose elements all slip; no motion reaches it.
 NO_YIELD = 1e300
 
 
 class Tangent(NamedTuple):
-    """Tangent of an interface.
+    """Tangent stiffness and slipping part of the friction elements of an interface.
 
     - stiffness: of the elements that stick [N/m], RIGID_STIFFNESS while a rigid element sticks
     - slipping: fraction of the friction limit that slips; 1 without elements
@@ -68,7 +68,7 @@ def next_yield_slide(interface, direction, table, memory):
 
 @njit(**NJIT_INLINE)
 def release_next_element(interface, direction, table, memory):
-    """Let the next element slip in a direction.
+    """Let the next friction element of an interface slip in a direction.
 
     If the innermost group slipped in this direction before, the whole group slips.
 
@@ -91,8 +91,11 @@ def release_next_element(interface, direction, table, memory):
 
 
 @njit(**NJIT_INLINE)
-def store_turning_point(interface, memory):
-    """Stop all elements that slip; they stay one group, stretched to their yield slides."""
+def store_reversal(interface, memory):
+    """Stop all slipping elements of an interface at a reversal.
+
+    They become one group, stretched to their yield displacements.
+    """
     if memory.n_slipping[interface] == 0:
         return
     group = memory.n_groups[interface]
@@ -122,7 +125,7 @@ def is_sticking(interface, table, memory):
 
 
 @njit(**NJIT_INLINE)
-def rigid_friction(interface, table, memory):
+def rigid_friction_force(interface, table, memory):
     """Return the friction force of the rigid element of an interface [N].
 
     It is the kinetic limit in slip, and the static limit where other elements hold the relative
@@ -160,14 +163,14 @@ def interface_force(interface, table, memory):
     float
     """
     return (
-        rigid_friction(interface, table, memory)
+        rigid_friction_force(interface, table, memory)
         + find_force_and_energy(interface, table, memory)[0]
     )
 
 
 @njit(**NJIT_INLINE)
 def find_force_and_energy(interface, table, memory):
-    """Sum the forces and energies of the elastic-plastic elements, group by group.
+    """Return force and elastic energy of the elastic-plastic elements of an interface.
 
     Parameters
     ----------
@@ -201,7 +204,7 @@ def find_force_and_energy(interface, table, memory):
 
 @njit(**NJIT_INLINE)
 def find_tangent(interface, table, memory):
-    """Return the tangent of an interface.
+    """Return the tangent stiffness, slipping fraction and slipping limit of an interface.
 
     Parameters
     ----------

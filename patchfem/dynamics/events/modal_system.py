@@ -1,4 +1,4 @@
-"""Arrays that the compiled event engine works in: modes, time, sums and workspace."""
+"""Arrays that the compiled event engine works on: modes, time, sums and workspace."""
 
 from typing import NamedTuple
 
@@ -7,18 +7,27 @@ import numpy as np
 from ...compiled import get_kernel_module
 from ...core import ModalBasis, PatchfemError
 from .elements import ElementTable, Memory, unstretched_memory
-from .positions_kernels import KIND, ConstraintStatus, Ledger, Limit, PreviousStatus, Segment, Time
+from .positions_kernels import (
+    SEGMENT_KIND,
+    ConstraintStatus,
+    Ledger,
+    Limit,
+    PreviousStatus,
+    Segment,
+    Time,
+)
 
-# revolutions per cycle closer to a whole number than this many times their size count as that number [1]
-WHOLE_TOL = 4e-15
-# bits of the leading part of the revolutions per cycle; its product with a number of cycles is then exact
-TURN_BITS = 24
+# Relative difference below which the number of drive revolutions per cycle counts as an integer; it is round-off.
+INTEGER_TOL = 4e-15
+# Bits of the leading part of the revolutions per cycle; its product with a number of cycles is exact in double
+# precision.
+REVOLUTION_BITS = 24
 
 series_kernels = get_kernel_module("dynamics.events.series_kernels")
 
 
 class ModalSystem(NamedTuple):
-    """Modes as arrays for the kernels.
+    """Modal matrices and participations as arrays for the kernels.
 
     The kernels take the number of modes from the length of `omega_squared`, and that of interfaces
     from `inverse_mass`. Of one mode behind one interface both are tuples: their length is then part
@@ -50,7 +59,7 @@ class ModalSystem(NamedTuple):
 
 
 def make_modal_system(modes: ModalBasis) -> ModalSystem:
-    """Return the arrays of a modal basis."""
+    """Return the arrays of a modal basis for the kernels."""
     damping = np.array(modes.damping_matrix, float)
     interfaces = np.array(modes.interfaces, float)
     output = np.array(modes.output, float)
@@ -82,22 +91,22 @@ def make_modal_system(modes: ModalBasis) -> ModalSystem:
 
 
 class TimeState(NamedTuple):
-    """Time of a run.
+    """Present time of a run, and the segments of its drive.
 
     - now: (6,) time and what the march notes of it, see `Time`
     - segments: (p, 12) segments of the drive, see `Segment`
     - period: (1,) duration of a cycle [s]
-    - is_at_turn: (i + 1,) 1 where an interface, or last the output, is at rest at a turning point
+    - is_at_reversal: (i + 1,) 1 where an interface, or last the output, is at rest at a reversal
     """
 
     now: np.ndarray
     segments: np.ndarray
     period: np.ndarray
-    is_at_turn: np.ndarray
+    is_at_reversal: np.ndarray
 
 
-def start_time_state(drive, n_interfaces: int) -> TimeState:
-    """Return the TimeState of a drive at t = 0.
+def make_time_state(drive, n_interfaces: int) -> TimeState:
+    """Return the time state of a run at t = 0.
 
     Parameters
     ----------
@@ -123,26 +132,32 @@ def start_time_state(drive, n_interfaces: int) -> TimeState:
 
 
 def drive_segments(drive) -> np.ndarray:
-    """Return the segments (p, 12) of a drive of `core` or `structure.drives`, see `Segment`."""
+    """Return the segments (p, 12) of a drive: sines, straight lines or a sweep.
+
+    The drive is one of `core` or `structure.drives`; for the columns see `Segment`.
+    """
     if drive.segments:
         return np.array([_sine_segment(segment, drive.period) for segment in drive.segments])
     return np.array(_sweep_segments(drive) if hasattr(drive, "low") else _record_segments(drive))
 
 
 def split_time(time: float, period: float) -> tuple:
-    """Return the cycle in which a time [s] lies and the time [s] since that cycle began.
+    """Split a time [s] into the number of its cycle and the time [s] since that cycle began.
 
     A time within a last digit of the end of a cycle is that end.
     """
     cycles = time / period
     nearest = round(cycles)
-    if abs(cycles - nearest) <= WHOLE_TOL * max(1.0, abs(cycles)):
+    if abs(cycles - nearest) <= INTEGER_TOL * max(1.0, abs(cycles)):
         return float(nearest), 0.0
     return float(int(cycles)), max(time - int(cycles) * period, 0.0)
 
 
 def _make_segment(start: float, period: float, kind: float, **columns) -> np.ndarray:
-    """Return one segment (12,) that starts at a time [s]; columns: values by the names of `Segment`."""
+    """Return one drive segment (12,) that starts at a time [s].
+
+    `columns` holds values by the names of `Segment` in lower case.
+    """
     segment = np.zeros(len(Segment))
     segment[: Segment.KIND] = split_time(start, period)
     segment[Segment.KIND] = kind
@@ -152,17 +167,17 @@ def _make_segment(start: float, period: float, kind: float, **columns) -> np.nda
 
 
 def _sine_segment(sine, period: float) -> np.ndarray:
-    """Return the segment of a sine, or of a constant where its amplitude or frequency is 0."""
+    """Return the drive segment of a sine, or of a constant if amplitude or frequency is 0."""
     omega = sine.omega if sine.amplitude else 0.0
     constant = sine.constant + (0.0 if omega else sine.amplitude * np.sin(sine.phase))
     revolutions = omega * period / (2 * np.pi)
-    is_whole = abs(revolutions - round(revolutions)) < WHOLE_TOL * max(1.0, revolutions)
+    is_whole = abs(revolutions - round(revolutions)) < INTEGER_TOL * max(1.0, revolutions)
     excess = 0.0 if is_whole else revolutions - int(revolutions)
-    rounded = round(excess * 2**TURN_BITS) / 2**TURN_BITS
+    rounded = round(excess * 2**REVOLUTION_BITS) / 2**REVOLUTION_BITS
     return _make_segment(
         sine.start,
         period,
-        KIND.sine,
+        SEGMENT_KIND.sine,
         constant=constant,
         amplitude=sine.amplitude if omega else 0.0,
         omega=omega,
@@ -174,7 +189,7 @@ def _sine_segment(sine, period: float) -> np.ndarray:
 
 
 def _sweep_segments(sweep) -> list:
-    """Return the segments of a sweep: the sweep itself, then a sine at its last frequency."""
+    """Return the two drive segments of a sweep: the sweep, then a sine at its last frequency."""
     first_omega = 2 * np.pi * sweep.low
     last_omega = 2 * np.pi * sweep.high
     duration = sweep.duration
@@ -191,7 +206,7 @@ def _sweep_segments(sweep) -> list:
         _make_segment(
             0.0,
             sweep.period,
-            KIND.log_chirp if is_logarithmic else KIND.chirp,
+            SEGMENT_KIND.log_chirp if is_logarithmic else SEGMENT_KIND.chirp,
             amplitude=amplitude,
             omega=first_omega,
             slope=slope,
@@ -201,7 +216,7 @@ def _sweep_segments(sweep) -> list:
         _make_segment(
             duration,
             sweep.period,
-            KIND.sine,
+            SEGMENT_KIND.sine,
             amplitude=amplitude * last_omega**2 if is_displacement else amplitude,
             omega=last_omega,
             phase=last_phase,
@@ -211,17 +226,20 @@ def _sweep_segments(sweep) -> list:
 
 
 def _record_segments(record) -> np.ndarray:
-    """Return the segments (p, 12) of a record: straight lines between its rows, then nothing."""
+    """Return the drive segments (p, 12) of a measured record: straight lines between its samples.
+
+    After the last sample the drive is 0.
+    """
     segments = np.zeros((len(record.time), len(Segment)))
     segments[:, : Segment.KIND] = [split_time(float(time), record.period) for time in record.time]
-    segments[:, Segment.KIND] = KIND.line
+    segments[:, Segment.KIND] = SEGMENT_KIND.line
     segments[:-1, Segment.CONSTANT] = record.value[:-1]
     segments[:-1, Segment.SLOPE] = np.diff(record.value) / np.diff(record.time)
     return segments
 
 
 def copy_into(old, new):
-    """Copy a nested tuple of arrays into the arrays of another one.
+    """Copy a nested tuple of arrays into the arrays of another tuple of the same shapes.
 
     Compiled code knows where the old arrays are, which takes most of the time of a short call.
 
@@ -246,16 +264,16 @@ def copy_into(old, new):
 
 
 def _has_same_shapes(old, new) -> bool:
-    """Return whether two tuples of arrays have the same shapes."""
+    """Return whether two nested tuples of arrays have the same shapes."""
     for a, b in zip(old, new):
-        same = _has_same_shapes(a, b) if isinstance(a, tuple) else a.shape == b.shape
-        if not same:
+        has_same_shape = _has_same_shapes(a, b) if isinstance(a, tuple) else a.shape == b.shape
+        if not has_same_shape:
             return False
     return True
 
 
 class PreviousCycle(NamedTuple):
-    """State at the last end of a cycle, by which `repeat_kernels` recognises a motion that repeats.
+    """State at the end of the previous cycle, by which a repeating motion is recognised.
 
     - status: (3,) see `PreviousStatus`
     - motion: (2, n) modal coordinates [m] and rates [m/s]
@@ -267,8 +285,8 @@ class PreviousCycle(NamedTuple):
     memory: Memory
 
 
-def start_previous_cycle(modal_system: ModalSystem, table: ElementTable) -> PreviousCycle:
-    """Return the PreviousCycle of a run that begins, which holds no state."""
+def make_previous_cycle(modal_system: ModalSystem, table: ElementTable) -> PreviousCycle:
+    """Return an empty record of the previous cycle for a run that begins."""
     status = np.zeros(len(PreviousStatus))
     status[PreviousStatus.SEGMENT] = -1.0
     return PreviousCycle(
@@ -279,7 +297,9 @@ def start_previous_cycle(modal_system: ModalSystem, table: ElementTable) -> Prev
 
 
 class Constraint(NamedTuple):
-    """Interfaces whose rigid elements stick, as a constraint on the modes (`stick_kernels.constrain_slides`).
+    """Constraint on the modes by the interfaces whose rigid elements stick.
+
+    It is built by `stick_kernels.constrain_slides`.
 
     - is_sticking: (i,) 1 where the rigid element of an interface sticks
     - status: (2,) see `ConstraintStatus`
@@ -304,7 +324,9 @@ class Constraint(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """The choice between stick and slip after an event (`stick_kernels.choose_sticks`).
+    """State of the search for the interfaces that stick after an event.
+
+    The search is `stick_kernels.choose_sticks`.
 
     - is_resting: (i,) 1 where an interface with a rigid element has no velocity
     - slip_signs, guess: (i,) directions of slip, 0 in stick, at first and as they are tried
@@ -323,7 +345,7 @@ class Choice(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Workspace of the kernels for one piece.
+    """Workspace of the kernels for one time interval.
 
     - coefficients: (terms, n) series of the modal coordinates [m]
     - drive: (3, terms) series of the drive [m s-2], and workspace for it
@@ -347,7 +369,7 @@ class Workspace(NamedTuple):
 
 
 def make_workspace(modal_system: ModalSystem) -> Workspace:
-    """Return a cleared workspace for a modal system."""
+    """Return a cleared workspace of the kernels for a modal system."""
     i, n = modal_system.interfaces.shape
     n_terms = series_kernels.MAX_POWER + 5
     constraint = Constraint(
@@ -375,7 +397,7 @@ def make_workspace(modal_system: ModalSystem) -> Workspace:
         friction_accel=np.empty(i),
         stiffness=np.empty(i),
         rates=np.empty((n, 4)),
-        hulls=np.empty((series_kernels.MAX_HALVINGS + 2, series_kernels.HULL_WIDTH)),
+        hulls=np.empty((series_kernels.MAX_HALVINGS + 2, series_kernels.N_HULL_COLUMNS)),
         constraint=constraint,
         choice=choice,
     )
@@ -383,7 +405,7 @@ def make_workspace(modal_system: ModalSystem) -> Workspace:
 
 
 def clear_workspace(workspace: Workspace) -> Workspace:
-    """Reset a workspace to its state before a run, and return it."""
+    """Reset a kernel workspace to its state before a run, and return it."""
     for array in (*workspace[:-2], *workspace.constraint, *workspace.choice):
         array.fill(0.0)
     workspace.choice.orders.fill(-1.0)
@@ -391,7 +413,7 @@ def clear_workspace(workspace: Workspace) -> Workspace:
 
 
 class RunSums(NamedTuple):
-    """Sums over a run.
+    """Energies, extremes and phasors that a run accumulates.
 
     - ledger: (8,) energies and counts, see `Ledger`
     - extremes: (c, 2) smallest and largest output [m] of every cycle
@@ -408,7 +430,7 @@ class RunSums(NamedTuple):
 
 
 class RunArrays(NamedTuple):
-    """All that the kernels of a run work on.
+    """All arrays that the kernels of a run work on.
 
     - modal_system: modes, which do not change
     - table: elements of the interfaces, which do not change
@@ -430,8 +452,8 @@ class RunArrays(NamedTuple):
     workspace: Workspace
 
 
-def start_sums(n_cycles: int, is_phasor_wanted, travel: float = np.inf) -> RunSums:
-    """Return the sums of a run that begins.
+def make_run_sums(n_cycles: int, is_phasor_wanted, travel: float = np.inf) -> RunSums:
+    """Return cleared sums for a run of a given number of cycles.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Named positions in the arrays of the event engine.
+"""Named indices of the arrays of the event engine.
 
 A kernel reads `row[Row.DURATION]` or `sums[Ledger.DRIVE_WORK]`. The enumerations below state unit and
 meaning of every position. Codes of kinds, causes and results, which arrays of floats hold, are the
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 
 class Segment(IntEnum):
-    """Columns of a segment of the drive.
+    """Column indices of a drive segment.
 
     - CYCLE, OFFSET: number of the cycle in which it starts, and time since that cycle began [s]
     - KIND: a number of `SegmentKinds`
@@ -41,7 +41,7 @@ class Segment(IntEnum):
 
 
 class SegmentKinds(NamedTuple):
-    """Kinds of a segment of the drive: sine, straight line, sweep with linear and with logarithmic frequency."""
+    """Codes of drive segments: sine, straight line, linear sweep, logarithmic sweep."""
 
     sine: float = 0.0
     line: float = 1.0
@@ -50,7 +50,7 @@ class SegmentKinds(NamedTuple):
 
 
 class Row(IntEnum):
-    """Columns of the row of a piece, as the piece begins.
+    """Column indices of a row, which holds the state at the start of a time interval.
 
     - TIME, DURATION: of the piece [s]
     - PHASE: of the drive [rad]
@@ -71,7 +71,7 @@ class Row(IntEnum):
 
 
 class Column(IntEnum):
-    """Columns of an interface in the row of a piece, measured from the first of them.
+    """Column indices of one interface in a row, counted from the first of its columns.
 
     - FORCE: friction force [N]; the reaction while a rigid element holds the relative displacement
     - STIFFNESS: of the elements that stick [N/m], infinite while a rigid element holds
@@ -94,17 +94,20 @@ class Column(IntEnum):
 
 
 class RowBegins(NamedTuple):
-    """Values of `Row.begin`, in increasing order of importance."""
+    """Codes of the reason for which a time interval begins, in increasing order of importance.
+
+    They are the values of `Row.BEGIN`.
+    """
 
     none: int = 0
     yielding: int = 1
     reversal: int = 2
     stick_or_slip: int = 3
-    drive_border: int = 4
+    drive_change: int = 4
 
 
 class MarchStatus(NamedTuple):
-    """Reasons why `march_kernels.march` returns.
+    """Codes of the reasons for which the march from event to event stops.
 
     - done: the time is reached
     - full: no row is free; the next call goes on
@@ -123,7 +126,7 @@ class MarchStatus(NamedTuple):
 
 
 class EventKinds(NamedTuple):
-    """Kinds of the event that ends a piece.
+    """Codes of the events that end a time interval.
 
     - none: the piece ends at a border of the cycle or of the drive
     - yielding: an elastic-plastic element starts to slip
@@ -141,7 +144,7 @@ class EventKinds(NamedTuple):
 
 
 class Time(IntEnum):
-    """Positions in `TimeState.now`.
+    """Indices of the entries of `TimeState.now`, the present time of a run.
 
     - CYCLE, OFFSET: number of the cycle, and time since it began [s]
     - SEGMENT: number of the segment of the drive
@@ -157,7 +160,7 @@ class Time(IntEnum):
 
 
 class Ledger(IntEnum):
-    """Positions in `RunSums.ledger`: energies [J] since the start, and counts.
+    """Indices of the entries of `RunSums.ledger`: energies [J] since the start, and counts.
 
     - DRIVE_WORK, VISCOUS_LOSS: work of the drive, and energy dissipated by the dampers
     - DRIVE_POWER: integral of the magnitude of the power of the drive
@@ -178,14 +181,18 @@ class Ledger(IntEnum):
 
 
 class Limit(IntEnum):
-    """Positions in `RunSums.limits`: travel of the output [m], and events in a row without progress."""
+    """Indices of the entries of `RunSums.limits`.
+
+    TRAVEL: travel limit of the output [m]; N_IDLE: number of successive events without progress
+    in time.
+    """
 
     TRAVEL = 0
     N_IDLE = 1
 
 
 class ConstraintStatus(IntEnum):
-    """Positions in `Constraint.status`.
+    """Indices of the entries of `Constraint.status`.
 
     - N_STICKING: number of interfaces whose rigid elements stick; below 0 where the constraint is
       to be built again
@@ -197,7 +204,7 @@ class ConstraintStatus(IntEnum):
 
 
 class PreviousStatus(IntEnum):
-    """Positions in `PreviousCycle.status`.
+    """Indices of the entries of `PreviousCycle.status`.
 
     - SEGMENT: of the drive then, -1 before there is a state
     - LAST_DISTANT: last cycle at whose end the state was far from that of the cycle before
@@ -210,7 +217,7 @@ class PreviousStatus(IntEnum):
 
 
 class RunMeasure(IntEnum):
-    """Positions of the measures of a run that `read_kernels` takes from its last cycles.
+    """Indices of the measures of a whole run that `read_kernels` takes from its last cycles.
 
     - MIN_OUTPUT, MAX_OUTPUT: of the output [m]
     - MAX_COORDINATE: largest modal coordinate [m]
@@ -240,7 +247,7 @@ class RunMeasure(IntEnum):
 
 
 class InterfaceMeasure(IntEnum):
-    """Positions of the measures of an interface that `read_kernels` takes from the last cycles.
+    """Indices of the measures of one interface that `read_kernels` takes from the last cycles.
 
     - MIN_SLIDE, MAX_SLIDE, MIN_SLIP, MAX_SLIP: of relative displacement and slip [m]
     - MAX_FORCE: largest force [N]
@@ -279,10 +286,10 @@ class InterfaceMeasure(IntEnum):
     SECANT = 20
 
 
-KIND = SegmentKinds()
-BEGIN = RowBegins()
-STATUS = MarchStatus()
-EVENT = EventKinds()
+SEGMENT_KIND = SegmentKinds()
+ROW_BEGIN = RowBegins()
+MARCH_STATUS = MarchStatus()
+EVENT_KIND = EventKinds()
 
-# columns of one interface in a row
+# Number of columns of one interface in a row.
 N_COLUMNS = len(Column)

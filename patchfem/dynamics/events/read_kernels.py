@@ -1,4 +1,4 @@
-"""Measures of the last cycles of a run, from its pieces (compiled).
+"""Measures of the last cycles of a run, from its recorded time intervals (compiled).
 
 Every measure is an integral or an extremum of the series of the pieces; nothing is sampled.
 """
@@ -18,7 +18,7 @@ from .positions_kernels import (
     RunMeasure,
     Segment,
 )
-from .search_kernels import displacement_at
+from .search_kernels import integrate_speed
 from .series_kernels import (
     GAUSS_POINTS,
     GAUSS_WEIGHTS,
@@ -28,27 +28,28 @@ from .series_kernels import (
     find_largest_magnitude,
 )
 
-# fraction of the friction limit; where more of it slips, the interface slips
+# Fraction of the friction limit; an interface slips where more than this fraction of it slips.
 SLIP_FRACTION = 0.5
-# fraction of a cycle; a shorter slip is not counted, because it is round-off of a stop
+# Minimum duration of a slip that counts, as a fraction of a cycle; a shorter slip is round-off at a stop.
 MIN_SLIP_DURATION = 1e-9
-# fraction of the largest rate of an interface, below which it is at rest
+# Fraction of the largest relative velocity of an interface, below which it counts as at rest.
 REST_RATE_RATIO = 1e-9
-# fraction of the range of an interface, below which its motion in a piece counts as rest
+# Fraction of the range of an interface, below which its motion in a time interval counts as rest.
 MIN_MOTION_RATIO = 1e-13
-# fraction of a cycle after its border within which a reversal still counts as at the border
-MAX_TURN_DELAY = 0.003
+# Maximum time between a reversal and the end of a cycle, as a fraction of a cycle, up to which the reversal counts as
+# at that end.
+MAX_REVERSAL_DELAY = 0.003
 
 
 @njit(**NJIT_INLINE)
-def force_column(interface, modal_system):
-    """Return the first column of an interface in a row."""
+def interface_column(interface, modal_system):
+    """Return the index of the first column of an interface in a row."""
     return Row.MOTION + 2 * len(modal_system.omega_squared) + N_COLUMNS * interface
 
 
 @njit(**NJIT_INLINE)
 def read_slide(row, interface, modal_system):
-    """Return the relative displacement [m] of an interface where a row begins.
+    """Return the relative displacement [m] of an interface at the start of a time interval.
 
     Parameters
     ----------
@@ -61,12 +62,12 @@ def read_slide(row, interface, modal_system):
     -------
     float
     """
-    return row[force_column(interface, modal_system) + Column.SLIDE]
+    return row[interface_column(interface, modal_system) + Column.SLIDE]
 
 
 @njit(**NJIT_INLINE)
 def read_rate(row, interface, modal_system):
-    """Return the relative velocity [m/s] of an interface where a row begins.
+    """Return the relative velocity [m/s] of an interface at the start of a time interval.
 
     Parameters
     ----------
@@ -88,7 +89,7 @@ def read_rate(row, interface, modal_system):
 
 @njit(**NJIT_INLINE)
 def find_end_force(rows, j, interface, modal_system):
-    """Return the force [N] of a free interface at the end of row j.
+    """Return the friction force [N] of a non-sticking interface at the end of a time interval.
 
     Parameters
     ----------
@@ -103,7 +104,7 @@ def find_end_force(rows, j, interface, modal_system):
     -------
     float
     """
-    at = force_column(interface, modal_system)
+    at = interface_column(interface, modal_system)
     step = read_slide(rows[j + 1], interface, modal_system) - read_slide(
         rows[j], interface, modal_system
     )
@@ -112,7 +113,7 @@ def find_end_force(rows, j, interface, modal_system):
 
 @njit(**NJIT_INLINE)
 def find_peak_acceleration(top, h, base_moves, largest, run):
-    """Return the larger of a bound and the peak acceleration of the output in a piece [m s-2].
+    """Return the peak output acceleration of a time interval [m s-2], or a larger lower bound.
 
     The series of the acceleration is left in the last but one of workspace.polynomials.
 
@@ -149,7 +150,7 @@ def find_peak_acceleration(top, h, base_moves, largest, run):
 
 @njit(**NJIT_INLINE)
 def add_integrals(row, top, border, run, run_values, interface_values):
-    """Add the integrals over the piece in the workspace to the measures.
+    """Add the harmonic and mean integrals of a time interval to the measures.
 
     Parameters
     ----------
@@ -190,14 +191,14 @@ def add_integrals(row, top, border, run, run_values, interface_values):
         run_values[RunMeasure.COS_3] += gain * cosine * (4 * cosine * cosine - 3)
         run_values[RunMeasure.SIN_3] += gain * sine * (3 - 4 * sine * sine)
         for f in range(n_interfaces):
-            at = force_column(f, modal_system)
+            at = interface_column(f, modal_system)
             values = interface_values[f]
             slide = w * read_slide(row, f, modal_system)
             force = 0.0
             if workspace.stiffness[f] == RIGID_STIFFNESS:
                 force = w * evaluate_polynomial(workspace.constraint.reactions[f], 0, top - 2, u)
             else:
-                step = displacement_at(workspace.polynomials[f], top, u)
+                step = integrate_speed(workspace.polynomials[f], top, u)
                 slide = slide + w * step
                 force = w * (row[at + Column.FORCE] + row[at + Column.STIFFNESS] * step)
                 values[InterfaceMeasure.PATH_WORK] += (
@@ -217,7 +218,7 @@ def add_integrals(row, top, border, run, run_values, interface_values):
 
 @njit(**NJIT_INLINE)
 def add_row_state(row, modal_system, run_values, interface_values):
-    """Include the state at the start of a row in the ranges of the measures.
+    """Include the state at the start of a time interval in the minima and maxima.
 
     Parameters
     ----------
@@ -239,7 +240,7 @@ def add_row_state(row, modal_system, run_values, interface_values):
     run_values[RunMeasure.MAX_OUTPUT] = max(run_values[RunMeasure.MAX_OUTPUT], output)
     for f in range(len(modal_system.inverse_mass)):
         values = interface_values[f]
-        at = force_column(f, modal_system)
+        at = interface_column(f, modal_system)
         slide = read_slide(row, f, modal_system)
         values[InterfaceMeasure.MIN_SLIDE] = min(values[InterfaceMeasure.MIN_SLIDE], slide)
         values[InterfaceMeasure.MAX_SLIDE] = max(values[InterfaceMeasure.MAX_SLIDE], slide)
@@ -253,7 +254,9 @@ def add_row_state(row, modal_system, run_values, interface_values):
 
 @njit(**NJIT_INLINE)
 def add_forces(rows, j, top, modal_system, workspace, interface_values):
-    """Update the largest forces with the piece of a row, and add its work by the trapezoidal rule.
+    """Update maximum forces, stuck times and friction work with a time interval.
+
+    The work is computed from the forces at its ends by the trapezoidal rule.
 
     Parameters
     ----------
@@ -270,7 +273,7 @@ def add_forces(rows, j, top, modal_system, workspace, interface_values):
     """
     for f in range(len(modal_system.inverse_mass)):
         values = interface_values[f]
-        at = force_column(f, modal_system)
+        at = interface_column(f, modal_system)
         if rows[j, at + Column.SLIPPING] < SLIP_FRACTION:
             values[InterfaceMeasure.STUCK_TIME] += rows[j, Row.DURATION]
         if workspace.stiffness[f] == RIGID_STIFFNESS:
@@ -294,8 +297,8 @@ def add_forces(rows, j, top, modal_system, workspace, interface_values):
 
 
 @njit(**NJIT_INLINE)
-def find_turning_force(rows, j, interface, modal_system, min_motion):
-    """Return the force of an interface at a reversal where a row begins [N].
+def find_reversal_force(rows, j, interface, modal_system, min_motion):
+    """Return the friction force of an interface at a reversal [N].
 
     It is the mean of the forces before and after the rest there.
 
@@ -336,7 +339,7 @@ def find_turning_force(rows, j, interface, modal_system, min_motion):
         <= min_motion
     ):
         row_after += 1
-    column = force_column(interface, modal_system)
+    column = interface_column(interface, modal_system)
     if row_before >= 0 and row_after < n_rows:
         return 0.5 * (
             find_end_force(rows, row_before, interface, modal_system)
@@ -356,8 +359,8 @@ def find_turning_force(rows, j, interface, modal_system, min_motion):
 
 
 @njit(**NJIT_INLINE)
-def find_turn_near_border(rows, j, forward, interface, run, rest_rate):
-    """Return the row near a border of a cycle at which an interface reverses.
+def find_reversal_near_cycle_end(rows, j, forward, interface, run, rest_rate):
+    """Return the row of a reversal near the end of a cycle.
 
     Parameters
     ----------
@@ -378,7 +381,7 @@ def find_turn_near_border(rows, j, forward, interface, run, rest_rate):
         -1 if there is none.
     """
     k = j
-    max_delay = MAX_TURN_DELAY * run.time_state.period[0]
+    max_delay = MAX_REVERSAL_DELAY * run.time_state.period[0]
     while 0 <= k < rows.shape[0] and abs(rows[k, Row.TIME] - rows[j, Row.TIME]) <= max_delay:
         if abs(read_rate(rows[k], interface, run.modal_system)) <= rest_rate:
             return k
@@ -388,7 +391,7 @@ def find_turn_near_border(rows, j, forward, interface, run, rest_rate):
 
 @njit(**NJIT_INLINE)
 def measure_cycles(rows, cycles, interface, run, values):
-    """Measure the mean range [m] and secant stiffness [N/m] of the cycles of an interface.
+    """Measure the mean range and the secant stiffness of an interface over the last cycles.
 
     Parameters
     ----------
@@ -434,17 +437,17 @@ def measure_cycles(rows, cycles, interface, run, values):
         )
         values[InterfaceMeasure.MEAN_RANGE] += range_of_slide / cycles
         if max_row == first_row or max_row == last_row:
-            max_row = find_turn_near_border(
+            max_row = find_reversal_near_cycle_end(
                 rows, max_row, max_row == last_row, interface, run, REST_RATE_RATIO * max_rate
             )
         if min_row == first_row or min_row == last_row:
-            min_row = find_turn_near_border(
+            min_row = find_reversal_near_cycle_end(
                 rows, min_row, min_row == last_row, interface, run, REST_RATE_RATIO * max_rate
             )
         if range_of_slide > 0.0 and max_row >= 0 and min_row >= 0:
             secant = (
-                find_turning_force(rows, max_row, interface, modal_system, min_motion)
-                - find_turning_force(rows, min_row, interface, modal_system, min_motion)
+                find_reversal_force(rows, max_row, interface, modal_system, min_motion)
+                - find_reversal_force(rows, min_row, interface, modal_system, min_motion)
             ) / range_of_slide
             if secant == secant:
                 n_secants += 1
@@ -457,7 +460,7 @@ def measure_cycles(rows, cycles, interface, run, values):
 
 @njit(**NJIT_INLINE)
 def measure_ringing(rows, first, last, modal_system, segment, values):
-    """Measure the free vibration in a stick of a single mode.
+    """Measure the free vibration of a single mode while its interface sticks.
 
     The measures are the angle by which the vibration turns, and its largest acceleration by the
     rule of `response.ringing`.
@@ -479,7 +482,7 @@ def measure_ringing(rows, first, last, modal_system, segment, values):
     angle = 0.0
     row = rows[first]
     damp = modal_system.damping[0, 0]
-    spring = force_column(0, modal_system) + Column.STIFFNESS
+    spring = interface_column(0, modal_system) + Column.STIFFNESS
     for j in range(first, last):
         angle += (
             sqrt(
@@ -527,7 +530,7 @@ def measure_ringing(rows, first, last, modal_system, segment, values):
 
 @njit(**NJIT_INLINE)
 def measure_sticks_and_releases(rows, run, values):
-    """Count the releases of the first interface, and measure the vibration in its sticks.
+    """Count the releases of the first interface, and measure the vibration while it sticks.
 
     Parameters
     ----------
@@ -542,7 +545,7 @@ def measure_sticks_and_releases(rows, run, values):
     time_state = run.time_state
     start_time = rows[0, Row.TIME]
     period = time_state.period[0]
-    at = force_column(0, modal_system)
+    at = interface_column(0, modal_system)
     is_single = len(modal_system.omega_squared) == 1 and len(modal_system.inverse_mass) == 1
     is_pending = False
     phase = 0.0
@@ -579,7 +582,7 @@ def measure_sticks_and_releases(rows, run, values):
 
 @njit(cache=True, nogil=True, **NJIT_KERNEL)
 def read_rows(rows, cycles, base_moves, run, run_values, interface_values):
-    """Measure the last cycles of a run.
+    """Measure the last cycles of a run from its recorded time intervals.
 
     Parameters
     ----------
@@ -611,7 +614,7 @@ def read_rows(rows, cycles, base_moves, run, run_values, interface_values):
     run_values[RunMeasure.MAX_OUTPUT] = -inf
     for f in range(n_interfaces):
         values = interface_values[f]
-        at = force_column(f, modal_system)
+        at = interface_column(f, modal_system)
         values[InterfaceMeasure.MIN_SLIDE] = inf
         values[InterfaceMeasure.MAX_SLIDE] = -inf
         values[InterfaceMeasure.MIN_SLIP] = inf

@@ -1,4 +1,4 @@
-"""Measures of the last cycles of one run or of many, from the numbers of `read_kernels`."""
+"""Measures of the last cycles of one or several runs, from the numbers of `read_kernels`."""
 
 from dataclasses import dataclass
 
@@ -8,14 +8,14 @@ from ...core import InterfaceLoop
 from ..integrated import mean_slip_phase
 from .positions_kernels import InterfaceMeasure, RunMeasure
 
-# [rad] angle by which a free vibration must turn in a stick to be measured: a vibration is reported from 1.5 periods on,
-# and a fit to a frequency that falls while elements yield is wrong by up to 0.05 of that angle
-MIN_RING_ANGLE = 0.95 * 3 * np.pi
+# Minimum angle [rad] of a free vibration during a stick that is measured. A vibration is reported from 1.5 periods on,
+# and a fit to a frequency that falls while elements yield is wrong by up to 0.05 of that angle.
+MIN_VIBRATION_ANGLE = 0.95 * 3 * np.pi
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Reading:
-    """Numbers of the last cycles of a run, or of many runs (...).
+    """Measures of the last cycles of one run, or of several runs (...).
 
     - run: (..., 13) see `positions_kernels.RunMeasure`
     - faces: (..., i, 21) see `positions_kernels.InterfaceMeasure`
@@ -28,23 +28,26 @@ class Reading:
     span: float
     period: float
 
-    def interface_value(self, place: int, face: int = 0):
-        """Return a number of an interface; position: a member of `InterfaceMeasure`."""
-        return self.faces[..., face, place]
+    def interface_value(self, measure: int, interface: int = 0):
+        """Return a measure of an interface.
+
+        `place` is a member of `InterfaceMeasure`.
+        """
+        return self.faces[..., interface, measure]
 
     @property
-    def swing(self):
-        """Half the range of the output [m]."""
+    def output_amplitude(self):
+        """Output amplitude, half of the peak-to-peak range [m]."""
         return (self.run[..., RunMeasure.MAX_OUTPUT] - self.run[..., RunMeasure.MIN_OUTPUT]) / 2
 
     @property
     def acceleration(self):
-        """Largest absolute acceleration of the output [m s-2]."""
+        """Peak magnitude of the output acceleration [m s-2]."""
         return self.run[..., RunMeasure.MAX_ACCELERATION]
 
     @property
-    def waves(self) -> tuple:
-        """First and third harmonic of the absolute acceleration of the output [m s-2]."""
+    def acceleration_harmonics(self) -> tuple:
+        """Amplitudes of the first and third harmonic of the absolute output acceleration [m s-2]."""
         x = self.run
         return (
             2 / self.span * np.hypot(x[..., RunMeasure.COS_1], x[..., RunMeasure.SIN_1]),
@@ -53,7 +56,10 @@ class Reading:
 
     @property
     def start(self):
-        """Mean phase [rad] modulo pi of the releases of the first interface, see `mean_slip_phase`."""
+        """Mean phase [rad] modulo pi at which the first interface starts to slip.
+
+        See `mean_slip_phase`.
+        """
         return mean_slip_phase(
             *(
                 self.run[..., place]
@@ -63,7 +69,7 @@ class Reading:
 
     @property
     def drift(self):
-        """Drift of the first interface per cycle [m].
+        """Drift of the relative displacement of the first interface per cycle [m].
 
         It is the difference of the mean relative displacements of the last and the first cycle
         over the cycles between them; in fewer than 1.5 cycles the difference between both ends.
@@ -89,41 +95,47 @@ class Reading:
 
     @property
     def rise(self):
-        """Mean magnitude of the first force in the last cycle minus that in the first [N]."""
+        """Increase of the mean friction force magnitude of the first interface [N].
+
+        It is that of the last cycle minus that of the first.
+        """
         return (
             np.abs(self.interface_value(InterfaceMeasure.LAST_FORCE))
             - np.abs(self.interface_value(InterfaceMeasure.FIRST_FORCE))
         ) / self.period
 
-    def _integral_with_phase(self, place: int, face: int):
-        """Return the integral with exp(-i omega t); place: that with the cosine, the sine follows."""
-        cosine = self.interface_value(place, face)
-        return cosine - 1j * self.interface_value(place + 1, face)
+    def _fourier_integral(self, cosine_measure: int, interface: int):
+        """Return the integral of an interface quantity times exp(-i omega t).
 
-    def loop(self, face: int = 0) -> InterfaceLoop:
-        """Return the InterfaceLoop of an interface."""
-        slide = 2 / self.span * self._integral_with_phase(InterfaceMeasure.SLIDE_COS, face)
-        force = 2 / self.span * self._integral_with_phase(InterfaceMeasure.FORCE_COS, face)
-        slip = self.interface_value(InterfaceMeasure.MAX_SLIP, face) - self.interface_value(
-            InterfaceMeasure.MIN_SLIP, face
+        `place` is the index of its integral with the cosine, which that with the sine follows.
+        """
+        cosine = self.interface_value(cosine_measure, interface)
+        return cosine - 1j * self.interface_value(cosine_measure + 1, interface)
+
+    def loop(self, interface: int = 0) -> InterfaceLoop:
+        """Return the friction loop of an interface."""
+        slide = 2 / self.span * self._fourier_integral(InterfaceMeasure.SLIDE_COS, interface)
+        force = 2 / self.span * self._fourier_integral(InterfaceMeasure.FORCE_COS, interface)
+        slip = self.interface_value(InterfaceMeasure.MAX_SLIP, interface) - self.interface_value(
+            InterfaceMeasure.MIN_SLIP, interface
         )
         return InterfaceLoop(
             slide,
             force,
-            self.interface_value(InterfaceMeasure.WORK, face),
+            self.interface_value(InterfaceMeasure.WORK, interface),
             slip,
-            self.interface_value(InterfaceMeasure.STUCK_TIME, face),
-            self.interface_value(InterfaceMeasure.MAX_FORCE, face),
+            self.interface_value(InterfaceMeasure.STUCK_TIME, interface),
+            self.interface_value(InterfaceMeasure.MAX_FORCE, interface),
         )
 
     @property
     def loops(self) -> tuple:
-        """InterfaceLoop of every interface."""
+        """Friction loop of every interface."""
         return tuple(map(self.loop, range(self.faces.shape[-2])))
 
 
-def find_sticking_ring(modal_system, table, reading: Reading) -> tuple | None:
-    """Find the free vibration in the sticks of one mode behind one interface under one sine.
+def find_stick_vibration(modal_system, table, reading: Reading) -> tuple | None:
+    """Find the free vibration of a single mode while its only interface sticks.
 
     Parameters
     ----------
@@ -139,7 +151,7 @@ def find_sticking_ring(modal_system, table, reading: Reading) -> tuple | None:
         elements are too short. None where samples must tell.
     """
     if table.n_elements[0] > 1:
-        return (0.0, 0.0, 0.0) if reading.run[RunMeasure.RING_ANGLE] < MIN_RING_ANGLE else None
+        return (0.0, 0.0, 0.0) if reading.run[RunMeasure.RING_ANGLE] < MIN_VIBRATION_ANGLE else None
     beta = modal_system.omega_squared[0] + table.stiffness_sum[0, -1] * modal_system.inverse_mass[0]
     half_damping = modal_system.damping[0, 0] / 2
     frequency = np.sqrt(max(beta - half_damping**2, 0.0))
@@ -153,7 +165,7 @@ def find_sticking_ring(modal_system, table, reading: Reading) -> tuple | None:
 
 
 def join_readings(readings) -> Reading:
-    """Join the Readings of runs with the same number of interfaces."""
+    """Join the measures of runs with the same number of interfaces."""
     columns = []
     for name in Reading.__dataclass_fields__:
         columns.append(np.array([getattr(reading, name) for reading in readings]))

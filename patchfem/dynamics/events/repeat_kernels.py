@@ -1,4 +1,4 @@
-"""End of a transient: a motion that returns to itself repeats bit by bit (compiled).
+"""Detection of a motion that repeats bit by bit, which ends the transient (compiled).
 
 A settled motion would go on to differ from cycle to cycle by rounding alone. Where the state at
 the end of a cycle equals that of the cycle before within REPEAT_TOL, it takes the digits of that
@@ -12,19 +12,19 @@ from math import pi, sqrt
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE
-from .positions_kernels import KIND, PreviousStatus, Segment, Time
+from .positions_kernels import SEGMENT_KIND, PreviousStatus, Segment, Time
 
-# change of the state in a cycle over the size of the motion, below which the motion repeats
+# Change of the state in a cycle over the size of the motion, below which the motion counts as repeating.
 REPEAT_TOL = 1e-14
-# the same ratio, at which the count of the cycles of approach begins
+# Change of the state in a cycle over the size of the motion, from which on the cycles of approach are counted.
 APPROACH_TOL = 1e-10
-# largest number of cycles of approach; the remaining change of the motion is then below 1e-11 of its size
+# Maximum number of cycles of approach; the remaining change of the motion is then below 1e-11 of its size.
 MAX_APPROACH_CYCLES = 9000.0
 
 
 @njit(**NJIT_INLINE)
-def measure_change(run):
-    """Return the change of the state since the last cycle and the size of the motion.
+def measure_cycle_change(run):
+    """Return the change of the state since the previous cycle, and the size of the motion.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def measure_change(run):
         change = max(change, abs(motion[0, i] - z), abs(motion[1, i] - v) / rate)
     if (
         previous.status[PreviousStatus.SEGMENT] != segment
-        or time_state.segments[segment, Segment.KIND] != KIND.sine
+        or time_state.segments[segment, Segment.KIND] != SEGMENT_KIND.sine
     ):
         return 1e300, size
     previous_memory = previous.memory
@@ -64,12 +64,12 @@ def measure_change(run):
             or previous_memory.direction[f] != memory.direction[f]
             or previous_memory.n_groups[f] != memory.n_groups[f]
             or previous_memory.rigid_state[f] != memory.rigid_state[f]
-            or time_state.is_at_turn[f] == 1.0
+            or time_state.is_at_reversal[f] == 1.0
         ):
             return 1e300, size
         row_norm = sqrt(
             modal_system.inverse_mass[f] * modal_system.mass
-        )  # of the slide in the coordinates
+        )  # norm of the row that gives the relative displacement from the coordinates
         for k in range(memory.n_groups[f]):
             if (
                 previous_memory.group_end[f, k] != memory.group_end[f, k]
@@ -83,15 +83,17 @@ def measure_change(run):
 
 
 @njit(**NJIT_INLINE)
-def forget_previous(previous):
-    """Clear the state at the end of the previous cycle."""
+def clear_previous_cycle(previous):
+    """Discard the stored state at the end of the previous cycle."""
     previous.status[PreviousStatus.SEGMENT] = -1.0
     previous.status[PreviousStatus.REPEATS] = 0.0
 
 
 @njit(**NJIT_INLINE)
 def detect_repeat(run):
-    """Return whether the state equals the previous one to round-off for the first time.
+    """Return whether the motion begins to repeat at this end of a cycle.
+
+    It does where the state equals that of the previous cycle to round-off for the first time.
 
     There and at all later ends of cycles the state takes the digits of the previous one; elsewhere
     the state is stored.
@@ -113,7 +115,7 @@ def detect_repeat(run):
     n_interfaces = len(modal_system.inverse_mass)
     status = previous.status
     previous_memory = previous.memory
-    change, size = measure_change(run)
+    change, size = measure_cycle_change(run)
     if change > APPROACH_TOL * size:
         status[PreviousStatus.LAST_DISTANT] = time_state.now[Time.CYCLE]
     if change <= REPEAT_TOL * size and (

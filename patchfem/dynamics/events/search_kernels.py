@@ -1,7 +1,7 @@
-"""Search for the first event of a piece (compiled).
+"""Search for the first event in a time interval (compiled).
 
-An event is a yield, the release of an interface that a rigid element holds, or a turning point of
-an interface or of the output. Up to the first turning point, which the Bernstein coefficients of
+An event is a yield, the release of an interface that a rigid element holds, or a reversal of
+an interface or of the output. Up to the first reversal, which the Bernstein coefficients of
 the speed prove, the relative displacement is monotone, so a yield before it is the one root of a
 monotone function: no event can be missed.
 """
@@ -12,15 +12,15 @@ from typing import NamedTuple
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE, NJIT_KERNEL
 from .memory_kernels import is_sticking, next_yield_slide
-from .positions_kernels import EVENT
-from .series_kernels import EPS, NO_ROOT, SINGLE_INTEGRAL, find_first_root, refine_root
+from .positions_kernels import EVENT_KIND
+from .series_kernels import EPS, NO_ROOT, SINGLE_INTEGRAL_FACTORS, find_first_root, refine_root
 
-# fraction of the sum of the terms of a speed, below which a term is round-off and has no sign
+# Fraction of the sum of the terms of a speed, below which a term is round-off and has no sign.
 ACCELERATION_TOL = 1e-14
 
 
 class NextEvent(NamedTuple):
-    """First event of a piece.
+    """First event in a time interval.
 
     - u: fraction of the piece; 1 where no event ends the piece, 0 where the elements change before
       anything moves
@@ -36,8 +36,8 @@ class NextEvent(NamedTuple):
 
 
 @njit(**NJIT_INLINE)
-def initial_direction(poly, top, is_at_rest):
-    """Return the order of the first term of a speed that is not round-off, and its sign.
+def find_initial_direction(poly, top, is_at_rest):
+    """Return order and sign of the first term of a velocity series that is above round-off.
 
     rests: whether the speed is zero at the start, so that the term of order 0 does not count.
 
@@ -69,7 +69,7 @@ def initial_direction(poly, top, is_at_rest):
 
 @njit(**NJIT_INLINE)
 def expand_speed(row, count, coefs, top, poly):
-    """Write the series over u of the speed along a row of participations.
+    """Write the power series of the velocity of an interface or of the output.
 
     Parameters
     ----------
@@ -92,8 +92,8 @@ def expand_speed(row, count, coefs, top, poly):
 
 
 @njit(**NJIT_INLINE)
-def displacement_at(poly, top, u):
-    """Return the integral of a speed from 0 to u.
+def integrate_speed(poly, top, u):
+    """Return the displacement, the integral of a velocity series from 0 to u.
 
     Parameters
     ----------
@@ -108,15 +108,17 @@ def displacement_at(poly, top, u):
     -------
     float
     """
-    out = poly[top - 1] * SINGLE_INTEGRAL[top]
+    out = poly[top - 1] * SINGLE_INTEGRAL_FACTORS[top]
     for k in range(top - 2, -1, -1):
-        out = out * u + poly[k] * SINGLE_INTEGRAL[k + 1]
+        out = out * u + poly[k] * SINGLE_INTEGRAL_FACTORS[k + 1]
     return out * u
 
 
 @njit(**NJIT_KERNEL)
 def find_crossing(poly, top, distance, limit, scratch):
-    """Return u in (0, limit] at which an interface has moved by a distance, else NO_ROOT.
+    """Return the fraction of a time interval at which a given displacement is reached.
+
+    It is NO_ROOT where it is not reached up to `limit`.
 
     Parameters
     ----------
@@ -134,16 +136,16 @@ def find_crossing(poly, top, distance, limit, scratch):
     -------
     float
     """
-    end = displacement_at(poly, top, limit)
+    end = integrate_speed(poly, top, limit)
     direction = 1.0 if distance > 0 else -1.0
     if direction * end < direction * distance:
         return NO_ROOT
     scratch[0] = direction * distance
     for k in range(top):
-        scratch[k + 1] = -direction * poly[k] * SINGLE_INTEGRAL[k + 1]
+        scratch[k + 1] = -direction * poly[k] * SINGLE_INTEGRAL_FACTORS[k + 1]
     start = limit * distance / end
     square = scratch[1] * scratch[1] - 4 * scratch[0] * scratch[2]
-    # Newton's method starts from the root of the first three terms
+    # Newton's method starts from the root of the first three terms.
     if square > 0 and 2 * scratch[0] < limit * (sqrt(square) - scratch[1]):
         start = 2 * scratch[0] / (sqrt(square) - scratch[1])
     return refine_root(scratch, 0, top, 0.0, limit, start)
@@ -202,7 +204,9 @@ def find_release(interface, top, limit, workspace):
 
 @njit(**NJIT_KERNEL)
 def find_speed_root(order, direction, poly, top, workspace):
-    """Return the first u at which a speed reverses, NO_ROOT if it does not.
+    """Return the fraction of a time interval at which a velocity first changes its sign.
+
+    It is NO_ROOT where the velocity keeps its sign.
 
     Parameters
     ----------
@@ -230,7 +234,9 @@ def find_speed_root(order, direction, poly, top, workspace):
 
 @njit(**NJIT_KERNEL)
 def find_stop(interface, direction, poly, top, workspace):
-    """Return u at which the slip of a rigid element first comes to rest; NO_ROOT if it does not.
+    """Return the fraction of a time interval at which a rigid slipping element stops.
+
+    It is NO_ROOT where the element does not stop.
 
     Parameters
     ----------
@@ -250,7 +256,7 @@ def find_stop(interface, direction, poly, top, workspace):
 
 @njit(**NJIT_INLINE)
 def find_output_reversal(event, top, run):
-    """Return the reversal of the output if it comes before an event, else the event.
+    """Return the reversal of the output or an earlier event.
 
     Parameters
     ----------
@@ -270,19 +276,19 @@ def find_output_reversal(event, top, run):
     poly = workspace.polynomials[n_interfaces + 1]
     n = len(modal_system.omega_squared)
     expand_speed(modal_system.output, n, workspace.coefficients, top, poly)
-    is_at_rest = run.time_state.is_at_turn[n_interfaces] == 1.0
-    order, direction = initial_direction(poly, top, is_at_rest)
+    is_at_rest = run.time_state.is_at_reversal[n_interfaces] == 1.0
+    order, direction = find_initial_direction(poly, top, is_at_rest)
     if direction == 0.0:
         return event
     root = find_speed_root(order, direction, poly, top, workspace)
     if root < event.u:
-        return NextEvent(root, EVENT.output_reversal, n_interfaces, -direction)
+        return NextEvent(root, EVENT_KIND.output_reversal, n_interfaces, -direction)
     return event
 
 
 @njit(**NJIT_KERNEL)
 def find_next_event(top, run):
-    """Find the first event of a piece.
+    """Find the first event of all interfaces in a time interval.
 
     Parameters
     ----------
@@ -301,14 +307,14 @@ def find_next_event(top, run):
     n = len(modal_system.omega_squared)
     n_interfaces = len(modal_system.inverse_mass)
     polynomials = workspace.polynomials
-    event = NextEvent(1.0, EVENT.none, 0, 0.0)
+    event = NextEvent(1.0, EVENT_KIND.none, 0, 0.0)
     for f in range(n_interfaces):
         poly = polynomials[f]
         expand_speed(modal_system.interfaces[f], n, workspace.coefficients, top, poly)
         if is_sticking(f, table, memory):
             root, direction = find_release(f, top, table.static_limit[f], workspace)
             if root <= event.u:
-                event = NextEvent(root, EVENT.release, f, direction)
+                event = NextEvent(root, EVENT_KIND.release, f, direction)
             continue
         if table.static_limit[f] > 0.0:
             direction = memory.rigid_state[f]
@@ -316,24 +322,26 @@ def find_next_event(top, run):
                 continue
             root = find_stop(f, direction, poly, top, workspace)
             if root <= event.u:
-                event = NextEvent(root, EVENT.reversal, f, -direction)
+                event = NextEvent(root, EVENT_KIND.reversal, f, -direction)
             if table.n_elements[f] == 0 or event.u == 0.0:
                 continue
         else:
-            order, direction = initial_direction(poly, top, run.time_state.is_at_turn[f] == 1.0)
+            order, direction = find_initial_direction(
+                poly, top, run.time_state.is_at_reversal[f] == 1.0
+            )
             if direction == 0.0:
                 continue
             if memory.n_slipping[f] > 0 and direction != memory.direction[f]:
-                return NextEvent(0.0, EVENT.reversal, f, direction)
+                return NextEvent(0.0, EVENT_KIND.reversal, f, direction)
             root = find_speed_root(order, direction, poly, top, workspace)
             if root < event.u:
-                event = NextEvent(root, EVENT.reversal, f, -direction)
+                event = NextEvent(root, EVENT_KIND.reversal, f, -direction)
         gap = next_yield_slide(f, direction, table, memory) - memory.slide[f]
         if direction * gap <= 0:
-            return NextEvent(0.0, EVENT.yielding, f, direction)
+            return NextEvent(0.0, EVENT_KIND.yielding, f, direction)
         root = find_crossing(poly, top, gap, event.u, polynomials[n_interfaces])
         if root <= event.u:
-            event = NextEvent(root, EVENT.yielding, f, direction)
+            event = NextEvent(root, EVENT_KIND.yielding, f, direction)
     if modal_system.output_interface < 0:
         return find_output_reversal(event, top, run)
     return event

@@ -1,4 +1,4 @@
-"""Power series of a linear motion over a short piece, and roots of polynomials (compiled).
+"""Power series of a linear motion in a short time interval, and polynomial roots (compiled).
 
 Over u = t/h in [0, 1] every coordinate is sum c_k u^k. If h is at most MAX_RATE_TIME over the
 fastest rate of the system, the terms decrease as MAX_RATE_TIME^k/k!, so a few dozen are exact to
@@ -17,50 +17,52 @@ from ...friction.flags_kernels import NJIT_INLINE, NJIT_KERNEL
 from .memory_kernels import RIGID_STIFFNESS
 from .positions_kernels import ConstraintStatus
 
-# longest piece times the fastest rate of the system [1]; 28 powers are then exact to round-off
+# Maximum of duration times fastest rate of the system [1]; 28 powers are then exact to round-off.
 MAX_RATE_TIME = 2.0
-# highest power of a series
+# Highest power of a series.
 MAX_POWER = 28
-# unit round-off of doubles
+# Unit round-off of double precision.
 EPS = 2.0**-52
-# position of a root that lies after the end of the piece
+# Code for a polynomial without a root in [0, 1]; any value above 1 serves.
 NO_ROOT = 2.0
-# halvings of a piece in the search for a root; the last interval is as long as the round-off of its position
+# Maximum number of halvings in the search for a root; the last interval is as short as the round-off of its position.
 MAX_HALVINGS = 52
-# columns for the Bernstein coefficients of an interval; the last one is 1 in a right half
-HULL_WIDTH = MAX_POWER + 5
-# highest power of the terms that the first search for a root evaluates
-FIRST_LOOK_POWER = 9
-# Gauss points of a piece
+# Number of columns for the Bernstein coefficients of an interval; the last column is 1 in a right half.
+N_HULL_COLUMNS = MAX_POWER + 5
+# Highest power of the terms that the first search for a root evaluates.
+FIRST_SEARCH_POWER = 9
+# Maximum number of Gauss points in a time interval.
 MAX_GAUSS_POINTS = 16
-# relative error of the integral of a squared motion by Gauss points
+# Relative error of the integral of a squared motion by Gauss points.
 GAUSS_TOL = 1e-13
 
-# largest rate times duration for which powers up to k suffice: the last term is below EPS/4
+# Largest rate times duration for which powers up to k suffice: the last term is then below EPS/4.
 _RATE_TIME_LIMITS = np.array(
     [0.0, 0.0] + [(EPS / 4 * factorial(k)) ** (1 / k) for k in range(2, MAX_POWER + 1)]
 )
-# factors of u^k in the second and in the first integral of u^(k - 2) and u^(k - 1)
-DOUBLE_INTEGRAL = np.array([0.0, 0.0] + [1 / (k * (k - 1)) for k in range(2, MAX_POWER + 2)])
-SINGLE_INTEGRAL = np.array([0.0] + [1 / k for k in range(1, MAX_POWER + 3)])
+# Factors of u^k in the second integral of u^(k - 2) and in the first integral of u^(k - 1).
+DOUBLE_INTEGRAL_FACTORS = np.array(
+    [0.0, 0.0] + [1 / (k * (k - 1)) for k in range(2, MAX_POWER + 2)]
+)
+SINGLE_INTEGRAL_FACTORS = np.array([0.0] + [1 / k for k in range(1, MAX_POWER + 3)])
 
 
 def _bernstein_row(degree: int, power: int) -> list:
-    """Return the Bernstein coefficients of u^power at a degree, filled up with zeros."""
+    """Return the Bernstein coefficients of u^power for a polynomial degree, padded with zeros."""
     row = [0.0] * (MAX_POWER + 4)
     for i in range(power, degree + 1):
         row[i] = comb(i, power) / comb(degree, power)
     return row
 
 
-# Bernstein coefficient i of u^k at degree d, [d, k, i]
+# Bernstein coefficient i of u^k for degree d, as [d, k, i].
 _BERNSTEIN = np.array(
     [[_bernstein_row(d, k) for k in range(MAX_POWER + 1)] for d in range(MAX_POWER + 1)]
 )
 
 
 def _gauss_limit(n_points: int) -> float:
-    """Return the largest rate times duration at which so many Gauss points meet GAUSS_TOL."""
+    """Return the largest rate times duration for which Gauss points integrate to GAUSS_TOL."""
     constant = (2 * n_points + 1) * factorial(2 * n_points) ** 3 / factorial(n_points) ** 4
     return 0.5 * (GAUSS_TOL * constant) ** (1 / (2 * n_points))
 
@@ -68,7 +70,7 @@ def _gauss_limit(n_points: int) -> float:
 _GAUSS_RATE_TIME_LIMITS = np.array(
     [0.0] + [_gauss_limit(g) for g in range(1, MAX_GAUSS_POINTS + 1)]
 )
-# points and weights on [0, 1] of Gauss rules of g points, [g, point]
+# Points and weights on [0, 1] of the Gauss rules with g points, as [g, point].
 GAUSS_POINTS, GAUSS_WEIGHTS = np.zeros((2, MAX_GAUSS_POINTS + 1, MAX_GAUSS_POINTS))
 for _g in range(1, MAX_GAUSS_POINTS + 1):
     _points, _weights = np.polynomial.legendre.leggauss(_g)
@@ -77,7 +79,7 @@ for _g in range(1, MAX_GAUSS_POINTS + 1):
 
 
 class MotionStart(NamedTuple):
-    """State of a linear motion at the start of a piece.
+    """State of a linear motion at the start of a time interval.
 
     - coordinates, rate: (n,) modal coordinates [m] and rates [m/s]
     - force: (i,) friction forces of the interfaces [N]
@@ -89,7 +91,7 @@ class MotionStart(NamedTuple):
 
 
 class MotionSeries(NamedTuple):
-    """Power series over a piece.
+    """Power series of drive and motion over a time interval.
 
     - drive: (> top,) acceleration of the drive [m s-2]
     - coefficients: (> top, n) modal coordinates [m]
@@ -101,7 +103,10 @@ class MotionSeries(NamedTuple):
 
 @njit(**NJIT_KERNEL)
 def find_highest_power(x):
-    """Return the highest power that a piece needs; x: its duration times the fastest rate."""
+    """Return the highest power that a series over a time interval needs.
+
+    x is the duration times the fastest rate.
+    """
     k = 4
     while k < MAX_POWER and _RATE_TIME_LIMITS[k] < x:
         k += 1
@@ -110,7 +115,7 @@ def find_highest_power(x):
 
 @njit(**NJIT_INLINE)
 def count_gauss_points(x):
-    """Return the number of Gauss points that integrate squares of the motion over a piece.
+    """Return the number of Gauss points that integrate squares of the motion accurately.
 
     x: duration of the piece times the fastest rate.
     """
@@ -122,7 +127,7 @@ def count_gauss_points(x):
 
 @njit(**NJIT_KERNEL)
 def bound_fastest_rate(modal_system, springs):
-    """Return an upper bound [1/s] of the rates of modes with springs (i,) [N/m].
+    """Return an upper bound [1/s] of the rates of modes with springs (i,) [N/m] at interfaces.
 
     Interfaces that are held only remove motions, so they do not count.
     """
@@ -135,7 +140,11 @@ def bound_fastest_rate(modal_system, springs):
 
 @njit(**NJIT_INLINE)
 def bound_modal_rate(modal_system, workspace):
-    """Return the bound of `bound_fastest_rate` for workspace.stiffness; 0 without free motions."""
+    """Return an upper bound [1/s] of the present modal rates.
+
+    It is that of `bound_fastest_rate` for workspace.stiffness, and 0 where the sticking
+    interfaces leave no motion.
+    """
     if workspace.constraint.status[ConstraintStatus.IS_IMMOBILE] == 1.0:
         return 0.0
     return bound_fastest_rate(modal_system, workspace.stiffness)
@@ -143,7 +152,9 @@ def bound_modal_rate(modal_system, workspace):
 
 @njit(**NJIT_INLINE)
 def expand_single_mode(start, series, h, top, modal_system, spring):
-    """Write the series of one mode with one interface, like `expand_motion` but faster.
+    """Expand the motion of one mode with one interface as a power series.
+
+    It does what `expand_motion` does for any system.
 
     It takes a third of the time.
 
@@ -160,7 +171,7 @@ def expand_single_mode(start, series, h, top, modal_system, spring):
     base = modal_system.base[0]
     stiff = h_squared * (modal_system.omega_squared[0] + spring * modal_system.inverse_mass[0])
     damp = h * modal_system.damping[0, 0]
-    # coefficients k and k + 1 of the series
+    # Coefficients k and k + 1 of the series.
     present = start.coordinates[0]
     following = h * start.rate[0]
     coefs[0, 0] = present
@@ -173,13 +184,15 @@ def expand_single_mode(start, series, h, top, modal_system, spring):
     for k in range(1, top - 1):
         forces = stiff * present + h_squared * base * drive[k] + damp * (k + 1) * following
         present = following
-        following = -DOUBLE_INTEGRAL[k + 2] * forces
+        following = -DOUBLE_INTEGRAL_FACTORS[k + 2] * forces
         coefs[k + 2, 0] = following
 
 
 @njit(**NJIT_INLINE)
 def expand_two_modes(start, series, h, top, modal_system, spring):
-    """Write the series of two uncoupled modes with one interface, like `expand_motion`.
+    """Expand the motion of two uncoupled modes with one interface as power series.
+
+    It does what `expand_motion` does for any system.
 
     Parameters
     ----------
@@ -194,7 +207,7 @@ def expand_two_modes(start, series, h, top, modal_system, spring):
     face_2 = modal_system.interfaces[0, 1]
     base_1 = modal_system.base[0]
     base_2 = modal_system.base[1]
-    # no constant: of one mode, where nothing comes here, it would not compile
+    # The index is no constant, because a constant would not compile for one mode, for which this code is never reached.
     second = len(modal_system.omega_squared) - 1
     stiff_1 = h_squared * modal_system.omega_squared[0]
     stiff_2 = h_squared * modal_system.omega_squared[second]
@@ -202,35 +215,41 @@ def expand_two_modes(start, series, h, top, modal_system, spring):
     damp_1 = h * modal_system.damping[0, 0]
     damp_2 = h * modal_system.damping[1, 1]
     friction = h_squared * start.force[0] / modal_system.mass
-    here_1 = start.coordinates[0]
-    here_2 = start.coordinates[1]
-    after_1 = h * start.rate[0]
-    after_2 = h * start.rate[1]
-    coefs[0, 0] = here_1
-    coefs[0, 1] = here_2
-    coefs[1, 0] = after_1
-    coefs[1, 1] = after_2
+    present_1 = start.coordinates[0]
+    present_2 = start.coordinates[1]
+    following_1 = h * start.rate[0]
+    following_2 = h * start.rate[1]
+    coefs[0, 0] = present_1
+    coefs[0, 1] = present_2
+    coefs[1, 0] = following_1
+    coefs[1, 1] = following_2
     for k in range(top - 1):
         base_term = h_squared * drive[k]
         count = k + 1
-        new_1 = -DOUBLE_INTEGRAL[k + 2] * (
-            stiff_1 * here_1 + base_1 * base_term + face_1 * friction + damp_1 * count * after_1
+        new_1 = -DOUBLE_INTEGRAL_FACTORS[k + 2] * (
+            stiff_1 * present_1
+            + base_1 * base_term
+            + face_1 * friction
+            + damp_1 * count * following_1
         )
-        new_2 = -DOUBLE_INTEGRAL[k + 2] * (
-            stiff_2 * here_2 + base_2 * base_term + face_2 * friction + damp_2 * count * after_2
+        new_2 = -DOUBLE_INTEGRAL_FACTORS[k + 2] * (
+            stiff_2 * present_2
+            + base_2 * base_term
+            + face_2 * friction
+            + damp_2 * count * following_2
         )
-        friction = stiff * (face_1 * after_1 + face_2 * after_2)
-        here_1 = after_1
-        here_2 = after_2
-        after_1 = new_1
-        after_2 = new_2
+        friction = stiff * (face_1 * following_1 + face_2 * following_2)
+        present_1 = following_1
+        present_2 = following_2
+        following_1 = new_1
+        following_2 = new_2
         coefs[k + 2, 0] = new_1
         coefs[k + 2, 1] = new_2
 
 
 @njit(**NJIT_KERNEL)
 def expand_immobile(start, series, top, modal_system, workspace):
-    """Write the series of `expand_motion` where the sticking interfaces stop all motion.
+    """Expand reactions as power series where the sticking interfaces prevent all motion.
 
     Only the reactions depend on time.
 
@@ -266,7 +285,9 @@ def expand_immobile(start, series, top, modal_system, workspace):
 
 @njit(**NJIT_KERNEL)
 def remove_sticking_motion(k, scale, modal_system, coefs, workspace):
-    """Remove the motion of sticking interfaces from coefficients k + 2, and store the reactions.
+    """Remove the motion of sticking interfaces from one power of the series.
+
+    The coefficients are those of power k + 2; the reactions are stored.
 
     The remaining acceleration is a - interfaces^T r/mass with r = mass (interfaces interfaces^T)^+
     interfaces a.
@@ -298,7 +319,7 @@ def remove_sticking_motion(k, scale, modal_system, coefs, workspace):
 
 @njit(**NJIT_KERNEL)
 def expand_motion(start, series, h, top, modal_system, workspace):
-    """Write the power series of the modes over a piece, and the reactions of sticking interfaces.
+    """Expand the modal motion and the reactions of sticking interfaces as power series.
 
     The equation is z'' = -D z' - omega^2 z - base a - interfaces^T (force + springs slide)/mass.
     Interfaces with infinite springs are held; workspace.constraint.reactions (i, >= top - 1) are
@@ -342,8 +363,8 @@ def expand_motion(start, series, h, top, modal_system, workspace):
         is_free = springs[f] < RIGID_STIFFNESS
         friction_accel[f] = start.force[f] / modal_system.mass if is_free else 0.0
     for k in range(top - 1):
-        scale = DOUBLE_INTEGRAL[k + 2] * h_squared
-        damp = DOUBLE_INTEGRAL[k + 2] * h * (k + 1)
+        scale = DOUBLE_INTEGRAL_FACTORS[k + 2] * h_squared
+        damp = DOUBLE_INTEGRAL_FACTORS[k + 2] * h * (k + 1)
         if k > 0:
             for f in range(n_interfaces):
                 term = 0.0
@@ -368,7 +389,7 @@ def expand_motion(start, series, h, top, modal_system, workspace):
 
 @njit(**NJIT_INLINE)
 def evaluate_polynomial(poly, low, top, u):
-    """Return the sum of poly[k] u^(k - low) for k from low to top.
+    """Evaluate the polynomial sum of poly[k] u^(k - low), k = low .. top.
 
     Terms with even and with odd powers are added separately, which halves the length of the
     dependency chain.
@@ -388,7 +409,7 @@ def evaluate_polynomial(poly, low, top, u):
     -------
     float
     """
-    # two independent sums of half the length, which the processor computes at the same time
+    # Two independent sums of half the length are computed by the processor at the same time.
     square = u * u
     even = poly[top]
     odd = 0.0
@@ -402,7 +423,9 @@ def evaluate_polynomial(poly, low, top, u):
 
 @njit(**NJIT_INLINE)
 def evaluate_with_slope(poly, low, top, u):
-    """Return the sum of `evaluate_polynomial` and its derivative.
+    """Evaluate a polynomial and its derivative.
+
+    For the polynomial see `evaluate_polynomial`.
 
     Parameters
     ----------
@@ -417,7 +440,7 @@ def evaluate_with_slope(poly, low, top, u):
     """
     square = u * u
     k = top - 1
-    # slopes over u^2
+    # These are the derivatives with respect to u^2.
     even = poly[top]
     odd = 0.0
     even_slope = 0.0
@@ -437,7 +460,7 @@ def evaluate_with_slope(poly, low, top, u):
 
 @njit(**NJIT_INLINE)
 def refine_root(poly, low, top, left, right, u):
-    """Return the root in [left, right] of a polynomial that decreases through zero there.
+    """Return the root of a polynomial in an interval in which it decreases through zero.
 
     Newton's method is guarded by bisection.
 
@@ -467,7 +490,7 @@ def refine_root(poly, low, top, left, right, u):
         if not left < new < right:
             new = 0.5 * (left + right)
         step = abs(new - u)
-        # steps shrink with their squares, so the next one would be step (step/last)^2
+        # The steps shrink quadratically, so the next one would be step (step/last)^2.
         if step <= 2 * EPS * u or (
             step < 0.01 * last and step * (step / last) ** 2 <= 0.1 * EPS * u
         ):
@@ -479,7 +502,7 @@ def refine_root(poly, low, top, left, right, u):
 
 @njit(**NJIT_INLINE)
 def fill_bernstein(poly, low, top, hull):
-    """Write the Bernstein coefficients of a polynomial.
+    """Write the Bernstein coefficients of a polynomial on [0, 1].
 
     Parameters
     ----------
@@ -488,7 +511,7 @@ def fill_bernstein(poly, low, top, hull):
     hull : ndarray
         Bernstein coefficients on [0, 1], which are written.
     """
-    # whole registers
+    # The length is padded to complete vector registers of four numbers.
     degree = top - low
     n_padded = (top - low) // 4 * 4 + 4
     for i in range(n_padded):
@@ -501,7 +524,7 @@ def fill_bernstein(poly, low, top, hull):
 
 @njit(**NJIT_INLINE)
 def find_possible_root(poly, low, top, hull):
-    """Return a position near which the first root in [0, 1] may lie.
+    """Estimate where the first root of a polynomial in [0, 1] may lie.
 
     The Bernstein coefficients of the first terms are compared with the sum of the magnitudes of the
     other terms.
@@ -519,26 +542,26 @@ def find_possible_root(poly, low, top, hull):
         NO_ROOT if there is none.
     """
     remainder = 0.0
-    n_padded = FIRST_LOOK_POWER // 4 * 4 + 4
-    for k in range(low + FIRST_LOOK_POWER + 1, top + 1):
+    n_padded = FIRST_SEARCH_POWER // 4 * 4 + 4
+    for k in range(low + FIRST_SEARCH_POWER + 1, top + 1):
         remainder += abs(poly[k])
     for i in range(n_padded):
         hull[i] = poly[low]
-    for k in range(1, FIRST_LOOK_POWER + 1):
+    for k in range(1, FIRST_SEARCH_POWER + 1):
         coefficient = poly[low + k]
         for i in range(n_padded):
-            hull[i] += coefficient * _BERNSTEIN[FIRST_LOOK_POWER, k, i]
-    for i in range(FIRST_LOOK_POWER + 1):
+            hull[i] += coefficient * _BERNSTEIN[FIRST_SEARCH_POWER, k, i]
+    for i in range(FIRST_SEARCH_POWER + 1):
         if hull[i] <= remainder:
             return (
                 i - hull[i] / (hull[i] - hull[i - 1]) if 0 < i and hull[i] < hull[i - 1] else i
-            ) / FIRST_LOOK_POWER
+            ) / FIRST_SEARCH_POWER
     return NO_ROOT
 
 
 @njit(**NJIT_INLINE)
 def prove_first_root(poly, low, top, u, workspace):
-    """Return the root near u if it is proved to be the first one, else NO_ROOT.
+    """Return a root of a polynomial if it is proved to be the first, else NO_ROOT.
 
     Newton's method finds the root r. The polynomial p(r s) is (1 - s) q(s), and the coefficients of
     q are sums of the last coefficients of p(r s). If q has no root in [0, 1], then p has none
@@ -567,7 +590,7 @@ def prove_first_root(poly, low, top, u, workspace):
         step = abs(step)
         if not 0.0 < u <= 1.0:
             return NO_ROOT
-        # the same step as in `refine_root`
+        # The convergence criterion is that of `refine_root`.
         has_converged = step <= 2 * EPS * u or (
             step < 0.01 * last and step * (step / last) ** 2 <= 0.1 * EPS * u
         )
@@ -592,7 +615,7 @@ def prove_first_root(poly, low, top, u, workspace):
 
 @njit(**NJIT_KERNEL)
 def find_first_root(poly, low, top, hulls):
-    """Return the first u in (0, 1] at which a polynomial is no longer positive.
+    """Return the first position in (0, 1] at which a polynomial is no longer positive.
 
     It is positive just after 0.
 
@@ -604,14 +627,14 @@ def find_first_root(poly, low, top, hulls):
     low, top : int
         The polynomial is the sum of poly[k] u^(k - low) for k from low to top.
     hulls : ndarray
-        (MAX_HALVINGS + 2, HULL_WIDTH) workspace.
+        (MAX_HALVINGS + 2, N_HULL_COLUMNS) workspace.
 
     Returns
     -------
     float
         NO_ROOT if there is none.
     """
-    # the indices are not wrapped, because the compiler then knows that none is negative
+    # The indices are masked, because the compiler then knows that none is negative.
     remainder = 0.0
     low = low & 31
     top = top & 31
@@ -619,7 +642,7 @@ def find_first_root(poly, low, top, hulls):
         remainder += abs(poly[k])
     if poly[low] > remainder:
         return NO_ROOT
-    if top - low > FIRST_LOOK_POWER + 2:
+    if top - low > FIRST_SEARCH_POWER + 2:
         u = find_possible_root(poly, low, top, hulls[0])
         if u < NO_ROOT:
             u = prove_first_root(poly, low, top, u, hulls)
@@ -643,7 +666,7 @@ def find_first_root(poly, low, top, hulls):
             if k > 0 and (hull[k] < 0) != (hull[k - 1] < 0):
                 changes += 1
                 k_change = k
-        # the interval has no root, so the search goes on in the part to its right that an earlier halving left
+        # The interval has no root, so the search continues in the part to its right that an earlier halving left.
         if lowest >= -noise:
             left += width
             depth, width = _take_right_half(hulls, depth, width, degree)
@@ -660,12 +683,12 @@ def find_first_root(poly, low, top, hulls):
         _halve_interval(hull, hulls[depth + 1], degree, True)
         depth = depth + 1
         width = width / 2
-        hulls[depth, HULL_WIDTH - 1] = 0.0
+        hulls[depth, N_HULL_COLUMNS - 1] = 0.0
 
 
 @njit(**NJIT_INLINE)
 def _halve_interval(hull, half, degree, first):
-    """Write the Bernstein coefficients of one half of an interval (de Casteljau)."""
+    """Write the Bernstein coefficients of one half of an interval (de Casteljau's algorithm)."""
     for k in range(degree + 1):
         half[k] = hull[k]
     if first:
@@ -680,19 +703,22 @@ def _halve_interval(hull, half, degree, first):
 
 @njit(**NJIT_INLINE)
 def _take_right_half(hulls, depth, width, degree):
-    """Return depth and width of the next right half; depth 0 where none is left."""
-    while depth > 0 and hulls[depth, HULL_WIDTH - 1] == 1.0:
+    """Return depth and width of the next right half of the search for a root.
+
+    The depth is 0 where no half remains.
+    """
+    while depth > 0 and hulls[depth, N_HULL_COLUMNS - 1] == 1.0:
         depth -= 1
         width *= 2
     if depth > 0:
         _halve_interval(hulls[depth - 1], hulls[depth], degree, False)
-        hulls[depth, HULL_WIDTH - 1] = 1.0
+        hulls[depth, N_HULL_COLUMNS - 1] = 1.0
     return depth, width
 
 
 @njit(cache=True, **NJIT_KERNEL)
 def find_largest_magnitude(poly, top, best, hulls):
-    """Return the larger of `best` and the largest magnitude of a polynomial on [0, 1].
+    """Return the largest magnitude of a polynomial on [0, 1], or a larger lower bound.
 
     The relative error is 1e-14. Intervals are halved until their Bernstein coefficients do not
     exceed the best value, or show at most one extremum, which Newton's method finds.
@@ -705,7 +731,7 @@ def find_largest_magnitude(poly, top, best, hulls):
     best : float
         A lower bound of the result.
     hulls : ndarray
-        (MAX_HALVINGS + 2, HULL_WIDTH) workspace.
+        (MAX_HALVINGS + 2, N_HULL_COLUMNS) workspace.
 
     Returns
     -------
@@ -728,7 +754,7 @@ def find_largest_magnitude(poly, top, best, hulls):
                 turns += 1
                 at = k
         known = largest <= best * (1 + 1e-14) or depth == MAX_HALVINGS
-        # by Descartes' rule there is at most one extremum; the ends have been checked
+        # By Descartes' rule there is at most one extremum; the ends have been checked.
         if not known and turns < 2:
             if turns == 1:
                 sense = 1.0 if hull[1] > hull[0] else -1.0
@@ -749,5 +775,5 @@ def find_largest_magnitude(poly, top, best, hulls):
         _halve_interval(hull, hulls[depth + 1], top, True)
         depth = depth + 1
         width = width / 2
-        hulls[depth, HULL_WIDTH - 1] = 0.0
+        hulls[depth, N_HULL_COLUMNS - 1] = 0.0
         best = max(best, abs(hulls[depth, top]))

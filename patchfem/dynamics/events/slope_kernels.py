@@ -1,35 +1,35 @@
-"""Run from event to event that carries its derivative along (compiled).
+"""March from event to event with the derivative of the motion (compiled).
 
 An interface remembers where its relative displacement turned. The force is continuous in those
-places, so nothing jumps at a yield or a turning point, and the derivative over a run is the
-product of the linear flows of its pieces. A turning point may shift in time, but the interface is
-at rest there, so the derivative of the new turning place is that of the relative displacement.
+places, so nothing jumps at a yield or a reversal, and the derivative over a run is the
+product of the linear flows of its pieces. A reversal may shift in time, but the interface is
+at rest there, so the derivative of the new reversal displacement is that of the relative displacement.
 """
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE, NJIT_KERNEL
 from .march_kernels import (
     apply_event,
-    clear_rests,
+    clear_reversal_marks,
     is_before,
     is_idle,
     move_state,
     output_displacement,
-    reaches_border,
+    reaches_breakpoint,
     reset_forces,
     start_piece,
-    step_to_border,
-    time_to_border,
+    step_to_breakpoint,
+    time_to_breakpoint,
     widen_extremes,
 )
-from .positions_kernels import EVENT, Time
+from .positions_kernels import EVENT_KIND, Time
 from .search_kernels import find_next_event
 from .series_kernels import MotionSeries, MotionStart, expand_motion
 
 
 @njit(**NJIT_INLINE)
-def move_slopes(u, piece, slopes, turning_slopes, run, scratch):
-    """Move the derivatives of coordinates and rates over a piece up to u.
+def move_slopes(u, piece, slopes, reversal_slopes, run, scratch):
+    """Propagate derivatives of modal coordinates and rates over part of a time interval.
 
     Parameters
     ----------
@@ -38,8 +38,8 @@ def move_slopes(u, piece, slopes, turning_slopes, run, scratch):
     piece : Piece
     slopes : ndarray
         (2, n, s) derivatives of coordinates and rates with respect to s numbers.
-    turning_slopes : ndarray
-        (i, t + 2, s) derivatives of the turning places.
+    reversal_slopes : ndarray
+        (i, t + 2, s) derivatives of the reversal displacements.
     run : RunArrays
     scratch : tuple
         Workspace: derivatives with respect to one number (2, n), the force on them (i,), their
@@ -68,7 +68,7 @@ def move_slopes(u, piece, slopes, turning_slopes, run, scratch):
                 end = memory.group_end[f, k]
                 force[f] -= (
                     table.stiffness_sum[f, end] - table.stiffness_sum[f, first]
-                ) * turning_slopes[f, k, s]
+                ) * reversal_slopes[f, k, s]
                 first = end
         start = MotionStart(slope[0], slope[1], force)
         series = MotionSeries(workspace.drive[1], coefs)
@@ -84,14 +84,16 @@ def move_slopes(u, piece, slopes, turning_slopes, run, scratch):
 
 
 @njit(**NJIT_INLINE)
-def store_turning_slope(interface, slopes, turning_slopes, run):
-    """Write the derivative of a new turning place of an interface, which is that of its slide.
+def store_reversal_slope(interface, slopes, reversal_slopes, run):
+    """Store the derivative of a new reversal displacement of an interface.
+
+    It is the derivative of the relative displacement, because the interface is at rest there.
 
     Parameters
     ----------
     interface : int
-    slopes, turning_slopes : ndarray
-        See `move_slopes`; turning_slopes is written.
+    slopes, reversal_slopes : ndarray
+        See `move_slopes`; reversal_slopes is written.
     run : RunArrays
     """
     modal_system = run.modal_system
@@ -99,28 +101,28 @@ def store_turning_slope(interface, slopes, turning_slopes, run):
         slope = 0.0
         for i in range(len(modal_system.omega_squared)):
             slope += modal_system.interfaces[interface, i] * slopes[0, i, s]
-        turning_slopes[interface, run.memory.n_groups[interface], s] = slope
+        reversal_slopes[interface, run.memory.n_groups[interface], s] = slope
 
 
 @njit(**NJIT_INLINE)
-def count_elements(memory, counts):
-    """Update the largest numbers of slipping elements and the smallest numbers of groups."""
+def update_element_counts(memory, counts):
+    """Update the maxima of slipping elements and the minima of element groups."""
     for f in range(counts.shape[1]):
         counts[0, f] = max(counts[0, f], memory.n_slipping[f])
         counts[1, f] = min(counts[1, f], memory.n_groups[f])
 
 
 @njit(cache=True, **NJIT_KERNEL)
-def march_with_slopes(stop, run, slopes, turning_slopes, scratch, counts):
-    """March from event to event without rows and energies, and carry the derivative along.
+def march_with_slopes(stop, run, slopes, reversal_slopes, scratch, counts):
+    """March from event to event with the derivative of the motion, without rows and energies.
 
     Parameters
     ----------
     stop : tuple
         Cycle and offset [s] at which the run ends.
     run : RunArrays
-    slopes, turning_slopes : ndarray
-        (2, n, s), (i, t + 2, s) derivatives of the motion and of the turning places with respect
+    slopes, reversal_slopes : ndarray
+        (2, n, s), (i, t + 2, s) derivatives of the motion and of the reversal displacements with respect
         to s numbers.
     scratch : tuple
         See `move_slopes`.
@@ -141,25 +143,25 @@ def march_with_slopes(stop, run, slopes, turning_slopes, scratch, counts):
     for k in range(no_drive.shape[0]):
         no_drive[k] = 0.0
     while is_before(now, stop):
-        count_elements(memory, counts)
-        piece = start_piece(time_to_border(time_state, stop), run)
+        update_element_counts(memory, counts)
+        piece = start_piece(time_to_breakpoint(time_state, stop), run)
         event = find_next_event(piece.top, run)
         u = event.u
         if u > 0:
             if now[Time.OFFSET] == 0.0:
                 widen_extremes(output_displacement(run), run)
-            move_slopes(u, piece, slopes, turning_slopes, run, scratch)
-            clear_rests(u, time_state)
+            move_slopes(u, piece, slopes, reversal_slopes, run, scratch)
+            clear_reversal_marks(u, time_state)
             move_state(u, piece, run)
-            if reaches_border(piece, u, now):
-                step_to_border(time_state, stop, piece.remaining)
+            if reaches_breakpoint(piece, u, now):
+                step_to_breakpoint(time_state, stop, piece.remaining)
             else:
                 now[Time.OFFSET] += u * piece.duration
             pieces += 1
         if is_idle(u * piece.duration, run):
             return -1
-        if event.kind == EVENT.reversal and memory.n_slipping[event.interface] > 0:
-            store_turning_slope(event.interface, slopes, turning_slopes, run)
+        if event.kind == EVENT_KIND.reversal and memory.n_slipping[event.interface] > 0:
+            store_reversal_slope(event.interface, slopes, reversal_slopes, run)
         apply_event(event, run)
-    count_elements(memory, counts)
+    update_element_counts(memory, counts)
     return pieces

@@ -1,4 +1,4 @@
-"""Periodic motion of modes behind elastic-plastic elements, by shooting.
+"""Periodic motion of modes with elastic-plastic friction elements, by shooting.
 
 Newton's method finds the fixed point of the map over a period.
 
@@ -16,21 +16,21 @@ import numpy as np
 from ...core import InitialState, ModalBasis, frozen_array
 from ..periodic import MappedPoint, PeriodicPoint, Shooting, bound_error
 from .elements import Memory
-from .period import PeriodMap, PeriodMapping, Point, copy_memory
+from .period import PeriodMap, PeriodMapping, PoincarePoint, copy_memory
 
-# periods of the run that leads to the start of Newton's method
+# Number of periods of the run that leads to the start of Newton's method.
 N_APPROACH_PERIODS = 4
-# fraction of the friction limit that may stick due to round-off where all interfaces slide
-WHOLE_SLIP_TOL = 1e-12
+# Fraction of the friction limit that may stick due to round-off where all interfaces slide.
+FULL_SLIP_TOL = 1e-12
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SteadyState:
-    """A periodic motion of elastic-plastic elements.
+    """Periodic motion of modes with elastic-plastic friction elements.
 
     - point, start, memory: state at phase 0 of the drive
     - residual: |state after a period - start| over the size of the motion
-    - multipliers: (m,) complex Floquet multipliers of motion and turning places, the largest first;
+    - multipliers: (m,) complex Floquet multipliers of motion and reversal displacements, the largest first;
       the motion is stable where all magnitudes are below 1
     - amplitude: half the range of the output [m]
     - slipping: fraction of the friction limit of all interfaces that slips within a cycle
@@ -38,7 +38,7 @@ class SteadyState:
     - iterations: of Newton's method
     """
 
-    point: Point
+    point: PoincarePoint
     start: InitialState
     memory: Memory
     residual: float
@@ -50,7 +50,10 @@ class SteadyState:
 
     @property
     def error(self) -> float:
-        """Relative error that the residual leaves in the motion, see `periodic.bound_error`."""
+        """Relative error of the motion due to the residual of Newton's method.
+
+        See `periodic.bound_error`.
+        """
         return bound_error(self.residual, self.multipliers)
 
     @property
@@ -58,10 +61,12 @@ class SteadyState:
         """State of the interfaces: "stuck", "partial slip", or "slides" where all of them slip."""
         if self.slipping == 0:
             return "stuck"
-        return "slides" if self.slipping > 1 - WHOLE_SLIP_TOL else "partial slip"
+        return "slides" if self.slipping > 1 - FULL_SLIP_TOL else "partial slip"
 
 
-def solve_steady(modes: ModalBasis, drive, groups, near: Point | None = None) -> SteadyState:
+def solve_steady(
+    modes: ModalBasis, drive, groups, near: PoincarePoint | None = None
+) -> SteadyState:
     """Find the periodic response to a sine that changes sign after half a period.
 
     Parameters
@@ -71,7 +76,7 @@ def solve_steady(modes: ModalBasis, drive, groups, near: Point | None = None) ->
         One segment, a sine.
     groups : sequence of Elements
         One for every interface.
-    near : Point, optional
+    near : PoincarePoint, optional
         Start of the search, rest by default.
 
     Returns
@@ -115,20 +120,20 @@ def find_steady_state_from(
     """
     period_map = PeriodMap(modes, groups)
     shooting = YieldShooting(period_map, drive, False)
-    point = Point(np.concatenate([start.z, start.v]), memory)
+    point = PoincarePoint(np.concatenate([start.z, start.v]), memory)
     return _make_steady(period_map, *shooting.find_periodic_point(point), False)
 
 
 def find_antisymmetric_motion(
-    period_map: PeriodMap, drive, near: Point | None = None
+    period_map: PeriodMap, drive, near: PoincarePoint | None = None
 ) -> PeriodicPoint:
-    """Find the motion that changes sign after half a period.
+    """Find the periodic motion that changes sign after half a period, by shooting.
 
     Parameters
     ----------
     period_map : PeriodMap
     drive
-    near : Point, optional
+    near : PoincarePoint, optional
         Start of the search, rest by default.
 
     Returns
@@ -142,12 +147,12 @@ def find_antisymmetric_motion(
 
 
 class YieldShooting(Shooting):
-    """Shooting with the map from yield to yield over a period.
+    """Shooting method for periodic motions of elastic-plastic friction elements.
 
     Where `half` is set, it is the map over half of one with the sign changed.
 
-    The numbers of a Point are its motion and its turning places; they match those of another one
-    whose turning places are of the same kind. Every group has the elements that it has at the end
+    The unknowns of a PoincarePoint are its motion and its reversal displacements; they match those of another point
+    whose reversal displacements are of the same kind. Every group has the elements that it has at the end
     of the run: they follow from the motion.
     """
 
@@ -162,8 +167,8 @@ class YieldShooting(Shooting):
         self.moved_by = max(moved, 1e-300)
         self.rows = np.maximum(np.abs(period_map.faces).sum(axis=1), 1e-300)
 
-    def map_point(self, point: Point) -> MappedPoint:
-        """Return the map of a Point; raise NotConverged where events accumulate."""
+    def map_point(self, point: PoincarePoint) -> MappedPoint:
+        """Map a state over the period; raise NotConverged where events accumulate."""
         mapping = self.period_map(self.drive, point, self.half)
         n = self.period_map.n
         omega = self.drive.segments[0].omega
@@ -174,11 +179,11 @@ class YieldShooting(Shooting):
             float(magnitudes[:, :n].max()), float(magnitudes[:, n:].max()) / omega, 1e-300
         )
         scale = np.repeat([motion_size, motion_size * omega], n)
-        has_same_numbers = _have_same_numbers(point, mapping.end)
-        if has_same_numbers:
-            scale = np.concatenate([scale, motion_size * self.rows[point.turning_places[0]]])
-            a = point.numbers
-            b = mapping.end.numbers
+        has_same_unknowns = _have_same_unknowns(point, mapping.end)
+        if has_same_unknowns:
+            scale = np.concatenate([scale, motion_size * self.rows[point.stored_reversals[0]]])
+            a = point.unknowns
+            b = mapping.end.unknowns
         return MappedPoint(
             point,
             mapping,
@@ -186,29 +191,29 @@ class YieldShooting(Shooting):
             scale,
             (a - b) / scale,
             motion_size / self.moved_by,
-            has_same_numbers,
-            has_same_numbers and _have_same_elements(point, mapping.end),
+            has_same_unknowns,
+            has_same_unknowns and _have_same_elements(point, mapping.end),
             mapping.kept,
         )
 
-    def step_from(self, mapped_point: MappedPoint, step) -> Point:
-        """Return the Point a step away, with the groups of elements at the end of the map."""
-        return mapped_point.image.end.with_numbers(mapped_point.point.numbers + step)
+    def step_from(self, mapped_point: MappedPoint, step) -> PoincarePoint:
+        """Return the state after a Newton step, with the element groups at the end of the map."""
+        return mapped_point.image.end.with_unknowns(mapped_point.point.unknowns + step)
 
-    def run_from(self, mapped_point: MappedPoint, n_periods: int) -> Point:
-        """Return the Point that a run from the end of a map reaches after some periods."""
-        return self.run(self._next(mapped_point.image), n_periods)
+    def run_from(self, mapped_point: MappedPoint, n_periods: int) -> PoincarePoint:
+        """Return the state after some periods that start at the end of a map."""
+        return self.run(self._make_next_start(mapped_point.image), n_periods)
 
-    def run(self, point: Point, n_periods: int) -> Point:
-        """Return the Point after some periods."""
+    def run(self, point: PoincarePoint, n_periods: int) -> PoincarePoint:
+        """Return the state after some periods."""
         for _ in range(2 * n_periods if self.half else n_periods):
-            point = self._next(self.period_map(self.drive, point, self.half, False))
+            point = self._make_next_start(self.period_map(self.drive, point, self.half, False))
         return point
 
-    def _next(self, mapping: PeriodMapping) -> Point:
-        """Return the end of a map as the start of the next one.
+    def _make_next_start(self, mapping: PeriodMapping) -> PoincarePoint:
+        """Return the end state of a map as the start of the next map.
 
-        For a motion that changes sign, the turning places that no slip has passed are left out, as
+        For a motion that changes sign, the reversal displacements that no slip has passed are left out, as
         if their elements had never slipped.
         """
         if not self.half or not mapping.min_groups.any():
@@ -224,18 +229,18 @@ class YieldShooting(Shooting):
                 memory.group_slide[f, 0] = 0.0
                 memory.group_sign[f, 0] = 0.0
                 memory.n_groups[f] += 1 - n_kept
-        return Point(mapping.end.motion, memory)
+        return PoincarePoint(mapping.end.motion, memory)
 
 
-def _have_same_numbers(point: Point, end: Point) -> bool:
-    """Return whether two Points have the same numbers: turning points of the same kind."""
+def _have_same_unknowns(point: PoincarePoint, end: PoincarePoint) -> bool:
+    """Return whether two states have the same unknowns: as many reversals of the same signs."""
     a = point.memory
     b = end.memory
     return _have_same_groups(a, b, a.group_sign, b.group_sign)
 
 
-def _have_same_elements(point: Point, end: Point) -> bool:
-    """Return whether two Points have equal groups and let the same elements slip."""
+def _have_same_elements(point: PoincarePoint, end: PoincarePoint) -> bool:
+    """Return whether two states have equal element groups and the same slipping elements."""
     a = point.memory
     b = end.memory
     return (
@@ -246,7 +251,7 @@ def _have_same_elements(point: Point, end: Point) -> bool:
 
 
 def _have_same_groups(a: Memory, b: Memory, values, other_values) -> bool:
-    """Return whether two memories have as many groups, and the same values (i, t) of them."""
+    """Return whether two memories have as many element groups with equal values (i, t)."""
     n_groups = a.n_groups.tolist()
     if n_groups != b.n_groups.tolist():
         return False

@@ -1,4 +1,4 @@
-"""Choice of the interfaces that stick after an event, Coulomb friction (compiled).
+"""Choice of the interfaces that stick after an event under Coulomb friction (compiled).
 
 While some interfaces stick, the acceleration is z'' = P a: a is the acceleration without
 their friction, and P projects onto the motions in which they stay at rest; the reactions are the
@@ -20,29 +20,32 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_KERNEL
 from .memory_kernels import RIGID_STIFFNESS, find_tangent, interface_force, is_sticking
 from .positions_kernels import ConstraintStatus
-from .series_kernels import DOUBLE_INTEGRAL, EPS, MotionSeries, MotionStart, expand_motion
+from .series_kernels import DOUBLE_INTEGRAL_FACTORS, EPS, MotionSeries, MotionStart, expand_motion
 
-# fraction of the sum of magnitudes of a term, below which the term counts as round-off
+# Fraction of the sum of the magnitudes in a term, below which the term counts as round-off.
 NOISE_TOL = 64 * EPS
-# factor of NOISE_TOL in a second try, which ill-conditioned rows of interfaces need
+# Factor of NOISE_TOL in a second attempt, which nearly dependent interfaces need.
 LOOSE_NOISE_FACTOR = 1e4
-# number of terms of a power series that may decide a choice; later ones are round-off
-MAX_ORDER = 8
-# largest number of interfaces at rest of which all choices (at most 6561) are tried
+# Number of terms of a power series that may decide between stick and slip; later terms are round-off.
+MAX_DECIDING_ORDER = 8
+# Maximum number of interfaces at rest for which all combinations (at most 6561) are tried.
 MAX_ENUMERATED = 8
-# largest number of exchanges per interface; a solvable choice takes fewer
+# Maximum number of exchanges per interface; a solvable choice takes fewer.
 MAX_EXCHANGES_PER_INTERFACE = 8
-# largest number of sweeps of Jacobi rotations; about five suffice
+# Maximum number of sweeps of Jacobi rotations; about five suffice.
 MAX_JACOBI_SWEEPS = 40
-# length of an orthogonal row over the longest one, below which it is linearly dependent
+# Length of an orthogonalised row over the longest one, below which it is linearly dependent.
 DEPENDENT_TOL = 1e-10
-# remainder of a row after projection over the row, below which the other interfaces hold this one too
+# Length of the remainder of an interface row after projection over that of the row, below which the other sticking
+# interfaces also prevent motion there.
 TIED_TOL = 1e-9
 
 
 @njit(**NJIT_KERNEL)
 def orthogonalise_rows(modal_system, workspace):
-    """Transform the rows of the sticking interfaces until they are orthogonal.
+    """Orthogonalise the participation rows of the sticking interfaces.
+
+    Return the length of the longest orthogonal row.
 
     Returns the length of the longest.
 
@@ -102,7 +105,7 @@ def orthogonalise_rows(modal_system, workspace):
 
 @njit(**NJIT_KERNEL)
 def constrain_slides(modal_system, workspace):
-    """Build the constraint of the interfaces in constraint.is_sticking (i,).
+    """Build the constraint on the modes by the sticking interfaces.
 
     It fills basis, inverse, is_tied and status of `modal_system.Constraint`.
     """
@@ -189,7 +192,7 @@ def remove_sticking_rates(rates, modal_system, workspace):
 
 @njit(**NJIT_KERNEL)
 def correct_sticking_slides(run):
-    """Remove the round-off of sticking interfaces from coordinates and rates.
+    """Remove the round-off motion of sticking interfaces from modal coordinates and rates.
 
     Parameters
     ----------
@@ -218,14 +221,14 @@ def correct_sticking_slides(run):
 
 @njit(**NJIT_KERNEL)
 def estimate_round_off(h, run):
-    """Write the sizes that terms of motion and reactions are added from.
+    """Estimate the magnitudes whose round-off limits the terms of motion and reactions.
 
     Parameters
     ----------
     h : float
         Duration of the piece [s].
     run : RunArrays
-        Its choice.motion_sizes (MAX_ORDER + 2, n) and choice.reaction_sizes (i, MAX_ORDER) are
+        Its choice.motion_sizes (MAX_DECIDING_ORDER + 2, n) and choice.reaction_sizes (i, MAX_DECIDING_ORDER) are
         written.
     """
     motion = run.motion
@@ -241,9 +244,9 @@ def estimate_round_off(h, run):
     for i in range(n):
         choice.motion_sizes[0, i] = abs(motion[0, i])
         choice.motion_sizes[1, i] = abs(h * motion[1, i])
-    for k in range(MAX_ORDER):
-        scale = DOUBLE_INTEGRAL[k + 2] * h_squared
-        damp = DOUBLE_INTEGRAL[k + 2] * h * (k + 1)
+    for k in range(MAX_DECIDING_ORDER):
+        scale = DOUBLE_INTEGRAL_FACTORS[k + 2] * h_squared
+        damp = DOUBLE_INTEGRAL_FACTORS[k + 2] * h * (k + 1)
         for f in range(n_interfaces):
             workspace.friction_accel[f] = 0.0
             if springs[f] < RIGID_STIFFNESS and k == 0:
@@ -281,8 +284,8 @@ def estimate_round_off(h, run):
 
 
 @njit(**NJIT_KERNEL)
-def leading_slip_term(interface, sign, noise, modal_system, workspace):
-    """Find the first term of the slip speed above round-off.
+def find_leading_slip_term(interface, sign, noise, modal_system, workspace):
+    """Find the first term of the slip velocity of an interface above round-off.
 
     Parameters
     ----------
@@ -297,11 +300,11 @@ def leading_slip_term(interface, sign, noise, modal_system, workspace):
     Returns
     -------
     order : float
-        MAX_ORDER where there is none.
+        MAX_DECIDING_ORDER where there is none.
     sign : float
         0 where there is none.
     """
-    for k in range(1, MAX_ORDER):
+    for k in range(1, MAX_DECIDING_ORDER):
         rate = 0.0
         size = 0.0
         for i in range(len(modal_system.omega_squared)):
@@ -311,12 +314,14 @@ def leading_slip_term(interface, sign, noise, modal_system, workspace):
             )
         if abs(rate) > noise * size:
             return float(k), 1.0 if sign * rate > 0 else -1.0
-    return float(MAX_ORDER), 0.0
+    return float(MAX_DECIDING_ORDER), 0.0
 
 
 @njit(**NJIT_KERNEL)
-def leading_margin_term(interface, side, noise, limit, workspace):
-    """Find the first term of limit - side reaction above round-off.
+def find_leading_margin_term(interface, side, noise, limit, workspace):
+    """Find the first term above round-off of the margin between reaction and limit.
+
+    The margin is limit - side times reaction.
 
     Parameters
     ----------
@@ -332,11 +337,11 @@ def leading_margin_term(interface, side, noise, limit, workspace):
     Returns
     -------
     order : float
-        MAX_ORDER where there is none.
+        MAX_DECIDING_ORDER where there is none.
     sign : float
         0 where there is none.
     """
-    for k in range(MAX_ORDER):
+    for k in range(MAX_DECIDING_ORDER):
         gap = -side * workspace.constraint.reactions[interface, k]
         size = workspace.choice.reaction_sizes[interface, k]
         if k == 0:
@@ -344,12 +349,12 @@ def leading_margin_term(interface, side, noise, limit, workspace):
             size = size + limit
         if abs(gap) > noise * size:
             return float(k), 1.0 if gap > 0 else -1.0
-    return float(MAX_ORDER), 0.0
+    return float(MAX_DECIDING_ORDER), 0.0
 
 
 @njit(**NJIT_KERNEL)
 def find_violation(noise, h, run):
-    """Return the first interface that violates the law under the guess, and the violation.
+    """Return the first interface that violates Coulomb's law under the guess, and how.
 
     Interfaces in choice.is_resting have no velocity. The memory, force and stiffness are left as
     they are under the guess, and choice.orders as the search for the next event needs them.
@@ -387,7 +392,7 @@ def find_violation(noise, h, run):
         choice.orders[f, 1] = 0.0
     start = MotionStart(motion[0], motion[1], memory.force)
     series = MotionSeries(workspace.drive[0], workspace.coefficients)
-    expand_motion(start, series, h, MAX_ORDER + 1, modal_system, workspace)
+    expand_motion(start, series, h, MAX_DECIDING_ORDER + 1, modal_system, workspace)
     estimate_round_off(h, run)
     for f in range(n_interfaces):
         if (
@@ -397,7 +402,7 @@ def find_violation(noise, h, run):
         ):
             continue
         if memory.rigid_state[f] != 0.0:
-            order, sign = leading_slip_term(
+            order, sign = find_leading_slip_term(
                 f, memory.rigid_state[f], noise, modal_system, workspace
             )
             if sign <= 0.0:
@@ -405,7 +410,7 @@ def find_violation(noise, h, run):
             choice.orders[f, 0] = order
             continue
         for side in (1, -1):
-            order, sign = leading_margin_term(f, side, noise, table.static_limit[f], workspace)
+            order, sign = find_leading_margin_term(f, side, noise, table.static_limit[f], workspace)
             if sign < 0.0:
                 return f, side
             if sign > 0.0:
@@ -415,7 +420,9 @@ def find_violation(noise, h, run):
 
 @njit(**NJIT_KERNEL)
 def choose_by_exchange(noise, h, run):
-    """Exchange the first interface that violates the law, until none does.
+    """Choose the sticking interfaces by exchanging the first one that violates Coulomb's law.
+
+    It ends when none violates the law.
 
     This is the rule of least index (Murty, Opsearch 11, 148, 1974). It ends with the only solution
     wherever the complementarity problem has a P-matrix, also over power series in time, which are
@@ -446,7 +453,7 @@ def choose_by_exchange(noise, h, run):
 
 @njit(**NJIT_KERNEL)
 def choose_by_enumeration(noise, h, run):
-    """Try all choices of the interfaces at rest, those with few slipping first.
+    """Choose the sticking interfaces by trying all combinations, those with few slipping first.
 
     Parameters
     ----------
@@ -527,7 +534,9 @@ def choose_sticks(h, run):
 
 @njit(**NJIT_KERNEL)
 def find_resting_interfaces(u, piece, run):
-    """Find the interfaces with rigid elements that have no velocity at u of a piece.
+    """Find the interfaces with rigid elements that have no velocity at an instant.
+
+    The instant is the fraction u of a time interval.
 
     They are those that stick and those whose speed is round-off; choice.is_resting and
     choice.slip_signs are written.

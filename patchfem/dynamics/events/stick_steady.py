@@ -1,4 +1,4 @@
-"""Periodic motion behind rigid elements (Coulomb friction), or none, by shooting.
+"""Periodic motion under Coulomb friction or without friction, by shooting.
 
 Newton's method finds the fixed point of the map over a period.
 
@@ -18,15 +18,15 @@ import numpy as np
 from ...core import InitialState, ModalBasis, PatchfemError, frozen_array
 from ..periodic import MappedPoint, MotionGrows, Shooting
 from . import histories
-from .positions_kernels import BEGIN, N_COLUMNS, Column, Row
+from .positions_kernels import N_COLUMNS, ROW_BEGIN, Column, Row
 
-# periods of a run where Newton's method leads away from the periodic motion
+# Maximum number of periods of the run that replaces Newton's method where it leads away from the periodic motion.
 MAX_APPROACH_PERIODS = 400
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CoulombSteadyState:
-    """A periodic motion under Coulomb friction.
+    """Periodic motion under Coulomb friction.
 
     - start: state at phase 0 of the drive
     - residual: |state after a period - start| over the size of the motion
@@ -52,15 +52,15 @@ class CoulombSteadyState:
 
 
 class CoulombPeriodMapping(NamedTuple):
-    """Image of a state (2n,) under the map over some periods.
+    """Image of a state (2n,) under the map over some periods of the drive.
 
     - end: the state at the end
     - slope: (2n, 2n) derivative of the map
     - signs: (k, i) signs of slip in the phases between events
-    - rubs: (i,) whether the interface has friction
-    - swing: half the range of the output [m]
+    - has_friction: (i,) whether the interface has friction
+    - output_amplitude: half the range of the output [m]
     - sizes: (2n,) sizes of the state on the way
-    - first: (n, n) projector of the first phase onto motions that leave the sticking interfaces
+    - first_projector: (n, n) projector of the first phase onto motions that leave the sticking interfaces
       alone
     - alone: see `SteadyState`
     """
@@ -68,15 +68,15 @@ class CoulombPeriodMapping(NamedTuple):
     end: np.ndarray
     slope: np.ndarray
     signs: np.ndarray
-    rubs: np.ndarray
-    swing: float
+    has_friction: np.ndarray
+    output_amplitude: float
     sizes: np.ndarray
-    first: np.ndarray
+    first_projector: np.ndarray
     alone: bool
 
 
 class LinearPhase:
-    """Motion from one event to the next, in which the same interfaces stick.
+    """Linear motion from one event to the next, in which the same interfaces stick.
 
     run: the run; row: first row of the phase; span: duration [s].
     """
@@ -88,38 +88,40 @@ class LinearPhase:
         self.run = run
         self.row = row
         self.span = span
-        at = run._column(0, 0)
+        at = run._column_index(0, 0)
         columns = row[at:].reshape(len(run.groups), N_COLUMNS)
-        self.held = np.isinf(columns[:, Column.STIFFNESS])
+        self.is_sticking = np.isinf(columns[:, Column.STIFFNESS])
         self.signs = columns[:, Column.DIRECTION]
-        rows = modal_system.interfaces[self.held]
-        self.pinv = np.linalg.pinv(rows, rcond=1e-10)
-        self.project = np.eye(n) - self.pinv @ rows
-        if len(rows) and np.abs(self.project).max() < 1e-9:
-            self.project = np.zeros((n, n))
-        self.given = (
-            np.where(self.held, 0.0, columns[:, Column.FORCE])
+        rows = modal_system.interfaces[self.is_sticking]
+        self.pseudo_inverse = np.linalg.pinv(rows, rcond=1e-10)
+        self.projector = np.eye(n) - self.pseudo_inverse @ rows
+        if len(rows) and np.abs(self.projector).max() < 1e-9:
+            self.projector = np.zeros((n, n))
+        self.friction_accel = (
+            np.where(self.is_sticking, 0.0, columns[:, Column.FORCE])
             @ modal_system.interfaces
             / modes.mass
         )
-        self.square = np.diag(modes.omega**2)
-        self.dampers = np.asarray(modes.damping_matrix, float)
+        self.stiffness_matrix = np.diag(modes.omega**2)
+        self.damping_matrix = np.asarray(modes.damping_matrix, float)
 
     def slope(self) -> np.ndarray:
         """Return the derivative (2n, 2n) of the end state with respect to the start state."""
-        n = len(self.square)
-        p = self.project
-        system_matrix = np.block([[np.zeros((n, n)), p], [-p @ self.square, -p @ self.dampers]])
-        return exponentiate_modal_matrix(system_matrix * self.span) @ self.taken_out()
+        n = len(self.stiffness_matrix)
+        p = self.projector
+        system_matrix = np.block(
+            [[np.zeros((n, n)), p], [-p @ self.stiffness_matrix, -p @ self.damping_matrix]]
+        )
+        return exponentiate_modal_matrix(system_matrix * self.span) @ self.stick_projection()
 
-    def taken_out(self) -> np.ndarray:
-        """Return the derivative (2n, 2n) of a state whose sticking interfaces come to rest."""
-        out = np.eye(2 * len(self.square))
-        out[len(self.square) :, len(self.square) :] = self.project
-        return out
+    def stick_projection(self) -> np.ndarray:
+        """Return the projection (2n, 2n) of a state that removes rates of sticking interfaces."""
+        projection = np.eye(2 * len(self.stiffness_matrix))
+        projection[len(self.stiffness_matrix) :, len(self.stiffness_matrix) :] = self.projector
+        return projection
 
     def acceleration(self, z, v, drive: float) -> tuple:
-        """Return the modal accelerations with and without the reactions.
+        """Return the modal accelerations with and without the reactions of sticking interfaces.
 
         Parameters
         ----------
@@ -127,7 +129,7 @@ class LinearPhase:
             (n,) coordinates [m].
         v : ndarray
             (n,) rates [m/s].
-        push : float
+        drive : float
             Drive [m s-2].
 
         Returns
@@ -136,18 +138,21 @@ class LinearPhase:
             (n,) [m s-2].
         """
         free_acceleration = (
-            -self.square @ z - self.dampers @ v - self.run.modes.base * drive - self.given
+            -self.stiffness_matrix @ z
+            - self.damping_matrix @ v
+            - self.run.modes.base * drive
+            - self.friction_accel
         )
-        return self.project @ free_acceleration, free_acceleration
+        return self.projector @ free_acceleration, free_acceleration
 
     def saltation(self, later: "LinearPhase") -> tuple:
-        """Return the saltation matrix of the event at the end.
+        """Return the saltation matrix (2n, 2n) of the event at the end of this phase.
 
         The second value tells whether only one interface changed.
         """
         run = self.run
         modes = self.run.modes
-        n = len(self.square)
+        n = len(self.stiffness_matrix)
         row = later.row
         z = row[Row.MOTION : Row.MOTION + n]
         v = row[Row.MOTION + n : Row.MOTION + 2 * n]
@@ -157,7 +162,7 @@ class LinearPhase:
         before, free_acceleration = self.acceleration(z, v, drive)
         changed = self.signs != later.signs
         interface, stops = _identify_event(
-            self, later, changed, modes.mass * free_acceleration @ self.pinv
+            self, later, changed, modes.mass * free_acceleration @ self.pseudo_inverse
         )
         gradient = np.zeros(2 * n)
         static = run.table.static_limit[interface]
@@ -166,16 +171,20 @@ class LinearPhase:
             gradient[n:] = run.modal_system.interfaces[interface]
             speed = float(run.modal_system.interfaces[interface] @ before)
         else:
-            reaction_row = self.pinv[:, np.flatnonzero(self.held) == interface][:, 0]
-            gradient[:n] = -reaction_row @ self.square
-            gradient[n:] = -reaction_row @ self.dampers
+            reaction_row = self.pseudo_inverse[:, np.flatnonzero(self.is_sticking) == interface][
+                :, 0
+            ]
+            gradient[:n] = -reaction_row @ self.stiffness_matrix
+            gradient[n:] = -reaction_row @ self.damping_matrix
             speed = float(
                 gradient[:n] @ v + gradient[n:] @ before - reaction_row @ modes.base * drive_rate
             )
         jump = np.zeros(2 * n)
-        if stops or static != kinetic:  # else nothing jumps at a release
+        if (
+            stops or static != kinetic
+        ):  # Without a difference of the limits nothing jumps at a release.
             jump[n:] = before - later.acceleration(z, v, drive)[0]
-        matrix = later.taken_out()
+        matrix = later.stick_projection()
         if speed != 0:
             matrix -= np.outer(matrix @ jump, gradient) / speed
         changes = (self.signs != 0) & (self.signs != later.signs)
@@ -184,14 +193,14 @@ class LinearPhase:
 
 
 def exponentiate_modal_matrix(matrix) -> np.ndarray:
-    """Return the exponential of a small matrix (2n, 2n) of coordinates and rates.
+    """Return the exponential of a small matrix (2n, 2n) of modal coordinates and rates.
 
     Taylor's series of 2^-s of the matrix, squared s times. SciPy's function starts the threads of
     its linear algebra, which takes up to milliseconds for two rows.
     """
     n = len(matrix) // 2
     sizes = np.abs(matrix)
-    # of rates
+    # The scale balances coordinates and rates.
     scale = np.sqrt(max(float(sizes.max()), 1e-300) / max(float(sizes[:n].max()), 1e-300))
     weight = np.repeat([scale, 1.0], n)
     balanced = matrix * (weight[:, None] / weight)
@@ -215,14 +224,14 @@ def _identify_event(phase: LinearPhase, next_phase: LinearPhase, changed, reacti
     stopped = np.flatnonzero(changed & (phase.signs != 0))
     if stopped.size:
         return int(stopped[0]), True
-    limits = phase.run.table.static_limit[phase.held]
+    limits = phase.run.table.static_limit[phase.is_sticking]
     distance_to_limit = np.abs(np.abs(reactions) / np.maximum(limits, 1e-300) - 1)
-    distance_to_limit[~changed[phase.held]] = np.inf
-    return int(np.flatnonzero(phase.held)[int(np.argmin(distance_to_limit))]), False
+    distance_to_limit[~changed[phase.is_sticking]] = np.inf
+    return int(np.flatnonzero(phase.is_sticking)[int(np.argmin(distance_to_limit))]), False
 
 
 def map_period(modes: ModalBasis, drive, groups, state, periods: int = 1) -> CoulombPeriodMapping:
-    """Map a state over whole periods of the drive, with the derivative.
+    """Map a state over complete periods of the drive, with the derivative.
 
     Parameters
     ----------
@@ -247,7 +256,7 @@ def map_period(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Cou
     collected_rows = []
     run.run_to(periods, lambda rows: collected_rows.append(rows.copy()))
     rows = np.concatenate(collected_rows)
-    borders = np.flatnonzero(rows[1:, Row.BEGIN] >= BEGIN.stick_or_slip) + 1
+    borders = np.flatnonzero(rows[1:, Row.BEGIN] >= ROW_BEGIN.stick_or_slip) + 1
     phases = []
     for first, end in pairwise([0, *borders.tolist(), len(rows)]):
         phases.append(LinearPhase(run, rows[first], float(rows[first:end, Row.DURATION].sum())))
@@ -273,7 +282,7 @@ def map_period(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Cou
         run.table.static_limit > 0,
         float(extremes[:, 1].max() - extremes[:, 0].min()) / 2,
         np.repeat(sizes, n),
-        phases[0].project,
+        phases[0].projector,
         has_single_events,
     )
 
@@ -331,7 +340,7 @@ def solve_steady(
 
 
 class CoulombShooting(Shooting):
-    """Shooting with the map from event to event over periods, see `solve_steady`."""
+    """Shooting method for periodic motions under Coulomb friction, see `solve_steady`."""
 
     def __init__(self, modes: ModalBasis, drive, groups, periods: int = 1):
         self.modes = modes
@@ -344,7 +353,7 @@ class CoulombShooting(Shooting):
         )
 
     def map_point(self, point) -> MappedPoint:
-        """Return the map of a state (2n,)."""
+        """Map a state (2n,) over the periods."""
         mapping = map_period(self.modes, self.drive, self.groups, point, self.periods)
         return MappedPoint(
             point,
@@ -356,14 +365,14 @@ class CoulombShooting(Shooting):
         )
 
     def step_from(self, mapped_point: MappedPoint, step):
-        """Return the state a step away, in which the sticking interfaces stay at rest."""
+        """Return the state after a Newton step, in which the sticking interfaces stay at rest."""
         n = self.modes.omega.size
-        out = mapped_point.point + step
-        out[n:] = mapped_point.image.first @ out[n:]
-        return out
+        state = mapped_point.point + step
+        state[n:] = mapped_point.image.first_projector @ state[n:]
+        return state
 
     def run_from(self, mapped_point: MappedPoint, n_periods: int):
-        """Return the state that a run from that of a map reaches after some periods."""
+        """Return the state after some periods that begin at a mapped state."""
         return self.run(mapped_point.point, n_periods)
 
     def run(self, state, n_periods: int):
@@ -382,7 +391,7 @@ def _make_steady(mapped_point: MappedPoint, n: int, regime, used: int) -> Coulom
     is_stop = (mapping.signs[:-1] != 0) & (mapping.signs[1:] == 0)
     stops = tuple(np.count_nonzero(is_stop, axis=0).tolist())
     if regime is None:
-        signs = mapping.signs[:, mapping.rubs]
+        signs = mapping.signs[:, mapping.has_friction]
         max_stops = max(stops)
         slips = bool(np.any(signs != 0)) or signs.shape[1] == 0
         rests = bool(np.any(signs == 0))
@@ -396,7 +405,7 @@ def _make_steady(mapped_point: MappedPoint, n: int, regime, used: int) -> Coulom
         InitialState(frozen_array(state[:n]), frozen_array(state[n:])),
         mapped_point.max_residual,
         frozen_array(mapped_point.multipliers(), complex),
-        mapping.swing,
+        mapping.output_amplitude,
         regime,
         stops,
         mapping.alone,

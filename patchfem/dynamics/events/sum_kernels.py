@@ -1,4 +1,4 @@
-"""Energies and phasor of a piece of the motion, summed by Gauss points (compiled)."""
+"""Energies and output phasor of a time interval, integrated by Gauss points (compiled)."""
 
 from math import cos, pi, sin
 
@@ -10,7 +10,7 @@ from .series_kernels import GAUSS_POINTS, GAUSS_WEIGHTS, count_gauss_points, eva
 
 @njit(**NJIT_INLINE)
 def evaluate_at_four(poly, low, top, u):
-    """Return the values of a polynomial at four points, as `evaluate_polynomial` does.
+    """Evaluate a polynomial at four points at once.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def evaluate_at_four(poly, low, top, u):
 
 @njit(**NJIT_INLINE)
 def evaluate_rates_at_four(coefs, i, top, u):
-    """Return the derivatives of a coordinate with respect to u at four points.
+    """Evaluate the derivative of a modal coordinate with respect to u at four points at once.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def evaluate_rates_at_four(coefs, i, top, u):
 
 @njit(**NJIT_INLINE)
 def add_piece_sums(u, piece, run):
-    """Add drive work, viscous loss and output phasor of a piece up to u to the sums.
+    """Add drive work, viscous loss and output phasor of part of a time interval to the sums.
 
     Four points are evaluated at a time, in registers.
 
@@ -92,7 +92,7 @@ def add_piece_sums(u, piece, run):
     work = 0.0
     loss = 0.0
     power_size = 0.0
-    for g in range(0, count, 4):  # four points at a time in registers
+    for g in range(0, count, 4):  # Four points at a time fit the vector registers.
         place = (
             u * GAUSS_POINTS[count, g],
             u * GAUSS_POINTS[count, g + 1],

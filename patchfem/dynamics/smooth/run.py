@@ -14,7 +14,7 @@ from ...friction.laws.stretch import unpack_bonds
 from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import choose_samples_per_cycle
 from ..events.modal_system import drive_segments
-from ..events.positions_kernels import KIND, Segment
+from ..events.positions_kernels import SEGMENT_KIND, Segment
 from ..integrated import make_histories
 from ..march.march import MarchResult
 from ..periodicity import FIRST_CHECK, bound_remaining_change
@@ -356,7 +356,9 @@ class Motion:
         """Return whether the drive ends in a sine of its own period."""
         last = self.arrays.segments[-1]
         has_period = abs(last[Segment.OMEGA] * self.drive.period / (2 * np.pi) - 1) < 1e-12
-        return last[Segment.KIND] == KIND.sine and last[Segment.AMPLITUDE] != 0 and has_period
+        return (
+            last[Segment.KIND] == SEGMENT_KIND.sine and last[Segment.AMPLITUDE] != 0 and has_period
+        )
 
     def _measure_change(self, last) -> float:
         """Return the largest relative change since the state `last` (N,), at least the tolerance.

@@ -325,7 +325,7 @@ def _python_seconds(model: Model) -> float:
     Cells of a slider density are not merged.
     """
     count, stiffness = expected_elements(model)
-    each = events_cost.python_seconds(
+    each = events_cost.estimate_cycle_time(
         model.rig.modes, model.rig.drive.signal, stiffness, count if stiffness else 0
     )
     return model.rig.drive.cycles * each * 2 ** count_merges(model)
@@ -334,10 +334,10 @@ def _python_seconds(model: Model) -> float:
 def _is_loop_kept(model: Model) -> bool:
     """Return whether machine code of the event loop is cached for the modes of a rig."""
     from ...dynamics.events.histories import (
-        is_loop_kept,  # imported here because a plan does not need the engine otherwise
+        is_loop_cached,  # imported here because a plan does not need the engine otherwise
     )
 
-    return is_loop_kept(model.rig.modes, model.rig.drive.signal)
+    return is_loop_cached(model.rig.modes, model.rig.drive.signal)
 
 
 def kept_samples(numerics) -> float:

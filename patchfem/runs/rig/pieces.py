@@ -238,7 +238,7 @@ class PieceReader(Reader):
 
         Parameters
         ----------
-        run : PieceRun
+        run : EventRunResult
         motion : Response
             Part of its histories.
         drive
@@ -376,7 +376,7 @@ def find_steady_motion(modes, drive, groups, done) -> tuple | None:
         Drive.
     groups : tuple
         Elements of every interface.
-    done : PieceRun
+    done : EventRunResult
 
     Returns
     -------
@@ -521,12 +521,12 @@ def measures_from_reading(
     dict
         NaN for a measure that a run does not have.
     """
-    none = np.full(np.shape(reading.swing), np.nan)[()]
+    none = np.full(np.shape(reading.output_amplitude), np.nan)[()]
     has_waves = sine and whole
-    first, third = reading.waves
+    first, third = reading.acceleration_harmonics
     loop = reading.loop()
     values = {
-        "relative_displacement_amplitude": reading.swing,
+        "relative_displacement_amplitude": reading.output_amplitude,
         "absolute_acceleration_peak": reading.acceleration,
         "absolute_acceleration_fundamental": first if has_waves else none,
         "acceleration_distortion": distortion_ratio(first, third, size) if has_waves else none,

@@ -189,7 +189,7 @@ def test_exact_rigid_block_that_slides(friction):
 def test_exact_a_million_cycles_without_drift(cycles, monkeypatch):
     """Every cycle marched, none counted on: the amplitude, the number of stops and the energy are those of the first
     ones."""
-    monkeypatch.setattr(histories._Run, "_skip_repeating_cycles", lambda self, *given: None)
+    monkeypatch.setattr(histories._EventRun, "_skip_repeating_cycles", lambda self, *given: None)
     done = driven(0.8, cycles=cycles)
     np.testing.assert_allclose(np.abs(done.amplitudes[100:]), 0.28704671337871602595, rtol=1e-12)
     assert done.log.count == 4 * cycles

@@ -18,7 +18,7 @@ from patchfem.core import (
     PatchfemError,
     SineDrive,
 )
-from patchfem.dynamics import BORDER
+from patchfem.dynamics import DRIVE_CHANGE
 from patchfem.dynamics.events.event_list import RELEASE, STOP
 from patchfem.dynamics.events.positions_kernels import N_COLUMNS, Column, Row
 from patchfem.response import energy_balance
@@ -90,7 +90,7 @@ def test_exact_steps_and_sines_in_turn_against_dop853():
         np.testing.assert_allclose([s(0.0) for s in found[k].modal], z, atol=1e-9)
     done = simulate(modes, drive, static, static, 5.0, 2)
     assert energy_balance(done.ledger) < 1e-10
-    assert np.count_nonzero(done.log.kind == BORDER) == 3
+    assert np.count_nonzero(done.log.kind == DRIVE_CHANGE) == 3
 
 
 def test_order_dependent_interfaces_against_a_march():
@@ -269,7 +269,7 @@ def choice_at_rest(seed, n, faces, ratio):
     )
     accel = rows @ (pull - forces @ rows / modes.mass)
     assert np.all(np.abs(forces) <= static * (1 + 1e-9))
-    ways = first[0, one._column(0, Column.DIRECTION) :: N_COLUMNS]
+    ways = first[0, one._column_index(0, Column.DIRECTION) :: N_COLUMNS]
     for c, sign in enumerate(ways):
         if sign:
             assert sign * accel[c] > 0 and forces[c] == pytest.approx(
@@ -418,11 +418,11 @@ def test_exact_coordinates_stay_on_the_stuck_slide():
     modes = basis_of([0.0, 1.4], 0.1, [[h, -0.6]], (-h, -0.8))
     one, rows = rows_of(modes, drives.make_levels([4.0, 0.3], 1.14, 3), 1.5, 1.5, 300)
     rows = rows[rows[:, Row.CYCLE] >= 20]
-    held = rows[0, one._column(0, Column.SLIDE)]
+    held = rows[0, one._column_index(0, Column.SLIDE)]
     z = rows[:, Row.MOTION : Row.MOTION + 2]
     assert (
-        not rows[:, one._column(0, Column.DIRECTION)].any()
-        and np.all(rows[:, one._column(0, Column.SLIDE)] == held)
+        not rows[:, one._column_index(0, Column.DIRECTION)].any()
+        and np.all(rows[:, one._column_index(0, Column.SLIDE)] == held)
         and abs(held) > 0.1
     )
     assert np.abs(z @ modes.interfaces[0] - held).max() < 4e-16 * np.abs(z).max()

@@ -98,7 +98,7 @@ def test_exact_random_rigs_against_long_runs(seed, cycles):
     rest = 1 - np.abs(found.multipliers).max()
     # it repeats
     assert np.abs(end - np.concatenate([before.z, before.v])).max() < 5e-10 * size * rest
-    assert found.amplitude == pytest.approx(long.swing, rel=1e-9)
+    assert found.amplitude == pytest.approx(long.output_amplitude, rel=1e-9)
     assert np.abs(mine.start.v - long.end[0].v).max() < 1e-9 * size * drive.omega
     assert max(found.residual, mine.residual) < 1e-12
     assert np.abs(found.multipliers[0]) == pytest.approx(np.abs(mine.multipliers[0]), abs=1e-6)
@@ -109,7 +109,7 @@ def test_exact_random_rigs_against_long_runs(seed, cycles):
 def test_exact_two_interfaces_against_a_long_run():
     found = steady(PAIR, SineDrive(1.0, 1.4), TWO)
     long = simulate(PAIR, SineDrive(1.0, 1.4), TWO, 400, window=1)
-    assert found.amplitude == pytest.approx(long.swing, rel=1e-12)
+    assert found.amplitude == pytest.approx(long.output_amplitude, rel=1e-12)
     again = simulate(
         PAIR, SineDrive(1.0, 1.4), TWO, 20, window=1, start=found.start, memory=found.memory
     )
@@ -120,10 +120,10 @@ def test_exact_two_interfaces_against_a_long_run():
 def columns(one, drive, point, half, step):
     """Derivative of a map by central differences."""
     out = []
-    for k in range(point.numbers.size):
-        move = step * np.eye(point.numbers.size)[k]
+    for k in range(point.unknowns.size):
+        move = step * np.eye(point.unknowns.size)[k]
         ends = [
-            one(drive, point.with_numbers(point.numbers + side * move), half, False).end.numbers
+            one(drive, point.with_unknowns(point.unknowns + side * move), half, False).end.unknowns
             for side in (1, -1)
         ]
         out.append((ends[0] - ends[1]) / (2 * step))
@@ -142,7 +142,7 @@ def test_order_the_derivative_is_that_of_finite_differences(rig, half):
     one = PeriodMap(modes, groups)
     found = steady(modes, drive, groups)
     slope = one(drive, found.point, half).slope
-    assert slope.shape == (found.point.numbers.size,) * 2 and slope.shape[0] > 2 * modes.omega.size
+    assert slope.shape == (found.point.unknowns.size,) * 2 and slope.shape[0] > 2 * modes.omega.size
     # between two events the map is a sum of sines and exponentials: differences are of second order
     misses = [
         np.abs(columns(one, drive, found.point, half, step) - slope).max() for step in (4e-6, 2e-6)
@@ -201,7 +201,7 @@ def test_exact_a_last_step_that_forgets_a_turn_ends_the_search():
     done = simulate(modes, drive, groups, 40, window=4)
     one = settled(modes, drive, groups, *done.end)
     on = simulate(modes, drive, groups, 2, window=1, start=one.start, memory=one.memory)
-    assert one.amplitude == pytest.approx(on.swing, rel=1e-9)
+    assert one.amplitude == pytest.approx(on.output_amplitude, rel=1e-9)
     np.testing.assert_allclose(
-        [on.end[0].z, on.end[0].v], [one.start.z, one.start.v], atol=1e-9 * on.swing
+        [on.end[0].z, on.end[0].v], [one.start.z, one.start.v], atol=1e-9 * on.output_amplitude
     )

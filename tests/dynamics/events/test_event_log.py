@@ -37,7 +37,7 @@ def test_exact_borders_of_levels_are_listed():
     modes = one_mode(0.05)
     drive = make_levels([1.0, 2.0, 0.5, 1.5], 0.9, 3)
     log = event_run.simulate(modes, drive, 0.6, 0.6, 12, 2).log
-    assert log.time[log.kind == event_list.BORDER] == pytest.approx(
+    assert log.time[log.kind == event_list.DRIVE_CHANGE] == pytest.approx(
         2 * np.pi / 0.9 * np.array([3, 6, 9])
     )
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patchfem.core import InitialState, Outcome
-from patchfem.dynamics import BORDER
+from patchfem.dynamics import DRIVE_CHANGE
 from patchfem.response import energy_balance
 from patchfem.structure.drives import RecordedDrive, SweepDrive
 
@@ -132,7 +132,7 @@ def test_exact_stiff_face_slides_once_a_record_passes_its_limit():
 
 def test_exact_the_end_of_a_record_is_a_border_where_it_jumps():
     done = simulate(basis_of([1.0]), record(4), 5.0, 5.0, 8.0, 2)
-    assert list(done.log.kind) == [BORDER] and done.log.time[0] == pytest.approx(30.0)
+    assert list(done.log.kind) == [DRIVE_CHANGE] and done.log.time[0] == pytest.approx(30.0)
 
 
 def test_always_the_energy_of_a_sweep_and_a_record_balances():

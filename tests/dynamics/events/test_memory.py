@@ -31,7 +31,7 @@ class Follower:
         memory = self.memory
         way = 1.0 if slide > self.memory.slide[0] else -1.0
         if memory.n_slipping[0] and memory.direction[0] != way:
-            kernels.store_turning_point.py_func(0, memory)
+            kernels.store_reversal.py_func(0, memory)
         while (
             way * (at := kernels.next_yield_slide.py_func(0, way, self.table, memory))
             <= way * slide

@@ -41,7 +41,7 @@ def test_exact_readings_are_those_of_a_marched_period(seed):
     )
     assert np.array_equal(seen.point.motion, one.point.motion)
     assert seen.acceleration == pytest.approx(done.acceleration, rel=1e-10)
-    assert seen.displacement == pytest.approx(gauged.swing, rel=1e-10)
+    assert seen.displacement == pytest.approx(gauged.output_amplitude, rel=1e-10)
     moved = -(drive.omega**2) * first_harmonic(done.window, drive.omega) - 1j * drive.acceleration
     assert abs(seen.fundamental - moved) < 1e-7 * abs(moved)  # Simpson's rule on 400 samples
 

@@ -39,8 +39,8 @@ def run_of(modes, drive, groups, cycles=24, window=5) -> tuple:
     """(the run, its rows in the window, what it shows)."""
     run = histories.start_event_run(modes, drive, groups, cycles, window)
     kept = []
-    ended = run._close_rows
-    run._close_rows = lambda late: kept.append(ended(late)) or kept[-1]
+    ended = run._append_end_row
+    run._append_end_row = lambda late: kept.append(ended(late)) or kept[-1]
     done = run.run(0, None)
     return run, kept[0][:-1], done
 
@@ -83,7 +83,7 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
     assert x.span == pytest.approx(span, rel=1e-13) and x.period == drive.period
     turn = np.exp(-1j * drive.omega * time) * weight
     size = np.abs(friction_force).max()
-    for harmonic, wave in zip((1, 3), x.waves):
+    for harmonic, wave in zip((1, 3), x.acceleration_harmonics):
         wanted = (
             2
             / span
@@ -93,7 +93,7 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
     # samples miss the peak
     assert x.acceleration == pytest.approx(np.abs(ends.acceleration).max(), rel=1e-4)
     assert x.acceleration >= np.abs(ends.acceleration).max() * (1 - 1e-13)
-    assert x.swing == pytest.approx(np.ptp(ends.output) / 2, rel=1e-12)
+    assert x.output_amplitude == pytest.approx(np.ptp(ends.output) / 2, rel=1e-12)
     for f, one in enumerate(done.loops):
         slide, rate, force = (out[:, 2 * n + 1 + 6 * f + k] for k in range(3))
         q, pull = (2 / span * np.sum(turn * part) for part in (slide, force))
@@ -156,7 +156,7 @@ def test_exact_a_run_in_brief_shows_what_the_run_shows():
             np.testing.assert_array_equal(two.amplitudes, whole.amplitudes)
             np.testing.assert_array_equal(two.reading.faces, one.reading.faces)
             share = one.reading.span / whole.reading.span
-            for name in ("swing", "acceleration", "start"):
+            for name in ("output_amplitude", "acceleration", "start"):
                 assert getattr(one.reading, name) == pytest.approx(
                     getattr(whole.reading, name), rel=same
                 )

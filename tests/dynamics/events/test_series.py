@@ -10,7 +10,7 @@ series = load_uncompiled("patchfem.dynamics.events.series_kernels")
 
 def test_exact_first_root_of_a_long_series_is_the_first_of_several():
     random = np.random.default_rng(4)
-    rooms = np.zeros((series.MAX_HALVINGS + 2, series.HULL_WIDTH))
+    rooms = np.zeros((series.MAX_HALVINGS + 2, series.N_HULL_COLUMNS))
     later = 0
     for case in range(400):
         places = np.sort(random.uniform(0.02, 1.4, int(random.integers(1, 5))))
@@ -49,12 +49,12 @@ def test_exact_largest_value_of_a_polynomial(seed):
     turns = turns[(abs(turns.imag) < 1e-12) & (turns.real > 0) & (turns.real < 1)].real
     want = np.abs(np.polyval(poly[::-1], np.concatenate([turns, [0.0, 1.0]]))).max()
     found = series.find_largest_magnitude(
-        row, 11, 0.0, np.zeros((series.MAX_HALVINGS + 2, series.HULL_WIDTH))
+        row, 11, 0.0, np.zeros((series.MAX_HALVINGS + 2, series.N_HULL_COLUMNS))
     )
     assert found == pytest.approx(want, rel=1e-13)
     assert (
         series.find_largest_magnitude(
-            row, 11, 2 * want, np.zeros((series.MAX_HALVINGS + 2, series.HULL_WIDTH))
+            row, 11, 2 * want, np.zeros((series.MAX_HALVINGS + 2, series.N_HULL_COLUMNS))
         )
         == 2 * want
     )
