@@ -9,6 +9,7 @@ fits of any model, and `measured_modes` for modes.
 PUBLIC = {
     "least_squares": (
         "Descent",
+        "DescentStorage",
         "Fit",
         "Problem",
         "SearchCounts",

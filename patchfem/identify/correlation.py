@@ -2,13 +2,15 @@
 
 import numpy as np
 
-MIN_ROWS = 20  # number of rows; with fewer, correlation cannot be distinguished from chance
-CHANCE_CORRELATION_FACTOR = 2.0  # standard deviations 1/sqrt(rows); a smaller correlation is chance
-MIN_REPEAT_CORRELATION = 0.5  # correlation of one cycle with the next; cycles with more are repeats
+MIN_ROWS = 20  # smallest number of rows whose correlation can be distinguished from chance
+# standard deviations 1/sqrt(rows) of the correlation of independent rows; a smaller correlation is attributed to chance
+CHANCE_CORRELATION_FACTOR = 2.0
+# correlation of the residuals of successive cycles, above which the cycles count as repetitions of one error
+MIN_REPEAT_CORRELATION = 0.5
 
 
 def estimate_effective_rows(residual) -> float:
-    """Return the number of independent rows that contain as much information as a residual.
+    """Estimate the number of independent rows that are equivalent to a correlated residual.
 
     The number is n/tau with tau = 1 + 2 sum rho_k over the lags k before the first one without
     correlation (Geyer, Statistical Science 7, 473, 1992). If the correlation returns at a later lag,
@@ -39,9 +41,9 @@ def estimate_effective_rows(residual) -> float:
 
 
 def _compute_autocorrelation(r) -> np.ndarray:
-    """Compute the autocorrelation (n,) of r at each lag.
+    """Compute the autocorrelation (n,) of a residual at every lag from 0 to n - 1.
 
-    All products are divided by n, so that the sum over the lags stays finite.
+    The residual r has the mean 0. All products are divided by n, so that the sum over the lags stays finite.
     """
     spectrum = np.fft.rfft(r, 2 * r.size)
     products = np.fft.irfft(spectrum * spectrum.conj())[: r.size]
@@ -51,7 +53,7 @@ def _compute_autocorrelation(r) -> np.ndarray:
 def _compute_repetition_factor(rho, first_lag: int) -> float:
     """Return the factor by which repeated cycles contain less information than independent ones.
 
-    `first_lag` is the first lag without correlation of neighbours.
+    `rho` (n,) is the autocorrelation, and `first_lag` is the first lag without correlation of neighbours.
     """
     n = rho.size
     lags = np.arange(first_lag + 1, n // 2 + 1)

@@ -19,9 +19,10 @@ MAX_SINUSOIDS = 8  # largest number of sinusoids in one fit
 # residual with / without a further sinusoid; above this ratio the sinusoid fits noise
 MAX_RESIDUAL_RATIO = 0.8
 MIN_MISFIT = 1e-9  # residual / record; a smaller residual is round-off
-MIN_LINE_DISTANCE = 3  # spectral lines, 1/T apart for a record of length T, between two sinusoids
+# smallest distance of two sinusoids in spectral lines, which are 1/T apart for a record of length T
+MIN_LINE_DISTANCE = 3
 MIN_AMPLITUDE_RATIO = 0.01  # amplitude / largest amplitude; weaker sinusoids are left out
-# decay rates at which the iteration starts, multiplied by the length of the record
+# decay rates, multiplied by the length of the record, from which the fit of a further sinusoid starts
 START_DECAY_RATES = (0.3, 3.0, 30.0)
 
 
@@ -32,23 +33,27 @@ class Decay:
     - frequency: undamped natural frequencies (n,) [Hz], w/(2 pi) with w^2 = w_r^2 + s_r^2.
     - damping: damping ratios (n,), s_r/w.
     - amplitude: amplitudes (n,) at the first sample.
-    - error: half-widths (n,) of the 95 % intervals of the damping, from the residual.
+    - damping_error: half-widths (n,) of the 95 % intervals of the damping ratios, from the residual.
     - misfit: root mean square of the residual over that of the record.
     """
 
     frequency: np.ndarray
     damping: np.ndarray
     amplitude: np.ndarray
-    error: np.ndarray
+    damping_error: np.ndarray
     misfit: float
 
     def decrement(self) -> np.ndarray:
-        """Return the logarithmic decrements (n,), 2 pi zeta / sqrt(1 - zeta^2)."""
+        """Return the logarithmic decrements (n,) of the sinusoids, 2 pi zeta / sqrt(1 - zeta^2)."""
         return 2 * np.pi * self.damping / np.sqrt(1 - self.damping**2)
 
 
 class _RefinedPoles(NamedTuple):
-    """Poles (2n,) w_1, s_1, w_2, ..., and the residual (k,) of the fit with them."""
+    """Poles of the sinusoids of a free decay, and the residual of the fit with these poles.
+
+    - poles: damped frequency [rad/s] and decay rate [1/s] of each sinusoid in turn, w_1, s_1, w_2, ... (2n,).
+    - residual: model minus data (k,).
+    """
 
     poles: np.ndarray
     residual: np.ndarray
@@ -60,7 +65,7 @@ class _RefinedPoles(NamedTuple):
 
 
 def fit_decay(time, value) -> Decay:
-    """Fit sinusoids to a free decay.
+    """Fit exponentially decaying sinusoids to a free decay.
 
     Parameters
     ----------
@@ -83,32 +88,33 @@ def fit_decay(time, value) -> Decay:
             f"the free decay has {time.size} samples; at least {MIN_SAMPLES} are needed"
         )
     time = time - time[0]
-    best = _RefinedPoles(np.empty(0), value - value.mean())
-    size = best.rms
-    while best.poles.size < 2 * MAX_SINUSOIDS and best.rms > MIN_MISFIT * size:
+    best_fit = _RefinedPoles(np.empty(0), value - value.mean())
+    record_rms = best_fit.rms
+    while best_fit.poles.size < 2 * MAX_SINUSOIDS and best_fit.rms > MIN_MISFIT * record_rms:
         attempts = []
-        for start in _find_starts(time, best):
-            attempt = _refine_poles(time, value, np.append(best.poles, start))
+        for start in _find_starts(time, best_fit):
+            attempt = _refine_poles(time, value, np.append(best_fit.poles, start))
             if _are_distinct(time, attempt.poles):
                 attempts.append(attempt)
         if not attempts:
             break
         attempt = min(attempts, key=lambda attempt: np.linalg.norm(attempt.residual))
-        if attempt.rms > MAX_RESIDUAL_RATIO * best.rms:
+        if attempt.rms > MAX_RESIDUAL_RATIO * best_fit.rms:
             break
-        best = attempt
-    if not best.poles.size:
+        best_fit = attempt
+    if not best_fit.poles.size:
         raise PatchfemError("the record contains no decaying oscillation")
-    return _make_decay(time, value, best.poles, best.rms / size)
+    return _make_decay(time, value, best_fit.poles, best_fit.rms / record_rms)
 
 
 def _make_decay(time, value, poles, misfit: float) -> Decay:
-    """Turn poles into natural frequencies and damping ratios with their errors."""
+    """Convert fitted poles to natural frequencies and damping ratios with their errors."""
     damped_omega = poles[0::2]
     rate = poles[1::2]
     columns = _compute_columns(time, poles)
     linear = project_data(columns, value)
-    pairs = linear.coefficients[1:].reshape(-1, 2)
+    # column 0 is the constant; then every sinusoid has a cosine and a sine
+    cos_sin_coefficients = linear.coefficients[1:].reshape(-1, 2)
     motions = columns * linear.coefficients
     energy = np.sum((motions[:, 1::2] + motions[:, 2::2]) ** 2, axis=0)
     is_kept = (rate > 0) & (energy > MIN_AMPLITUDE_RATIO**2 * energy.max())
@@ -125,14 +131,14 @@ def _make_decay(time, value, poles, misfit: float) -> Decay:
     return Decay(
         frequency=(w / (2 * np.pi))[order],
         damping=(rate / w)[order],
-        amplitude=np.hypot(*pairs.T)[order],
-        error=(1.96 * errors[1::2] / w)[order],
+        amplitude=np.hypot(*cos_sin_coefficients.T)[order],
+        damping_error=(1.96 * errors[1::2] / w)[order],
         misfit=float(misfit),
     )
 
 
 def _are_distinct(time, poles) -> bool:
-    """Return whether all sinusoids differ in frequency and oscillate faster than they decay."""
+    """Return whether all fitted sinusoids differ in frequency and oscillate faster than they decay."""
     damped_omega = poles[0::2]
     distances = np.diff(np.sort(damped_omega))
     are_apart = (distances >= MIN_LINE_DISTANCE * 2 * np.pi / time[-1]).all()
@@ -140,7 +146,10 @@ def _are_distinct(time, poles) -> bool:
 
 
 def _compute_columns(time, poles) -> np.ndarray:
-    """Compute the columns (k, 1 + 2n) of the linear problem: 1, cosine and sine of each pole."""
+    """Compute the design matrix of a decay fit: a constant, and two sinusoids for each pole.
+
+    The columns (k, 1 + 2n) are 1, and the decaying cosine and sine of each pole.
+    """
     columns = [np.ones(time.size)]
     for omega, rate in poles.reshape(-1, 2):
         envelope = np.exp(-np.clip(rate * time, -50.0, 700.0))
@@ -149,26 +158,26 @@ def _compute_columns(time, poles) -> np.ndarray:
 
 
 def _compute_derivatives(time, columns, linear: Projection) -> np.ndarray:
-    """Compute the derivatives (k, 2n) of the residual with respect to the poles."""
-    slopes = []
+    """Compute the derivatives (k, 2n) of the residual of a decay fit with respect to its poles."""
+    derivatives = []
     for k in range(1, columns.shape[1], 2):
         cosine, sine = columns[:, k : k + 2].T
         a, b = linear.coefficients[k : k + 2]
-        slopes += [time * (b * cosine - a * sine), -time * (a * cosine + b * sine)]
-    return linear.jacobian(np.stack(slopes, axis=1))
+        derivatives += [time * (b * cosine - a * sine), -time * (a * cosine + b * sine)]
+    return linear.jacobian(np.stack(derivatives, axis=1))
 
 
 def _refine_poles(time, value, poles) -> _RefinedPoles:
-    """Minimize the residual from a start."""
+    """Minimize the residual of a decay fit over its poles, from starting poles (2n,)."""
 
-    def slopes(poles) -> np.ndarray:
+    def compute_jacobian(poles) -> np.ndarray:
         columns = _compute_columns(time, poles)
         return _compute_derivatives(time, columns, project_data(columns, value))
 
     result = least_squares(
         lambda p: project_data(_compute_columns(time, p), value).residual,
         poles,
-        slopes,
+        compute_jacobian,
         x_scale="jac",
         xtol=1e-14,
         ftol=1e-14,
@@ -178,19 +187,19 @@ def _refine_poles(time, value, poles) -> _RefinedPoles:
     return _RefinedPoles(result.x, -result.fun)
 
 
-def _find_starts(time, best: _RefinedPoles) -> list:
-    """Return starting poles (w_r, s_r) at the highest spectral line, with several decay rates.
+def _find_starts(time, best_fit: _RefinedPoles) -> list:
+    """Choose starting poles of a further sinusoid at the highest spectral line of the residual.
 
-    Lines near a known sinusoid are left out: what it leaves there is no further mode, but a decay that is
-    not exponential, which the misfit shows.
+    They have several decay rates. Lines near a sinusoid of the fit are left out: its residual there is no
+    further mode, but stems from a decay that is not exponential, which the misfit shows.
     """
-    even = np.linspace(0, time[-1], time.size)
-    n_padded = 4 * even.size
-    duration = n_padded * (even[1] - even[0])
-    lines = np.abs(np.fft.rfft(np.interp(even, time, best.residual), n_padded))
+    even_times = np.linspace(0, time[-1], time.size)
+    n_padded = 4 * even_times.size
+    duration = n_padded * (even_times[1] - even_times[0])
+    lines = np.abs(np.fft.rfft(np.interp(even_times, time, best_fit.residual), n_padded))
     lines[:2] = 0.0
     frequency = np.arange(lines.size) / duration
-    for known, rate in best.poles.reshape(-1, 2) / (2 * np.pi):
-        lines[np.abs(frequency - known) < max(MIN_LINE_DISTANCE / time[-1], rate)] = 0.0
+    for known_frequency, rate in best_fit.poles.reshape(-1, 2) / (2 * np.pi):
+        lines[np.abs(frequency - known_frequency) < max(MIN_LINE_DISTANCE / time[-1], rate)] = 0.0
     omega = 2 * np.pi * int(np.argmax(lines)) / duration
-    return [np.array([omega, decay / time[-1]]) for decay in START_DECAY_RATES]
+    return [np.array([omega, scaled_rate / time[-1]]) for scaled_rate in START_DECAY_RATES]

@@ -10,6 +10,7 @@ the residual follows the input most, as long as each reduces it enough.
 """
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -18,35 +19,37 @@ from scipy.optimize import least_squares
 
 from ..core import PatchfemError
 from ..structure.modal_fit import ModalFit, add_mode
-from .frequency_response import MAX_NYQUIST_FRACTION, Estimate, estimate_response
+from .frequency_response import MAX_NYQUIST_FRACTION, FrequencyResponse, estimate_response
 from .variable_projection import Projection, compute_standard_errors, project_data
 
-# time derivative of the displacement
+# order of the time derivative of the displacement, by the quantity of the response
 DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 MAX_MODES = 12  # largest number of modes in one fit
 # fraction of the residual sum of squares that a further mode must remove
 MIN_RESIDUAL_DECREASE = 0.02
-MIN_RMS_RATIO = 3e-3  # root mean square of a mode / that of the response; weaker modes are left out
+MIN_RMS_RATIO = (
+    3e-3  # root mean square of a mode / that of the response; a weaker mode is not added
+)
 MIN_MISFIT = 1e-8  # residual / response; a smaller residual is round-off
 MAX_START_EVALUATIONS = 12  # evaluations from each start; only the best is refined further
-# samples at both ends that are not fitted, because the transform joins them by a jump
+# number of samples at each end that are not fitted, because the Fourier transform joins the ends by a jump
 N_EDGE_SAMPLES = 32
 # number of samples of a record that are fitted, counted from its beginning
 MAX_FITTED_SAMPLES = 2**16
-MIN_ZETA = 1e-6  # smallest damping ratio
-MAX_ZETA = 0.5  # largest damping ratio
-# widths of a peak at the starts, in spectral lines of a segment
+MIN_ZETA = 1e-6  # lower bound of the damping ratios in the search
+MAX_ZETA = 0.5  # upper bound of the damping ratios in the search
+# widths zeta f of the peak of a further mode from which its fit starts, in spectral lines of a segment
 START_PEAK_WIDTHS = (0.1, 1.0, 5.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DrivenModes:
-    """Modes of one response, in rising order of frequency.
+    """Natural modes fitted to one response and its input, in rising order of frequency.
 
     - frequency: natural frequencies (n,) [Hz].
     - damping: damping ratios (n,).
     - residue: residues A (n,) of sum A / (w_r^2 - w^2 + 2i zeta w_r w).
-    - error: half-widths (n,) of the 95 % intervals of the damping, from the residual.
+    - damping_error: half-widths (n,) of the 95 % intervals of the damping ratios, from the residual.
     - estimate_damping: damping ratios (n,) of a fit to the windowed estimate, nan where it finds no mode.
     - coherence: coherence (n,) at the peaks, or None.
     - misfit: root mean square of the residual over that of the response.
@@ -55,18 +58,30 @@ class DrivenModes:
     frequency: np.ndarray
     damping: np.ndarray
     residue: np.ndarray
-    error: np.ndarray
+    damping_error: np.ndarray
     estimate_damping: np.ndarray
     coherence: np.ndarray | None
     misfit: float
 
 
-class _Columns(NamedTuple):
-    """Columns (k, 3 + 3n) of the linear problem, and derivatives of those of each mode.
+class _ModeColumn(IntEnum):
+    """Columns (k, 3) of one mode in the design matrix, and their coefficients (3,).
 
-    The first three columns do not depend on the modes. Each mode has three: its driven response, and
-    cosine and sine of its free decay. `by_frequency` and `by_damping` hold their derivatives over ln w_r
-    and ln zeta_r.
+    - RESPONSE: response of the mode to the input; its coefficient is the residue.
+    - COSINE, SINE: free decay of the mode.
+    """
+
+    RESPONSE = 0
+    COSINE = 1
+    SINE = 2
+
+
+class _Columns(NamedTuple):
+    """Design matrix of the linear least-squares problem for given modes, with its derivatives.
+
+    - design: columns (k, 3 + 3n). The first three do not depend on the modes: a constant, and the residuals
+      of modes below and above the band. The columns of each mode follow (`_ModeColumn`).
+    - by_frequency, by_damping: derivatives of the columns of each mode with respect to ln w_r and ln zeta_r.
     """
 
     design: np.ndarray
@@ -75,7 +90,11 @@ class _Columns(NamedTuple):
 
 
 class _ModeFit(NamedTuple):
-    """Parameters theta (2n,): ln w_r, then ln zeta_r; and the residual (k,) of their fit."""
+    """Modes fitted to a record, and the residual of this fit.
+
+    - theta: ln w_r of all modes, then ln zeta_r of all modes (2n,).
+    - residual: model minus data (k,).
+    """
 
     theta: np.ndarray
     residual: np.ndarray
@@ -87,7 +106,7 @@ class _ModeFit(NamedTuple):
 
 
 class _ModeProblem:
-    """Separable least-squares problem of an input and its response."""
+    """Least-squares problem of the modes that explain the response of a record by its input."""
 
     def __init__(self, step: float, force, response, derivative: int):
         self.inner = slice(N_EDGE_SAMPLES, force.size - N_EDGE_SAMPLES)
@@ -96,23 +115,23 @@ class _ModeProblem:
         self.force = force
         self.time = (step * np.arange(force.size))[self.inner]
         self.value = response[self.inner]
-        self.size = np.sqrt(np.mean((self.value - self.value.mean()) ** 2))
+        self.response_rms = np.sqrt(np.mean((self.value - self.value.mean()) ** 2))
         self.omega = 2 * np.pi * rfftfreq(force.size, step)
         self.input = (1j * self.omega) ** derivative * rfft(force)
         lower = -self.input / np.maximum(self.omega, self.omega[1]) ** 2
         lower[0] = 0.0
         self.fixed = [
             np.ones(self.time.size),
-            self._transform_back(lower),
-            self._transform_back(self.input),
+            self._inverse_transform(lower),
+            self._inverse_transform(self.input),
         ]
 
-    def _transform_back(self, lines) -> np.ndarray:
-        """Transform spectral lines into the time of the fitted samples."""
-        return irfft(lines, self.samples)[self.inner]
+    def _inverse_transform(self, spectrum) -> np.ndarray:
+        """Transform a spectrum back to the times of the fitted samples."""
+        return irfft(spectrum, self.samples)[self.inner]
 
     def columns(self, theta) -> _Columns:
-        """Compute the columns of the linear problem, and their derivatives."""
+        """Compute the design matrix of the linear problem for given modes, with its derivatives."""
         columns = list(self.fixed)
         by_frequency = []
         by_damping = []
@@ -124,13 +143,17 @@ class _ModeProblem:
             envelope = np.exp(-np.minimum(rate * self.time, 700.0))
             cosine = envelope * np.cos(damped_omega * self.time)
             sine = envelope * np.sin(damped_omega * self.time)
-            columns += [self._transform_back(self.input * pole), cosine, sine]
+            columns += [self._inverse_transform(self.input * pole), cosine, sine]
             motion = (pole, rate, cosine, sine)
-            by_frequency.append(self._derivatives(motion, 2 * w * w + damping, damped_omega))
-            by_damping.append(self._derivatives(motion, damping, -w * z * z * w / damped_omega))
+            by_frequency.append(
+                self._differentiate_columns(motion, 2 * w * w + damping, damped_omega)
+            )
+            by_damping.append(
+                self._differentiate_columns(motion, damping, -w * z * z * w / damped_omega)
+            )
         return _Columns(np.stack(columns, axis=1), by_frequency, by_damping)
 
-    def _derivatives(self, motion: tuple, by_pole, by_omega) -> list:
+    def _differentiate_columns(self, motion: tuple, by_pole, by_omega) -> list:
         """Compute the derivatives of the three columns of a mode with respect to ln w or ln zeta.
 
         `motion` holds its pole, decay rate, cosine and sine. `by_pole` and `by_omega` are the derivatives
@@ -138,20 +161,24 @@ class _ModeProblem:
         """
         pole, rate, cosine, sine = motion
         return [
-            self._transform_back(-self.input * pole**2 * by_pole),
+            self._inverse_transform(-self.input * pole**2 * by_pole),
             -self.time * (rate * cosine + by_omega * sine),
             -self.time * (rate * sine - by_omega * cosine),
         ]
 
     def solve(self, theta) -> Projection:
-        """Solve the linear problem for given modes."""
+        """Fit the linear coefficients to the response for given modes."""
         return project_data(self.columns(theta).design, self.value)
 
+    def mode_coefficients(self, linear: Projection) -> np.ndarray:
+        """Return the coefficients (n, 3) of the columns of each mode (`_ModeColumn`)."""
+        return linear.coefficients[len(self.fixed) :].reshape(-1, len(_ModeColumn))
+
     def slopes(self, theta) -> np.ndarray:
-        """Compute the derivatives (k, 2n) of the residual."""
+        """Compute the derivatives (k, 2n) of the residual with respect to ln w_r and ln zeta_r."""
         columns = self.columns(theta)
         linear = project_data(columns.design, self.value)
-        coefficients = linear.coefficients[3:].reshape(-1, 3)
+        coefficients = self.mode_coefficients(linear)
         slopes = []
         for derivatives in (columns.by_frequency, columns.by_damping):
             for mode_coefficients, mode_columns in zip(coefficients, derivatives):
@@ -160,12 +187,12 @@ class _ModeProblem:
         return linear.jacobian(np.stack(slopes, axis=1))
 
     def refine(self, theta, max_evaluations: int = 100, tolerance: float = 1e-13) -> _ModeFit:
-        """Minimize the residual from a start.
+        """Minimize the residual over frequencies and damping ratios, from starting modes.
 
         Parameters
         ----------
         theta : (2n,) ndarray
-            Start.
+            Starting values of ln w_r of all modes, then of ln zeta_r.
         max_evaluations : int
         tolerance : float
             Relative change at which the iteration ends.
@@ -174,9 +201,9 @@ class _ModeProblem:
         low = np.repeat(np.log([self.omega[1] / 2, MIN_ZETA]), n)
         high = np.repeat(np.log([np.pi / self.step, MAX_ZETA]), n)
         result = least_squares(
-            lambda p: self.solve(p).residual / self.size,
+            lambda p: self.solve(p).residual / self.response_rms,
             np.clip(theta, low + 1e-9, high - 1e-9),
-            lambda p: self.slopes(p) / self.size,
+            lambda p: self.slopes(p) / self.response_rms,
             bounds=(low, high),
             x_scale="jac",
             xtol=tolerance,
@@ -184,13 +211,18 @@ class _ModeProblem:
             gtol=1e-14,
             max_nfev=max_evaluations,
         )
-        return _ModeFit(result.x, result.fun * self.size)
+        return _ModeFit(result.x, result.fun * self.response_rms)
 
 
 def fit_driven_modes(
-    step: float, force, response, quantity: str, estimate: Estimate, band: tuple = (0.0, np.inf)
+    step: float,
+    force,
+    response,
+    quantity: str,
+    estimate: FrequencyResponse,
+    band: tuple = (0.0, np.inf),
 ) -> DrivenModes:
-    """Fit modes to a response and its input.
+    """Fit natural modes to the time histories of a response and its input.
 
     Parameters
     ----------
@@ -200,7 +232,7 @@ def fit_driven_modes(
         Input and response.
     quantity : str
         Kind of the response, a key of `DERIVATIVE_ORDERS`.
-    estimate : Estimate
+    estimate : FrequencyResponse
         Frequency response of the same record, for `estimate_damping`.
     band : (float, float)
         Band [Hz] of the modes that are returned; those outside are fitted as well.
@@ -215,21 +247,25 @@ def fit_driven_modes(
         If no mode is visible in the band.
     """
     derivative = DERIVATIVE_ORDERS[quantity]
-    record = _ModeProblem(
+    problem = _ModeProblem(
         step, force[:MAX_FITTED_SAMPLES], response[:MAX_FITTED_SAMPLES], derivative
     )
-    fit = _add_modes(record, estimate)
+    fit = _add_modes(problem, estimate)
     n = fit.theta.size // 2
     w, zeta = np.exp(fit.theta).reshape(2, -1)
-    residue = record.solve(fit.theta).coefficients[3::3]
+    residue = problem.mode_coefficients(problem.solve(fit.theta))[:, _ModeColumn.RESPONSE]
     rms = float(np.sqrt(np.mean(fit.residual**2)))
-    error = compute_standard_errors(record.slopes(fit.theta), rms)[n:] * zeta
-    low = 2 * np.pi * max(band[0], estimate.frequency[0])
-    high = 2 * np.pi * min(band[1], MAX_NYQUIST_FRACTION / (2 * step))
-    is_kept = (w >= low) & (w <= high) & (zeta > 2 * MIN_ZETA) & (zeta < 0.99 * MAX_ZETA)
+    # the standard errors of ln zeta follow those of ln w
+    zeta_error = compute_standard_errors(problem.slopes(fit.theta), rms)[n:] * zeta
+    min_frequency, max_frequency = band
+    min_w = 2 * np.pi * max(min_frequency, estimate.frequency[0])
+    max_w = 2 * np.pi * min(max_frequency, MAX_NYQUIST_FRACTION / (2 * step))
+    # a mode whose damping ratio ends at a bound of the search fits noise or a trend, not a resonance
+    is_resonance = (zeta > 2 * MIN_ZETA) & (zeta < 0.99 * MAX_ZETA)
+    is_kept = (w >= min_w) & (w <= max_w) & is_resonance
     if not is_kept.any():
         raise PatchfemError(
-            f"no mode is visible in the response between {band[0]:g} and {band[1]:g} Hz"
+            f"no mode is visible in the response between {min_frequency:g} and {max_frequency:g} Hz"
         )
     order = np.flatnonzero(is_kept)[np.argsort(w[is_kept])]
     frequency = w[order] / (2 * np.pi)
@@ -240,18 +276,18 @@ def fit_driven_modes(
         frequency=frequency,
         damping=zeta[order],
         residue=residue[order],
-        error=1.96 * error[order],
+        damping_error=1.96 * zeta_error[order],
         estimate_damping=_fit_estimate(estimate, w, zeta, derivative)[order],
         coherence=coherence,
-        misfit=rms / record.size,
+        misfit=rms / problem.response_rms,
     )
 
 
-def _add_modes(record: _ModeProblem, estimate: Estimate) -> _ModeFit:
-    """Add modes one at a time, as long as each reduces the residual enough."""
+def _add_modes(record: _ModeProblem, estimate: FrequencyResponse) -> _ModeFit:
+    """Add modes to a fit one at a time, as long as each reduces the residual enough."""
     fit = _ModeFit(np.empty(0), record.solve(np.empty(0)).residual)
-    min_reduction = MIN_RMS_RATIO**2 * fit.residual.size * record.size**2
-    min_square = (MIN_MISFIT * record.size) ** 2 * fit.residual.size
+    min_reduction = MIN_RMS_RATIO**2 * fit.residual.size * record.response_rms**2
+    min_square = (MIN_MISFIT * record.response_rms) ** 2 * fit.residual.size
     while fit.theta.size < 2 * MAX_MODES and fit.sum_of_squares > min_square:
         attempts = []
         for start in _find_starts(record, estimate, fit.residual):
@@ -269,8 +305,8 @@ def _add_modes(record: _ModeProblem, estimate: Estimate) -> _ModeFit:
     return fit
 
 
-def _find_starts(record: _ModeProblem, estimate: Estimate, residual) -> list:
-    """Return starting modes (w, zeta) at the line where the residual follows the input most."""
+def _find_starts(record: _ModeProblem, estimate: FrequencyResponse, residual) -> list:
+    """Choose starting modes (w, zeta) where the input explains most of the residual."""
     response = estimate_response(
         record.step,
         record.force[record.inner],
@@ -290,10 +326,11 @@ def _find_starts(record: _ModeProblem, estimate: Estimate, residual) -> list:
     return starts
 
 
-def _fit_estimate(estimate: Estimate, w, zeta, derivative: int) -> np.ndarray:
-    """Fit modes of frequencies w (n,) [rad/s] to a windowed estimate.
+def _fit_estimate(estimate: FrequencyResponse, w, zeta, derivative: int) -> np.ndarray:
+    """Fit modes to a windowed frequency response, starting from the modes of the record.
 
-    Returns the damping ratios (n,), nan for a mode that moved away.
+    `w` (n,) are their frequencies [rad/s]. Returns the damping ratios (n,), nan for a mode whose frequency
+    changes by 10 % or more.
     """
     fit = ModalFit(2 * np.pi * estimate.frequency, estimate.value[:, None], np.array([derivative]))
     theta, _ = fit.refine(np.log(np.concatenate([w, zeta])))

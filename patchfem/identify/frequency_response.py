@@ -15,7 +15,7 @@ from ..response.welch import CrossDensities, average_segments, transform_segment
 
 # largest error of a sample time in time steps; times in text files have only six digits
 MAX_TIME_ERROR = 1e-3
-DEFAULT_N_SEGMENTS = 8  # number of segment lengths in a record, if the user gives no length
+DEFAULT_N_SEGMENTS = 8  # length of a record / length of its segments, if the user gives no length
 MIN_SEGMENT_SAMPLES = 64  # smallest number of samples in a segment
 # fraction of the largest response; if both ends are below it, the record is a complete transient
 MAX_END_FRACTION = 1e-2
@@ -28,12 +28,12 @@ WINDOW_WIDTH_LINES = 1.5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Estimate:
-    """Frequency response estimated from a record.
+class FrequencyResponse:
+    """Frequency response of a record, estimated with its coherence.
 
     - frequency: frequencies (q,) > 0 [Hz].
     - value: response over input (q,), complex.
-    - input: power of the input per Hz (q,).
+    - input: power spectral density (q,) of the input.
     - coherence: coherence (q,), None for a single segment.
     - segment: samples of a segment.
     - segments: number of segments that were averaged.
@@ -50,7 +50,10 @@ class Estimate:
 
 
 def find_time_step(time) -> float:
-    """Return the time step [s] of times (k,); raise PatchfemError if it is not even."""
+    """Return the time step [s] of an evenly sampled record.
+
+    `time` (k,) are the times of its samples. Raises PatchfemError if they are not evenly spaced.
+    """
     step = (time[-1] - time[0]) / (time.size - 1)
     deviation = np.abs(time - time[0] - step * np.arange(time.size)).max() / step
     if deviation > max(MAX_TIME_ERROR, 1e-5 * time.size):
@@ -63,8 +66,10 @@ def find_time_step(time) -> float:
 
 def estimate_response(
     step: float, force, response, segment: int | None = None, window: str | None = None
-) -> Estimate:
-    """Estimate the frequency response of a record by H1; segments overlap by half.
+) -> FrequencyResponse:
+    """Estimate the frequency response of a record by the H1 estimator.
+
+    Segments overlap by half.
 
     Parameters
     ----------
@@ -80,17 +85,17 @@ def estimate_response(
 
     Returns
     -------
-    Estimate
+    FrequencyResponse
 
     Raises
     ------
     PatchfemError
         If the segment does not fit, or if the input is zero.
     """
-    is_whole = segment is None and window in (None, "none") and _is_transient(response)
+    is_single_segment = segment is None and window in (None, "none") and _is_transient(response)
     if segment is None:
-        segment = force.size if is_whole else 2 * (force.size // (2 * DEFAULT_N_SEGMENTS))
-    window = window or ("none" if is_whole else "hann")
+        segment = force.size if is_single_segment else 2 * (force.size // (2 * DEFAULT_N_SEGMENTS))
+    window = window or ("none" if is_single_segment else "hann")
     if not MIN_SEGMENT_SAMPLES <= segment <= force.size:
         raise PatchfemError(
             f"a segment has {segment} samples; at least {MIN_SEGMENT_SAMPLES}, and at most the {force.size} samples of "
@@ -101,14 +106,14 @@ def estimate_response(
         step, (force, response), segment, has_window=has_window
     )
     densities = average_segments(*transforms)
-    lowest = WINDOW_WIDTH_LINES / (segment * step) if has_window else 0.0
-    is_kept = (frequency > lowest) & (frequency <= MAX_NYQUIST_FRACTION / (2 * step))
+    min_frequency = WINDOW_WIDTH_LINES / (segment * step) if has_window else 0.0
+    is_kept = (frequency > min_frequency) & (frequency <= MAX_NYQUIST_FRACTION / (2 * step))
     is_kept &= densities.input > MIN_INPUT_POWER * densities.input[is_kept].max(initial=0.0)
     if not is_kept.any() or not densities.input.max() > 0:
         raise PatchfemError("the input is zero, so there is no response to it")
-    densities = CrossDensities(*(part[is_kept] for part in densities))
+    densities = CrossDensities(*(density[is_kept] for density in densities))
     n_segments = transforms.shape[1]
-    return Estimate(
+    return FrequencyResponse(
         frequency=frequency[is_kept],
         value=densities.cross / densities.input,
         input=densities.input,
@@ -120,8 +125,10 @@ def estimate_response(
 
 
 def _is_transient(response) -> bool:
-    """Return whether a response starts and ends at rest, so that no segment cuts it."""
-    n_ends = max(response.size // 50, 1)
-    size = np.abs(response).max(initial=0.0)
-    ends = max(np.abs(response[:n_ends]).max(), np.abs(response[-n_ends:]).max())
-    return bool(ends <= MAX_END_FRACTION * size)
+    """Return whether a response starts and ends at rest, so that no segment truncates it."""
+    n_end_samples = max(response.size // 50, 1)
+    max_response = np.abs(response).max(initial=0.0)
+    max_end_response = max(
+        np.abs(response[:n_end_samples]).max(), np.abs(response[-n_end_samples:]).max()
+    )
+    return bool(max_end_response <= MAX_END_FRACTION * max_response)

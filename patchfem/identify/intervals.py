@@ -14,25 +14,27 @@ from ..core import frozen_array
 from .correlation import estimate_effective_rows
 from .space import CubeResidual
 
-# fraction of the largest singular value of the scaled Jacobian; smaller ones are undetermined directions
+# fraction of the largest singular value of the scaled Jacobian; directions with smaller ones are undetermined
 MIN_SINGULAR_VALUE = 1e-6
 # fraction of the largest residual; a value that changes the residual by less has no effect
 MIN_RESIDUAL_EFFECT = 1e-9
 # squared component of an undetermined direction; a value with a smaller one is determined
 MIN_DIRECTION_COMPONENT = 1e-3
-# relative error of the linear growth of the sum of squares at an interval's ends
+# largest relative deviation from the growth of the sum of squares that a linear residual would have at the ends of
+# an interval; above it the end is found by the profile
 MAX_NONLINEARITY = 0.2
-MIN_INTERVAL = 1e-9  # fraction of the range of a parameter; a smaller interval is round-off and treated as linear
-# distance to the bound / first step of a profile, for a parameter without a linear interval
+# half-width as a fraction of the range of a value; a smaller interval is round-off and treated as linear
+MIN_INTERVAL = 1e-9
+# distance to the bound / first step of a profile, for a value without a linear interval
 N_FIRST_STEPS = 64
-# relative error of the growth of the sum of squares at the end of a profile, also for quick models
+# relative error, at the end of a profile, of the square root of the growth of the sum of squares
 PROFILE_TOL = 1e-3
-QUICK_PROFILE_TOL = 1e-2
+QUICK_PROFILE_TOL = 1e-2  # PROFILE_TOL of a residual that is expensive to evaluate
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FitIntervals:
-    """95 % intervals of a fit of n values, read-only.
+    """95 % confidence intervals of the n values of a fit, and what the rows do not determine.
 
     - ends: ends (n, 2) of the intervals, NaN for a value that the rows do not determine.
     - methods: "linear", "profile" or "none" for each value.
@@ -53,11 +55,11 @@ class FitIntervals:
     rows: float
 
 
-class _LeastSquares(NamedTuple):
-    """Result of a fit whose intervals are computed.
+class _FittedPoint(NamedTuple):
+    """Least-squares fit whose confidence intervals are computed.
 
     - model: residual over the unit cube.
-    - u: point (n,) of the cube.
+    - u: point (n,) of the cube with the least squares.
     - cost: sum of squares there.
     - growth: relative growth of the sum of squares at the end of an interval of 95 %.
     - descend: function that minimizes the residual over some coordinates.
@@ -71,7 +73,11 @@ class _LeastSquares(NamedTuple):
 
 
 class _IntervalEnd(NamedTuple):
-    """End of an interval in the unit cube, and whether it is only the bound."""
+    """End of the confidence interval of a value.
+
+    - end: coordinate of the unit cube.
+    - is_open: whether the end is only the bound of the value.
+    """
 
     end: float
     is_open: bool
@@ -93,7 +99,7 @@ def make_unknown_intervals(n: int) -> FitIntervals:
 def compute_intervals(
     model: CubeResidual, u, cost: float, descend: Callable, *, is_series: bool = False
 ) -> FitIntervals:
-    """Compute the intervals of a least-squares fit.
+    """Compute the 95 % confidence intervals of the values of a least-squares fit.
 
     A value on a bound is constant in the linear intervals of the others, and has a profile of its own.
 
@@ -119,29 +125,31 @@ def compute_intervals(
     dof = max(rows - n, 1)
     cost = max(cost, (1e-15 * model.largest) ** 2 * model.rows, 1e-300)
     jacobian = model.jacobian(u, range(n))
-    size = np.sqrt((jacobian**2).sum(axis=0))
-    has_effect = size > MIN_RESIDUAL_EFFECT * model.largest * np.sqrt(model.rows)
-    inner = [i for i in range(n) if 0 < u[i] < 1 and has_effect[i]]
-    inverse, null = _invert_normal_matrix(jacobian[:, inner], size[inner])
-    is_unknown = (null**2 > MIN_DIRECTION_COMPONENT).any(axis=0)
-    unknown = set(np.array(inner, int)[is_unknown].tolist())
+    column_norm = np.sqrt((jacobian**2).sum(axis=0))
+    has_effect = column_norm > MIN_RESIDUAL_EFFECT * model.largest * np.sqrt(model.rows)
+    free_values = [i for i in range(n) if 0 < u[i] < 1 and has_effect[i]]
+    inverse, null_vectors = _invert_normal_matrix(
+        jacobian[:, free_values], column_norm[free_values]
+    )
+    is_unknown = (null_vectors**2 > MIN_DIRECTION_COMPONENT).any(axis=0)
+    unknown = set(np.array(free_values, int)[is_unknown].tolist())
     quantile = student.ppf(0.975, dof)
     covariance = np.full((n, n), np.nan)
-    covariance[np.ix_(inner, inner)] = inverse * cost / dof
-    half = quantile * np.sqrt(np.diag(covariance))
-    fit = _LeastSquares(model, u, cost, quantile**2 / dof, descend)
+    covariance[np.ix_(free_values, free_values)] = inverse * cost / dof
+    half_width = quantile * np.sqrt(np.diag(covariance))
+    fit = _FittedPoint(model, u, cost, quantile**2 / dof, descend)
     ends = np.full((n, 2), np.nan)
     open_ends = np.zeros((n, 2), bool)
     methods = ["none"] * n
     for i in range(n):
         if not has_effect[i] or i in unknown:
             continue
-        if i in inner and _is_linear(fit, i, half[i], covariance, inner):
+        if i in free_values and _is_linear(fit, i, half_width[i], covariance, free_values):
             methods[i] = "linear"
-            ends[i] = u[i] - half[i], u[i] + half[i]
+            ends[i] = u[i] - half_width[i], u[i] + half_width[i]
             continue
         others = [k for k in range(n) if k != i and has_effect[k]]
-        profiles = [_follow_profile(fit, i, sign, half[i], others) for sign in (-1.0, 1.0)]
+        profiles = [_follow_profile(fit, i, sign, half_width[i], others) for sign in (-1.0, 1.0)]
         open_ends[i] = [profile.is_open for profile in profiles]
         if not open_ends[i].all():
             methods[i] = "profile"
@@ -151,14 +159,19 @@ def compute_intervals(
         methods=tuple(methods),
         open_ends=frozen_array(open_ends, bool),
         correlation=frozen_array(_compute_correlation(covariance, unknown)),
-        sensitivity=frozen_array(size / np.sqrt(model.rows)),
-        unknown=frozen_array(_list_unknown_directions(model, u, inner, null, size)),
+        sensitivity=frozen_array(column_norm / np.sqrt(model.rows)),
+        unknown=frozen_array(
+            _list_unknown_directions(model, u, free_values, null_vectors, column_norm)
+        ),
         rows=float(rows),
     )
 
 
 def _convert_ends(model: CubeResidual, u, ends) -> np.ndarray:
-    """Convert ends (n, 2) of intervals about a point u of the unit cube to values."""
+    """Convert the ends (n, 2) of intervals in the unit cube to values.
+
+    Each end is taken along its coordinate from the point u (n,).
+    """
     values = ends.copy()
     for i in np.flatnonzero(np.isfinite(ends[:, 0])):
         for side in (0, 1):
@@ -168,23 +181,23 @@ def _convert_ends(model: CubeResidual, u, ends) -> np.ndarray:
     return values
 
 
-def _invert_normal_matrix(jacobian, size) -> tuple:
-    """Invert J^T J over the directions that the rows determine.
+def _invert_normal_matrix(jacobian, column_norm) -> tuple:
+    """Invert the normal matrix J^T J over the directions that the rows determine.
 
-    Returns the inverse (f, f), and the unit directions (d, f) that they do not determine. `size` (f,) are
-    the norms of the columns.
+    Returns the inverse (f, f), and the unit directions (d, f) that they do not determine. `column_norm` (f,)
+    are the norms of the columns of J.
     """
-    if not size.size:
+    if not column_norm.size:
         return np.zeros((0, 0)), np.zeros((0, 0))
-    _, values, directions = np.linalg.svd(jacobian / size, full_matrices=True)
+    _, values, directions = np.linalg.svd(jacobian / column_norm, full_matrices=True)
     values = np.concatenate([values, np.zeros(directions.shape[0] - values.size)])
     is_known = values > MIN_SINGULAR_VALUE * values[0]
-    root = directions[is_known].T / values[is_known] / size[:, None]
-    return root @ root.T, directions[~is_known]
+    inverse_root = directions[is_known].T / values[is_known] / column_norm[:, None]
+    return inverse_root @ inverse_root.T, directions[~is_known]
 
 
 def _compute_correlation(covariance, unknown: set) -> np.ndarray:
-    """Return the correlation matrix (n, n), NaN for unknown values."""
+    """Return the correlation matrix (n, n) of fitted values, NaN for undetermined ones."""
     matrix = covariance.copy()
     index = list(unknown)
     matrix[index] = np.nan
@@ -194,33 +207,36 @@ def _compute_correlation(covariance, unknown: set) -> np.ndarray:
         return matrix / np.outer(scale, scale)
 
 
-def _list_unknown_directions(model: CubeResidual, u, inner: list, null, size) -> np.ndarray:
-    """Return the undetermined directions (d, n) as relative changes, scaled to a maximum of 1.
+def _list_unknown_directions(
+    model: CubeResidual, u, free_values: list, null_vectors, column_norm
+) -> np.ndarray:
+    """Return the directions of fitted values that the rows do not determine, as relative changes.
 
-    If a value at the point u of the cube is 0, they are changes over the range.
+    The largest change of each direction (d, n) is 1. If a value at the point u of the cube is 0, they are
+    changes over the range.
     """
     values = model.space.values(u)
     slope = model.space.slope(u)
-    scale = values if (values[inner] != 0).all() else model.space.high - model.space.low
-    directions = np.zeros((len(null), u.size))
-    for row, direction in zip(directions, null):
-        row[inner] = direction / size[inner] * slope[inner]
-        row[inner] /= scale[inner]
+    scale = values if (values[free_values] != 0).all() else model.space.high - model.space.low
+    directions = np.zeros((len(null_vectors), u.size))
+    for row, direction in zip(directions, null_vectors):
+        row[free_values] = direction / column_norm[free_values] * slope[free_values]
+        row[free_values] /= scale[free_values]
         row /= row[np.argmax(np.abs(row))]
         row[np.abs(row) < 1e-3] = 0.0
     return directions
 
 
-def _is_linear(fit: _LeastSquares, i: int, half: float, covariance, inner: list) -> bool:
+def _is_linear(fit: _FittedPoint, i: int, half_width: float, covariance, free_values: list) -> bool:
     """Return whether the sum of squares grows at both ends of a linear interval as predicted.
 
-    The other values follow their covariance (n, n) with value i.
+    The interval is that of value i. The other values follow their covariance (n, n) with value i.
     """
-    if half < MIN_INTERVAL:
+    if half_width < MIN_INTERVAL:
         return True
     for sign in (-1.0, 1.0):
         end = fit.u.copy()
-        end[inner] += sign * half * covariance[i, inner] / covariance[i, i]
+        end[free_values] += sign * half_width * covariance[i, free_values] / covariance[i, i]
         if (end < 0).any() or (end > 1).any():
             return False
         residual = fit.model(end)
@@ -233,48 +249,49 @@ def _is_linear(fit: _LeastSquares, i: int, half: float, covariance, inner: list)
 
 
 def _follow_profile(
-    fit: _LeastSquares, i: int, sign: float, half: float, others: list
+    fit: _FittedPoint, i: int, sign: float, half_width: float, others: list
 ) -> _IntervalEnd:
-    """Find the end of the interval of value i by the profile of the sum of squares.
+    """Find an end of the interval of a fitted value by the profile of the sum of squares.
 
-    There the sum of squares, minimized over the other values, has grown by `fit.growth`. The root of the
-    growth is nearly linear, so that a secant step inside a bracket finds it.
+    At this end of the interval of value i, on the side `sign`, the sum of squares, minimized over the other
+    values, has grown by `fit.growth`. The root of the growth is nearly linear, so that a secant step inside a
+    bracket finds it.
     """
-    room = fit.u[i] if sign < 0 else 1 - fit.u[i]
-    if room <= 0:
+    max_step = fit.u[i] if sign < 0 else 1 - fit.u[i]
+    if max_step <= 0:
         return _IntervalEnd(fit.u[i], True)
 
-    def evaluate(step: float, near) -> tuple:
-        point = near.copy()
+    def evaluate(step: float, nearby_point) -> tuple:
+        point = nearby_point.copy()
         point[i] = fit.u[i] + sign * step
         descent = fit.descend(fit.model, point, others)
         growth = max(descent.cost / fit.cost - 1, 0.0)
         return np.sqrt(growth / fit.growth) - 1, descent.u
 
-    step = room / N_FIRST_STEPS
-    if np.isfinite(half) and half > MIN_INTERVAL:
-        step = min(half, room)
+    step = max_step / N_FIRST_STEPS
+    if np.isfinite(half_width) and half_width > MIN_INTERVAL:
+        step = min(half_width, max_step)
     low = 0.0
     f_low = -1.0
     high = None
-    near = fit.u
+    nearby_point = fit.u
     tolerance = QUICK_PROFILE_TOL if fit.model.is_quick else PROFILE_TOL
     # the step doubles until the end is bracketed; bracketing and the secant method need fewer than 40 evaluations
     for _ in range(40):
-        f, point = evaluate(step, near)
+        f, point = evaluate(step, nearby_point)
         if abs(f) < tolerance:
             break
         if f < 0:
             low = step
             f_low = f
-            near = point
-            if step >= room:
-                return _IntervalEnd(float(fit.u[i] + sign * room), True)
+            nearby_point = point
+            if step >= max_step:
+                return _IntervalEnd(float(fit.u[i] + sign * max_step), True)
         else:
             high = step
             f_high = f
         if high is None:
-            step = min(2 * step, room)
+            step = min(2 * step, max_step)
             continue
         fraction = -f_low / (f_high - f_low) if np.isfinite(f_high) else 0.5
         step = low + (high - low) * min(max(fraction, 0.1), 0.9)

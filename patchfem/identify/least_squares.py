@@ -9,6 +9,7 @@ squares.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -21,19 +22,45 @@ from .space import CubeResidual, SearchSpace, make_space, make_space_filling_poi
 COST_TOL = 1e-10  # relative change of the sum of squares in a step at which a descent ends
 QUICK_COST_TOL = 1e-4  # COST_TOL of a residual that is expensive to evaluate
 MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without those for Jacobians
-# fraction of the largest residual; a fit with less is exact and needs no other starting point
+# root mean square of the residual / largest residual of the search; below it a fit is exact and the search ends
 EXACT_FIT_RATIO = 1e-9
 # sum of squares / the smallest one; descents that end below it found the same minimum
 SAME_MINIMUM_RATIO = 1.02
 SAME_RESULT_TOL = 1e-6  # relative difference of the sums of squares of descents that agree
-# fraction of the range; a value closer to a bound is also tried on the bound
+# fraction of the range; a value closer to a bound is tried on the bound as well
 NEAR_BOUND_FRACTION = 1e-3
 # number of points per value at which the residual is evaluated to choose the starting points
 N_TRIALS_PER_VALUE = 8
 
 
+class IntervalKind(StrEnum):
+    """Assumption on the rows from which the intervals of a fit are computed.
+
+    - ROWS: the rows are independent.
+    - SERIES: the rows are a series in time, in which correlated neighbours count as fewer rows.
+    - BOUNDS: no intervals are computed (NaN); values near a bound are still tried on it.
+    - NONE: no intervals are computed, and no value is tried on a bound.
+    """
+
+    ROWS = "rows"
+    SERIES = "series"
+    BOUNDS = "bounds"
+    NONE = ""
+
+
+class DescentStorage:
+    """Storage of the descents of a search, so that it can be continued; this one stores nothing."""
+
+    def load(self, start: int) -> "Descent | None":
+        """Return the stored descent from a start, or None."""
+        return None
+
+    def save(self, start: int, descent: "Descent") -> None:
+        """Store the descent from a start."""
+
+
 class SearchCounts(NamedTuple):
-    """Evaluations of the residual by a search.
+    """Evaluations of the residual by a search, and their failures.
 
     - evaluations: number of evaluations.
     - failures: number of those that failed.
@@ -105,10 +132,10 @@ class Problem:
 
     @property
     def space(self) -> SearchSpace:
-        """The space of the values; ValueError if the bounds are wrong."""
+        """Unit cube of the bounds of the values; raises ValueError if the bounds are wrong."""
         return make_space(self.low, self.high)
 
-    def solve(self, max_descents: int = 3, interval_kind: str = "rows") -> Fit:
+    def solve(self, max_descents: int = 3, interval_kind: str = IntervalKind.ROWS) -> Fit:
         """Minimize the sum of squares of the residual within the bounds.
 
         Parameters
@@ -116,8 +143,10 @@ class Problem:
         max_descents : int
             Largest number of descents; with 1 only that from `start`, if it works.
         interval_kind : str
-            ``"rows"`` takes rows as independent, ``"series"`` counts correlated neighbours as fewer. ``""``
-            leaves the intervals NaN, and tries no value on its bound; ``"bounds"`` only leaves the intervals.
+            ``"rows"``: the rows are independent.
+            ``"series"``: the rows are a series in time, in which correlated neighbours count as fewer rows.
+            ``"bounds"``: the intervals are NaN; values near a bound are still tried on it.
+            ``""``: the intervals are NaN, and no value is tried on a bound.
 
         Returns
         -------
@@ -146,11 +175,11 @@ def run_descents(
     starting_points,
     *,
     stops_when_exact: bool = False,
-    saved: Callable = lambda *arguments: None,
+    storage: DescentStorage | None = None,
     before_descent: Callable | None = None,
     report: Callable | None = None,
 ) -> list:
-    """Descend from several points of the unit cube.
+    """Minimize the residual locally from several points of the unit cube.
 
     Parameters
     ----------
@@ -159,9 +188,8 @@ def run_descents(
         Points from which the descents start.
     stops_when_exact : bool
         Whether a result to round-off ends the search.
-    saved : callable
-        ``saved(k)`` returns the descent from point k of an earlier search, or None; ``saved(k,
-        descent)`` stores it.
+    storage : DescentStorage, optional
+        Descents of an earlier search that are not repeated; new ones are added. By default nothing is stored.
     before_descent : callable, optional
         Is called before each descent.
     report : callable, optional
@@ -171,14 +199,15 @@ def run_descents(
     -------
     list of Descent
     """
+    storage = storage or DescentStorage()
     ends = []
-    for k, begin in enumerate(starting_points):
-        end = saved(k)
+    for k, starting_point in enumerate(starting_points):
+        end = storage.load(k)
         if end is None:
             if before_descent is not None:
                 before_descent()
-            end = descend(model, begin, range(len(begin)))
-            saved(k, end)
+            end = descend(model, starting_point, range(len(starting_point)))
+            storage.save(k, end)
         ends.append(end)
         if report is not None:
             report(1)
@@ -188,9 +217,9 @@ def run_descents(
 
 
 def assemble_fit(
-    model: CubeResidual, ends: list, interval_kind: str = "rows", first_descents=None
+    model: CubeResidual, ends: list, interval_kind: str = IntervalKind.ROWS, first_descents=None
 ) -> Fit:
-    """Assemble the fit of the best of some descents.
+    """Assemble the result of a least-squares fit from the best of its descents.
 
     Parameters
     ----------
@@ -210,11 +239,12 @@ def assemble_fit(
     agreed = sum(abs(end.cost - best.cost) <= max_difference for end in ends)
     u = best.u
     cost = best.cost
-    if interval_kind:
+    if interval_kind != IntervalKind.NONE:
         u, cost = _move_onto_bounds(model, u, cost)
     intervals = make_unknown_intervals(u.size)
-    if interval_kind not in ("", "bounds"):
-        intervals = compute_intervals(model, u, cost, descend, is_series=interval_kind == "series")
+    if interval_kind in (IntervalKind.ROWS, IntervalKind.SERIES):
+        is_series = interval_kind == IntervalKind.SERIES
+        intervals = compute_intervals(model, u, cost, descend, is_series=is_series)
     n_same_valley = sum(end.cost <= SAME_MINIMUM_RATIO * cost for end in first_descents or ends)
     is_converged = best.is_converged or n_same_valley > 1
     at_bound = np.where(u <= 0, "low", np.where(u >= 1, "high", ""))
@@ -229,17 +259,19 @@ def assemble_fit(
     )
 
 
-def choose_starting_points(model: CubeResidual, own, count: int, trials: int = 0) -> list:
+def choose_starting_points(
+    model: CubeResidual, given_start, max_points: int, n_trials: int = 0
+) -> list:
     """Choose points of the unit cube from which descents start.
 
     Parameters
     ----------
     model : CubeResidual
-    own : (n,) ndarray or None
+    given_start : (n,) ndarray or None
         Point that comes first, if it works.
-    count : int
+    max_points : int
         Largest number of points.
-    trials : int
+    n_trials : int
         Number of points that fill the cube, of which the best are chosen; by default 8 n.
 
     Returns
@@ -252,27 +284,27 @@ def choose_starting_points(model: CubeResidual, own, count: int, trials: int = 0
         If the residual fails at all points.
     """
     n = model.space.low.size
-    if count == 1 and own is not None and model(own) is not None:
-        return [own]
+    if max_points == 1 and given_start is not None and model(given_start) is not None:
+        return [given_start]
     costs = []
     points = []
-    for u in make_space_filling_points(trials or N_TRIALS_PER_VALUE * n, n):
+    for u in make_space_filling_points(n_trials or N_TRIALS_PER_VALUE * n, n):
         residual = model(u)
         if residual is not None:
             costs.append(float(residual @ residual))
             points.append(u)
     best = [points[k] for k in np.argsort(costs, kind="stable")]
-    if own is not None and model(own) is not None:
-        best = [own, *best]
+    if given_start is not None and model(given_start) is not None:
+        best = [given_start, *best]
     if not best:
         raise NotConverged(
             f"the model failed at all {model.evaluations} starting points of the search: {model.reason}"
         )
-    return best[: max(1, count)]
+    return best[: max(1, max_points)]
 
 
 class _CubeSlice(NamedTuple):
-    """Residual over some coordinates of the unit cube; the others keep their values.
+    """Residual as a function of some coordinates of the unit cube; the others are constant.
 
     - model: residual over the whole cube.
     - u: point (n,) of the cube.
@@ -283,23 +315,23 @@ class _CubeSlice(NamedTuple):
     u: np.ndarray
     free: list
 
-    def point(self, part) -> np.ndarray:
-        """Return the point (n,) with the values `part` (f,) of the free coordinates."""
-        moved = self.u.copy()
-        moved[self.free] = part
-        return moved
+    def point(self, free_coordinates) -> np.ndarray:
+        """Return the point (n,) of the unit cube with given values (f,) of the free coordinates."""
+        full_point = self.u.copy()
+        full_point[self.free] = free_coordinates
+        return full_point
 
-    def residual(self, part) -> np.ndarray:
-        """Return the residual (r,), with a penalty where it fails."""
-        return self.model.with_penalty(self.point(part))
+    def residual(self, free_coordinates) -> np.ndarray:
+        """Return the residual (r,), or a large penalty where it cannot be evaluated."""
+        return self.model.with_penalty(self.point(free_coordinates))
 
-    def jacobian(self, part) -> np.ndarray:
-        """Return the derivatives (r, f) of the residual."""
-        return self.model.jacobian(self.point(part), self.free)
+    def jacobian(self, free_coordinates) -> np.ndarray:
+        """Return the derivatives (r, f) of the residual with respect to the free coordinates."""
+        return self.model.jacobian(self.point(free_coordinates), self.free)
 
 
 def descend(model: CubeResidual, u, free) -> Descent:
-    """Descend from a point of the unit cube by SciPy's trust-region reflective method.
+    """Minimize a residual locally from a point of the unit cube (trust-region reflective method).
 
     The end is never worse than the start.
 
@@ -307,7 +339,7 @@ def descend(model: CubeResidual, u, free) -> Descent:
     ----------
     model : CubeResidual
     u : (n,) array_like
-        Start.
+        Starting point.
     free : sequence of int
         Indices of the coordinates that may change.
 
@@ -317,29 +349,29 @@ def descend(model: CubeResidual, u, free) -> Descent:
     """
     u = np.array(u, float)
     free = list(free)
-    here = model(u)
-    if here is None:
+    start_residual = model(u)
+    if start_residual is None:
         return Descent(u, np.inf, False, model.rows)
-    start = Descent(u, float(here @ here), True, model.rows)
+    start = Descent(u, float(start_residual @ start_residual), True, model.rows)
     if not free:
         return start
 
     slice_of_cube = _CubeSlice(model, u, free)
     # the trust region starts inside the bounds
     for margin in (1e-3, 1e-9):
-        begin = np.clip(u[free], margin, 1 - margin)
-        if model(slice_of_cube.point(begin)) is not None:
+        inner_start = np.clip(u[free], margin, 1 - margin)
+        if model(slice_of_cube.point(inner_start)) is not None:
             break
     else:
         return start._replace(is_converged=False)
-    size = max(float(np.abs(slice_of_cube.residual(begin)).max()), 1e-300)
+    residual_scale = max(float(np.abs(slice_of_cube.residual(inner_start)).max()), 1e-300)
     ftol = QUICK_COST_TOL if model.is_quick else COST_TOL
     result = least_squares(
-        lambda part: slice_of_cube.residual(part) / size,
-        begin,
+        lambda part: slice_of_cube.residual(part) / residual_scale,
+        inner_start,
         bounds=(0, 1),
         method="trf",
-        jac=lambda part: slice_of_cube.jacobian(part) / size,
+        jac=lambda part: slice_of_cube.jacobian(part) / residual_scale,
         ftol=ftol,
         xtol=10 * ftol,
         gtol=1e-15,
@@ -354,17 +386,18 @@ def descend(model: CubeResidual, u, free) -> Descent:
 
 
 def _move_onto_bounds(model: CubeResidual, u, cost: float) -> tuple:
-    """Move values that press against a bound onto it, and keep the result if it is no worse.
+    """Set values near a bound to the bound, unless this raises the sum of squares.
 
-    The other values are fitted again.
-
-    Returns the point u (n,) and the sum of squares.
+    Only values are set that would decrease the sum of squares beyond the bound. The other values are
+    fitted again. Returns the point u (n,) and the sum of squares.
     """
     gradient = model.jacobian(u, range(u.size)).T @ model(u)
-    presses_low = (u < NEAR_BOUND_FRACTION) & (gradient > 0)
-    presses_high = (u > 1 - NEAR_BOUND_FRACTION) & (gradient < 0)
-    presses = presses_low | presses_high
-    if not presses.any():
+    belongs_on_low = (u < NEAR_BOUND_FRACTION) & (gradient > 0)
+    belongs_on_high = (u > 1 - NEAR_BOUND_FRACTION) & (gradient < 0)
+    belongs_on_bound = belongs_on_low | belongs_on_high
+    if not belongs_on_bound.any():
         return u, cost
-    end = descend(model, np.where(presses, np.round(u), u), np.flatnonzero(~presses))
+    end = descend(
+        model, np.where(belongs_on_bound, np.round(u), u), np.flatnonzero(~belongs_on_bound)
+    )
     return (end.u, end.cost) if end.cost <= cost * (1 + 1e-9) else (u, cost)

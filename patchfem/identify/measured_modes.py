@@ -11,11 +11,11 @@ from ..structure import places as structure_places
 from ..structure.places import MeasuredModes
 from .decay import fit_decay
 from .driven_modes import DERIVATIVE_ORDERS, MAX_FITTED_SAMPLES, DrivenModes, fit_driven_modes
-from .frequency_response import Estimate, estimate_response, find_time_step
-from .swings import describe_sparse_end, find_half_swings
+from .frequency_response import FrequencyResponse, estimate_response, find_time_step
+from .half_cycles import describe_missing_samples_at_end, find_half_cycles
 
-INPUT_QUANTITIES = ("force", "base_acceleration")  # quantities of a record that drive the rig
-# quantities whose mode-shape components a user can name
+INPUT_QUANTITIES = ("force", "base_acceleration")  # quantities of a record that can be its input
+# motions of a mode whose node and direction in a file of mode shapes a user can name (--map)
 SHAPE_QUANTITIES = ("slide", "output", "base", "normal", "pitch")
 # fraction by which the damping ratio of the windowed estimate may be larger without a note
 MAX_DAMPING_EXCESS = 0.05
@@ -28,7 +28,7 @@ MAX_DECAY_MISFIT = 0.05
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ListedModes:
-    """Modes for the tables [[structure.mode]] of a scene.
+    """Measured modes, as the contents of the tables [[structure.mode]] of a scene.
 
     - frequency: natural frequencies (n,) [Hz].
     - damping: damping ratios (n,).
@@ -45,20 +45,30 @@ class ListedModes:
     mass: float | None
     descriptions: list
     notes: list = field(default_factory=list)
-    estimate: Estimate | None = None
+    estimate: FrequencyResponse | None = None
 
 
 class RecordEstimate(NamedTuple):
-    """Frequency response of a record, time step [s], and names of input and response."""
+    """Frequency response of a record, with the quantities from which it was estimated.
 
-    estimate: Estimate
+    - estimate: frequency response.
+    - step: time step [s].
+    - input, response: names of the quantities.
+    """
+
+    estimate: FrequencyResponse
     step: float
     input: str
     response: str
 
 
 class _ModeRows(NamedTuple):
-    """Mode-shape components (n,) by key, modal mass [kg] or None, and notes."""
+    """Mode-shape components and modal mass that follow from the residues of modes.
+
+    - rows: components (n,) by the key of the table of a mode.
+    - mass: modal mass [kg], or None.
+    - notes: sentences for the user.
+    """
 
     rows: dict
     mass: float | None
@@ -66,7 +76,10 @@ class _ModeRows(NamedTuple):
 
 
 def find_response_name(values: dict) -> str:
-    """Return the name of the only response of a record; raise PatchfemError if there is not one."""
+    """Return the name of the response of a record.
+
+    Raises PatchfemError unless the record has exactly one.
+    """
     names = [name for name in DERIVATIVE_ORDERS if name in values]
     if len(names) != 1:
         raise PatchfemError(
@@ -79,7 +92,7 @@ def find_response_name(values: dict) -> str:
 def estimate_record(
     values: dict, segment: float | None = None, window: str | None = None
 ) -> RecordEstimate:
-    """Estimate the frequency response of a record.
+    """Estimate the frequency response of a record with one input and one response.
 
     Parameters
     ----------
@@ -97,7 +110,7 @@ def estimate_record(
     Raises
     ------
     PatchfemError
-        If the record lacks one of them, or has several inputs or responses.
+        If the record lacks time, input or response, or has several inputs or responses.
     """
     response = find_response_name(values)
     inputs = [name for name in INPUT_QUANTITIES if name in values]
@@ -117,7 +130,7 @@ def estimate_record(
 def identify_driven_modes(
     values: dict, segment: float | None, window: str | None, band: tuple
 ) -> ListedModes:
-    """Identify modes from the response to a force at the same point or to a base acceleration.
+    """Identify modes from the response to a force at the same point or to base acceleration.
 
     An acceleration is absolute; a displacement or a velocity is relative to the base. The slide of the
     contact is taken to be the motion at this place.
@@ -133,19 +146,21 @@ def identify_driven_modes(
     -------
     ListedModes
     """
-    estimate, step, drive, response = estimate_record(values, segment, window)
-    force = values[drive]
-    motion = values[response]
-    if drive == "base_acceleration" and response == "acceleration":
-        motion = motion - force
-    relative = estimate_response(step, force, motion, estimate.segment, estimate.window)
-    modes = fit_driven_modes(step, force, motion, response, relative, band)
-    rows, mass, notes = (
-        _convert_force_residues(modes) if drive == "force" else _convert_base_residues(modes)
+    estimate, step, input_name, response_name = estimate_record(values, segment, window)
+    excitation = values[input_name]
+    response = values[response_name]
+    if input_name == "base_acceleration" and response_name == "acceleration":
+        response = response - excitation
+    relative_estimate = estimate_response(
+        step, excitation, response, estimate.segment, estimate.window
     )
-    if force.size > MAX_FITTED_SAMPLES:
+    modes = fit_driven_modes(step, excitation, response, response_name, relative_estimate, band)
+    rows, mass, notes = (
+        _convert_force_residues(modes) if input_name == "force" else _convert_base_residues(modes)
+    )
+    if excitation.size > MAX_FITTED_SAMPLES:
         notes.append(
-            f"the modes are fitted to the first {MAX_FITTED_SAMPLES} of {force.size} samples, a duration of "
+            f"the modes are fitted to the first {MAX_FITTED_SAMPLES} of {excitation.size} samples, a duration of "
             f"{MAX_FITTED_SAMPLES * step:.4g} s"
         )
     return ListedModes(
@@ -154,7 +169,7 @@ def identify_driven_modes(
         rows=rows,
         mass=mass,
         descriptions=_describe_modes(modes),
-        notes=_note_quality(modes, estimate, step) + notes,
+        notes=_write_fit_notes(modes, estimate, step) + notes,
         estimate=estimate,
     )
 
@@ -183,21 +198,21 @@ def _convert_force_residues(modes: DrivenModes) -> _ModeRows:
 def _convert_base_residues(modes: DrivenModes) -> _ModeRows:
     """Split residues of a base excitation into participation and mode-shape component.
 
-    The residue is minus their product; both factors get the same size.
+    The residue is minus their product; both factors get the same magnitude before they are scaled.
     """
     product = -modes.residue
-    size = np.sqrt(np.abs(product))
+    magnitude = np.sqrt(np.abs(product))
     # the squared participations sum to at most 1
-    scale = max(1.0, float(np.sqrt(np.sum(size**2))))
-    motion = np.sign(product) * size * scale
-    rows = {"slide": motion, "output": motion, "base": size / scale}
+    scale = max(1.0, float(np.sqrt(np.sum(magnitude**2))))
+    motion = np.sign(product) * magnitude * scale
+    rows = {"slide": motion, "output": motion, "base": magnitude / scale}
     return _ModeRows(rows, None, ["a response to base motion gives no modal mass: set moving_mass"])
 
 
 def _describe_modes(modes: DrivenModes) -> list:
-    """Describe the damping of each mode and how it was determined."""
+    """Describe the damping ratio of each mode and the record from which it follows."""
     descriptions = []
-    for k, (zeta, error) in enumerate(zip(modes.damping, modes.error)):
+    for k, (zeta, error) in enumerate(zip(modes.damping, modes.damping_error)):
         text = f"damping {zeta:.4g} +- {error:.1g} from the whole record"
         if modes.estimate_damping[k] > 0:
             text += f"; the estimate from windowed segments gives {modes.estimate_damping[k]:.4g}"
@@ -207,8 +222,8 @@ def _describe_modes(modes: DrivenModes) -> list:
     return descriptions
 
 
-def _note_quality(modes: DrivenModes, estimate: Estimate, step: float) -> list:
-    """Write notes on peaks that the window widens, and on a large misfit."""
+def _write_fit_notes(modes: DrivenModes, estimate: FrequencyResponse, step: float) -> list:
+    """Write notes on peaks that the window widens, and on a large misfit of the modes."""
     notes = []
     is_widened = modes.estimate_damping > (1 + MAX_DAMPING_EXCESS) * modes.damping
     # a single segment has no window, so that a larger damping comes from noise
@@ -230,9 +245,9 @@ def _note_quality(modes: DrivenModes, estimate: Estimate, step: float) -> list:
 
 
 def _select_decay(values: dict, begin: float | None) -> tuple:
-    """Return the times [s] and values of the only response from `begin` [s] on.
+    """Select the times [s] and values of the response of a record from the start of its decay.
 
-    By default they begin at the maximum.
+    The decay starts at the time `begin` [s], by default at the largest deviation from the final value.
     """
     value = values[find_response_name(values)]
     if "time" not in values:
@@ -247,7 +262,7 @@ def _select_decay(values: dict, begin: float | None) -> tuple:
 
 
 def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
-    """Determine frequency and damping of a free decay as functions of the amplitude.
+    """Compute frequency and damping ratio of a measured free decay against its amplitude.
 
     A velocity is divided by the undamped circular frequency of its point, an acceleration by its square.
     Amplitudes whose damping ratio is too uncertain are left out with a note.
@@ -271,8 +286,8 @@ def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
         If no decay rises above the noise.
     """
     time, value = _select_decay(values, begin)
-    swings = find_half_swings(time, value)
-    curve = compute_swing_curve(swings)
+    half_cycles = find_half_cycles(time, value)
+    curve = compute_swing_curve(half_cycles)
     notes = []
     is_certain = curve.damping_error <= MAX_ERROR_RATIO * np.abs(curve.damping)
     if curve.time.size and not is_certain.all():
@@ -286,19 +301,22 @@ def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
             f"of the damping ratio is wider than {MAX_ERROR_RATIO:g} times its value there"
         )
         curve = curve.at(is_certain)
-    reason = describe_sparse_end(time, swings)
+    reason = describe_missing_samples_at_end(time, half_cycles)
     if reason:
-        notes.append(f"the decay is followed up to {swings.middle[-1]:.4g} s only: {reason}")
+        notes.append(f"the decay is followed up to {half_cycles.middle[-1]:.4g} s only: {reason}")
     omega = 2 * np.pi * curve.frequency / np.sqrt(1 - curve.damping**2)
     displacement = curve.amplitude / omega ** DERIVATIVE_ORDERS[find_response_name(values)]
     return curve._replace(amplitude=displacement), notes
 
 
 def identify_decay_modes(values: dict, begin: float | None = None) -> ListedModes:
-    """Identify modes from a free decay that begins at `begin` [s], by default at the maximum."""
+    """Identify natural modes from a measured free decay.
+
+    The decay starts at the time `begin` [s], by default at the largest deviation from the final value.
+    """
     decay = fit_decay(*_select_decay(values, begin))
     descriptions = []
-    for zeta, error, decrement in zip(decay.damping, decay.error, decay.decrement()):
+    for zeta, error, decrement in zip(decay.damping, decay.damping_error, decay.decrement()):
         descriptions.append(
             f"damping {zeta:.4g} +- {error:.1g}, logarithmic decrement {decrement:.4g}"
         )
@@ -317,7 +335,7 @@ def identify_decay_modes(values: dict, begin: float | None = None) -> ListedMode
 
 
 def list_shape_modes(shapes: MeasuredModes, places: dict) -> ListedModes:
-    """List measured shapes as modes.
+    """Convert measured mode shapes to the modes of a scene and their modal mass.
 
     The mass is 1 / sum phi^2 at the place that slides, or at `base`: the part of the mass that the modes
     contain there. With a larger mass, part of it would belong to no mode.

@@ -1,4 +1,4 @@
-"""The bounds of a search as a unit cube, and a residual over it that counts evaluations."""
+"""Mapping of the bounds of a search to a unit cube, and the residual as a function on this cube."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from ..core import Missing, PatchfemError
 
 DIFFERENCE_STEP = 1e-5  # fraction of the range of a value; step of difference quotients
 MIN_LOG_RATIO = 10  # upper / lower bound; a value with a wider range is searched in logarithms
-PENALTY_FACTOR = 1e3  # residual of a failed evaluation / largest residual so far
+PENALTY_FACTOR = 1e3  # residual that stands for a failed evaluation / largest residual so far
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -25,17 +25,19 @@ class SearchSpace:
     log: np.ndarray
 
     def values(self, u) -> np.ndarray:
-        """Return the values (n,) at a point u (n,) of the cube; at its ends, exactly the bounds."""
+        """Return the values (n,) at a point u of the unit cube; on its faces, exactly the bounds."""
         u = np.asarray(u, float)
         inside = np.empty(u.size)
-        for i, part in enumerate(u):
+        for i, coordinate in enumerate(u):
             low = self.low[i]
             high = self.high[i]
-            inside[i] = low * (high / low) ** part if self.log[i] else low + (high - low) * part
+            inside[i] = (
+                low * (high / low) ** coordinate if self.log[i] else low + (high - low) * coordinate
+            )
         return np.where(u <= 0, self.low, np.where(u >= 1, self.high, inside))
 
     def unit(self, values) -> np.ndarray:
-        """Return the point (n,) of the cube that is nearest to values (n,)."""
+        """Return the point (n,) of the unit cube that is nearest to given values (n,)."""
         u = np.empty(len(values))
         for i, value in enumerate(values):
             low = self.low[i]
@@ -47,7 +49,7 @@ class SearchSpace:
         return np.clip(u, 0.0, 1.0)
 
     def slope(self, u) -> np.ndarray:
-        """Return the derivatives (n,) of the values with respect to u (n,)."""
+        """Return the derivatives (n,) of the values with respect to coordinates u of the cube."""
         slope = self.high - self.low
         ratio = self.high[self.log] / self.low[self.log]
         slope[self.log] = self.values(u)[self.log] * np.log(ratio)
@@ -55,7 +57,9 @@ class SearchSpace:
 
 
 def make_space(low, high) -> SearchSpace:
-    """Build the unit cube of bounds; a positive value with a wide range is searched in logarithms.
+    """Map the bounds of values to the unit cube.
+
+    A positive value with a wide range is searched in logarithms.
 
     Parameters
     ----------
@@ -122,7 +126,7 @@ class CubeResidual:
         self._last_residual = residual
 
     def _evaluate(self, u) -> np.ndarray | None:
-        """Evaluate the residual at u (n,) and count it."""
+        """Evaluate the residual at u (n,), and count the evaluation and its failure."""
         self.evaluations += 1
         reason = ""
         try:
@@ -142,16 +146,20 @@ class CubeResidual:
         return residual
 
     def with_penalty(self, u) -> np.ndarray:
-        """Evaluate the residual (r,) at u (n,); where it fails, return rows larger than all so far."""
+        """Evaluate the residual (r,) at u (n,); if this fails, return a penalty.
+
+        The penalty is larger than all residuals so far.
+        """
         residual = self(u)
         if residual is None:
             return np.full(self.rows, PENALTY_FACTOR * max(self.largest, 1e-300))
         return residual
 
     def jacobian(self, u, free) -> np.ndarray:
-        """Compute the derivatives (r, f) along some coordinates by central differences.
+        """Compute the derivatives (r, f) of the residual along some coordinates by differences.
 
-        They are one-sided at a bound, beside a failure, and for an expensive residual.
+        The differences are central, but one-sided at a bound, next to a failed evaluation, and for an
+        expensive residual.
 
         Parameters
         ----------
@@ -159,13 +167,18 @@ class CubeResidual:
         free : sequence of int
             Indices of the f coordinates.
         """
-        here = self(u)
-        columns = [_difference_quotient(here, self._neighbours(u, i)) for i in free]
-        self._remember(u, here)
+        residual_at_u = self(u)
+        columns = [
+            _difference_quotient(residual_at_u, self._evaluate_neighbours(u, i)) for i in free
+        ]
+        self._remember(u, residual_at_u)
         return np.column_stack(columns) if columns else np.zeros((self.rows, 0))
 
-    def _neighbours(self, u, i: int) -> dict:
-        """Evaluate the residual at points beside u, by their number of steps along coordinate i."""
+    def _evaluate_neighbours(self, u, i: int) -> dict:
+        """Evaluate the residual at points near u that differ from u along coordinate i.
+
+        Returns residuals (r,) by the number of difference steps from u.
+        """
         neighbours = {}
         for n_steps in (1, -1, 2, -2):
             if self.is_quick and neighbours:
@@ -180,19 +193,23 @@ class CubeResidual:
         return neighbours
 
 
-def _difference_quotient(here, neighbours: dict) -> np.ndarray:
+def _difference_quotient(residual_at_u, neighbours: dict) -> np.ndarray:
     """Compute a derivative (r,) by finite differences from the residuals at neighbouring points.
 
-    It is 0 if there is no neighbour.
+    `neighbours` holds these residuals by the number of steps. Without any the derivative is 0.
     """
     if 1 in neighbours and -1 in neighbours:
         return (neighbours[1] - neighbours[-1]) / (2 * DIFFERENCE_STEP)
     for k in (1, -1):
         if k in neighbours and 2 * k in neighbours:
-            return k * (4 * neighbours[k] - 3 * here - neighbours[2 * k]) / (2 * DIFFERENCE_STEP)
+            return (
+                k
+                * (4 * neighbours[k] - 3 * residual_at_u - neighbours[2 * k])
+                / (2 * DIFFERENCE_STEP)
+            )
         if k in neighbours:
-            return k * (neighbours[k] - here) / DIFFERENCE_STEP
-    return np.zeros_like(here)
+            return k * (neighbours[k] - residual_at_u) / DIFFERENCE_STEP
+    return np.zeros_like(residual_at_u)
 
 
 def make_space_filling_points(count: int, n: int) -> np.ndarray:

@@ -26,17 +26,17 @@ MAX_MINIMA = 3  # largest number of minima of the cheap model from which the sea
 MIN_MINIMUM_DISTANCE = 0.03
 # sum of squares / the smallest one; a minimum with a larger ratio is left out
 MAX_COST_RATIO = 10.0
-# sum of squares / the smallest one; points below it are refined with derivatives of the expensive model
-MAX_RIVAL_COST_RATIO = 1.5
+# sum of squares / the smallest one; minima below it are refined with derivatives of the expensive model
+MAX_LOCAL_MINIMUM_RATIO = 1.5
 # fraction of the edge of the unit cube; step of difference quotients of the expensive model
 DIFFERENCE_STEP = 1e-4
 MIN_IMPROVEMENT = 1e-4  # relative decrease of the sum of squares below which the search ends
 
 
 class _SearchPoint(NamedTuple):
-    """Point of a search.
+    """Point that a search with two models has reached.
 
-    - sum_of_squares: of the expensive model.
+    - sum_of_squares: sum of squares of the residual of the expensive model.
     - u: point (n,) of the unit cube.
     - model: corrected cheap model with the value and the slopes of the expensive one there, or None.
     """
@@ -48,7 +48,7 @@ class _SearchPoint(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TwoModels:
-    """A cheap and an expensive model of the same data.
+    """Cheap and expensive model of the same data, with the residual of their fit.
 
     - cheap, expensive: functions of values (n,) that return an array; a PatchfemError is a failure.
     - residual: function of such an array that returns the residual (r,).
@@ -60,15 +60,15 @@ class TwoModels:
     residual: Callable
     space: SearchSpace
 
-    def search(self, own, starts: int) -> tuple:
-        """Minimize the sum of squares of the expensive model.
+    def search(self, given_values, n_starts: int) -> tuple:
+        """Minimize the sum of squares of the expensive model with the help of the cheap one.
 
         Parameters
         ----------
-        own : (n,) array_like
-            Values from which the search starts, besides others.
-        starts : int
-            Starts of the search with the cheap model.
+        given_values : (n,) array_like
+            Values at one of the starting points.
+        n_starts : int
+            Number of starting points of the search with the cheap model.
 
         Returns
         -------
@@ -85,73 +85,77 @@ class TwoModels:
             If the cheap model fails at all starts.
         """
         cheap = CubeResidual(lambda values: self.residual(self.cheap(values)), self.space)
-        trials = N_TRIALS_PER_VALUE * len(own)
-        begins = choose_starting_points(cheap, self.space.unit(own), starts, trials)
+        n_trials = N_TRIALS_PER_VALUE * len(given_values)
+        starting_points = choose_starting_points(
+            cheap, self.space.unit(given_values), n_starts, n_trials
+        )
         points = []
         errors = []
-        for u in _choose_minima(run_descents(cheap, begins)):
+        for u in _choose_minima(run_descents(cheap, starting_points)):
             try:
-                points.append(self._search_with_value(u))
+                points.append(self._minimize_with_value_correction(u))
             except PatchfemError as error:
                 errors.append(error)
         if not points:
             raise errors[0]
-        limit = MAX_RIVAL_COST_RATIO * min(point.sum_of_squares for point in points)
-        rivals = [point for point in points if point.sum_of_squares <= limit]
-        refined = list(map(self._search_with_slopes, rivals))
+        limit = MAX_LOCAL_MINIMUM_RATIO * min(point.sum_of_squares for point in points)
+        best_points = [point for point in points if point.sum_of_squares <= limit]
+        refined = list(map(self._minimize_with_slope_correction, best_points))
         best = min(refined, key=lambda point: point.sum_of_squares)
         return best.model, self.space.values(best.u)
 
-    def correct_cheap_model(self, u, expensive, slopes=None) -> Callable:
-        """Correct the cheap model at a point of the unit cube.
+    def correct_cheap_model(self, u, expensive_value, slopes=None) -> Callable:
+        """Correct the cheap model to agree with the expensive one at a point of the unit cube.
 
         Parameters
         ----------
         u : (n,) ndarray
-        expensive : ndarray
+        expensive_value : ndarray
             Value of the expensive model at u.
         slopes : (..., n) ndarray, optional
-            Differences of the slopes of the models over u.
+            Derivatives with respect to u of the expensive model minus those of the corrected cheap model.
 
         Returns
         -------
         callable
             Function of values (n,).
         """
-        here = self.cheap(self.space.values(u))
-        ratio = np.divide(expensive, here, out=np.ones_like(expensive), where=here != 0)
+        cheap_value = self.cheap(self.space.values(u))
+        ratio = np.divide(
+            expensive_value, cheap_value, out=np.ones_like(expensive_value), where=cheap_value != 0
+        )
 
         def model(values) -> np.ndarray:
-            out = expensive + ratio * (self.cheap(values) - here)
+            out = expensive_value + ratio * (self.cheap(values) - cheap_value)
             return out if slopes is None else out + slopes @ (self.space.unit(values) - u)
 
         return model
 
-    def _search_with_value(self, u) -> _SearchPoint:
-        """Minimize with the cheap model, corrected to the expensive one at the last minimum.
+    def _minimize_with_value_correction(self, u) -> _SearchPoint:
+        """Minimize by the cheap model, corrected to the value of the expensive one at each minimum.
 
-        Both steps are repeated from u (n,) until the models agree. Returns the best point.
+        Minimization and correction are repeated from u (n,) until the models agree. Returns the best point.
         """
-        expensive = self.expensive(self.space.values(u))
-        best = _SearchPoint(self._sum_of_squares(expensive), u)
+        expensive_value = self.expensive(self.space.values(u))
+        best = _SearchPoint(self._sum_of_squares(expensive_value), u)
         for _ in range(MAX_CORRECTIONS):
-            model = self.correct_cheap_model(u, expensive)
+            model = self.correct_cheap_model(u, expensive_value)
             u = self._descend(model, u)
             values = self.space.values(u)
             try:
-                expensive = self.expensive(values)
+                expensive_value = self.expensive(values)
             except PatchfemError:
                 break
-            sum_of_squares = self._sum_of_squares(expensive)
+            sum_of_squares = self._sum_of_squares(expensive_value)
             if sum_of_squares < best.sum_of_squares:
                 best = _SearchPoint(sum_of_squares, u)
-            change = np.abs(self.residual(expensive) - self.residual(model(values))).max()
+            change = np.abs(self.residual(expensive_value) - self.residual(model(values))).max()
             if change < MAX_RESIDUAL_CHANGE:
                 break
         return best
 
-    def _search_with_slopes(self, point: _SearchPoint) -> _SearchPoint:
-        """Minimize with the cheap model, corrected to value and derivatives of the expensive one.
+    def _minimize_with_slope_correction(self, point: _SearchPoint) -> _SearchPoint:
+        """Minimize by the cheap model, corrected to value and derivatives of the expensive one.
 
         Returns the best point, without a model if the sum of squares does not converge.
         """
@@ -159,7 +163,7 @@ class TwoModels:
         u = point.u
         for _ in range(MAX_CORRECTIONS):
             try:
-                model = self._tangent_model(u)
+                model = self._make_tangent_model(u)
                 new_u = self._descend(model, u)
                 new_sum = self._sum_of_squares(self.expensive(self.space.values(new_u)))
             except PatchfemError:
@@ -171,20 +175,22 @@ class TwoModels:
             u = new_u
         return _SearchPoint(sum_of_squares, u)
 
-    def _tangent_model(self, u) -> Callable:
+    def _make_tangent_model(self, u) -> Callable:
         """Correct the cheap model to the value and derivatives of the expensive one at u (n,).
 
         The derivatives are one-sided difference quotients.
         """
-        expensive = self.expensive(self.space.values(u))
-        plain = self.correct_cheap_model(u, expensive)
+        expensive_value = self.expensive(self.space.values(u))
+        value_corrected_model = self.correct_cheap_model(u, expensive_value)
         slopes = []
         for i in range(u.size):
             neighbour = u.copy()
             neighbour[i] += -DIFFERENCE_STEP if u[i] > 0.5 else DIFFERENCE_STEP
             values = self.space.values(neighbour)
-            slopes.append((self.expensive(values) - plain(values)) / (neighbour[i] - u[i]))
-        return self.correct_cheap_model(u, expensive, np.stack(slopes, axis=-1))
+            slopes.append(
+                (self.expensive(values) - value_corrected_model(values)) / (neighbour[i] - u[i])
+            )
+        return self.correct_cheap_model(u, expensive_value, np.stack(slopes, axis=-1))
 
     def _descend(self, model: Callable, u) -> np.ndarray:
         """Return the point (n,) of the unit cube at which a descent with a model from u (n,) ends."""
@@ -192,19 +198,22 @@ class TwoModels:
         return descend(cube_residual, u, range(u.size)).u
 
     def _sum_of_squares(self, data) -> float:
-        """Return the sum of squares of the residual of computed data."""
+        """Return the sum of squares of the residual for data that a model computed."""
         return float(np.square(self.residual(data)).sum())
 
 
 def _choose_minima(ends: list) -> list:
-    """Return the points (n,) of the best descents that are far enough apart, best first."""
+    """Return the end points (n,) of the best descents, at least a minimum distance apart.
+
+    The best comes first.
+    """
     ends = sorted((end for end in ends if np.isfinite(end.cost)), key=lambda end: end.cost)
-    valleys = []
+    minima = []
     for end in ends:
-        distances = [np.abs(end.u - valley).max() for valley in valleys]
+        distances = [np.abs(end.u - minimum).max() for minimum in minima]
         if (
             end.cost <= MAX_COST_RATIO * ends[0].cost
             and min(distances, default=1.0) >= MIN_MINIMUM_DISTANCE
         ):
-            valleys.append(end.u)
-    return valleys[:MAX_MINIMA]
+            minima.append(end.u)
+    return minima[:MAX_MINIMA]

@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-# largest condition number of the design matrix; weaker directions get no coefficient
+# largest condition number of the design matrix; in directions of smaller singular values the coefficients are 0
 MAX_CONDITION = 1e12
 
 
 class Projection(NamedTuple):
-    """Solution of the linear problem for given nonlinear parameters.
+    """Solution of a linear least-squares problem for given nonlinear parameters.
 
-    - residual: model minus value (k,).
+    - residual: model minus data (k,).
     - coefficients: coefficients (n,) of the columns.
     - basis: orthonormal basis (k, n) of the columns.
     """
@@ -21,23 +21,31 @@ class Projection(NamedTuple):
     basis: np.ndarray
 
     def jacobian(self, derivatives) -> np.ndarray:
-        """Return the Jacobian (k, p) of the residual, projected off the columns (Kaufman 1975).
+        """Return the Jacobian (k, p) of the residual in the nonlinear parameters (Kaufman 1975).
 
-        `derivatives` (k, p) are those of the model over the nonlinear parameters, with constant
-        coefficients.
+        It is the part of `derivatives` that is orthogonal to the columns. `derivatives` (k, p) are those of
+        the model with respect to the nonlinear parameters, with constant coefficients.
         """
         return derivatives - self.basis @ (self.basis.T @ derivatives)
 
 
 def project_data(design, value) -> Projection:
-    """Solve design (k, n) @ coefficients = value (k,) in the least-squares sense."""
+    """Fit data by a linear combination of the columns of a design matrix, by least squares.
+
+    `design` (k, n) is the matrix, and `value` (k,) are the data.
+    """
     norms = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
-    basis, triangle = np.linalg.qr(design / norms)
-    scaled = np.linalg.lstsq(triangle, basis.T @ value, rcond=1 / MAX_CONDITION)[0]
-    return Projection(design / norms @ scaled - value, scaled / norms, basis)
+    basis, triangular = np.linalg.qr(design / norms)
+    scaled_coefficients = np.linalg.lstsq(triangular, basis.T @ value, rcond=1 / MAX_CONDITION)[0]
+    return Projection(
+        design / norms @ scaled_coefficients - value, scaled_coefficients / norms, basis
+    )
 
 
 def compute_standard_errors(jacobian, rms: float) -> np.ndarray:
-    """Return the standard deviations (p,) of parameters from the rms of the residual."""
+    """Estimate the standard deviations of fitted parameters from the residual of the fit.
+
+    `jacobian` (k, p) holds the derivatives of the residual, whose root mean square is `rms`.
+    """
     variances = np.diag(np.linalg.pinv(jacobian.T @ jacobian))
     return rms * np.sqrt(np.maximum(variances, 0))

@@ -1,15 +1,16 @@
-"""Sentences on what a fit does not determine, with the names of the values."""
+"""Sentences on the fitted values that the data do not determine."""
 
 import numpy as np
 
 from ..core import Outcome
 from .least_squares import MAX_EVALUATIONS, Fit
 
-MIN_SENSITIVITY = 1e-9  # fraction of the largest sensitivity; a value with less has no effect
+# fraction of the largest sensitivity; a fitted value with a smaller one has no effect on the residual
+MIN_SENSITIVITY = 1e-9
 
 
 def describe_fit(fit: Fit, names) -> list:
-    """Describe which values a fit does not determine, and where the search failed.
+    """Describe the values that a fit does not determine, and the failures of its search.
 
     The sentences name values that are at a bound, without effect, determined only in a combination, or whose
     interval reaches a bound; failed evaluations; and a search that did not converge.
@@ -61,15 +62,20 @@ def describe_fit(fit: Fit, names) -> list:
 
 
 def _describe_combination(row, names) -> str:
-    """Describe a direction (n,) of relative changes in % that has no effect."""
+    """Describe a combined change of fitted values that leaves the residual unchanged.
+
+    `row` (n,) is the relative change of each value [%].
+    """
     involved = np.flatnonzero(row)
     changes = ", ".join(f"{names[i]} by {row[i]:+.3g} %" for i in involved)
-    known = ""
+    known_combination = ""
     if involved.size == 2:
         first, second = row[involved]
         if abs(abs(first) - abs(second)) < 2e-3:
-            known = f": only their {'product' if first * second < 0 else 'ratio'} is known"
+            known_combination = (
+                f": only their {'product' if first * second < 0 else 'ratio'} is known"
+            )
     return (
         f"{' and '.join(names[i] for i in involved)} cannot be determined separately (changing {changes} together has "
-        f"no effect){known}"
+        f"no effect){known_combination}"
     )

@@ -2,7 +2,7 @@
 
 In: the half swings of a decay, i.e. the motion from one turning point to the next. The turning
 points of a computed motion come from the cubic between samples (`find_turning_points`), the half swings of a
-measured one from a sine fitted to each (`identify.swings`). Out: a `DecayCurve`.
+measured one from a sine fitted to each (`identify.half_cycles`). Out: a `DecayCurve`.
 
 Half swing k has a middle t_k and a size S_k. Over 2 m + 1 half swings, the slope of ln S_k is
 the logarithmic decrement of half a cycle, pi zeta/(1 - zeta^2)^(1/2), and the slope of t_k is

@@ -68,7 +68,7 @@ def test_always_noise_leaves_the_damping_within_its_error():
         STEP, force, noisy, "acceleration", estimate_response(STEP, force, noisy)
     )
     assert found.frequency.size == 2 and found.misfit == pytest.approx(0.1, rel=0.05)
-    assert (np.abs(found.damping - ZETA) < 1.5 * found.error).all()  # 1.5 of 95 %: 3 sigma
+    assert (np.abs(found.damping - ZETA) < 1.5 * found.damping_error).all()  # 1.5 of 95 %: 3 sigma
     np.testing.assert_allclose(found.damping, ZETA, rtol=0.02)
 
 
@@ -89,7 +89,7 @@ def test_always_a_noisy_decay_lies_within_its_error():
     rng = np.random.default_rng(4)
     for _ in range(2):
         found = fit_decay(time, value + 0.01 * rng.normal(size=time.size))
-        assert (np.abs(found.damping - ZETA) < 1.6 * found.error).all()
+        assert (np.abs(found.damping - ZETA) < 1.6 * found.damping_error).all()
 
 
 def test_always_a_decay_by_dry_friction_is_said_not_to_be_exponential():

@@ -9,7 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import NotConverged
-from ...identify.least_squares import Descent, Fit, Problem, assemble_fit, run_descents
+from ...identify.least_squares import (
+    Descent,
+    DescentStorage,
+    Fit,
+    Problem,
+    assemble_fit,
+    run_descents,
+)
 from ...identify.space import CubeResidual
 from .cells import Readings
 from .computed import ModelReadings
@@ -88,7 +95,7 @@ def make_residual(cells: Readings, computed: ModelReadings, training, unstable: 
     return residual
 
 
-class _SavedDescents:
+class _StoredDescents(DescentStorage):
     """Descents from the starts of a search, which a caller can store as lists.
 
     Parameters
@@ -103,15 +110,15 @@ class _SavedDescents:
         self.name = name
         self.access_ends = access_ends
 
-    def __call__(self, start: int, *descent: Descent) -> Descent | None:
-        """Store the descent of a start, or return the stored one; None if there is none."""
-        name = f"{self.name}/{start}"
-        if descent:
-            u, cost, is_converged, rows = descent[0]
-            stored_cost = cost if np.isfinite(cost) else None
-            self.access_ends(name, [*u.tolist(), stored_cost, rows, bool(is_converged)])
-            return None
-        stored = self.access_ends(name)
+    def save(self, start: int, descent: Descent) -> None:
+        """Store the descent from a start."""
+        stored_cost = descent.cost if np.isfinite(descent.cost) else None
+        numbers = [*descent.u.tolist(), stored_cost, descent.rows, bool(descent.is_converged)]
+        self.access_ends(f"{self.name}/{start}", numbers)
+
+    def load(self, start: int) -> Descent | None:
+        """Return the stored descent from a start, or None."""
+        stored = self.access_ends(f"{self.name}/{start}")
         if not stored:
             return None
         *u, cost, rows, is_converged = stored
@@ -161,7 +168,7 @@ def search_random_starts(
     ends = run_descents(
         quick,
         starts,
-        saved=_SavedDescents(name, settings.access_ends),
+        storage=_StoredDescents(name, settings.access_ends),
         before_descent=before_descent,
         report=report,
     )

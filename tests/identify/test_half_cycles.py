@@ -5,7 +5,7 @@ import pytest
 
 from patchfem.core import PatchfemError
 from patchfem.identify import compute_decay_curve
-from patchfem.identify.swings import find_half_swings
+from patchfem.identify.half_cycles import find_half_cycles
 from patchfem.response import compute_swing_curve
 
 
@@ -43,7 +43,7 @@ def covered(kind, seeds) -> np.ndarray:
         rng = np.random.default_rng(seed)
         t, y, frequency, ratio = kind(rng)
         found = compute_swing_curve(
-            find_half_swings(t, y + 10 ** rng.uniform(-4, -1.5) * rng.normal(size=t.size))
+            find_half_cycles(t, y + 10 ** rng.uniform(-4, -1.5) * rng.normal(size=t.size))
         )
         out += zip(
             np.abs(found.frequency - frequency(found.amplitude)) <= found.frequency_error,
@@ -75,10 +75,10 @@ def test_refuses_what_holds_no_decay():
     rng = np.random.default_rng(0)
     t = np.arange(500) / 1000
     with pytest.raises(PatchfemError, match=r"rise above the noise|samples per cycle"):
-        find_half_swings(t, rng.normal(size=t.size))
+        find_half_cycles(t, rng.normal(size=t.size))
     with pytest.raises(PatchfemError, match="the free decay has 9 samples"):
-        find_half_swings(t[:9], t[:9])
+        find_half_cycles(t[:9], t[:9])
     with pytest.raises(PatchfemError, match="the record contains no oscillation"):
-        find_half_swings(t, 0 * t)
+        find_half_cycles(t, 0 * t)
     with pytest.raises(PatchfemError, match="samples per cycle"):
-        find_half_swings(t, np.cos(2 * np.pi * 300 * t))
+        find_half_cycles(t, np.cos(2 * np.pi * 300 * t))
