@@ -168,9 +168,9 @@ class CubeResidual:
             Indices of the f coordinates.
         """
         residual_at_u = self(u)
-        columns = [
-            _difference_quotient(residual_at_u, self._evaluate_neighbours(u, i)) for i in free
-        ]
+        columns = []
+        for i in free:
+            columns.append(_difference_quotient(residual_at_u, self._evaluate_neighbours(u, i)))
         self._remember(u, residual_at_u)
         return np.column_stack(columns) if columns else np.zeros((self.rows, 0))
 
