@@ -28,7 +28,7 @@ from scene_texts import (
 )
 
 from patchfem.dynamics import checkpoint
-from patchfem.dynamics.march import march
+from patchfem.dynamics.march import run as march_run
 from patchfem.export.results import is_state
 
 MARCH = '[accuracy]\nmethod = "march"\nsteps_per_cycle = 60\n'
@@ -64,7 +64,7 @@ RIGS = {
 @pytest.fixture
 def often(monkeypatch):
     """Marches keep their state after every second cycle; the list has a number per state."""
-    monkeypatch.setattr(march, "MAX_PIECE_CYCLES", 2)
+    monkeypatch.setattr(march_run, "MAX_PIECE_CYCLES", 2)
     saved = []
     save = checkpoint.save_checkpoint
 

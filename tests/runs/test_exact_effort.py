@@ -1,6 +1,5 @@
 """What the exact engine is expected to cost, the engine that is chosen for it, and that the cost is bounded."""
 
-
 import numpy as np
 import pytest
 from event_run import rows_of

@@ -83,11 +83,14 @@ def loaded_again(code: str, *words) -> set:
 def has_code_of(modules: set, name: str) -> bool:
     """Return whether modules of a package of others, or of a folder or module of ours, are among those loaded.
 
-    The `__init__` of a folder that holds a docstring alone does not count: Python loads it with any module of
-    the folder that is named and not yet used.
+    The `__init__` of a folder that has only a docstring and the table of its public names does not count: Python
+    loads it with any module of the folder that is named and not yet used.
     """
-    whole = name if name in ("scipy", "skfem", *ALWAYS) else f"patchfem.{name}"
-    return any((one == whole or one.startswith(f"{whole}.")) and not _words(one) for one in modules)
+    full_name = name if name in ("scipy", "skfem", *ALWAYS) else f"patchfem.{name}"
+    return any(
+        (module == full_name or module.startswith(f"{full_name}.")) and not _has_names_only(module)
+        for module in modules
+    )
 
 
 def absent(modules: set, *names) -> None:
@@ -96,11 +99,13 @@ def absent(modules: set, *names) -> None:
 
 
 @cache
-def _words(name: str) -> bool:
-    """Whether a module of ours is the `__init__` of a folder with a docstring alone."""
+def _has_names_only(name: str) -> bool:
+    """Return whether a module is the `__init__` of a folder with only a docstring and a table of public names."""
     path = PACKAGE.joinpath(*name.split(".")[1:], "__init__.py")
-    return (
-        name.startswith("patchfem.")
-        and path.is_file()
-        and len(ast.parse(path.read_text("utf-8")).body) == 1
+    if not name.startswith("patchfem.") or not path.is_file():
+        return False
+    _, *statements = ast.parse(path.read_text("utf-8")).body
+    return all(
+        isinstance(statement, ast.Assign) and ast.unparse(statement.targets[0]) == "PUBLIC"
+        for statement in statements
     )

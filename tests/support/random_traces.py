@@ -18,7 +18,7 @@ from synthetic import self_affine
 import patchfem as pf
 from patchfem.model import build
 from patchfem.runs import measures, solve_all
-from patchfem.runs.patch import ladder
+from patchfem.runs.patch import fine
 from patchfem.scene import loads
 
 LENGTH, CELLS = 12.7e-3, 1588  # of the interface [m]; of the even mesh beside
@@ -126,11 +126,10 @@ def _beside(kind: str, asked, tolerance: float) -> dict:
     """Measures of a patch by name from cells alone: even ones of traces that are fine everywhere, else graded ones."""
     if kind in FINE:
         return measures(*solve_all(asked.with_mesh(element_size=LENGTH / CELLS), tolerance))
-    given = ladder._finer
-    ladder._finer = lambda asked: False
+    takes_points = fine.takes_points
+    fine.takes_points = lambda patch_model: False
     try:
-        return measures(
-            *(one for one in solve_all(asked, tolerance) if one is not None), tolerance=tolerance
-        )
+        patches = [patch for patch in solve_all(asked, tolerance) if patch is not None]
+        return measures(*patches, tolerance=tolerance)
     finally:
-        ladder._finer = given
+        fine.takes_points = takes_points
