@@ -46,7 +46,7 @@ PUBLIC = {
         "stuck_patch_stiffness",
     ),
     "patch.faces": (
-        "UNKNOWN",
+        "NO_ERROR_ESTIMATE",
         "has_error_meshes",
         "static_measures_without_errors",
     ),

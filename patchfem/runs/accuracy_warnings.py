@@ -231,8 +231,8 @@ def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
     if tolerances:
         return f"{cause}; set accuracy.tolerance = {min(tolerances):.3g} for a finer mesh"
     patches = [finding.patch for finding, _ in places if isinstance(finding.patch, press.Patch)]
-    seconds = max(map(ladder.next_seconds, patches), default=0.0)
-    limit = ladder.most_seconds(patch_models[0])
+    seconds = max(map(ladder.predict_next_mesh_seconds, patches), default=0.0)
+    limit = ladder.max_condensing_seconds(patch_models[0])
     if seconds > limit:
         cause += (
             f"; the next mesh would take about {format_number(seconds, 2)} CPU s, and at most {limit:g} CPU s are spent "
@@ -250,7 +250,9 @@ def _refining_tolerance(finding: Finding, coarse) -> float | None:
     patch_model = finding.model.patch
     tolerance = finding.model.accuracy.tolerance
     if patch_model.mesh.shared is not None and isinstance(finding.patch, press.Patch):
-        if ladder.next_seconds(finding.patch) > ladder.most_seconds(patch_model):
+        if ladder.predict_next_mesh_seconds(finding.patch) > ladder.max_condensing_seconds(
+            patch_model
+        ):
             return None
     if not any(coarse) or patch_model.mesh.shared is not None:
         return PROPOSED_TOLERANCE_RATIO * tolerance

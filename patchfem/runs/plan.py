@@ -212,7 +212,7 @@ def _make_plan(model: Model) -> Plan:
             for name, link in patch_plan.chain(interface.patch).items():
                 if link != "rigid":
                     chain[rows.add_interface_number(name, number)] = link
-            on_patch += patch_plan.face_words(model.rig.friction.names[number], interface)
+            on_patch += patch_plan.describe_patch(model.rig.friction.names[number], interface)
     cost = _cost(model)
     on_law += cost.words
     if model.kind == "bench":

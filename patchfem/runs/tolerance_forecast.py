@@ -149,7 +149,7 @@ def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
     if not patch.nominal_load > 0:
         return None
     size = patch.uniform_element_size
-    share = size / patch_grids.base_grids(patch).contact.width
+    share = size / patch_grids.make_base_grids(patch).contact.width
     if tolerance > OF_ELEMENT * share:
         return None
     words = f"with contact.element_size = {format_length(size, 3)} ({format_number(share, 2)} of the length in contact)"

@@ -123,7 +123,7 @@ def widths(rows) -> list:
 
 @pytest.fixture
 def small(monkeypatch):
-    monkeypatch.setattr(ladder, "MAX_SECONDS", LEAST)
+    monkeypatch.setattr(ladder, "MAX_CONDENSING_SECONDS", LEAST)
 
 
 @pytest.mark.share(0, 3, 6)
@@ -159,7 +159,7 @@ def test_exact_the_limit_of_a_geometric_series(ratio):
 
 
 if __name__ == "__main__":
-    ladder.MAX_SECONDS = LEAST
+    ladder.MAX_CONDENSING_SECONDS = LEAST
     for name, found in campaign(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])).items():
         cover, ratio = 1 - np.mean([missed(*row) for row in found]), widths(found) or [0.0]
         print(

@@ -83,9 +83,9 @@ SMALL_CROWN = 'radius = "0.3 m"'
 )
 def test_always_further_searches_for_the_contact_give_the_same_columns(ending, monkeypatch):
     columns = []
-    for fraction in (grids.SETTLED_FRACTION, -1.0):  # a search is never settled with -1
+    for fraction in (grids.BAND_CHANGE_TOL, -1.0):  # a search is never settled with -1
         store.clear()
-        monkeypatch.setattr(grids, "SETTLED_FRACTION", fraction)
-        columns.append(grids.base_grids(asked(PIECES + ending)).bodies[0].x)
+        monkeypatch.setattr(grids, "BAND_CHANGE_TOL", fraction)
+        columns.append(grids.make_base_grids(asked(PIECES + ending)).bodies[0].x)
     settled, searched = columns
     assert np.abs(settled - searched).max() < 0.1 * np.diff(searched).min()

@@ -68,7 +68,7 @@ def holds(result, name, truth) -> bool:
 @pytest.fixture
 def cheap(monkeypatch):
     """Coarser automatic meshes: a hundredth of the work."""
-    monkeypatch.setattr(ladder, "MAX_SECONDS", {True: 0.1, False: 0.1})
+    monkeypatch.setattr(ladder, "MAX_CONDENSING_SECONDS", {True: 0.1, False: 0.1})
 
 
 @pytest.mark.share(0)

@@ -17,7 +17,7 @@ from patchfem.mesh import graded_grid, write_mesh
 from patchfem.mesh.pairs import as_piece
 from patchfem.model import make_piece_meshes
 from patchfem.runs import measures, solve_all
-from patchfem.runs.patch.measures import plane_band
+from patchfem.runs.patch.measures import plane_state_sentences
 from patchfem.runs.patch.press import solve
 from patchfem.runs.patch.values import values
 from patchfem.runs.run import run
@@ -319,7 +319,7 @@ def test_exact_the_chosen_mesh_meets_hertz_within_its_error():
 def test_exact_the_plane_band_is_the_other_plane_state():
     found = asked(TILT.format(1e-5))
     patch = solve(found, *make_piece_meshes(found))
-    [sentence] = plane_band(found, patch)
+    [sentence] = plane_state_sentences(found, patch)
     in_stress = replace(found, pieces=replace(found.pieces, plane="stress"))
     stress = values(solve(in_stress, *make_piece_meshes(found)))
     mine = values(patch)
@@ -330,7 +330,7 @@ def test_exact_the_plane_band_is_the_other_plane_state():
     )
     wide = asked()
     wide = replace(wide, pieces=replace(wide.pieces, width=60e-3))
-    assert plane_band(wide, solve(wide, *make_piece_meshes(wide))) == []
+    assert plane_state_sentences(wide, solve(wide, *make_piece_meshes(wide))) == []
 
 
 def test_always_the_bar_of_an_even_mesh_holds_the_error_of_its_rows():

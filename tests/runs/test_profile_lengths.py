@@ -79,7 +79,7 @@ def on_points(tmp_path, x, z, text, *settings):
             text + '[contact.profile]\nfile = "trace.csv"\n', tmp_path / "scene.toml", sets=settings
         )
     ).patch
-    assert trace.takes_points(asked)
+    assert trace.can_use_points(asked)
     return trace.solve_on_points(asked, lambda found: True).measures
 
 

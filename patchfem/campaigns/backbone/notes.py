@@ -52,7 +52,7 @@ def note_missing_mesh(joint: Joint) -> list:
         return []
     if not model.partial_slip or joint.coarse is not None:
         has_errors = not model.rig.friction.has_partial_slip or faces.has_error_meshes(model)
-        return [] if has_errors else [MISSING_ERRORS + faces.UNKNOWN]
+        return [] if has_errors else [MISSING_ERRORS + faces.NO_ERROR_ESTIMATE]
     cure = "leave out contact.element_size"
     if model.patch.mesh.file is not None:
         cure = "split the elements of contact.mesh"

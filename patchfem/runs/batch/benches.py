@@ -22,7 +22,7 @@ def refuses(model: Model) -> str:
         or model.patch.mesh.edge_motion
     ):
         return "the case has no patch, or its patch or load changes during the slide"
-    return static.not_together(model.patch)
+    return static.reason_not_batched(model.patch)
 
 
 def group(model: Model) -> Hashable:

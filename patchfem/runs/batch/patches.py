@@ -39,13 +39,15 @@ class _Nodes(NamedTuple):
 def refuses(model: Model) -> str:
     """Return why a static patch is not pressed together with others, or ""."""
     return (
-        static.not_together(model.patch) if model.kind == "patch" else "the case is no static patch"
+        static.reason_not_batched(model.patch)
+        if model.kind == "patch"
+        else "the case is no static patch"
     )
 
 
 def group(model: Model) -> Hashable:
     """Return a key that is equal for models whose patches are pressed together."""
-    return geometry_key(model.patch), static.pressing_kind(model.patch), model.accuracy.tolerance
+    return geometry_key(model.patch), static.batch_key(model.patch), model.accuracy.tolerance
 
 
 def parts(models: Sequence[Model]) -> dict:
@@ -67,7 +69,7 @@ def solved_together(models: Sequence[Model]) -> list[Model]:
     out = list(models)
     groups = {}
     for case, model in enumerate(models):
-        if not static.not_together(model.patch):
+        if not static.reason_not_batched(model.patch):
             asked = store.content_key(model.patch) if store.may_be_shared(model.patch) else case
             groups.setdefault(group(model), {}).setdefault(asked, []).append(case)
     for alike in groups.values():
@@ -114,7 +116,7 @@ def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
     first = models[0]
     alike = isinstance(models, SimilarModels)
     asked = (
-        static.loads_by_columns(models.columns().patch, len(models))
+        static.loads_from_columns(models.columns().patch, len(models))
         if alike
         else static.collect_loads([model.patch for model in models])
     )

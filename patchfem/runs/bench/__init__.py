@@ -1,4 +1,4 @@
-"""Law bench: a prescribed slide in, the friction loop out.
+"""Law bench: friction loop of an interface under a prescribed relative displacement.
 
 In: a scene with [slide], its solved patch or none, samples of time and slide. Out: `BenchRun`
 with histories of force and energy, frames of the interface, and measures. `engine` chooses how

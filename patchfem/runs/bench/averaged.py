@@ -1,4 +1,4 @@
-"""Averaged friction law on a patch: along a prescribed slide, or as limit of a rigid block.
+"""Friction law averaged over a patch, for a prescribed displacement or a sliding block.
 
 In: a model with law 'convolution' and its pressed patch. Out: the law object, the limit force
 over mu_s N, and tractions.
@@ -9,16 +9,20 @@ import numpy as np
 from ...core import PatchfemError
 from ...effects import describe_unsupported, import_effect, law_has_trait
 
-EQUAL_LIMITS_TOL = 1e-9  # relative difference of the limits in both directions that counts as zero
+# Largest relative difference of the limit forces in both directions that counts as zero.
+EQUAL_LIMITS_TOL = 1e-9
 
 
 def _law():
-    """Return the module of the averaged law."""
+    """Return the module of the averaged friction law, imported on first use."""
     return import_effect("friction.law=convolution")
 
 
 def law_on(model, patch):
-    """Return the law of a bench; patch: None for [normal]."""
+    """Return the averaged friction law of a model on its patch.
+
+    patch: None under [normal].
+    """
     f = model.friction
     law = _law()
     if patch is None:
@@ -29,12 +33,12 @@ def law_on(model, patch):
 
 
 def limit_share(model, patch) -> float:
-    """Return the limit force of a rigid block over mu_s N [1]: below 1 for the averaged law.
+    """Return the limit friction force of a rigid block over static friction x load [1].
 
     Raises
     ------
     PatchfemError
-        If the limit differs between the two directions of the slide.
+        If the limit differs between the two directions of sliding.
     """
     f = model.friction
     if patch is None or not law_has_trait(f.law, "averaged"):
@@ -55,16 +59,16 @@ def limit_share(model, patch) -> float:
 
 
 def limit_tractions(model, patch, force) -> np.ndarray:
-    """Return the tractions of a rigid block under resultants of the friction.
+    """Distribute resultant friction forces of a rigid block as tractions over its nodes.
 
-    They are proportional to the averaged pressure in the direction of the force.
+    The tractions are proportional to the averaged pressure in the direction of the force.
 
     Parameters
     ----------
     model : Model
     patch : Patch
     force : (f,)
-        Resultants [N].
+        Resultant forces [N].
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Law bench: slide an interface along a prescribed path; compute the loop and its measures.
+"""Law bench: prescribe the displacement of an interface and compute the friction loop.
 
 In: a model with [slide] and its pressed patch, or none for a single point. Out: a `BenchRun`,
 with or without the shear compliance of the pieces.
@@ -31,7 +31,7 @@ from .stepped import slide_in_plane, slide_step_by_step
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BenchRun:
-    """One pass along the path, at k samples.
+    """Histories, fields and measures of an interface along a prescribed path, at k samples.
 
     - time, slide, rate, force, load, slip (k,): [s], [m], [m/s], [N], [N], [m].
     - ledger (4, k): work, stored, dissipated and created energy [J]; all but the stored energy are
@@ -68,7 +68,7 @@ class BenchRun:
 def run(
     model, patch, steps: int, frames: int = 0, path=None, watch: PassOptions = DEFAULT_OPTIONS
 ) -> BenchRun:
-    """Slide the interface of a model along its path.
+    """Compute the friction histories of a model along its bench path.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def run(
     values = _measure(model, time, slide, histories, first)
     values |= _measure_loop(model, time, slide, histories, first, omega) if omega else {}
     values["work_check"] = work_difference(histories.ledger[0], loops, jumps)
-    span = time[-1]  # the division by the span avoids overflow for an extremely slow slide
+    span = time[-1]  # Division by the span avoids overflow for an extremely slow motion.
     rate = np.zeros(time.size)
     if time.size > 2:
         rate = np.gradient(slide, time / span) / span
@@ -113,7 +113,7 @@ def run(
 
 
 def _solve(task: Slide) -> tuple[SlideHistories, dict]:
-    """Return the histories of a pass, and those of the lateral direction by name."""
+    """Return the histories along the path, and those of the lateral direction by name."""
     if task.model.slide.across is not None:
         return slide_in_plane(task)
     if task.model.partial_slip:
@@ -126,10 +126,11 @@ def _solve(task: Slide) -> tuple[SlideHistories, dict]:
 
 
 def _measure(model, time, slide, histories: SlideHistories, first: int) -> dict:
-    """Return the measures of a pass by name, except those of its loop."""
+    """Return the measures of a bench by name, except those of its loop."""
     force = histories.force
     load = histories.load
-    # the ratio refers to the applied load: friction is lost where the piece slides off the pressure
+    # The ratio refers to the applied load: friction is lost where the piece slides off the
+    # pressure.
     applied = load if model.load_varies else np.full_like(load, load[0])
     is_loaded = applied > 1e-3 * applied.max(initial=0.0)
     ratio = np.divide(force, applied, out=np.zeros_like(force), where=is_loaded)
@@ -151,7 +152,10 @@ def _measure(model, time, slide, histories: SlideHistories, first: int) -> dict:
 
 
 def _measure_loop(model, time, slide, histories: SlideHistories, first: int, omega: float) -> dict:
-    """Return the measures of the loop of the last cycle, which starts at sample `first`, by name."""
+    """Return the measures of the loop of the last cycle by name.
+
+    The last cycle starts at sample `first`.
+    """
     time = time[first:]
     slide = slide[first:]
     force = histories.force[first:]

@@ -1,4 +1,4 @@
-"""Rigid slide of a law without memory in closed form, under a constant load.
+"""Rigid sliding of a friction law without memory in closed form, under a constant load.
 
 In: a model whose pressure moves with the upper piece, and a path. Out: `SlideHistories`. In every step,
 the force of such a law is a fraction of its limit, and the limit depends only on the direction
@@ -10,11 +10,11 @@ import numpy as np
 from .law import ends_of_rest, law_for, nodal_pressure
 from .ledger import Slide, SlideHistories, elastic_slip, local_slip, make_ledger
 
-N_GAUSS_POINTS = 8  # Gauss points in a step over a flank
+N_GAUSS_POINTS = 8  # Number of Gauss points per step along the flank of a groove.
 
 
 def closed_form(task: Slide) -> SlideHistories:
-    """Slide the interface of a law without memory along its path, in closed form."""
+    """Compute the histories of rigid sliding with a law without memory, in closed form."""
     if task.model.grooves is not None:
         return _closed_form_on_grooves(task)
     slide = task.slide
@@ -23,7 +23,7 @@ def closed_form(task: Slide) -> SlideHistories:
     limits = np.stack([law.limit(sigma, -1.0), law.limit(sigma, 1.0)])
     increments = np.diff(slide)
     fraction = law.limit_fraction(increments, np.diff(task.time))
-    if law.has_force_at_rest:  # the last traction persists during rest
+    if law.has_force_at_rest:  # At rest, the traction of the last motion persists.
         last = _last_moving_steps(increments)
         fraction = np.where(last < 0, 0.0, fraction[last])
     fraction = np.concatenate([[0.0], fraction])
@@ -51,7 +51,7 @@ def closed_form(task: Slide) -> SlideHistories:
 
 
 def _closed_form_on_grooves(task: Slide) -> SlideHistories:
-    """Slide a law without memory slowly over grooves, in closed form.
+    """Compute the histories of slow rigid sliding over grooves, in closed form.
 
     The force is N (t + phi)/(1 - phi t), with the slope t and phi = f/R along the flank. The lift
     of the load is stored energy, the friction work along the flank is dissipated; no mass is
@@ -71,7 +71,7 @@ def _closed_form_on_grooves(task: Slide) -> SlideHistories:
         lowest, highest = (
             grooves.force_ratio(slide[0], sign, model.friction.static) for sign in (-1.0, 1.0)
         )
-        # at rest before the motion, friction on the flank takes the value that balances the load
+        # At rest before the motion, friction on the flank takes the value that balances the load.
         ratio[direction == 0] = np.clip(0.0, lowest, highest)
         loss = load * grooves.friction_loss(slide[:-1], slide[1:], law.kinetic)
     else:
@@ -81,7 +81,7 @@ def _closed_form_on_grooves(task: Slide) -> SlideHistories:
         ratio = (slope + phi) / (1 - phi * slope)
 
         def dissipated_force(places):
-            """Return the dissipated work per slide [N] at slides (k - 1,) [m]."""
+            """Return the dissipated work per displacement [N] at displacements (k - 1,) [m]."""
             slope, phi = _along_flank(grooves, law, places, speed)
             return load * phi * (1 + slope**2) / (1 - phi * slope)
 
@@ -105,13 +105,13 @@ def _closed_form_on_grooves(task: Slide) -> SlideHistories:
 
 
 def _last_moving_steps(increments) -> np.ndarray:
-    """Return the last step with a motion up to each step (k - 1,); -1 if there is none."""
+    """Return the index (k - 1,) of the last step with motion up to each step; -1 without one."""
     steps = np.where(increments != 0, np.arange(increments.size), -1)
     return np.maximum.accumulate(steps)
 
 
 def integrate_steps(slide, integrand) -> np.ndarray:
-    """Integrate integrand(q) over q in every step of a slide by Gauss quadrature, (k - 1,).
+    """Integrate a function of the displacement over every step by Gauss quadrature.
 
     Parameters
     ----------
@@ -128,9 +128,9 @@ def integrate_steps(slide, integrand) -> np.ndarray:
 
 
 def _along_flank(grooves, law, slide, speed) -> tuple:
-    """Return slope t and friction ratio f/R along the flank [1] of a law of the speed.
+    """Return slope t and friction ratio f/R [1] along a groove flank, for a law of the speed.
 
-    At slides [m] with speeds [m/s].
+    They are given at displacements [m] with speeds [m/s].
     """
     t = grooves.slope(slide)
     return t, law.static * law.limit_fraction(np.sqrt(1 + t**2) * speed, 1.0)

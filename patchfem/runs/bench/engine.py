@@ -1,4 +1,4 @@
-"""Engine of a bench: the method that slides its interface, its error and its cost.
+"""Choice of the method that computes the friction along a bench path, and its cost.
 
 In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `Cost`. Recursion, list of
 bonds and elements are the compiled ones that rigs use. A law without memory needs no loop. If
@@ -20,16 +20,19 @@ from ...friction.bonds import parameters
 from ...slip import shear_modes
 from ..cost import MARCH_CODE, NO_CODE, SHORT_CODE, Cost, MemoryPart
 
-MAX_GROOVE_STEPS = 200_000  # most steps per cycle over grooves
-GROOVE_SAMPLES = 20  # samples per radian of grooves
-SAMPLE_BYTES = 250.0  # memory of a sample of the slide [bytes]
-# passes over the list relative to those in a rig: a prescribed slide needs no search for the
-# increment
+MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
+GROOVE_SAMPLES = 20  # Number of samples per radian of the groove phase.
+SAMPLE_BYTES = 250.0  # Memory of a sample of the histories [bytes].
+# List passes per step over those in a rig. A prescribed displacement needs no search for the
+# increment of the displacement.
 LIST_PASSES = 1 / 3
 
 
 class Method(Enum):
-    """Method that computes the slide of a bench; the value is its name in summaries and plans."""
+    """Method that computes the friction of a bench.
+
+    The value is its name in summaries and plans.
+    """
 
     CLOSED = "closed form"
     ELEMENTS = "parallel elements"
@@ -46,7 +49,7 @@ LIST_METHODS = (Method.LIST, Method.LISTS)
 
 @dataclass(frozen=True, slots=True)
 class BenchEngine:
-    """Method with which a bench slides its interface.
+    """Method and settings with which a bench computes the friction along its path.
 
     - method: Method.
     - seconds: CPU seconds per sample.
@@ -77,7 +80,7 @@ class BenchEngine:
 def bench_engine(
     model, slide, points: int = 1, choice: "bond_engines.EngineChoice | None" = None
 ) -> BenchEngine:
-    """Return the engine of a bench.
+    """Choose the method with which a bench computes the friction along its path.
 
     Parameters
     ----------
@@ -121,7 +124,7 @@ def bench_engine(
 
 
 def steps_per_cycle(model) -> int:
-    """Return the steps per cycle of a bench: from the scene, else from tolerance and grooves."""
+    """Return the steps per cycle of a bench, from the scene or else from tolerance and grooves."""
     slide = model.slide
     accuracy = model.accuracy
     steps = slide.steps(accuracy.tolerance, accuracy.steps_per_cycle, model.friction.bond_length)
@@ -133,18 +136,19 @@ def steps_per_cycle(model) -> int:
 
 
 def pressure_changes(model) -> bool:
-    """Return whether the pressure of a point changes during the slide.
+    """Return whether the pressure of a point changes during the motion.
 
-    It changes with the load, or if the point slides over the pressure of the other piece.
+    It changes with the load, or if the point moves over the pressure distribution of the other
+    piece.
     """
     return model.load_varies or model.side == "lower"
 
 
 def choose_bond_sum(model, slide) -> "bond_engines.EngineChoice":
-    """Choose the engine that sums over the bonds of an interface that slides rigidly.
+    """Choose the engine that sums over the bonds of a rigidly sliding interface.
 
-    It is chosen as in a rig, except that its error is relative to the force that is reached, which
-    is small if the stroke is short compared with the bond length. slide: samples (k,) [m].
+    It is chosen as in a rig, except that its error is relative to the reached force, which is small
+    if the stroke is short compared with the bond length. slide: samples (k,) [m].
     """
     law = model.bonds
     accuracy = model.accuracy
@@ -157,7 +161,7 @@ def choose_bond_sum(model, slide) -> "bond_engines.EngineChoice":
 
 
 def requested_engine(model) -> str:
-    """Return the engine of a sum over bonds that the scene names, or "auto".
+    """Return the engine that the scene requests for a sum over bonds, or "auto".
 
     "merged" replaces it if every point has its own list and bonds keep the pressure at which they
     formed while it changes, because each step then leaves a strip.
@@ -172,10 +176,11 @@ def requested_engine(model) -> str:
 
 
 def choose_smooth_bond_sum(model, slide) -> "bond_engines.EngineChoice | None":
-    """Choose the engine as `choose_bond_sum` does, but without merging, for a fit.
+    """Choose a bond-sum engine without merging, whose force varies smoothly with parameters.
 
-    None for laws without bonds, or if the scene prescribes the engine or the merging.
-    With merging, the force would jump by the error of the sum when a value of the scene changes.
+    It is None for laws without bonds, or if the scene prescribes the engine or the merging. With
+    merging, the force would jump by the error of the sum when a value of the scene changes, which
+    disturbs a fit.
     """
     if (
         not law_has_trait(model.friction.law, "bonds")
@@ -190,7 +195,7 @@ def choose_smooth_bond_sum(model, slide) -> "bond_engines.EngineChoice | None":
 
 
 def mean_stroke(slide) -> tuple:
-    """Return mean path [m] and mean number of moving steps between two reversals of a slide."""
+    """Return mean path [m] and mean number of moving steps between two reversals of a path."""
     moves = np.diff(slide)
     directions = np.sign(moves[moves != 0])
     count = 1 + np.count_nonzero(directions[1:] != directions[:-1])
@@ -200,14 +205,14 @@ def mean_stroke(slide) -> tuple:
 def _choose_sum_engine(
     model, slide, points: int, choice: "bond_engines.EngineChoice", lists: int = 1
 ) -> BenchEngine:
-    """Return the engine of a sum over bonds.
+    """Return the bench engine for a law that sums over bonds, with its predicted CPU time.
 
     lists: number of lists, one per point with shear modes, else 1.
     """
     law = model.bonds
     if choice.engine == "recursion":
         return BenchEngine(Method.RECURSION, cost_model.RECURSION_STEP_SECONDS, choice)
-    if law.breakaway and lists == 1:  # a list cannot represent an elastic range
+    if law.breakaway and lists == 1:  # A bond list cannot represent an elastic range.
         return _stepped_engine(model, slide, points)
     size = slide.size
     max_move = float(np.abs(np.diff(slide)).max())
@@ -226,12 +231,12 @@ def _choose_sum_engine(
 
 
 def _stepped_engine(model, slide, points: int) -> BenchEngine:
-    """Return the engine that evaluates a law sample by sample."""
+    """Return the bench engine that evaluates a friction law sample by sample."""
     return BenchEngine(Method.STEPPED, _stepped_seconds(model, slide, points))
 
 
 def _stepped_seconds(model, slide, points: int) -> float:
-    """Return the CPU seconds of a step in NumPy.
+    """Predict the CPU time [s] of one step of a NumPy law.
 
     The law depends on the last increment, or is a sum over the strips of the path.
     """
@@ -248,13 +253,13 @@ def _stepped_seconds(model, slide, points: int) -> float:
 
 
 def slips_by_elements(model) -> bool:
-    """Return whether the slide of a model moves parallel elements, one per node that slips."""
+    """Return whether parallel elements represent the partial slip of a bench."""
     simple = model.grooves is None and model.slide.across is None
     return model.partial_slip and simple and not law_has_trait(model.friction.law, "bonds")
 
 
 def cost(model, points: int) -> Cost:
-    """Return the cost of a slide.
+    """Predict the cost of a bench along its path.
 
     Parameters
     ----------
@@ -288,13 +293,16 @@ def cost(model, points: int) -> Cost:
 
 
 def _samples_key(model) -> str:
-    """Return the key of the scene that sets the number of samples."""
+    """Return the scene key that sets the number of samples of a bench."""
     if model.slide.kind == "file":
         return "slide.file"
     return "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else "slide.cycles"
 
 
 def groups(model) -> dict:
-    """Return the amplitude of the slide over the bond length by name; {} without a bond length."""
+    """Return the ratio of displacement amplitude to bond length by name.
+
+    The dict is empty without a bond length.
+    """
     length = model.friction.bond_length
     return {"amplitude_over_bond_length": model.slide.amplitude / length} if length else {}

@@ -25,13 +25,15 @@ from .engine import LIST_METHODS, Method, slips_by_elements
 from .law import estimate_tail_loss
 from .ledger import PassOptions
 
-# tolerance that sets the steps of passes on coarser meshes; elements follow any path exactly
+# Tolerance that sets the steps of passes on coarser meshes. Parallel elements follow any path
+# exactly, so that it is not the tolerance of the run.
 MESH_TOL = 1e-2
-FINER_MERGE_FACTOR = 0.5  # factor of the merge width in the pass that shows the error of merging
+# Merge width of the pass that shows the merging error over that of the fine pass.
+FINER_MERGE_FACTOR = 0.5
 
 
 class Pass(NamedTuple):
-    """Settings of a coarse pass of a bench along its path.
+    """Settings of a coarser computation along the bench path, for an error estimate.
 
     - steps: steps per cycle.
     - level: index of the coarser mesh; 0 is that of the run.
@@ -47,7 +49,7 @@ class Pass(NamedTuple):
 
 
 class PassErrors(NamedTuple):
-    """Errors of a bench from coarse passes.
+    """Errors of the measures of a bench, estimated from coarser computations.
 
     - errors: errors by measure name, one dict per kind.
     - seconds: CPU seconds.
@@ -60,7 +62,7 @@ class PassErrors(NamedTuple):
 
 
 def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> PassErrors:
-    """Estimate the errors of a bench from coarse passes along its path.
+    """Estimate the errors of a bench from coarser computations along its path.
 
     Parameters
     ----------
@@ -68,15 +70,15 @@ def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> Pa
     patches : list of Patch
         The patch on nested meshes, fine to coarse; [None] without a patch.
     fine : BenchRun
-        The pass itself.
+        The computation whose errors are estimated.
     steps : int
-        Its steps per cycle.
+        Its number of steps per cycle.
     say : callable, optional
         Callback for a line of text.
     """
 
     def solve(variant: Pass):
-        """Return the BenchRun of a Pass."""
+        """Run the bench with the settings of a coarse pass and return its BenchRun."""
         watch = PassOptions(variant.choice, say, springs=variant.springs, modes=variant.modes)
         return bench.run(model, patches[variant.level], variant.steps, watch=watch)
 
@@ -92,12 +94,12 @@ def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> Pa
 
 
 def list_coarse_passes(model, patches: list, fine, steps: int) -> list:
-    """Return the coarse passes of a bench, as `CoarserRuns`.
+    """List the coarser computations of a bench from which its errors are estimated.
 
-    They have half and a quarter of the steps; at a quarter of them also the coarser mesh, another
-    number of shear modes, merged cells of a density of sliders, or narrower strips of a merged list
-    of bonds. Parallel elements are run on all coarser meshes, with steps that do not depend on the
-    tolerance.
+    They have half and a quarter of the steps. At a quarter of the steps they also have the coarser
+    mesh, another number of shear modes, merged cells of a slider density, or narrower strips of a
+    merged bond list. Parallel elements are run on all coarser meshes, with steps that do not depend
+    on the tolerance.
 
     Parameters
     ----------
@@ -110,7 +112,7 @@ def list_coarse_passes(model, patches: list, fine, steps: int) -> list:
     choice = fine.engine.choice
     half = Pass(max(4, steps // 8 * 4), 0, choice)
     few = Pass(max(4, steps // 16 * 4), 0, choice)
-    # elements follow any path exactly, so that the sampling affects the harmonics only
+    # Parallel elements follow any path exactly, so that the sampling affects the harmonics only.
     rule = convergence_errors if slips_by_elements(model) else partial(step_errors, steps=steps)
     out = [CoarserRuns((half, few), rule, of="steps")]
     meshed = len(patches) > 1
@@ -120,7 +122,7 @@ def list_coarse_passes(model, patches: list, fine, steps: int) -> list:
         same = model.slide.steps(MESH_TOL, model.accuracy.steps_per_cycle, length)
         out.append(shear.coarser_elements(len(patches) - 1, few._replace(steps=same)))
     elif meshed:
-        # the number of modes is fixed, so that only the mesh changes
+        # The number of modes is fixed, so that only the mesh changes.
         count = shear.count_shear_modes(model, patch) if model.partial_slip else None
         out.append(make_coarser_space(few._replace(level=1, modes=count), few))
         if count:
@@ -138,7 +140,10 @@ def list_coarse_passes(model, patches: list, fine, steps: int) -> list:
 
 
 def sum_error(model, engine) -> float:
-    """Return the error bound of the sum over bonds over the friction limit [1]; 0 without a sum."""
+    """Return the error bound of the sum over bonds relative to the friction limit [1].
+
+    It is 0 for a law without such a sum.
+    """
     if engine.method in LIST_METHODS:
         return engine.choice.error
     if engine.method in (Method.STEPPED, Method.PLANE) and is_bond_list(model.friction):
@@ -147,7 +152,7 @@ def sum_error(model, engine) -> float:
 
 
 def _sum_errors(model, fine) -> dict:
-    """Return the errors of the measures of a pass due to its sum over bonds, by name."""
+    """Return the errors of the bench measures due to the sum over bonds, by measure name."""
     work = np.abs(np.diff(fine.ledger[0]))
     friction = model.friction
     scale = FrictionScale(

@@ -1,4 +1,4 @@
-"""Contact of the compiled loops that follows a prescribed slide, in blocks of samples.
+"""Response of a compiled contact model to a prescribed displacement, in blocks of samples.
 
 In: a ContactModel and a `Slide`. Out: `Followed`.
 """
@@ -16,7 +16,7 @@ from .ledger import BLOCK, Slide, SlideHistories, make_ledger
 
 
 class Followed(NamedTuple):
-    """Histories of a contact along a slide, at k samples.
+    """Histories of a contact model under a prescribed displacement, at k samples.
 
     - force, slip (k,): [N], [m].
     - ledger (4, k): energies of `make_ledger` [J].
@@ -33,7 +33,7 @@ class Followed(NamedTuple):
     n_failed: int
 
     def require_convergence(self) -> None:
-        """Raise NotConverged if the residual of a step was too large."""
+        """Raise NotConverged if the residual of any step was too large."""
         if self.n_failed:
             raise NotConverged(
                 f"in {self.n_failed} time steps of the prescribed slide the friction force has an error "
@@ -42,7 +42,7 @@ class Followed(NamedTuple):
             )
 
     def histories(self, load: float, tau, local) -> SlideHistories:
-        """Return the histories of a pass under a constant load [N].
+        """Return the histories as those of a bench under a constant load [N].
 
         Parameters
         ----------
@@ -55,7 +55,7 @@ class Followed(NamedTuple):
 
 
 def follow_path(model, task: Slide, paced: bool = False) -> Followed:
-    """Slide a ContactModel along its path.
+    """Compute the response of a ContactModel to the displacement path of a bench.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def follow_path(model, task: Slide, paced: bool = False) -> Followed:
     energies = np.zeros((slide.size, 2))
 
     def follow_block(contact, begin: int, end: int) -> int:
-        """Follow the samples of a block; return the number of steps with too large a residual."""
+        """Compute the samples of a block and return the number of steps that did not converge."""
         block = slice(begin, end + 1)
         return loops.follow_path(
             slide[block].copy(),
@@ -117,6 +117,6 @@ def follow_path(model, task: Slide, paced: bool = False) -> Followed:
 
 
 def _pace_changes(time) -> np.ndarray:
-    """Return the samples at which the length of the time step changes."""
+    """Return the indices of the samples at which the length of the time step changes."""
     step = np.diff(time)
     return 1 + np.flatnonzero(np.abs(np.diff(step)) > 1e-6 * np.minimum(step[1:], step[:-1]))

@@ -1,4 +1,4 @@
-"""Friction law object that a bench evaluates, and the pressure under which it slides.
+"""Friction law that a bench evaluates, and the pressure under which its interface slides.
 
 In: a model with friction and its patch. Out: a NumPy law object for any value of friction.law,
 nodal pressures and areas.
@@ -13,7 +13,10 @@ from . import averaged
 
 
 def law_for(model, patch=None):
-    """Return the NumPy law object of a bench; only an averaged law depends on the patch."""
+    """Return the NumPy object of the friction law of a model.
+
+    Only an averaged law depends on the patch.
+    """
     f = model.friction
     if law_has_trait(f.law, "averaged"):
         return averaged.law_on(model, patch)
@@ -29,7 +32,7 @@ def law_for(model, patch=None):
 
 
 def estimate_tail_loss(model) -> float:
-    """Return the error due to the cut-off of the NumPy sum over bonds, over the friction limit."""
+    """Return the cut-off error of the NumPy sum over bonds relative to the friction limit [1]."""
     accuracy = model.accuracy
     if accuracy.quadrature == "direct":
         return 0.0
@@ -37,9 +40,9 @@ def estimate_tail_loss(model) -> float:
 
 
 def nodal_pressure(model, patch) -> tuple:
-    """Return pressure (m,) [Pa] and area (m,) [m2] of the nodes.
+    """Return pressure (m,) [Pa] and area (m,) [m2] of the interface nodes.
 
-    Without a patch it is a single point that carries the load.
+    Without a patch there is a single point that carries the load.
     """
     if patch is None:
         return np.array([model.point.load]), np.ones(1)
@@ -47,10 +50,11 @@ def nodal_pressure(model, patch) -> tuple:
 
 
 def ends_of_rest(model, slide) -> dict:
-    """Return the samples at which a slide starts from rest under a higher static friction.
+    """Return the samples where motion starts from rest with static above kinetic friction.
 
-    They are the first sample of a slide and the last one of every rest; the values are the signs of
-    the motion that starts there. The dict is empty unless static exceeds kinetic Coulomb friction.
+    They are the first sample of the path and the last one of every rest; the values are the signs
+    of the motion that starts there. The dict is empty unless static exceeds kinetic Coulomb
+    friction.
     """
     f = model.friction
     if not law_has_trait(f.law, "set-valued") or f.kinetic is None or not f.kinetic < f.static:

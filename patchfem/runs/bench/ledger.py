@@ -1,4 +1,4 @@
-"""Slide of a bench as its engines take it, its histories, and its energy balance.
+"""Task of a bench engine, the histories that it returns, and their energy balance.
 
 In: forces, losses and samples of a pass. Out: `SlideHistories`, the ledger (4, k), and slip of the
 interface and of its points.
@@ -11,14 +11,15 @@ import numpy as np
 
 from ...effects import law_has_trait
 
-# samples between two reports of progress; with so many, the cost of a call of compiled code is
-# negligible
+# Number of samples between two progress reports. With so many, the cost of calling compiled code is
+# negligible.
 BLOCK = 4096
-ROUND_OFF_FRACTION = 1e-13  # relative to the dissipated energy; less created energy is round-off
+# Created energy over dissipated energy below which the created energy is round-off.
+ROUND_OFF_FRACTION = 1e-13
 
 
 class SlideHistories(NamedTuple):
-    """Histories of a pass over k samples.
+    """Histories of force, slip and energies along the bench path, at k samples.
 
     - force, load (k,): [N].
     - slip (k,): [m].
@@ -37,7 +38,7 @@ class SlideHistories(NamedTuple):
 
 
 def make_ledger(work, stored, losses) -> np.ndarray:
-    """Return work, stored, dissipated and created energy (4, k) [J] of samples.
+    """Return work, stored, dissipated and created energy (4, k) [J] of k samples.
 
     Parameters
     ----------
@@ -52,15 +53,15 @@ def make_ledger(work, stored, losses) -> np.ndarray:
 
 
 def gains_and_losses(losses) -> tuple:
-    """Return created and dissipated energy, summed over points that lose energy (..., m) each.
+    """Return the created and the dissipated energy, summed over m points.
 
-    A negative loss is created energy.
+    losses (..., m): dissipated energy of each point; a negative one is created energy.
     """
     return -np.minimum(losses, 0.0).sum(axis=-1), np.maximum(losses, 0.0).sum(axis=-1)
 
 
 def elastic_slip(model, slide, force, load) -> np.ndarray:
-    """Return the slip (k,) [m] of the whole interface: the slide minus the stretch of the bonds.
+    """Return the slip (k,) [m] of a rigid interface: displacement minus elastic bond stretch.
 
     The stretch is at most one bond length.
 
@@ -79,7 +80,7 @@ def elastic_slip(model, slide, force, load) -> np.ndarray:
 
 
 def local_slip(model, slide, tau, sigma) -> np.ndarray:
-    """Return the slip (f, m) [m] of points that share a slide.
+    """Return the slip (f, m) [m] of points under a common relative displacement.
 
     Parameters
     ----------
@@ -98,7 +99,7 @@ def local_slip(model, slide, tau, sigma) -> np.ndarray:
 
 
 def _length(model) -> float:
-    """Return the bond length [m]; 0 for a law that does not stretch."""
+    """Return the bond length [m]; 0 for a law without elastic stretch."""
     if law_has_trait(model.friction.law, "averaged"):
         return 0.0
     return model.friction.bond_length or 0.0
@@ -106,7 +107,7 @@ def _length(model) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PassOptions:
-    """Options and callbacks of a pass.
+    """Options and callbacks for a computation along the bench path.
 
     - choice: method of the sum over bonds; None: chosen by the pass.
     - say: callback for a line of text when something compiles.
@@ -123,7 +124,7 @@ class PassOptions:
     modes: int | None = None
 
     def report(self, fraction: float) -> None:
-        """Report the completed fraction (0 to 1) to `progress`, if there is one."""
+        """Report the completed fraction (0 to 1) to the progress callback, if there is one."""
         if self.progress is not None:
             self.progress(fraction)
 
@@ -132,7 +133,7 @@ DEFAULT_OPTIONS = PassOptions()
 
 
 class Slide(NamedTuple):
-    """Slide of an interface along samples of its path, which an engine computes.
+    """Relative displacement of an interface, sampled along a prescribed path for an engine.
 
     - model, patch: Model and its pressed Patch; None under [normal].
     - time, slide (k,): samples [s], [m].
@@ -151,7 +152,7 @@ class Slide(NamedTuple):
 
     @property
     def frame_numbers(self) -> np.ndarray:
-        """Samples of the frames; the first sample, the pressed state, is not among them."""
+        """Indices of the samples of the frames, without the first sample (the pressed state)."""
         if not self.frames:
             return np.zeros(0, int)
         numbers = np.linspace(0, self.slide.size - 1, self.frames + 1).round().astype(int)[1:]

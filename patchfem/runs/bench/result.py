@@ -1,4 +1,4 @@
-"""Bench from its plan to its result: slide, errors, and warnings on law and overhang.
+"""Bench from its plan to its Result, with errors and with warnings on law and overhang.
 
 In: a plan of kind bench and its pressed patch. Out: a Result.
 """
@@ -39,12 +39,12 @@ from .engine import steps_per_cycle
 from .errors import PassErrors, estimate_pass_errors
 from .ledger import PassOptions
 
-MAX_EXTRA_CYCLES = 4  # further cycles in which a steady loop is searched for
-MAX_EVALUATIONS = 2e6  # most evaluations (points times samples) of this search
+MAX_EXTRA_CYCLES = 4  # Largest number of further cycles in which a steady loop is searched for.
+MAX_EVALUATIONS = 2e6  # Largest number of evaluations (points times samples) of this search.
 
 
 def run_prescribed(what, patch, coarse, seconds, warnings, say, progress, estimate) -> Result:
-    """Run a plan of kind bench.
+    """Run the plan of a bench and return its Result.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def run_prescribed(what, patch, coarse, seconds, warnings, say, progress, estima
 
 
 def _law_warnings(model) -> list:
-    """Return the warnings on a law of bonds that do not depend on the slide."""
+    """Return the warnings on a bond law that do not depend on the displacement path."""
     if not law_has_trait(model.friction.law, "bonds"):
         return []
     warnings = [
@@ -128,7 +128,7 @@ def _law_warnings(model) -> list:
 
 
 def _warn_of_created_energy(model, fine) -> list:
-    """Return a warning, as a list, on energy that the printed law created."""
+    """Return a warning, as a list, on energy that the law in the report's form created."""
     created = fine.values["energy_created"]
     exchanged = np.abs(np.diff(fine.ledger[0])).sum()
     if model.friction.reading != "report" or created <= 1e-6 * exchanged:
@@ -141,7 +141,7 @@ def _warn_of_created_energy(model, fine) -> list:
 
 
 def _growth_notes(model, fine) -> list:
-    """Return the notes on the growth of bonds."""
+    """Return the notes on the growth of bonds with contact time."""
     friction = model.friction
     if not law_has_trait(friction.law, "bonds"):
         return []
@@ -152,7 +152,7 @@ def _growth_notes(model, fine) -> list:
 
 
 def _closing_gap(fine) -> float:
-    """Return by how much the last cycle does not close [1].
+    """Return the relative mismatch of start and end of the last cycle [1].
 
     It is the larger of two changes over the cycle: that of the force over its peak, and that of the
     stored energy over the work.
@@ -170,7 +170,7 @@ def _closing_gap(fine) -> float:
 
 
 def _warn_if_open(model, patch, fine, steps: int) -> list:
-    """Return a warning, as a list, if the last loop does not close and is not the steady one.
+    """Return a warning, as a list, if the last loop is neither closed nor steady.
 
     It names the number of cycles after which the loop is steady, if MAX_EXTRA_CYCLES cycles with at most
     MAX_EVALUATIONS evaluations show it.
@@ -207,7 +207,7 @@ def _warn_if_open(model, patch, fine, steps: int) -> list:
 
 
 def _warn_of_overhang(patch_model, patch, fine) -> list:
-    """Return warnings of a bench whose slide leaves the patch."""
+    """Return warnings of a bench whose upper piece slides off the patch."""
     warnings = []
     lateral = 0.0
     if fine.lateral is not None:

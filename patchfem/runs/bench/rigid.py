@@ -1,4 +1,4 @@
-"""Rigid slide under a pressure that moves with the upper piece, by the compiled engines.
+"""Rigid sliding under a pressure that moves with the upper piece, by compiled engines.
 
 In: a `Slide`. Out: `SlideHistories`. Every point has the same slide, and the laws are
 linear in the pressure, so that the traction of a point is that of a single point with the whole
@@ -26,7 +26,7 @@ from .ledger import Slide, SlideHistories, elastic_slip, local_slip
 
 
 def slide_rigidly(task: Slide) -> SlideHistories:
-    """Slide the interface rigidly along its path by a compiled engine."""
+    """Compute the histories of rigid sliding along the bench path by a compiled engine."""
     model = task.model
     law = model.friction.law
     sigma, weight = nodal_pressure(model, task.patch)
@@ -86,7 +86,7 @@ def climbing(model, load: float, patch=None, count: int | None = None):
 
 
 def _one_point(task: Slide, load: float) -> ContactModel:
-    """Return one point with the whole load [N] as a contact of the compiled loops."""
+    """Return the contact model of a single point that carries the full load [N]."""
     model = task.model
     friction = model.friction
     engine = task.engine
@@ -105,7 +105,7 @@ def _one_point(task: Slide, load: float) -> ContactModel:
 
 
 def coarser_cells(few) -> CoarserRuns:
-    """Return the coarse runs in which groups of four cells of a density of sliders are merged.
+    """Return the coarser runs in which groups of four cells of a slider density are merged.
 
     few: the Pass with which they are compared.
     """

@@ -1,4 +1,4 @@
-"""Slide of pieces that deform in shear: parallel elements, or bond points with shear modes.
+"""Sliding of pieces that deform in shear: parallel elements or shear modes.
 
 In: a `Slide` of a model with [contact.shear]. Out: `SlideHistories`, and the coarse passes that
 show the error of the mesh of elements.
@@ -22,12 +22,12 @@ from .follow import follow_path
 from .ledger import Slide, SlideHistories
 from .rigid import climbing
 
-# fraction of the mean pressure assumed at nodes that the lower piece does not press at first
+# Fraction of the mean pressure assumed at nodes without initial pressure of the lower piece.
 OPEN_PRESSURE_FRACTION = 1e-3
 
 
 def slide_in_shear(task: Slide) -> SlideHistories:
-    """Slide the holders of pieces that deform in shear.
+    """Compute the histories under a prescribed displacement of pieces that deform in shear.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def slide_in_shear(task: Slide) -> SlideHistories:
 
 
 def _slide_elements(task: Slide) -> SlideHistories:
-    """Slide Coulomb and elastic-plastic points as parallel elements."""
+    """Compute the histories of Coulomb or elastic-plastic points as parallel elements."""
     patch = task.patch
     friction = task.model.friction
     length = make_law(friction).element(1.0).length
@@ -56,7 +56,7 @@ def _slide_elements(task: Slide) -> SlideHistories:
 
 
 def _slide_over_grooves(task: Slide) -> SlideHistories:
-    """Slide pieces over grooves, with points that share the height and have shear modes."""
+    """Compute the histories of deformable pieces over grooves, with shear modes."""
     model = task.model
     patch = task.patch
     load = patch.pressure.load
@@ -69,7 +69,7 @@ def _slide_over_grooves(task: Slide) -> SlideHistories:
 
 
 def climbed_fields(patch, contact, states) -> tuple:
-    """Return traction (f, m) [Pa] with climbing, and slip (f, m) [m], of points over grooves.
+    """Return traction (f, m) [Pa] with climbing and slip (f, m) [m] of points over grooves.
 
     The points have shear modes.
 
@@ -96,7 +96,7 @@ def climbed_fields(patch, contact, states) -> tuple:
 
 
 def _slide_bond_points(task: Slide) -> SlideHistories:
-    """Slide bond points, or lists of bonds, with shear modes."""
+    """Compute the histories of bond points or bond lists with shear modes."""
     model = task.model
     patch = task.patch
     law = model.bonds
@@ -116,7 +116,7 @@ def _slide_bond_points(task: Slide) -> SlideHistories:
 
 
 def shear_modes_of_points(model, patch, count: int | None = None):
-    """Return the ShearModes of the points of a sum over bonds.
+    """Return the shear modes of the points at which a bench sums over bonds.
 
     If the pressure belongs to the lower piece, the points are all nodes; a node without pressure at
     first counts as if under OPEN_PRESSURE_FRACTION times the mean pressure of the others.
@@ -134,7 +134,7 @@ def shear_modes_of_points(model, patch, count: int | None = None):
     count = count or model.accuracy.shear_modes
     if model.side != "lower":
         return bond_shear_modes(patch, law, count, tolerance)
-    # this call refuses a patch that could jump without a slide
+    # This call refuses a patch that could jump without a change of displacement.
     bond_shear_modes(patch, law, 1, 1.0)
     return bond_shear_modes(
         patch,
@@ -146,12 +146,12 @@ def shear_modes_of_points(model, patch, count: int | None = None):
 
 
 def mean_pressure(patch) -> float:
-    """Return the load over the nodal areas that carry it [Pa]."""
+    """Return the mean pressure [Pa] over the nodes that carry load."""
     return patch.pressure.load / float(patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0))
 
 
 def count_shear_modes(model, patch) -> int | None:
-    """Return the number of shear modes of a bench with bonds; None if there are none."""
+    """Return the number of shear modes of a bench with bonds, or None without shear modes."""
     if (
         not model.partial_slip
         or not law_has_trait(model.friction.law, "bonds")
@@ -162,7 +162,7 @@ def count_shear_modes(model, patch) -> int | None:
 
 
 def lists_on_lower_piece(model, patch, found, shear):
-    """Return lists of bonds, one per node, under the pressure of the lower piece.
+    """Return the model with a bond list per node, under the pressure of the lower piece.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def lists_on_lower_piece(model, patch, found, shear):
 
 
 def sheared_lists(patch, law, shear, found, force=None):
-    """Return lists of bonds with the ShearModes of a pressed patch.
+    """Return the model with bond lists at the points of the shear modes of a pressed patch.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def sheared_lists(patch, law, shear, found, force=None):
 
 
 def coarser_elements(count: int, few) -> CoarserRuns:
-    """Return the coarse runs of a bench with parallel elements, on coarser meshes.
+    """Return the coarser runs of a bench with parallel elements, on coarser meshes.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def coarser_elements(count: int, few) -> CoarserRuns:
 def mesh_errors(*values: dict) -> dict:
     """Return the error of each measure from its values on nested meshes, fine to coarse.
 
-    The residual of a balance is an error itself; its change is used.
+    The residual of a balance is an error itself, so that its change is used.
     """
     changes = absolute_change(values[0], values[1])
     errors = convergence_errors(*values)

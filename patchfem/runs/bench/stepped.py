@@ -1,4 +1,4 @@
-"""Rigid slide with the NumPy laws, sample by sample, for varying pressure or two directions.
+"""Rigid sliding with NumPy laws, sample by sample, for varying pressure or two directions.
 
 In: a `Slide`. Out: `SlideHistories`. This reference implementation of the compiled
 engines takes every law and every bench with a rigid slide.
@@ -22,15 +22,15 @@ from .ledger import (
     make_ledger,
 )
 
-# most strip-point products of a direct quadrature; a bench with more is refused
+# Largest number of strip-point products of a direct quadrature; a larger bench is refused.
 MAX_STRIP_POINT_PRODUCTS = 2e11
 
 
 def slide_step_by_step(task: Slide) -> SlideHistories:
-    """Slide every point along its path.
+    """Compute the histories of rigid sliding sample by sample with a NumPy law.
 
-    The pressure moves with the upper piece, belongs to the lower one, or the load changes with
-    time.
+    The pressure moves with the upper piece, belongs to the lower piece, or changes with the load
+    over time.
 
     Raises
     ------
@@ -61,12 +61,13 @@ def slide_step_by_step(task: Slide) -> SlideHistories:
 
 
 def slide_in_plane(task: Slide) -> tuple[SlideHistories, dict]:
-    """Slide an interface in two directions, along the displacement and `lateral` of slide.file.
+    """Compute the histories of rigid sliding in two directions, from a displacement file.
 
-    The pressure of a rigid upper piece is constant at every point, and the law is linear in it, so
-    that the traction of every point is that of a point under unit pressure times its pressure.
-    yaw_moment [N m] is the sum of y f_x - x f_y, the moment about +z of the friction on the upper
-    piece, with f positive against its slip; strips have their positions y over the width.
+    The directions are those of the displacement and of `lateral` in slide.file. The pressure of a
+    rigid upper piece is constant at every point, and the law is linear in it, so that the traction
+    of every point is that of a point under unit pressure times its pressure. yaw_moment [N m] is
+    the sum of y f_x - x f_y, the moment about +z of the friction on the upper piece, with f
+    positive against its slip; strips have their positions y over the width.
 
     Returns
     -------
@@ -104,7 +105,7 @@ def slide_in_plane(task: Slide) -> tuple[SlideHistories, dict]:
 
 
 class _Points(NamedTuple):
-    """Points of an interface.
+    """Areas of the interface points and their pressure along the path.
 
     - weight (m,): areas [m2].
     - pressure: function from the index of a sample to the pressure (m,) [Pa].
@@ -115,7 +116,7 @@ class _Points(NamedTuple):
 
 
 class _LawHistories(NamedTuple):
-    """Histories of k samples in d directions.
+    """Force, load, energy and traction histories of a friction law in d directions.
 
     - force (k, d), load (k,): [N].
     - ledger (4, k): energies of `make_ledger` [J].
@@ -131,7 +132,7 @@ class _LawHistories(NamedTuple):
 def _evaluate_law(
     task: Slide, law, take_step: Callable, path, points: _Points, breakaways: dict
 ) -> _LawHistories:
-    """Evaluate a law along a path, sample by sample.
+    """Evaluate a friction law along a displacement path, sample by sample.
 
     Parameters
     ----------
@@ -192,7 +193,7 @@ def _evaluate_law(
 
 
 def refuse_long_sum(model, law, samples: int, points: int, slide) -> None:
-    """Raise Missing if the NumPy sum over bonds needs more than MAX_STRIP_POINT_PRODUCTS strip-point products.
+    """Raise Missing if the direct sum over bonds exceeds MAX_STRIP_POINT_PRODUCTS.
 
     Bonds older than 25 bond lengths count as cut off.
 
@@ -219,7 +220,7 @@ def refuse_long_sum(model, law, samples: int, points: int, slide) -> None:
 
 
 def _pressed_points(task: Slide) -> _Points:
-    """Return the points of an interface with their pressure along the path."""
+    """Return the interface points with their pressure along the path."""
     model = task.model
     if model.load_varies:
         loads = model.point.evaluate(task.time)
@@ -230,22 +231,22 @@ def _pressed_points(task: Slide) -> _Points:
     x = task.patch.x
 
     def moved_pressure(sample: int) -> np.ndarray:
-        """Return the pressure of the lower piece at the points of the upper one."""
+        """Return the pressure of the displaced lower piece at the points of the upper piece."""
         return np.interp(x + task.slide[sample], x, sigma, left=0.0, right=0.0)
 
     return _Points(weight, moved_pressure)
 
 
 def _step_law(law, state, increment: float, before, after, duration: float) -> Step:
-    """Take one step of a law at constant or given pressure."""
+    """Compute one step of a friction law at constant or given pressure."""
     return law.step(state, increment, before, after, duration)
 
 
 def _step_under_changing_load(law, state, increment: float, before, after, duration: float) -> Step:
-    """Take one step of a law while the load changes from `before` to `after`.
+    """Compute one step of a friction law while the load changes from `before` to `after`.
 
-    Half of the change is applied before the motion, half after it (order 1 if bonds are released,
-    else 2). A law without stretch takes the change during the motion.
+    Half of the change is applied before the motion and half after it, which is of order 1 if bonds
+    are released, else of order 2. A law without stretch takes the change during the motion.
     """
     if increment != 0 and getattr(law, "can_change_load", False):
         return law.step(state, increment, before, after, duration)
@@ -257,7 +258,7 @@ def _step_under_changing_load(law, state, increment: float, before, after, durat
 
 
 class _PressureSums(NamedTuple):
-    """Load [N], and sums f x (moment) and f y (roll) [N m] of the pressure."""
+    """Load [N] of the pressure, and its first moments in x (moment) and y (roll) [N m]."""
 
     load: float
     moment: float = 0.0
@@ -265,7 +266,7 @@ class _PressureSums(NamedTuple):
 
 
 def _pressure_sums(model, patch) -> _PressureSums:
-    """Return the sums of the pressure; y is known for strips only, else 0."""
+    """Return the load and the first moments of the pressure; y is 0 without strips."""
     if patch is None:
         return _PressureSums(model.point.load)
     force = patch.pressure.sigma_n * patch.pieces.interface.weight

@@ -13,17 +13,18 @@ from ...contact.unilateral import press
 from ...core import Compliance, NotConverged, PatchfemError, frozen_array
 from ...formatting import format_length
 
-APPROACH_TOL = 1e-6  # largest remaining distance to the approach, over the approach
-GAP_ROUND = 1e-9  # the same over the range of the gap, whose round-off limits the search
+APPROACH_TOL = 1e-6  # Relative error of the reached approach above which the search has failed.
+# Same error relative to the range of the gap, whose round-off limits the accuracy.
+GAP_ROUND_OFF_TOL = 1e-9
 
 
 def press_to_approach_with_rotation(
-    patch_model, pieces: Compliance, gap, under_load, stiff: Compliance
+    patch_model, pieces: Compliance, gap, solve_under_load, stiffened_pieces: Compliance
 ):
-    """Solve the contact under a prescribed approach with free rotation.
+    """Solve the contact of a piece that is free to rotate under a prescribed approach.
 
-    The load is searched at which the approach is reached. If even a millionth of the load that flat
-    pieces would need is too much, nothing touches.
+    A bracketing search finds the load that gives the approach. If even a millionth of the load that
+    flat pieces would need gives more than this approach, the pieces do not touch.
 
     Parameters
     ----------
@@ -31,9 +32,9 @@ def press_to_approach_with_rotation(
     pieces : Compliance
     gap : (m,) or (s, m)
         Unloaded gap [m], of strips (s, m).
-    under_load : callable
+    solve_under_load : callable
         Function (patch_model, pieces, gap) that solves the contact under the load of the model.
-    stiff : Compliance
+    stiffened_pieces : Compliance
         Pieces with their skin as under a large load.
 
     Returns
@@ -43,30 +44,34 @@ def press_to_approach_with_rotation(
     Raises
     ------
     PatchfemError
-        If the middle of the piece does not close as the load increases (`refuse_opening`).
+        If the middle of the piece does not close as the load increases (`refuse_opening_gap`).
     NotConverged
         If the approach jumps past the distance: a single node under the load line carries the load
         at any rotation between two bounds.
     """
     from scipy.optimize import brentq
 
-    refuse_opening(patch_model, stiff)
+    refuse_opening_gap(patch_model, stiffened_pieces)
     distance = patch_model.loading.approach
     solutions = []
-    least = _least_load(patch_model, np.ptp(pieces.interface.x))
+    min_load = _min_stable_load(patch_model, np.ptp(pieces.interface.x))
 
     def excess(log_load: float) -> float:
-        """Return by how much the approach under least load + exp(log_load) [N] exceeds the distance."""
-        # in excess of the least load: near it, the piece rotates ever faster until it tips over
-        load = least + float(np.exp(log_load))
+        """Return the approach under a trial load minus the prescribed approach [m].
+
+        log_load is the logarithm of the load [N] in excess of the least stable load.
+        """
+        # The unknown is the excess over the least load, because near it the piece rotates ever
+        # faster until it tips over.
+        load = min_load + float(np.exp(log_load))
         solutions.append(
-            under_load(patch_model.with_loading(load=load, approach=None), pieces, gap)
+            solve_under_load(patch_model.with_loading(load=load, approach=None), pieces, gap)
         )
         return solutions[-1].pressure.approach - distance
 
     top = np.log(max(distance, np.ptp(gap), 1e-12) / pieces.normal.mean())
-    low = top = max(top, np.log(least) if least > 0 else top)
-    bottom = top - np.log(1e6) if least == 0 else np.log(least * 1e-9)
+    low = top = max(top, np.log(min_load) if min_load > 0 else top)
+    bottom = top - np.log(1e6) if min_load == 0 else np.log(min_load * 1e-9)
     for _ in range(60):
         if excess(top) >= 0:
             break
@@ -77,7 +82,7 @@ def press_to_approach_with_rotation(
             unloaded_model = patch_model.with_loading(
                 load=0.0, approach=None, can_rotate=False, rotational_stiffness=0.0
             )
-            unloaded = under_load(unloaded_model, pieces, gap)
+            unloaded = solve_under_load(unloaded_model, pieces, gap)
             open_gap = frozen_array(np.atleast_2d(gap).min(axis=0) - min(distance, gap.min()))
             pressure = replace(unloaded.pressure, gap=open_gap, approach=distance)
             return unloaded._replace(pressure=pressure)
@@ -86,7 +91,7 @@ def press_to_approach_with_rotation(
     approaches = [solution.pressure.approach for solution in solutions]
     nearest = int(np.argmin(np.abs(np.array(approaches) - distance)))
     error = abs(approaches[nearest] - distance)
-    if error > APPROACH_TOL * distance + GAP_ROUND * np.ptp(gap):
+    if error > APPROACH_TOL * distance + GAP_ROUND_OFF_TOL * np.ptp(gap):
         below = max(approach for approach in approaches if approach < distance)
         above = min(approach for approach in approaches if approach > distance)
         raise NotConverged(
@@ -99,8 +104,8 @@ def press_to_approach_with_rotation(
     return solutions[nearest]
 
 
-def _least_load(patch_model, length: float) -> float:
-    """Return the load [N] below which a free piece tips over under its moment."""
+def _min_stable_load(patch_model, length: float) -> float:
+    """Return the load [N] below which a freely rotating piece tips over under its moment."""
     tips = (
         patch_model.loading.can_rotate
         and patch_model.loading.line_moment
@@ -109,8 +114,8 @@ def _least_load(patch_model, length: float) -> float:
     return 2 * abs(patch_model.loading.line_moment) / length if tips else 0.0
 
 
-def refuse_opening(patch_model, pieces: Compliance) -> None:
-    """Raise PatchfemError if a larger load on the load line opens the gap in the middle.
+def refuse_opening_gap(patch_model, pieces: Compliance) -> None:
+    """Raise PatchfemError if a larger load on the load line opens the gap at mid-length.
 
     Under large loads the shapes of the surfaces become irrelevant. The problem of flat pieces, also
     on a rotational spring, has a single scale: twice the load doubles forces, rotation and
@@ -125,7 +130,7 @@ def refuse_opening(patch_model, pieces: Compliance) -> None:
     flat = np.zeros(pieces.interface.x.size)
 
     def closing(offset: float) -> float:
-        """Return the approach [m] of flat pieces that a load of 1 N presses at `offset` [m]."""
+        """Return the approach [m] of flat pieces under a load of 1 N at position `offset` [m]."""
         return press(
             pieces, flat, 1.0, float(offset), spring=patch_model.loading.rotational_stiffness
         ).approach

@@ -23,12 +23,13 @@ from ...mesh.tensor import TensorGrid
 from ...model.pieces import make_elastic_layers
 from . import store
 
-LEAST_CACHED = 150  # number of interface nodes from which a condensed operator is kept on disk
+# Smallest number of interface nodes for which the condensed operator is cached on disk.
+MIN_CACHED_NODES = 150
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Pair:
-    """Two pieces condensed to their interface, independent of load and shape.
+    """Two elastic pieces condensed to their interface, independent of load and surface shape.
 
     - grid, piece: mesh and assembled piece of the lower side: TensorGrid with Piece, or PieceMesh
       with Substructure.
@@ -52,12 +53,15 @@ class Pair:
 
     @property
     def coupling(self) -> float:
-        """Largest normal closing over largest slide per shear force [1]; 0 for mirrored pieces."""
+        """Return the largest normal closing per largest tangential displacement under a shear force.
+
+        The ratio [1] is 0 for mirrored pieces.
+        """
         return float(np.abs(self.closing).max() / np.abs(self.compliance.tangential).max())
 
     @property
     def row(self) -> float:
-        """Mean height [m] of the cells along the interface of both pieces."""
+        """Mean height [m] of the elements next to the interface, averaged over both pieces."""
         return float(self.grid.first_row_height + self.upper_grid.first_row_height) / 2
 
     @property
@@ -66,21 +70,23 @@ class Pair:
         return max(self.piece.round_off_error, self.upper.round_off_error)
 
     def forces(self, nodal) -> tuple:
-        """Return nodal forces (..., m) of the interface on the nodes of the lower and upper piece."""
+        """Return the interface forces (..., m) as nodal forces of the lower and of the upper piece."""
         if self.joint is None:
             return nodal, nodal
         return self.joint.distribute_forces(nodal)
 
 
 def finite_elements(body, layers: Layers):
-    """Return the piece of a tensor grid (Piece) or of any mesh (Substructure)."""
+    """Return the assembled piece of a tensor grid (Piece) or of any other mesh (Substructure)."""
     if isinstance(body, TensorGrid):
         return make_piece(body.x, body.depth, body.coating_rows, layers)
     return substructure.Substructure(body, layers)
 
 
 def load_compliance(body, piece, fresh: bool) -> InterfaceCompliance:
-    """Return the compliances (nn, tt, nt) of a piece, if possible from the cache on disk.
+    """Return the interface compliance of a piece, from the cache on disk if it is there.
+
+    It has the normal, tangential and coupling parts nn, tt and nt.
 
     Parameters
     ----------
@@ -90,7 +96,7 @@ def load_compliance(body, piece, fresh: bool) -> InterfaceCompliance:
         Whether to ignore the cache.
     """
     is_grid = isinstance(body, TensorGrid)
-    if (body.x.size if is_grid else len(body.points) ** 0.5) < LEAST_CACHED:
+    if (body.x.size if is_grid else len(body.points) ** 0.5) < MIN_CACHED_NODES:
         return interface_compliance(piece)
     if is_grid:
         key = cache.grid_key(body.x, body.depth, body.coating_rows, piece.layers)
@@ -107,7 +113,7 @@ def load_compliance(body, piece, fresh: bool) -> InterfaceCompliance:
 
 
 def condense(patch_model, grid, upper_grid=None, fresh: bool = False) -> Pair:
-    """Assemble and condense the pieces of a `PatchModel`.
+    """Assemble the two pieces of a `PatchModel` and condense them to their interface.
 
     Parameters
     ----------
@@ -134,20 +140,20 @@ def condense(patch_model, grid, upper_grid=None, fresh: bool = False) -> Pair:
     joint = None
     x = grid.x
     share = grid.tributary_lengths()
-    if upper_grid is not None and not _match(x, upper_grid.x):
+    if upper_grid is not None and not _nodes_match(x, upper_grid.x):
         joint = mortar.join_pieces(
             mortar.PieceInterface(x, low), mortar.PieceInterface(upper_grid.x, high)
         )
         x = joint.x
         share = joint.tributary_lengths
         parts = joint.compliance
-    # Shear of the upper piece lifts the interface where that of a like lower piece lowers it: nt
-    # cancels.
+    # Equal shear forces raise the interface of the upper piece as much as they lower that of an
+    # equal lower piece, so that the coupling nt cancels.
     else:
         parts = (low.nn + high.nn, low.tt + high.tt, low.nt - high.nt)
     normal, tangential, closing = (frozen_array(part / width) for part in parts)
     interface = Interface(frozen_array(x), frozen_array(share * width), width)
-    rise = sum(_rise(body, interface.x) for body in (grid, upper_grid or grid))
+    rise = sum(_end_gap(body, interface.x) for body in (grid, upper_grid or grid))
     seconds = {"condense": perf_counter() - start}
     pieces = Compliance(interface, normal, tangential)
     return Pair(
@@ -156,14 +162,14 @@ def condense(patch_model, grid, upper_grid=None, fresh: bool = False) -> Pair:
 
 
 def shared_pairs(patch_model) -> tuple:
-    """Return the condensed pieces (Pair) of every level of a `PatchModel` that has `meshes`."""
+    """Return the condensed pieces (Pair) of a `PatchModel` on every level of its shared meshes."""
     return tuple(
         shared_pair(patch_model, level) for level in range(len(patch_model.mesh.shared.levels))
     )
 
 
 def shared_pair(patch_model, level: int) -> Pair:
-    """Return the condensed pieces of one level of a `PatchModel` that has `meshes`."""
+    """Return the condensed pieces of a `PatchModel` on a given level of its shared meshes."""
     bodies = patch_model.mesh.shared.levels[level]
     return store.reuse(
         _pair_key(patch_model, patch_model.mesh.shared.name, level),
@@ -172,7 +178,7 @@ def shared_pair(patch_model, level: int) -> Pair:
 
 
 def keep_pairs(patch_model, meshes, pairs) -> None:
-    """Keep condensed pieces (Pair, level by level) of new shared meshes for `shared_pair`.
+    """Store the condensed pieces of new shared meshes, level by level, for `shared_pair`.
 
     patch_model: one of the patches that share the meshes.
     """
@@ -181,7 +187,7 @@ def keep_pairs(patch_model, meshes, pairs) -> None:
 
 
 def _pair_key(patch_model, name: str, level: int) -> tuple:
-    """Return the key of the condensed pieces of a `PatchModel` on one level of named meshes."""
+    """Return the key under which the condensed pieces of a named shared mesh are stored."""
     return (
         "pair",
         name,
@@ -194,9 +200,9 @@ def _pair_key(patch_model, name: str, level: int) -> tuple:
 
 
 def delete_factors(pair: Pair) -> Pair:
-    """Delete the factors of pieces on grids, and return the Pair.
+    """Delete the factorised matrices of pieces on tensor grids, and return the Pair.
 
-    They need far more memory than the compliance, and are recomputed for fields.
+    The factors need far more memory than the compliance, and are recomputed for fields.
     """
     for piece in (pair.piece, pair.upper):
         if isinstance(piece, Piece) and not piece.round_off_error:
@@ -205,7 +211,7 @@ def delete_factors(pair: Pair) -> Pair:
 
 
 def pair_on_same_meshes(patch_model, pair: Pair) -> Pair:
-    """Return the pieces of a `PatchModel` condensed on the meshes of another Pair.
+    """Return the pieces of a `PatchModel`, condensed on the meshes of a given Pair.
 
     Shared pieces are reused if the meshes are shared.
     """
@@ -219,12 +225,12 @@ def pair_on_same_meshes(patch_model, pair: Pair) -> Pair:
     return condense(patch_model, pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
 
 
-def _rise(body, x) -> np.ndarray:
-    """Return the gap (m,) [m] at x (m,) that the rounded ends of a body cause."""
+def _end_gap(body, x) -> np.ndarray:
+    """Return the gap (m,) [m] at positions x (m,) [m] due to the rounded ends of a body."""
     rise = getattr(body, "interface_depths", None)
     return np.zeros(x.size) if rise is None else np.interp(x, body.x, rise)
 
 
-def _match(x, other) -> bool:
-    """Return whether the interface nodes of both pieces coincide."""
+def _nodes_match(x, other) -> bool:
+    """Return whether the interface nodes of the lower and the upper piece coincide."""
     return other.size == x.size and np.abs(other - x).max() <= 1e-9 * np.ptp(x)

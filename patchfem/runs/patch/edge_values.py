@@ -1,10 +1,12 @@
-"""Record of the extent and the stiffness of a contact, for patches of any kind."""
+"""Record of the length and the stiffness of a contact, for patches with and without strips."""
 
 from typing import NamedTuple
 
 
 class EdgeValues(NamedTuple):
-    """Quantities that depend on where a contact ends, numbers or (q,).
+    """Contact length and contact stiffnesses that depend on where the contact ends.
+
+    Each is a number, or (q,) for q patches.
 
     - length: length in contact [m]; the mean of strips.
     - width: distance between the first and the last end [m].

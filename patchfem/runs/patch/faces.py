@@ -23,7 +23,7 @@ from .values import values
 
 
 class Face(NamedTuple):
-    """Patch of an interface of a rig.
+    """Contact patch of a single interface of a rig, with its solutions on several meshes.
 
     - number: index of the interface.
     - name: nodes of the interface as the scene writes them, "1-0".
@@ -40,81 +40,81 @@ class Face(NamedTuple):
 
     @property
     def patch(self) -> Patch:
-        """Pressed Patch on the finest mesh."""
+        """Solved Patch of the interface on the finest mesh."""
         return self.patches[0]
 
     @property
     def surface(self):
-        """`press.Surface` on whose points the fields are given."""
+        """`press.Surface` at whose points the fields of the interface are given."""
         return patch_surface(self.patch, self.fields or {})
 
     @property
     def folder(self) -> str:
-        """Name of the interface as the name of a folder."""
+        """Folder name of the interface in the files of a run."""
         return self.name.replace(" (", "_").removesuffix(")")
 
     @property
     def partial_slip(self) -> str:
-        """Key that lets the patch slip in part; "" if there is none."""
+        """Scene key that enables partial slip of the patch; "" if the patch moves as one point."""
         return self.model.patch.interface.partial_slip
 
     def slide(self, response) -> np.ndarray:
-        """Return the slide (k,) [m] of the interface in a Response."""
+        """Return the relative displacement (k,) [m] of the interface in a Response."""
         slides = response.extra.get("slides")
         return response.slide if slides is None else slides[:, self.number]
 
 
 def press_faces(model) -> Iterator[Face]:
-    """Yield a Face for each interface of a model that has a patch, pressed."""
+    """Iterate over the interfaces of a model that have a patch, with the contact solved."""
     rig = model.rig
-    for number, one in enumerate(rig.friction.interfaces if rig is not None else ()):
-        if one.patch is not None:
-            own = replace(model, patch=one.patch, friction=one.numbers)
+    for number, interface in enumerate(rig.friction.interfaces if rig is not None else ()):
+        if interface.patch is not None:
+            own = replace(model, patch=interface.patch, friction=interface.numbers)
             yield Face(
                 number,
                 rig.friction.names[number],
                 own,
-                press_on_meshes(one, model.accuracy.tolerance),
+                press_on_meshes(interface, model.accuracy.tolerance),
             )
 
 
-def press_on_meshes(one, tolerance: float) -> tuple:
-    """Return the Patch of an InterfaceLaw and those on coarser meshes.
+def press_on_meshes(interface, tolerance: float) -> tuple:
+    """Solve the contact of the patch of an InterfaceLaw on its mesh and on coarser ones.
 
-    They are computed once for all runs of a process with the same patch; a patch with files, which
-    may change, once for its model.
+    The solution is computed once for all runs of a process with the same patch. A patch with files,
+    which may change, is solved once per model.
 
     Raises
     ------
     PatchfemError
         With the key of the interface at fault.
     """
-    patch_model = one.patch
+    patch_model = interface.patch
     files = patch_model.mesh.file is not None or patch_model.gap.profile is not None
     key = ("face", patch_model if files else store.content_key(patch_model), tolerance)
     try:
         return store.reuse(key, lambda: result.solve_all(patch_model, tolerance))
     except PatchfemError as error:
-        error.key = error.key and f"{one.key}.{error.key}"
+        error.key = error.key and f"{interface.key}.{error.key}"
         raise
 
 
 def condense_again(model) -> None:
-    """Condense the pieces of every interface again, ignoring all kept results."""
+    """Condense the pieces of every interface of a model again, ignoring cached operators."""
     store.clear()
-    for one in model.rig.friction.interfaces if model.rig is not None else ():
-        if one.patch is not None:
-            result.solve_all(one.patch, model.accuracy.tolerance, fresh=True)
+    for interface in model.rig.friction.interfaces if model.rig is not None else ():
+        if interface.patch is not None:
+            result.solve_all(interface.patch, model.accuracy.tolerance, fresh=True)
 
 
-def make_elements(one, tolerance: float, coarser: bool = False) -> tuple:
-    """Return the parallel elements of an InterfaceLaw whose patch slips in part.
+def make_elements(interface, tolerance: float, coarser: bool = False) -> tuple:
+    """Return the parallel Jenkins elements of an interface whose patch slips partially.
 
-    A patch without load has one element that yields at once.
+    A patch without load has a single element that yields at once.
 
     Parameters
     ----------
-    one : InterfaceLaw
+    interface : InterfaceLaw
     tolerance : float
     coarser : bool
         Whether to use the coarser mesh of the error estimate.
@@ -122,23 +122,23 @@ def make_elements(one, tolerance: float, coarser: bool = False) -> tuple:
     Returns
     -------
     tuple
-        Stiffness (t,) [N/m], yield slide (t,) [m], and the JenkinsSet (None for strips).
+        Stiffness (t,) [N/m], yield displacement (t,) [m], and the JenkinsSet (None for strips).
     """
-    patch = press_on_meshes(one, tolerance)[int(coarser)]
-    static = one.numbers.static
+    patch = press_on_meshes(interface, tolerance)[int(coarser)]
+    static = interface.numbers.static
     if not patch.pressure.load > 0:
         return np.array([1 / patch.giving.mean()]), np.zeros(1), None
-    length = record.make_law(one.numbers, one.load).element(one.load).length
+    length = record.make_law(interface.numbers, interface.load).element(interface.load).length
     if patch.strips is not None:
         return *map(
             np.concatenate, zip(*jenkins_elements.strip_elements(patch, static, length))
         ), None
-    found = jenkins_elements.elements(patch, static, length)
-    return found.stiffness, found.yield_displacement, found
+    jenkins_set = jenkins_elements.elements(patch, static, length)
+    return jenkins_set.stiffness, jenkins_set.yield_displacement, jenkins_set
 
 
 def interfaces_with_coarse_mesh(model) -> list:
-    """Return the indices of interfaces that have a coarser mesh, one tuple per distinct patch."""
+    """Return the indices of interfaces that have a coarser mesh, as a tuple per distinct patch."""
     out = {}
     for face in press_faces(model):
         if face.partial_slip and face.patches[1] is not None:
@@ -146,30 +146,34 @@ def interfaces_with_coarse_mesh(model) -> list:
     return [tuple(numbers) for numbers in out.values()]
 
 
-def faces_with_frames(model, shots) -> tuple:
-    """Return the Faces of a model with their frames.
+def faces_with_frames(model, snapshots) -> tuple:
+    """Return the patches of all interfaces with snapshots of their slip and shear stress.
 
     The frames of a patch without elements, or without shots, show the pressed state only.
 
     Parameters
     ----------
     model : Model
-    shots : list
+    snapshots : list
         Snapshots of the event engine: time [s], and (slide [m], stretch (t,) [m]) of every
         interface.
     """
     out = []
     for face in press_faces(model):
-        one = model.rig.friction.interfaces[face.number]
+        interface = model.rig.friction.interfaces[face.number]
         fields = at_rest(face.patch)
-        found = make_elements(one, model.accuracy.tolerance)[2] if face.partial_slip else None
-        if found is not None and shots:
-            states = [shot["faces"][face.number] for shot in shots]
-            length = record.make_law(one.numbers, one.load).element(one.load).length
-            tau, local = slip_fields.element_fields(face.patch, found, states, length)
+        jenkins_set = (
+            make_elements(interface, model.accuracy.tolerance)[2] if face.partial_slip else None
+        )
+        if jenkins_set is not None and snapshots:
+            states = [shot["faces"][face.number] for shot in snapshots]
+            length = (
+                record.make_law(interface.numbers, interface.load).element(interface.load).length
+            )
+            tau, local = slip_fields.element_fields(face.patch, jenkins_set, states, length)
             fields = interface_frames(
                 face.patch,
-                np.array([shot["time"] for shot in shots]),
+                np.array([shot["time"] for shot in snapshots]),
                 tau,
                 local,
                 np.array([slide for slide, _ in states]),
@@ -179,70 +183,72 @@ def faces_with_frames(model, shots) -> tuple:
 
 
 def has_error_meshes(model) -> bool:
-    """Return whether every patch that slips in part has a coarser mesh for its error."""
+    """Return whether every patch with partial slip has a coarser mesh for its error estimate."""
     return all(face.patches[1] is not None for face in press_faces(model) if face.partial_slip)
 
 
 def static_measures_without_errors(model) -> dict:
-    """Return static measures by name of all patches of a model, without errors."""
+    """Return the static measures of all patches of a model by name, without error estimates."""
     if model.patch is not None:
         return result.static_measures_without_errors(model)
     with locate_errors(model.source):
         return {
-            rows.add_interface_number(name, face.number): found
+            rows.add_interface_number(name, face.number): value
             for face in press_faces(model)
-            for name, found in values(face.patch).items()
+            for name, value in values(face.patch).items()
         }
 
 
 def static_measures(model) -> dict:
-    """Return the static measures of the patches by name.
+    """Return the static measures of all patches of a model by name, with error estimates.
 
-    Those of an interface after the first have its number after the name.
+    From the second interface on, the number of the interface follows the name.
     """
     return {
-        rows.add_interface_number(name, face.number): found
+        rows.add_interface_number(name, face.number): measure
         for face in press_faces(model)
-        for name, found in result.static_measures(face.model, face.patch, face.patches[1:]).items()
+        for name, measure in result.static_measures(
+            face.model, face.patch, face.patches[1:]
+        ).items()
     }
 
 
 def collect_warnings(model) -> list:
-    """Return the warnings on the pressed patches."""
+    """Return the warnings on strains and missing error estimates of the patches of a model."""
     return merge_sentences(
         model,
         lambda face: [
             *result.warn_of_strains(face.model.patch, face.patch),
-            *([UNKNOWN] if face.patches[1] is None else []),
+            *([NO_ERROR_ESTIMATE] if face.patches[1] is None else []),
         ],
     )
 
 
-UNKNOWN = "the interface has too few elements for an estimate of the error; leave out contact.element_size"
+NO_ERROR_ESTIMATE = "the interface has too few elements for an estimate of the error; leave out contact.element_size"
 
 
 def collect_notes(model) -> list:
-    """Return notes on what the static model of the patches neglects."""
+    """Return notes on the effects that the static model of the patches neglects."""
     return merge_sentences(
         model,
         lambda face: result.notes_on_neglected_effects(face.model, face.patch, face.patches[1:]),
     )
 
 
-def merge_sentences(model, told: Callable) -> list:
-    """Return the sentences on all patches, each once with the names of its interfaces.
+def merge_sentences(model, list_sentences: Callable) -> list:
+    """Return the sentences on all patches of a model, each with the names of its interfaces.
 
     Keys are written as they occur in the scene.
 
     Parameters
     ----------
     model : Model
-    told : callable
+    list_sentences : callable
         Function of a Face that returns its sentences.
     """
     out: dict = {}
     for face in press_faces(model):
-        for text in told(face):
+        for text in list_sentences(face):
             out.setdefault(in_scene(model, text), []).append(face.name)
     return [
         f"interface{'s' * (len(names) > 1)} {', '.join(names)}: {text}"
@@ -251,7 +257,7 @@ def merge_sentences(model, told: Callable) -> list:
 
 
 def in_scene(model, text: str) -> str:
-    """Return a sentence on a patch with its keys of [contact] as they are in the scene.
+    """Replace the [contact] keys in a sentence on a patch by the keys that the scene uses.
 
     If the model has no patch of its own, these keys belong to [structure.interface.contact].
     """

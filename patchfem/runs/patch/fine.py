@@ -1,4 +1,4 @@
-"""Patch under a measured profile on equally spaced points, as fine as the samples and finer.
+"""Contact under a measured profile, solved on successively more equally spaced points.
 
 In: a `PatchModel` with a profile. Out: static measures with errors, and the pressure on the
 points. The compliance of waves along the interface is known in closed form; finite elements
@@ -33,28 +33,32 @@ from .measures import (
     Estimate,
     Resolution,
     converge,
-    shared_errors,
+    estimate_common_errors,
 )
 from .press import PointSolution, Surface
 from .values import peak_pressures, static_values
 
-MIN_LEVELS = 3  # fewer levels do not show an order of convergence
-MAX_POINTS = 60_000  # points of a level; more would exceed the time of a patch
-MAX_WORK = 2.5e7  # iterations times points of a level, for the same reason
-MIN_POINTS = 500  # points of the first level
-END_CELL = 1e-4  # cell at the ends over the length, on level 0
-MIDDLE_CELL = 1 / 30  # cell in the middle over the length, on level 0
-GROWTH = 0.8  # growth of these cells per distance
-CONTACT_TOL = 3e-8  # relative residual of a solved contact
-MAX_ITERATIONS = 4000  # iterations of one contact
-CORNER_SPAN = 1e-3  # length of a corner over that of the interface
-# pressure at a corner over the largest; above it the largest pressure may be at the corner
+MIN_LEVELS = 3  # Smallest number of refinement levels from which an order of convergence is seen.
+# Largest number of points of a level, because more would exceed the CPU time of a patch.
+MAX_POINTS = 60_000
+MAX_WORK = 2.5e7  # Largest iterations times points of a level, limited for the same reason.
+MIN_POINTS = 500  # Smallest number of points of the coarsest level.
+END_CELL_RATIO = 1e-4  # Cell length at the ends over the length of the interface, on level 0.
+MIDDLE_CELL_RATIO = (
+    1 / 30
+)  # Cell length in the middle over the length of the interface, on level 0.
+CELL_GROWTH = 0.8  # Increase of the cell length per distance from the end [1].
+CONTACT_TOL = 3e-8  # Relative residual at which the contact counts as solved.
+MAX_ITERATIONS = 4000  # Largest number of iterations of a contact solution.
+CORNER_LENGTH_RATIO = 1e-3  # Length of the corner region over the length of the interface.
+# Pressure at a corner over the largest pressure; above this ratio the peak may be at the corner.
 MIN_CORNER_PRESSURE_RATIO = 0.2
-MAX_OVERLAP = 1e-6  # largest overlap of a solved contact over the displacement due to the pressure
+# Largest overlap of the surfaces of a solved contact over the displacement due to the pressure.
+MAX_OVERLAP_RATIO = 1e-6
 
 
 class PointLevel(NamedTuple):
-    """Solution of the contact on the points of one level.
+    """Solution of a contact problem on the equally spaced points of a refinement level.
 
     - force (n,): nodal forces [N].
     - surface: pressure and gap on the points.
@@ -76,7 +80,7 @@ class PointLevel(NamedTuple):
 
 
 class FreeEnds(NamedTuple):
-    """Change of the compliance of infinite layers by the free ends of the pieces.
+    """Change of the compliance of infinite elastic layers due to the free ends of the pieces.
 
     - x (k,): positions [m].
     - normal, tangential (k, k): changes [m2/N] for pressure and for shear.
@@ -88,7 +92,7 @@ class FreeEnds(NamedTuple):
 
 
 class PointForces(NamedTuple):
-    """Forces on the points of a level, and the state of the upper holder.
+    """Nodal contact forces at the points of a level, with approach and rotation of the holder.
 
     - force (n,): nodal forces [N].
     - approach, rotation: [m] and [rad]; the rotation adds to that of the gap.
@@ -110,7 +114,7 @@ class HolderState(NamedTuple):
     rotation: float
 
 
-def takes_points(patch_model) -> bool:
+def can_use_points(patch_model) -> bool:
     """Return whether a `PatchModel` can be solved on equally spaced points.
 
     These are bare pieces of equal length with a profile, under a load, or under an approach without
@@ -130,7 +134,7 @@ def takes_points(patch_model) -> bool:
 
 
 def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
-    """Solve a `PatchModel` on an increasing number of points.
+    """Solve the contact of a `PatchModel` on successively more equally spaced points.
 
     Parameters
     ----------
@@ -162,25 +166,25 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
 
 
 def _first_level_points(patch_model) -> int:
-    """Return the number of points of the first level."""
+    """Return the number of points of the coarsest level of a `PatchModel`."""
     n_samples = patch_model.pieces.length / profile.find_sample_spacing(patch_model.gap.profile)
     return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))
 
 
 def _is_expensive(level: PointLevel) -> bool:
-    """Return whether doubling the points of a level exceeds the limit of points or iterations."""
+    """Return whether doubling the points of a level exceeds the limit of points or work."""
     count = level.force.size
     return 2 * count > MAX_POINTS or 3 * level.n_iterations * count > MAX_WORK
 
 
 def _add_series(coarse: list, levels: list) -> dict:
-    """Return the estimates of measures by name from two series of levels.
+    """Return the estimates of measures by name from two successive refinement series.
 
-    The first series has ever finer cells at the ends, the second ever more points with the finest
-    of these cells. The extrapolation and the error of the first are added to the second.
+    The first series refines the cells at the ends; the second increases the number of points with
+    the finest of these cells. The extrapolation and the error of the first are added to the second.
     """
     finest = levels[-1]
-    shared = shared_errors(finest.resolution, finest.values)
+    shared = estimate_common_errors(finest.resolution, finest.values)
     by_points = converge([level.values for level in levels], shared, 0.0)
     by_ends = converge([level.values for level in coarse], {}, 0.0)
     return {
@@ -194,10 +198,10 @@ def _add_series(coarse: list, levels: list) -> dict:
 
 
 def _compute_free_ends(patch_model, level: int) -> FreeEnds:
-    """Return the change of compliance due to the free ends of the pieces, on cells of a level."""
+    """Compute the change of compliance due to the free ends, with cells of a refinement level."""
     half = patch_model.pieces.length / 2
-    cell = END_CELL * patch_model.pieces.length
-    middle_cell = MIDDLE_CELL * patch_model.pieces.length
+    cell = END_CELL_RATIO * patch_model.pieces.length
+    middle_cell = MIDDLE_CELL_RATIO * patch_model.pieces.length
     bands = ((-half, -half, cell), (half, half, cell))
     layout = Layout(
         start=-half,
@@ -206,25 +210,25 @@ def _compute_free_ends(patch_model, level: int) -> FreeEnds:
         span=(-half, half),
         max_loaded_length=middle_cell,
         max_length=middle_cell,
-        slope=GROWTH,
+        slope=CELL_GROWTH,
     ).scale_cells(0.5**level)
     x = divide_into_columns(layout)
     changes = 0.0
     for piece, multiplicity in _distinct_pieces(patch_model):
-        depth, coated = _rows(piece, layout)
+        depth, coated = _row_depths(piece, layout)
         body = make_piece(x, depth, coated, make_elastic_layers(patch_model, piece))
         changes = changes + multiplicity * np.array(end_compliance(body))
     return FreeEnds(x, *changes)
 
 
 def _distinct_pieces(patch_model) -> list:
-    """Return (piece, multiplicity) for the distinct pieces."""
+    """Return the distinct pieces of a patch as pairs (piece, multiplicity)."""
     pieces = patch_model.pieces
     return [(pieces.upper, 2)] if pieces.are_alike else [(pieces.lower, 1), (pieces.upper, 1)]
 
 
-def operators(patch_model, ends: FreeEnds, count: int) -> tuple:
-    """Return the PointCompliance for pressure and for shear of equally spaced points.
+def make_point_compliances(patch_model, ends: FreeEnds, count: int) -> tuple:
+    """Return the compliance of equally spaced points for pressure and for shear.
 
     Parameters
     ----------
@@ -253,8 +257,8 @@ def operators(patch_model, ends: FreeEnds, count: int) -> tuple:
     return tuple(out)
 
 
-def _rows(piece, layout: Layout) -> tuple:
-    """Return the depths [m] of the rows of a piece, and the number of rows in its coating."""
+def _row_depths(piece, layout: Layout) -> tuple:
+    """Return the depths [m] of the element rows of a piece and the number of coating rows."""
     height = piece.height
     coating = piece.thickness
     end_cell = layout.bands[0][2]
@@ -270,12 +274,12 @@ def _rows(piece, layout: Layout) -> tuple:
 
 
 def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLevel:
-    """Solve the contact on `count` points.
+    """Solve the contact of a `PatchModel` on a given number of equally spaced points.
 
     start: forces (n,) [N] of the level with half as many points, or None.
     """
     length = patch_model.pieces.length
-    normal, shear = operators(patch_model, ends, count)
+    normal, shear = make_point_compliances(patch_model, ends, count)
     x = normal.x
     between = np.linspace(-length / 2, length / 2, 2 * count + 1)
     gap = patch_model.gap.evaluate(between).heights[1::2]
@@ -285,7 +289,7 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
     opening = gap + solution.rotation * x - solution.approach + deflection
     largest_deflection = np.abs(deflection).max()
     active = force > 0
-    if not opening.min() >= -MAX_OVERLAP * largest_deflection:
+    if not opening.min() >= -MAX_OVERLAP_RATIO * largest_deflection:
         raise NotConverged(
             f"contact: at {count} points the pieces still overlap by up to {-opening.min():.1e} m"
         )
@@ -302,7 +306,8 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         solution.approach,
         patch_model.gap.angle + solution.rotation,
     )
-    tangential = np.nan  # for unlike pieces it depends on the closing that shear causes
+    # For unlike pieces the stiffness depends on the normal closing that shear causes.
+    tangential = np.nan
     if patch_model.pieces.are_alike:
         tangential = set_stiffness(shear, active, unit, contact_edges)
     edge_values = EdgeValues(
@@ -312,7 +317,7 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         tangential=tangential,
         rotational=set_stiffness(normal, active, x, contact_edges),
     )
-    # the pressure at an end of the interface is that of the point
+    # The pressure at an end of the interface is taken from the point there.
     peak = float(peak_pressures(x, sigma[None], node_fraction=unit)[0])
     values = static_values(length, normal.area * count, state, peak, edge_values)
     if np.isnan(tangential):
@@ -327,7 +332,7 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         can_rotate=patch_model.loading.moment is not None,
         closing=float(np.ptp(gap) + largest_deflection),
     )
-    n_corner = max(1, round(CORNER_SPAN * count))
+    n_corner = max(1, round(CORNER_LENGTH_RATIO * count))
     corner_force = max(force[:n_corner].max(), force[-n_corner:].max())
     return PointLevel(
         force,
@@ -341,9 +346,9 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
 
 
 def _contact_intervals(active, contact_edges: list, length: float) -> np.ndarray:
-    """Return the parts in contact (k, 2) [m] of a contact set (n,) of bool.
+    """Return the intervals in contact (k, 2) [m] for a contact set (n,) of bool.
 
-    A part ends at an edge between two points, or at an end of the interface.
+    An interval ends at an edge between two points, or at an end of the interface.
     """
     is_active = np.concatenate([[False], active, [False]])
     edges = iter(contact_edges)
@@ -355,7 +360,7 @@ def _contact_intervals(active, contact_edges: list, length: float) -> np.ndarray
 
 
 def _solve_forces(patch_model, normal: PointCompliance, gap, start) -> PointForces:
-    """Solve for the forces of a level, under the load or approach of a `PatchModel`."""
+    """Solve for the nodal forces of a refinement level under the prescribed load or approach."""
     x = normal.x
     loading = patch_model.loading
     begin = None if start is None else np.repeat(start, 2) / 2

@@ -4,7 +4,7 @@ In: a `PatchModel`. Out: the coarsest grids of its pieces. They follow from the 
 contact is searched on columns that are graded to the result of the previous search, in plans
 and runs alike. Every further grid splits all cells in two, so that the grids of a tighter
 tolerance contain those of a wider one. `ladder` decides how many grids a run takes, `plan`
-predicts it. Read `base_grids` first, then `find_layout`.
+predicts it. Read `make_base_grids` first, then `make_layout`.
 """
 
 from dataclasses import dataclass
@@ -22,47 +22,60 @@ from .condensed import Pair, condense, delete_factors
 from .press import Patch, press_patch
 from .values import contact_ends
 
-SEARCH_CELLS = 96  # columns of the first search for the contact
-# most columns of the coarsest grid; a layout with more is made coarser everywhere
+# Number of equal columns of the grid with which the search for the contact starts.
+N_SEARCH_COLUMNS = 96
+# Largest number of columns of the coarsest grid; a finer layout is coarsened everywhere.
 MAX_COLUMNS = 120
-# Each dict has a value for a patch at rest (True) and a value for a patch that moves (False), which
-# gets fewer nodes because every time step takes longer with more of them.
-SLOPE = {True: 0.5, False: 0.9}  # growth of the cells of the coarsest grid per distance [1]
-EDGE_CELLS = {True: 20, False: 10}  # length of a contact over the coarsest cells at its edges
-# shortest cell of the coarsest grid over the length: some tens of picometres, near round-off
-MIN_CELL = 4e-9
-STEP_CELLS = 8  # cells at a step of the gap are this many times shorter than those at an edge
-# most ends of a contact; one with more consists of many islands and gets equal columns
-MAX_PLACES = 12
-SWING = (0.5, 1.5)  # multiples of the mean load between which a varying load is expected
-# coarsest cell over the length of the interface if wear may move the edges anywhere
-WEAR_CELL = 1 / 48
-NODE_CELLS = 64  # cells along a contact of one or two nodes in the next search
-WAVE_CELLS = 16  # cells per wave of the gap, in the search and in the third grid
-# cells are graded to those maxima of the pressure that exceed this fraction of the largest
-CREST = 0.3
-CREST_CELLS = 4  # cells of the coarsest grid in the half-width of a maximum of the pressure
-# cells of the coarsest grid in a slip zone; the third grid has 16, which give the work to about 1 %
-SLIP_CELLS = 4
-# cell of the search over the cell of the layout in a slip zone; above it the search is repeated
-MAX_SEARCH_CELL = 4.0
-# most searches; each one has columns that are graded to the result of the previous one
+# Each dict has a value for a static patch (True) and for a patch in motion (False), which gets
+# fewer nodes because they lengthen every time step.
+CELL_GROWTH = {
+    True: 0.5,
+    False: 0.9,
+}  # Growth of the cell length with distance on the coarsest grid [1].
+# Contact length divided by the length of the coarsest cell at its edges.
+EDGE_CELLS = {True: 20, False: 10}
+# Shortest cell of the coarsest grid over the length: some tens of picometres, near round-off.
+MIN_CELL_RATIO = 4e-9
+# Factor by which cells at a step of the gap are shorter than cells at a contact edge.
+STEP_CELL_FACTOR = 8
+# Largest number of contact ends; with more, the contact consists of islands and gets equal columns.
+MAX_CONTACT_ENDS = 12
+# Smallest and largest load over the mean load that are expected under a varying load.
+LOAD_RANGE_FACTORS = (0.5, 1.5)
+# Longest cell over the length of the interface if wear may move the contact edges anywhere.
+MAX_WEAR_CELL_RATIO = 1 / 48
+N_CELLS_PER_SMALL_CONTACT = (
+    64  # Number of cells along a contact of one or two nodes in the next search.
+)
+N_CELLS_PER_WAVE = (
+    16  # Number of cells per wavelength of the gap, in the search and in the third grid.
+)
+# Smallest pressure maximum over the largest pressure towards which cells are graded.
+MIN_PEAK_RATIO = 0.3
+N_CELLS_PER_PEAK = 4  # Number of cells of the coarsest grid per half-width of a pressure maximum.
+# Number of coarsest cells in a slip zone; the third grid has 16, which give the work to about 1 %.
+N_CELLS_PER_SLIP_ZONE = 4
+# Largest search cell over the layout cell in a slip zone; above it the search is repeated.
+MAX_SEARCH_CELL_RATIO = 4.0
+# Largest number of searches; the columns of each are graded to the previous result.
 MAX_SEARCHES = 8
-# The search ends when no band of the layout moves or changes by more than this fraction of its
-# cell, because the next search would have the same columns.
-SETTLED_FRACTION = 0.1
-MIN_LEVELS = 3  # fewer nested meshes do not show an order of convergence
-# predicted CPU seconds of condensing, above which a finer mesh is not tried
-MAX_SECONDS = {
+# Change of a band over its cell length below which the search ends, because the next search would
+# have the same columns.
+BAND_CHANGE_TOL = 0.1
+MIN_LEVELS = 3  # Smallest number of nested meshes from which an order of convergence is seen.
+# Largest predicted CPU time [s] of condensing a mesh that is still tried.
+MAX_CONDENSING_SECONDS = {
     True: 3.0,
     False: 0.4,
 }
-OTHER_FACTOR = 4.0  # condensing a mesh that is not a tensor grid takes this many times as long
+UNSTRUCTURED_COST_FACTOR = (
+    4.0  # Ratio of the CPU times of condensing an unstructured mesh and a tensor grid.
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactExtent:
-    """Extent of a contact, found by a search.
+    """Extent of a contact region with its edges, corners, pressure maxima and slip zones.
 
     - span: (start, end) [m] of the loaded part of the interface.
     - places: positions [m] at which the pressure ends inside the interface, or the nodes of a
@@ -82,16 +95,16 @@ class ContactExtent:
 
     @property
     def width(self) -> float:
-        """Length of the loaded part [m]."""
+        """Length [m] of the loaded part of the interface."""
         return self.span[1] - self.span[0]
 
 
-def search_pair(patch_model) -> Pair:
-    """Return the pieces on the columns of the first search for a contact.
+def condense_on_search_grid(patch_model) -> Pair:
+    """Return the condensed pieces on the equal columns with which the contact search starts.
 
     Patches of the same geometry share them.
     """
-    layout = search_layout(patch_model)
+    layout = make_search_layout(patch_model)
     key = (
         "search",
         layout,
@@ -108,19 +121,21 @@ def search_pair(patch_model) -> Pair:
 
 
 class BaseGrids(NamedTuple):
-    """Coarsest grids of a patch, a single one if its pieces are alike, and its contact.
+    """Coarsest grids of a patch, graded to its contact.
 
-    contact: ContactExtent that they are graded to; None without a load.
+    There is a single grid if the pieces are alike.
+
+    contact: ContactExtent to which the grids are graded; None without a load.
     """
 
     bodies: list
     contact: ContactExtent | None
 
 
-def base_grids(patch_model) -> BaseGrids:
-    """Return the coarsest grids of a `PatchModel`, graded to the contact that is found on them.
+def make_base_grids(patch_model) -> BaseGrids:
+    """Return the coarsest grids of a `PatchModel`, graded to its contact region.
 
-    The result is kept, because the plan of a run and the run itself need the same grids.
+    The result is cached, because the plan of a run and the run itself need the same grids.
     """
     has_files = patch_model.mesh.file is not None or patch_model.gap.profile is not None
     key = ("base grids", patch_model if has_files else store.content_key(patch_model))
@@ -128,21 +143,24 @@ def base_grids(patch_model) -> BaseGrids:
 
 
 def _search_grids(patch_model) -> BaseGrids:
-    """Search for the contact of a `PatchModel` on columns graded to the result of the last search.
+    """Find the contact of a `PatchModel` on columns that are graded from search to search.
 
     If a varying load moves the edges of the contact, the columns are fine wherever the edges lie
-    between SWING times the load; if wear moves them, no column is longer than WEAR_CELL of the
+    between LOAD_RANGE_FACTORS times the load; if wear moves them, no column is longer than MAX_WEAR_CELL_RATIO of the
     interface.
     """
     sweep = []
     if patch_model.mesh.edge_motion == "load" and patch_model.loading.load is not None:
-        sweep = [patch_model.with_loading(load=share * patch_model.loading.load) for share in SWING]
-    layout = search_layout(patch_model)
+        sweep = [
+            patch_model.with_loading(load=share * patch_model.loading.load)
+            for share in LOAD_RANGE_FACTORS
+        ]
+    layout = make_search_layout(patch_model)
     contact = None
-    # without a load there is no contact to search for
+    # Without a load there is no contact to search for.
     for search in range(MAX_SEARCHES if patch_model.nominal_load > 0 else 0):
         if search == 0:
-            pair = search_pair(patch_model)
+            pair = condense_on_search_grid(patch_model)
         else:
             pair = condense(patch_model, *make_grids(patch_model, layout))
         x = pair.grid.x
@@ -152,9 +170,11 @@ def _search_grids(patch_model) -> BaseGrids:
             extents.append(contact_extent(patch, patch_model.mesh.slip))
         contact = extents[0]
         last = layout
-        layout = find_layout(patch_model, extents)
+        layout = make_layout(patch_model, extents)
         cells = max(extent.cell / extent.width for extent in extents)
-        shows = _shows_crests(patch_model, x, layout) and _shows_slip(contact.slip_zones, x, layout)
+        shows = _resolves_waves(patch_model, x, layout) and _resolves_slip_zones(
+            contact.slip_zones, x, layout
+        )
         if cells <= 1 / (EDGE_CELLS[patch_model.mesh.is_static] - 1) and shows:
             break
         if _is_settled(layout, last):
@@ -163,56 +183,56 @@ def _search_grids(patch_model) -> BaseGrids:
 
 
 def _is_settled(layout: Layout, last: Layout) -> bool:
-    """Return whether the bands of two layouts differ by at most SETTLED_FRACTION of their cells."""
+    """Return whether the bands of two successive layouts agree within BAND_CHANGE_TOL."""
     if len(layout.bands) != len(last.bands):
         return False
     bands = np.reshape(layout.bands, (-1, 3))
     last_bands = np.reshape(last.bands, (-1, 3))
     cells = np.minimum(bands[:, 2:], last_bands[:, 2:])
-    return bool((np.abs(bands - last_bands) <= SETTLED_FRACTION * cells).all())
+    return bool((np.abs(bands - last_bands) <= BAND_CHANGE_TOL * cells).all())
 
 
-def _shows_slip(zones: tuple, x, layout: Layout) -> bool:
-    """Return whether columns x (k,) [m] resolve the slip zones.
+def _resolves_slip_zones(zones: tuple, x, layout: Layout) -> bool:
+    """Return whether columns at x (k,) [m] resolve the slip zones of a patch.
 
-    Their cells are at most MAX_SEARCH_CELL times those of a layout.
+    Their cells are at most MAX_SEARCH_CELL_RATIO times those of a layout.
     """
-    middle = (x[1:] + x[:-1]) / 2
+    midpoint = (x[1:] + x[:-1]) / 2
     long = np.diff(x)
     for low, high in zones:
         inside = (x[1:] > low) & (x[:-1] < high)
-        if (long[inside] > MAX_SEARCH_CELL * layout.cell_lengths(middle[inside])).any():
+        if (long[inside] > MAX_SEARCH_CELL_RATIO * layout.cell_lengths(midpoint[inside])).any():
             return False
     return True
 
 
-def _shows_crests(patch_model, x, layout: Layout) -> bool:
-    """Return whether columns x (k,) [m] are short enough for a pressure over waves.
+def _resolves_waves(patch_model, x, layout: Layout) -> bool:
+    """Return whether columns at x (k,) [m] resolve the pressure maxima on a wavy surface.
 
     The limit is twice the cells of a layout.
     """
-    if _longest(patch_model) == np.inf or x.size > MAX_COLUMNS:
+    if _max_wave_cell(patch_model) == np.inf or x.size > MAX_COLUMNS:
         return True
     return bool((np.diff(x) <= 2 * layout.cell_lengths((x[1:] + x[:-1]) / 2)).all())
 
 
-def _longest(patch_model) -> float:
-    """Return the longest cell [m] that resolves the waves of profile and shapes; else inf."""
+def _max_wave_cell(patch_model) -> float:
+    """Return the longest cell [m] that resolves the waves of the gap; inf without waves."""
     return min(
-        patch_model.gap.wave / WAVE_CELLS,
+        patch_model.gap.wave / N_CELLS_PER_WAVE,
         np.inf if patch_model.gap.profile is None else patch_model.uniform_element_size,
     )
 
 
-def search_layout(patch_model) -> Layout:
-    """Return equal columns on which a contact is searched for."""
+def make_search_layout(patch_model) -> Layout:
+    """Return the layout of equal columns for the first search for the contact."""
     half = patch_model.pieces.length / 2
-    cell = min(patch_model.pieces.length / SEARCH_CELLS, _longest(patch_model))
+    cell = min(patch_model.pieces.length / N_SEARCH_COLUMNS, _max_wave_cell(patch_model))
     return Layout(-half, half, (), (-half, half), cell, cell, 0.0)
 
 
-def find_layout(patch_model, extents: list) -> Layout:
-    """Return the columns of the coarsest mesh, graded towards the ends of some contacts.
+def make_layout(patch_model, extents: list) -> Layout:
+    """Return the column layout of the coarsest mesh, graded towards the ends of given contacts.
 
     extents: ContactExtents, of one patch under several loads or of several patches.
     """
@@ -220,36 +240,38 @@ def find_layout(patch_model, extents: list) -> Layout:
     half = length / 2
     span = (min(extent.span[0] for extent in extents), max(extent.span[1] for extent in extents))
     width = min(extent.width for extent in extents)
-    thick = _coating(patch_model)
-    # the third mesh, whose cells are a quarter as long, has to resolve the waves
-    most = min(length / 12, 4 * _longest(patch_model))
-    if max(len(extent.places) for extent in extents) > MAX_PLACES:
-        return Layout(-half, half, (), span, *(2 * [min(length / 64, most)]), 0.0)
+    thick = _thinner_coating(patch_model)
+    # The third mesh, whose cells are a quarter as long, has to resolve the waves.
+    max_cell = min(length / 12, 4 * _max_wave_cell(patch_model))
+    if max(len(extent.places) for extent in extents) > MAX_CONTACT_ENDS:
+        return Layout(-half, half, (), span, *(2 * [min(length / 64, max_cell)]), 0.0)
     if patch_model.mesh.edge_motion == "wear":
-        most = min(most, length * WEAR_CELL)
-    inside = min(width / 6, length / 24, most)
-    # a contact of one or two nodes is searched again with shorter cells
-    along = NODE_CELLS
+        max_cell = min(max_cell, length * MAX_WEAR_CELL_RATIO)
+    inside = min(width / 6, length / 24, max_cell)
+    # A contact of one or two nodes is searched for again with shorter cells.
+    along = N_CELLS_PER_SMALL_CONTACT
     if np.isfinite(max(extent.cell for extent in extents)):
         along = EDGE_CELLS[patch_model.mesh.is_static]
-    # a band that an edge sweeps would have many cells, and each is a different contact set
+    # A band along the path of a moving edge would need many cells, and each of them changes the
+    # contact set.
     fine = thick / 4 if thick and patch_model.mesh.edge_motion != "load" else np.inf
-    least = max(min(width / along, fine), MIN_CELL * length)
-    bands = _bands([extent.places for extent in extents], least)
-    # a jump of the gap is a node; quantities that depend on it converge with the first power of its
-    # cell
-    bands += tuple((place, place, least / STEP_CELLS) for place in patch_model.gap.jumps)
+    min_cell = max(min(width / along, fine), MIN_CELL_RATIO * length)
+    bands = _edge_bands([extent.places for extent in extents], min_cell)
+    # A jump of the gap lies on a node; quantities that depend on it converge at first order in the
+    # cell length.
+    bands += tuple((place, place, min_cell / STEP_CELL_FACTOR) for place in patch_model.gap.jumps)
     known, fall = find_rounded_edges(patch_model)
-    near = [place for place in known if span[0] - least <= place <= span[1] + least]
-    bands += tuple((place, place, min(least, fall / 4)) for place in near)
-    sharp = STEP_CELLS if patch_model.has_singular_ends else 1
-    if _longest(patch_model) < np.inf:
+    near = [place for place in known if span[0] - min_cell <= place <= span[1] + min_cell]
+    bands += tuple((place, place, min(min_cell, fall / 4)) for place in near)
+    sharp = STEP_CELL_FACTOR if patch_model.has_singular_ends else 1
+    if _max_wave_cell(patch_model) < np.inf:
         crests = [crest for extent in extents for crest in extent.crests]
         bands += tuple(
-            (place, place, max(half / CREST_CELLS, least / STEP_CELLS)) for place, half in crests
+            (place, place, max(half / N_CELLS_PER_PEAK, min_cell / STEP_CELL_FACTOR))
+            for place, half in crests
         )
     bands += tuple(
-        (low, high, max((high - low) / SLIP_CELLS, MIN_CELL * length))
+        (low, high, max((high - low) / N_CELLS_PER_SLIP_ZONE, MIN_CELL_RATIO * length))
         for extent in extents
         for low, high in extent.slip_zones
     )
@@ -257,32 +279,40 @@ def find_layout(patch_model, extents: list) -> Layout:
         min(
             thick / 16 if thick else np.inf, width / EDGE_CELLS[patch_model.mesh.is_static] / sharp
         ),
-        MIN_CELL * length,
+        MIN_CELL_RATIO * length,
     )
     ends = {place for extent in extents for place in extent.corners}
     bands += tuple((place, place, corner) for place in sorted(ends))
-    # the far corners, where a free side meets the holder, have singular stresses
+    # At the far corners, where a free side meets the holder, the stresses are singular.
     bands += tuple(
         (side * half, side * half, min(patch_model.pieces.height, length) / 20) for side in (-1, 1)
     )
     return Layout(
-        -half, half, bands, span, max(inside, least), most, SLOPE[patch_model.mesh.is_static]
+        -half,
+        half,
+        bands,
+        span,
+        max(inside, min_cell),
+        max_cell,
+        CELL_GROWTH[patch_model.mesh.is_static],
     )
 
 
-def _bands(places: list, least: float) -> tuple:
-    """Return the bands of the edges, each with cells of at most `least` [m].
+def _edge_bands(edge_positions: list, min_cell: float) -> tuple:
+    """Return the mesh bands around contact edges, each with cells of at most `min_cell` [m].
 
     If the number of edges is the same in all contacts, a band covers the range that its edge
     sweeps.
     """
-    if len({len(each) for each in places}) == 1:
-        return tuple((min(sweep), max(sweep), least) for sweep in zip(*places, strict=True))
-    return tuple((place, place, least) for each in places for place in each)
+    if len({len(positions) for positions in edge_positions}) == 1:
+        return tuple(
+            (min(sweep), max(sweep), min_cell) for sweep in zip(*edge_positions, strict=True)
+        )
+    return tuple((place, place, min_cell) for positions in edge_positions for place in positions)
 
 
-def _coating(patch_model) -> float:
-    """Return the thickness [m] of the thinner coating; 0 without a coating."""
+def _thinner_coating(patch_model) -> float:
+    """Return the thickness [m] of the thinner of the coatings; 0 without a coating."""
     return min(
         (
             piece.thickness
@@ -294,7 +324,7 @@ def _coating(patch_model) -> float:
 
 
 def contact_extent(patch: Patch, slip=None) -> ContactExtent:
-    """Return the extent of the contact of a patch, or the cells around its smallest gap.
+    """Return the contact region of a patch, or without contact the cells at its smallest gap.
 
     A smooth skin carries pressure everywhere; the part with a thousandth of the largest pressure
     counts.
@@ -317,7 +347,7 @@ def contact_extent(patch: Patch, slip=None) -> ContactExtent:
     index = np.flatnonzero(bears.any(axis=0))
     low = x[max(index[0] - 1, 0)]
     high = x[min(index[-1] + 1, x.size - 1)]
-    # a contact of few nodes: the next search has shorter cells around it
+    # For a contact of few nodes, the next search has shorter cells around it.
     if index.size < 4 and index.size < x.size:
         return ContactExtent((float(low), float(high)), tuple(x[index].tolist()), (), np.inf)
     changes = np.flatnonzero((bears[:, 1:] != bears[:, :-1]).any(axis=0))
@@ -334,29 +364,33 @@ def contact_extent(patch: Patch, slip=None) -> ContactExtent:
         tuple(places.tolist()),
         corners,
         float(cells.max(initial=0.0)),
-        _crests(x, sigma),
+        _pressure_peaks(x, sigma),
         slip_zones.slip_zones(patch, slip, found) if slip is not None else (),
     )
 
 
-def _crests(x, sigma) -> tuple:
-    """Return (position, half-width) [m] of the maxima of pressures (m,) [Pa] inside a contact.
+def _pressure_peaks(x, sigma) -> tuple:
+    """Return (position, half-width) [m] of the maxima of the pressures (m,) [Pa] in a contact.
 
-    Both are those of the parabola through three nodes.
+    Both follow from the parabola through three nodes.
     """
-    top = np.flatnonzero(
-        (sigma[1:-1] > CREST * sigma.max())
+    peak_node = np.flatnonzero(
+        (sigma[1:-1] > MIN_PEAK_RATIO * sigma.max())
         & (sigma[1:-1] > sigma[:-2])
         & (sigma[1:-1] >= sigma[2:])
     )
-    rise = np.diff(sigma) / np.diff(x)
-    bend = -2 * np.diff(rise)[top] / (x[top + 2] - x[top])
-    wide = np.sqrt(2 * sigma[top + 1] / bend)
-    return tuple(zip(x[top + 1].tolist(), wide.tolist())) if top.size <= MAX_PLACES else ()
+    increase = np.diff(sigma) / np.diff(x)
+    bend = -2 * np.diff(increase)[peak_node] / (x[peak_node + 2] - x[peak_node])
+    half_width = np.sqrt(2 * sigma[peak_node + 1] / bend)
+    return (
+        tuple(zip(x[peak_node + 1].tolist(), half_width.tolist()))
+        if peak_node.size <= MAX_CONTACT_ENDS
+        else ()
+    )
 
 
 def make_grids(patch_model, layout: Layout) -> list:
-    """Return the grids of the pieces with the columns of a layout; one grid if they are alike."""
+    """Return the grids of both pieces with the columns of a layout; one grid if they are alike."""
     pieces = (patch_model.pieces.lower, patch_model.pieces.upper)
     if patch_model.pieces.are_alike:
         pieces = pieces[:1]
@@ -365,15 +399,15 @@ def make_grids(patch_model, layout: Layout) -> list:
         extend_grid(
             patch_model,
             piece,
-            grid_on(patch_model, x, piece),
-            1 + SLOPE[patch_model.mesh.is_static],
+            make_grid(patch_model, x, piece),
+            1 + CELL_GROWTH[patch_model.mesh.is_static],
         )
         for piece in pieces
     ]
 
 
 def make_columns(patch_model, layout: Layout) -> np.ndarray:
-    """Return the columns (k,) [m] of a layout, at most MAX_COLUMNS."""
+    """Return the node positions (k,) [m] of a column layout with at most MAX_COLUMNS columns."""
     x = divide_into_columns(layout, patch_model.gap.jumps)
     while x.size > MAX_COLUMNS + 1 and layout.bands:
         layout = layout.scale_cells(x.size / MAX_COLUMNS)
@@ -381,30 +415,30 @@ def make_columns(patch_model, layout: Layout) -> np.ndarray:
     return x
 
 
-def grid_on(patch_model, x, piece) -> TensorGrid:
-    """Return the grid of one piece on columns x (k,) [m].
+def make_grid(patch_model, x, piece) -> TensorGrid:
+    """Return the tensor grid of a piece on node positions x (k,) [m] along the interface.
 
     Its rows are as fine as the columns at the interface, at the inner face of the coating and at
     the holder.
     """
     thick = piece.thickness
     height = piece.height
-    top = float(np.diff(x).min())
-    # a row is at most a tenth of the length; in a piece taller than this it may be 1/24 of the
-    # height, and never more than 1/6 of it
+    first_row = float(np.diff(x).min())
+    # A row is at most a tenth of the length, in a tall piece at most 1/24 of the height, and never
+    # more than 1/6 of the height.
     cap = min(max(patch_model.pieces.length / 10, height / 24), height / 6)
-    bands = [(0.0, 0.0, top), (height, height, min(height, patch_model.pieces.length) / 60)]
+    bands = [(0.0, 0.0, first_row), (height, height, min(height, patch_model.pieces.length) / 60)]
     if thick:
-        bands.append((thick, thick, max(thick / 4, top)))
+        bands.append((thick, thick, max(thick / 4, first_row)))
     layout = Layout(
-        0.0, height, tuple(bands), (0.0, height), cap, cap, SLOPE[patch_model.mesh.is_static]
+        0.0, height, tuple(bands), (0.0, height), cap, cap, CELL_GROWTH[patch_model.mesh.is_static]
     )
     depth, coated = divide_into_rows(layout, thick)
     return TensorGrid(frozen_array(x), depth, coated)
 
 
-def node_counts(body) -> tuple:
-    """Return the (columns, rows) of nodes of a whole body."""
+def count_nodes(body) -> tuple:
+    """Return the numbers of node columns and node rows of a body."""
     plan = body.base_grid
     if plan is None:
         return body.x.size, max(3, round(len(body.points) / body.x.size))
@@ -412,20 +446,20 @@ def node_counts(body) -> tuple:
 
 
 def is_mirrored(body) -> bool:
-    """Whether a body is a plain grid that is its own mirror image."""
+    """Return whether a body is a plain tensor grid that is its own mirror image."""
     return body.base_grid is body and bool(
         np.abs(body.x + body.x[::-1]).max() <= 1e-12 * body.length
     )
 
 
 def predict_condensing_seconds(bodies) -> float:
-    """Return the predicted CPU seconds of condensing the bodies of a patch.
+    """Predict the CPU time [s] of condensing the bodies of a patch.
 
     bodies: (lower, upper or None), or a single one for alike pieces.
     """
     total = 0.0
     for body in bodies:
         if body is not None:
-            factor = 1.0 if body.base_grid is body else OTHER_FACTOR
-            total += factor * predict_seconds(*node_counts(body), is_mirrored(body))
+            factor = 1.0 if body.base_grid is body else UNSTRUCTURED_COST_FACTOR
+            total += factor * predict_seconds(*count_nodes(body), is_mirrored(body))
     return total

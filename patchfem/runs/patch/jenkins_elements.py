@@ -1,4 +1,4 @@
-"""Parallel Jenkins elements of a pressed patch that slips, computed once for all its runs.
+"""Parallel Jenkins elements of a patch with partial slip, computed once for all its runs.
 
 In: a pressed `Patch`, coefficient of friction and bond length. Out: a JenkinsSet, or
 `StripElements` of each strip (`slip.shear_modes`).
@@ -14,7 +14,7 @@ from .press import Patch
 
 
 class StripElements(NamedTuple):
-    """Parallel elements of one strip.
+    """Parallel Jenkins elements of a single strip of a patch.
 
     - stiffness (t,): [N/m].
     - yield_displacement (t,): slide at which each element yields [m].
@@ -25,7 +25,7 @@ class StripElements(NamedTuple):
 
 
 def elements(patch: Patch, static: float, length: float) -> "shear_modes.JenkinsSet":
-    """Return the parallel elements of a patch whose points yield at their friction limit.
+    """Return the parallel elements of a patch whose points yield at their friction limits.
 
     The limit of a point is the coefficient of friction times its load. Coulomb elements of
     different coefficients have the same springs, so they are computed once and scaled.
@@ -41,7 +41,7 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
     load = patch.pressure.sigma_n * patch.pieces.interface.weight
 
     def make() -> "shear_modes.JenkinsSet":
-        """Compute the elements; Coulomb elements are scaled from those of coefficient 1."""
+        """Compute the Jenkins elements of a patch; Coulomb elements are scaled from mu = 1."""
         if length or not static > 0:
             return shear_modes.jenkins_set(patch.giving, static * load, length)
         unit_elements = store.reuse(
@@ -53,7 +53,7 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
 
 
 def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripElements, ...]:
-    """Return the parallel elements of every strip of a patch in strips.
+    """Return the parallel Jenkins elements of every strip of a patch that is divided in strips.
 
     The strips are not coupled: each one has its own part of the compliance of the pieces and its
     own pressure. An open strip has one element that yields at once.
@@ -66,11 +66,11 @@ def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripEle
     length : float
         Length of a bond [m].
     """
-    # the compliance of a strip is that of its part of the width
+    # The compliance of a strip is that of its fraction of the width.
     giving = patch.giving * len(patch.strips.offsets)
 
     def make_strip_elements(force) -> StripElements:
-        """Return the elements of a strip under nodal forces (m,) [N]."""
+        """Return the Jenkins elements of a strip under nodal normal forces (m,) [N]."""
         if not (static > 0 and force.any()):
             return StripElements(np.array([1 / giving.mean()]), np.zeros(1))
         found = shear_modes.jenkins_set(giving, static * force, length)

@@ -12,19 +12,21 @@ from ...core import NotConverged, Outcome
 from ...model.pieces import make_piece_meshes
 from . import fine, slip_zones, store
 from .condensed import condense, shared_pairs
-from .grids import MAX_SECONDS, MIN_LEVELS, base_grids, predict_condensing_seconds
+from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
 from .measures import max_error_ratio, measures
 from .press import press_patch, solve
 
-# tolerance [1] down to which a patch that slips may take as many CPU seconds as a moving mesh; at a tenth of this
-# tolerance it may take 3.2 times as many
-TOL_OF_SECONDS = 1e-3
-MAX_COLUMNS_WITHOUT_COARSER = 8  # columns of a mesh up to which it has no coarser one
-MAX_DECADES = 6  # decades of the tolerance that are searched for one that needs a finer mesh
+# Tolerance [1] at and above which a patch with partial slip gets the CPU time of a moving mesh. The
+# CPU time grows with (1/tolerance)^0.5 below it, so that a tenth of it allows 3.2 times as much.
+SLIP_REFERENCE_TOL = 1e-3
+# Largest number of columns of a mesh for which no coarser mesh is made.
+MAX_COLUMNS_WITHOUT_COARSER = 8
+# Largest number of decades over which the tolerance is lowered to find one that needs a finer mesh.
+MAX_DECADES = 6
 
 
 def solve_split(patch_model, level: int, estimate: bool) -> tuple:
-    """Solve a patch on the mesh of its file with every edge halved `level` times.
+    """Solve the contact on the mesh of a file with every edge halved `level` times.
 
     The coarser patches are those of `solve_all`.
     """
@@ -35,7 +37,7 @@ def solve_split(patch_model, level: int, estimate: bool) -> tuple:
 
 
 def solve_all(patch_model, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
-    """Solve a patch on its mesh and on coarser ones.
+    """Solve the contact of a patch on its mesh and on the coarser meshes of its error estimate.
 
     A patch without a prescribed element size is solved on a ladder of nested meshes until it meets
     its tolerance. An unstructured mesh has no coarser one: its second patch is on the mesh with
@@ -72,13 +74,13 @@ def solve_all(patch_model, tolerance: float, estimate: bool = True, fresh: bool 
         ("patches", store.content_key(patch_model), estimate),
         lambda: solve_on_pairs(patch_model, shared_pairs(patch_model), estimate),
     )
-    if estimate and _misses_trace(patch_model, patches, tolerance):
+    if estimate and _misses_tolerance_with_profile(patch_model, patches, tolerance):
         return solve_on_ladder(patch_model.with_mesh(shared=None), tolerance)
     return patches
 
 
-def _misses_trace(patch_model, patches: tuple, tolerance: float) -> bool:
-    """Return whether a patch with a profile misses its tolerance on shared meshes."""
+def _misses_tolerance_with_profile(patch_model, patches: tuple, tolerance: float) -> bool:
+    """Return whether the error of a patch with a profile exceeds the tolerance on shared meshes."""
     has_trace = patch_model.mesh.is_automatic and patch_model.gap.profile is not None
     if not has_trace or patches[1] is None:
         return False
@@ -86,37 +88,38 @@ def _misses_trace(patch_model, patches: tuple, tolerance: float) -> bool:
 
 
 def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
-    """Solve a patch on condensed pieces, from fine to coarse (see `solve_all`)."""
+    """Solve the contact of a patch on given condensed pieces, ordered from fine to coarse."""
     return _pad_to_three(
         press_patch(patch_model, pair) for pair in (pairs if estimate else pairs[:1])
     )
 
 
 def _pad_to_three(patches) -> tuple:
-    """Return patches, padded with None to at least three."""
+    """Append None to solved patches until there are at least three entries."""
     out = tuple(patches)
     return out + (None,) * (3 - len(out))
 
 
 def _solve_with_coarser(patch_model, bodies: tuple, estimate: bool, fresh: bool) -> tuple:
-    """Solve a patch on given bodies and on coarser ones (see `solve_all`)."""
-    levels = [bodies, *(comparison_meshes(*bodies) if estimate else ())]
+    """Solve the contact of a patch on given meshes and on coarser ones (see `solve_all`)."""
+    levels = [bodies, *(make_comparison_meshes(*bodies) if estimate else ())]
     return _pad_to_three(solve(patch_model, *level, fresh) for level in levels)
 
 
-def meshes_of_file(patch_model) -> list:
-    """Return the meshes of a patch whose elements are prescribed or come from a file.
+def make_file_meshes(patch_model) -> list:
+    """Return the meshes of a patch with prescribed element size or mesh file.
 
     The order is that of `solve_all`.
     """
     bodies = make_piece_meshes(patch_model)
-    return [bodies, *comparison_meshes(*bodies)]
+    return [bodies, *make_comparison_meshes(*bodies)]
 
 
-def comparison_meshes(low, high) -> list:
-    """Return the meshes (lower, upper or None) that show the error of given ones.
+def make_comparison_meshes(low, high) -> list:
+    """Return comparison meshes (lower, upper or None) that show the error of given meshes.
 
-    They are coarser grids, or the unstructured mesh with every edge halved; empty for few columns.
+    They are coarser grids, or the unstructured mesh with every edge halved. The list is empty for
+    meshes with few columns.
     """
     if low.x.size <= MAX_COLUMNS_WITHOUT_COARSER:
         return []
@@ -133,7 +136,7 @@ def comparison_meshes(low, high) -> list:
 def solve_on_ladder(
     patch_model, tolerance: float, estimate: bool = True, fresh: bool = False
 ) -> tuple:
-    """Solve a patch on a ladder of nested meshes until it meets its tolerance.
+    """Solve the contact of a patch on successively finer meshes until it meets its tolerance.
 
     If the next mesh is expensive, points as fine as the profile give more accurate measures, and
     the mesh serves fields and motion. The refinement ends if the next mesh would exceed the work
@@ -154,7 +157,7 @@ def solve_on_ladder(
     tuple
         Patches on all meshes, fine to coarse.
     """
-    grids = base_grids(patch_model).bodies
+    grids = make_base_grids(patch_model).bodies
     patches = []
     points = None
     while True:
@@ -162,7 +165,7 @@ def solve_on_ladder(
         if estimate or len(patches) == MIN_LEVELS - 1:
             try:
                 patch = press_patch(patch_model, condense(patch_model, *grids, fresh=fresh))
-            # the cells are too short for double precision: the coarser meshes are kept
+            # The cells are too short for double precision, so that the coarser meshes are kept.
             except NotConverged:
                 if not patches or patches[0] is None:
                     raise
@@ -174,52 +177,61 @@ def solve_on_ladder(
         if not estimate or patch.pressure.outcome is Outcome.NO_CONTACT:
             return tuple(patches)
         seconds = predict_condensing_seconds(grids)
-        if points is not None:  # the solution on points of the profile is kept for finer meshes
-            patches[0] = _with_points(patch, points)
+        if points is not None:  # The solution on points of the profile is kept for finer meshes.
+            patches[0] = _attach_point_solution(patch, points)
         is_within = max_error_ratio(measures(*patches, tolerance=tolerance), tolerance) <= 1
-        shows_slip = _shows_slip(patch_model, patches, tolerance)
-        if seconds > MAX_SECONDS[False] and not is_within and fine.takes_points(patch_model):
+        shows_slip = _resolves_slip_work(patch_model, patches, tolerance)
+        if (
+            seconds > MAX_CONDENSING_SECONDS[False]
+            and not is_within
+            and fine.can_use_points(patch_model)
+        ):
             meets_tolerance = partial(_meets_tolerance, patches, tolerance)
             points = fine.solve_on_points(patch_model, meets_tolerance)
-            patches[0] = _with_points(patch, points)
+            patches[0] = _attach_point_solution(patch, points)
             is_within = max_error_ratio(measures(*patches, tolerance=tolerance), tolerance) <= 1
         is_done = shows_slip and (patches[0].points is not None or is_within)
-        if is_done or seconds > most_seconds(patch_model, tolerance):
+        if is_done or seconds > max_condensing_seconds(patch_model, tolerance):
             return tuple(patches)
 
 
-def _with_points(patch, points):
-    """Return a patch with its solution on points; the patch itself if that is None."""
+def _attach_point_solution(patch, points):
+    """Attach the solution on profile points to a solved patch, if there is such a solution."""
     if points is None:
         return patch
     return replace(patch, points=points, averaging=points.spacing)
 
 
 def _meets_tolerance(patches: list, tolerance: float, points) -> bool:
-    """Return whether patches meet the tolerance with a solution on points."""
-    found = measures(_with_points(patches[0], points), *patches[1:], tolerance=tolerance)
-    return max_error_ratio(found, tolerance) <= 1
+    """Return whether solved patches, with the solution on profile points, meet the tolerance."""
+    patch_measures = measures(
+        _attach_point_solution(patches[0], points), *patches[1:], tolerance=tolerance
+    )
+    return max_error_ratio(patch_measures, tolerance) <= 1
 
 
-def most_seconds(patch_model, tolerance: float | None = None) -> float:
-    """Return the predicted CPU seconds that the finest mesh of a `PatchModel` may take.
+def max_condensing_seconds(patch_model, tolerance: float | None = None) -> float:
+    """Return the largest predicted CPU time [s] that is allowed for the finest mesh of a patch.
 
     The motion of a prescribed slip is cheap, so that a tight tolerance allows a finer mesh, up to
-    the limit of a static patch. tolerance: None for the limit at any tolerance.
+    the limit of a static patch. With tolerance None it is the limit at any tolerance.
     """
     if patch_model.mesh.slip is None:
-        return MAX_SECONDS[patch_model.mesh.is_static]
+        return MAX_CONDENSING_SECONDS[patch_model.mesh.is_static]
     if tolerance is None:
-        return MAX_SECONDS[True]
+        return MAX_CONDENSING_SECONDS[True]
     return min(
-        MAX_SECONDS[True], MAX_SECONDS[False] * max(1.0, (TOL_OF_SECONDS / tolerance) ** 0.5)
+        MAX_CONDENSING_SECONDS[True],
+        MAX_CONDENSING_SECONDS[False] * max(1.0, (SLIP_REFERENCE_TOL / tolerance) ** 0.5),
     )
 
 
 def solve_static_ladder(
     patch_model, tolerance: float, estimate: bool = True, fresh: bool = False
 ) -> tuple:
-    """Solve the patch of a bench with partial slip on the meshes of a static run, fine to coarse.
+    """Solve the patch of a law bench with partial slip on the meshes of a static run.
+
+    The patches are ordered from fine to coarse.
 
     Return () if the mesh is prescribed or shared with other cases, or if the patch is solved
     already.
@@ -235,15 +247,15 @@ def solve_static_ladder(
     return solve_on_ladder(static, patch_model.mesh.tolerance or tolerance, estimate, fresh)
 
 
-def _shows_slip(patch_model, patches: list, tolerance: float) -> bool:
-    """Return whether patches, fine to coarse, resolve the work of a prescribed slip."""
+def _resolves_slip_work(patch_model, patches: list, tolerance: float) -> bool:
+    """Return whether the meshes of a patch resolve the friction work of a prescribed slip."""
     if patch_model.mesh.slip is None:
         return True
-    return slip_zones.slip_missed(patches, patch_model.mesh.slip, tolerance) <= 1
+    return slip_zones.max_slip_error_ratio(patches, patch_model.mesh.slip, tolerance) <= 1
 
 
 def tolerance_of_next_mesh(patch_model, patches, tolerance: float) -> float | None:
-    """Return the loosest tolerance / 10^k at which a patch would be solved on a finer mesh.
+    """Return the largest tolerance/10^k at which a patch would be solved on a finer mesh.
 
     Parameters
     ----------
@@ -258,8 +270,8 @@ def tolerance_of_next_mesh(patch_model, patches, tolerance: float) -> float | No
         None if the next mesh is too expensive or no tolerance needs it: then the ladder is
         complete.
     """
-    seconds = next_seconds(patches[0])
-    if seconds > most_seconds(patch_model):
+    seconds = predict_next_mesh_seconds(patches[0])
+    if seconds > max_condensing_seconds(patch_model):
         return None
     known = [patch for patch in patches if patch is not None]
     if patches[0].points is not None:
@@ -268,14 +280,16 @@ def tolerance_of_next_mesh(patch_model, patches, tolerance: float) -> float | No
     for decade in range(1, MAX_DECADES + 1):
         tighter = tolerance * 10.0**-decade
         found = measures(*known, tolerance=tighter)
-        is_done = max_error_ratio(found, tighter) <= 1 and _shows_slip(patch_model, known, tighter)
-        if not is_done and seconds <= most_seconds(patch_model, tighter):
+        is_done = max_error_ratio(found, tighter) <= 1 and _resolves_slip_work(
+            patch_model, known, tighter
+        )
+        if not is_done and seconds <= max_condensing_seconds(patch_model, tighter):
             return tighter
     return None
 
 
-def next_seconds(patch) -> float:
-    """Return the predicted CPU seconds of condensing the pieces of a patch on its next mesh."""
+def predict_next_mesh_seconds(patch) -> float:
+    """Predict the CPU time [s] of condensing the pieces of a patch on the next finer mesh."""
     pair = patch.pair
     grids = [pair.grid] if pair.upper is pair.piece else [pair.grid, pair.upper_grid]
     return predict_condensing_seconds([grid.refine() for grid in grids])

@@ -1,4 +1,4 @@
-"""Limits of values on nested meshes, and their errors, by geometric extrapolation.
+"""Geometric extrapolation of values on nested meshes to their limits, with error estimates.
 
 In: values on two or more meshes, each with cells half as long as the previous one. Out: a
 `Limit` with the error of the finest value and of the extrapolated one.
@@ -8,20 +8,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-MAX_RATIO = 4.0  # ratio of successive changes at second order, the largest that is used
-MAX_RATIO_NOT_NESTED = 2.5  # largest ratio that is used for meshes that are not nested
-MIN_REGULAR_RATIO = 2.6  # smallest ratio of a series that converges with its order
-MAX_REGULAR_RATIO = 6.0  # largest such ratio; above it, the last change is small by chance
-MIN_RATIO = 1.6  # smallest ratio from which the remainder is computed
-MIN_CONVERGING_RATIO = 1.3  # series with smaller ratios do not converge yet
-# error over the remainder, for a steady ratio; the interval fails in less than 2 of 100 random
-# scenes
+MAX_RATIO = 4.0  # Largest ratio of successive changes that is used, about that of second order.
+# Largest ratio of successive changes that is used for meshes that are not nested.
+MAX_RATIO_NOT_NESTED = 2.5
+# Smallest ratio of successive changes of a series that converges at its order.
+MIN_REGULAR_RATIO = 2.6
+# Largest ratio of successive changes that counts as regular; above it the last change is
+# accidentally small.
+MAX_REGULAR_RATIO = 6.0
+MIN_RATIO = 1.6  # Smallest ratio of successive changes from which the remainder is computed.
+# Smallest ratio of successive changes of a series that counts as converging.
+MIN_CONVERGING_RATIO = 1.3
+# Error over remainder of a series with a steady ratio. With it the interval fails in less than 2 of
+# 100 random scenes.
 STEADY_FACTOR = 1.8
-UNSTEADY_FACTOR = 2.0  # error over the largest change, for a series without a steady ratio
+UNSTEADY_FACTOR = 2.0  # Error over the largest change, for a series without a steady ratio.
 
 
 class Limit(NamedTuple):
-    """Limit of series of values on nested meshes, (...) each.
+    """Limit of a series of values on nested meshes, with its error.
 
     - value: value on the finest mesh.
     - error: half-width of an interval around `value` that contains the limit.
@@ -36,7 +41,7 @@ class Limit(NamedTuple):
 
 
 def extrapolate(values, nested: bool = True) -> Limit:
-    """Return the limits of series of two or more values on meshes of successively halved cells.
+    """Extrapolate two or more values on meshes of successively halved cells to their limits.
 
     Three values give a ratio of successive changes. If it is steady, the remainder of the geometric
     series is the error of the finest value. With two values the error is twice their change. For

@@ -2,7 +2,7 @@
 
 In: a `Patch` and the same on coarser meshes. Out: measures by name (`measures`). A value is that of
 the finest mesh, or its limit by extrapolation (`limits`). Its error contains the remaining change
-by refinement and the errors that no change of the mesh shows (`shared_errors`). The module has also
+by refinement and the errors that no change of the mesh shows (`estimate_common_errors`). The module has also
 the model errors due to the plane state and the number of strips.
 """
 
@@ -24,30 +24,31 @@ from .limits import extrapolate
 from .press import Patch, press_patch
 from .values import edge_cells, open_ends, unresolved_rounding, values
 
-# width over height of a piece that is clearly in plane strain; its inverse: in plane stress
+# Width over height of a piece that is clearly in plane strain; the inverse holds for plane stress.
 MIN_PLANE_STRAIN_RATIO = 8.0
-FEW_NODES = 12  # the measures of a contact with fewer nodes depend on this number
-UNRESOLVED_NODES = 3  # contacts with at most this many nodes are not resolved
-ROUND_OFF_FRACTION = 5e-12  # relative round-off of the equations of contact
-MIN_ERROR = 1e-9  # smallest relative error that is stated, because nobody needs less
-MIN_EDGE_OFFSET = 0.012  # error of the position of an edge between nodes, in cells
-# the pressure at a corner may still increase by this many times its last change
+MIN_RESOLVED_NODES = 12  # Number of contact nodes below which the measures depend on this number.
+MAX_UNRESOLVED_NODES = 3  # Largest number of nodes of a contact that counts as not resolved.
+ROUND_OFF_FRACTION = 5e-12  # Relative round-off error of the solved contact equations.
+MIN_ERROR = 1e-9  # Smallest relative error that is stated, because no use needs a smaller one.
+MIN_EDGE_OFFSET = 0.012  # Smallest error of the position of an edge between nodes, in cell lengths.
+# Further increase of the pressure at a corner under refinement over its last change.
 CORNER_RISE_FACTOR = 4.0
-# fraction of the pressure at the corner of a coating that cells longer than its thickness may miss
+# Fraction of the pressure at the corner of a coating that is missed by cells longer than its
+# thickness.
 CORNER_LAYER_FRACTION = 0.15
-# hidden error of an extrapolated value over that of the finest mesh: 4/3 + 1/3, rounded up
+# Hidden error of an extrapolated value over that of the finest mesh: 4/3 + 1/3, rounded up.
 EXTRAPOLATED_ERROR_RATIO = 2.0
-# none of several meshes that do not resolve a rounding shows its effect: the factor of their errors
+# Factor on the errors of meshes too coarse for a rounding, because none of them shows its effect.
 UNRESOLVED_ROUNDING_FACTOR = 2.0
 MEASURES_WITH_BAND = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 PEAK_MEASURES = (
     "pressure_peak",
     "loaded_fraction",
-)  # measures that an unbounded pressure leaves out
+)  # measures without a value if the pressure is unbounded
 
 
 class Estimate(NamedTuple):
-    """Static measure of one patch, or of q patches, and what it was computed from.
+    """Estimated value and error of a static measure of one patch, or of q patches.
 
     - value: number or (q,).
     - error: numerical error; None without a coarser mesh.
@@ -59,11 +60,14 @@ class Estimate(NamedTuple):
     is_extrapolated: bool = False
 
     def select(self, case: int) -> "Estimate":
-        """Return the estimate of one of q patches."""
+        """Return the estimate of a single patch out of q patches."""
         return Estimate(self.value[case], self.error[case], self.is_extrapolated[case])
 
     def to_measure(self, name: str, floor: float | None = None) -> Measure:
-        """Return the Measure of a single patch; None as floor for that of the table."""
+        """Return the Measure of a single patch for the measure table.
+
+        With floor None, the floor of the table applies.
+        """
         row = TABLE[name]
         engine = patch_rows.ON_FINEST_MESH
         if self.is_extrapolated:
@@ -78,7 +82,7 @@ class Estimate(NamedTuple):
 
 
 def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:
-    """Return the static measures of a patch by name, each with its error.
+    """Return the static measures of a patch by name, each with its estimated error.
 
     Parameters
     ----------
@@ -94,14 +98,14 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
         Measure by name; the error is None without a coarser mesh, and 0 without a load.
     """
     finest = values(fine)
-    coarse = _with_parts_of_finest(fine, [patch for patch in coarse if patch is not None])
+    coarse = _select_equal_part_counts(fine, [patch for patch in coarse if patch is not None])
     if coarse and finest["normal_load"] > 0:
         missed_peak = unresolved_rounding(fine)
         estimates = converge(
             [*(values(patch) for patch in reversed(coarse)), finest],
-            shared_errors(_resolution_of_patch(fine, missed_peak), finest),
+            estimate_common_errors(_resolution_of_patch(fine, missed_peak), finest),
             tolerance,
-            all(cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *coarse))),
+            all(are_cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *coarse))),
             max(MIN_ERROR, fine.pair.round_off_error),
             UNRESOLVED_ROUNDING_FACTOR if missed_peak else 1.0,
         )
@@ -110,23 +114,24 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
         estimates = {name: Estimate(value, error) for name, value in finest.items()}
     out = {name: estimate.to_measure(name) for name, estimate in estimates.items()}
     if coarse and fine.averaging is not None:
-        out |= _peak_at_corner(out, fine, coarse[0])
+        out |= _include_corner_pressure(out, fine, coarse[0])
     for name, found in ({} if fine.points is None else fine.points.measures).items():
         if found.error < out[name].error:
             out[name] = replace(
                 out[name], value=found.value, error=found.error, engine=patch_rows.ON_POINTS
             )
-    reason = _why_unbounded(fine)
+    reason = _reason_for_unbounded_pressure(fine)
     for name in PEAK_MEASURES if reason else ():
         out[name] = replace(out[name], value=None, error=None, reason=reason)
     return out
 
 
-def _with_parts_of_finest(fine: Patch, coarse: list) -> list:
-    """Return the coarser patches that resolve as many parts of the contact as the finest one.
+def _select_equal_part_counts(fine: Patch, coarse: list) -> list:
+    """Return the coarser patches with as many contact regions as the finest patch.
 
-    A part of a few cells next to a step may be missing on a coarse mesh. The change to such a mesh
-    shows this part and no order of convergence, so that neither this mesh nor coarser ones count.
+    A contact region of a few cells next to a step may be missing on a coarse mesh. The change to
+    such a mesh shows this region and no order of convergence, so that neither this mesh nor coarser
+    ones count.
 
     Parameters
     ----------
@@ -137,7 +142,7 @@ def _with_parts_of_finest(fine: Patch, coarse: list) -> list:
     Returns
     -------
     list of Patch
-        At least the first one, whose change is then the only one that the error rests on.
+        At least the first one, whose change then determines the error alone.
     """
     if not fine.model.gap.jumps:
         return coarse
@@ -149,12 +154,12 @@ def _with_parts_of_finest(fine: Patch, coarse: list) -> list:
 
 
 def _count_parts(active) -> int:
-    """Return the number of intervals in contact of a contact set (m,) of bool."""
+    """Return the number of contact intervals of a contact set (m,) of bool."""
     return int(active[0]) + int(np.count_nonzero(active[1:] & ~active[:-1]))
 
 
-def _peak_at_corner(found: dict, fine: Patch, coarse: Patch) -> dict:
-    """Return the measures of the peak with errors that contain the pressure at a corner.
+def _include_corner_pressure(measures_by_name: dict, fine: Patch, coarse: Patch) -> dict:
+    """Return the peak measures with errors that include the pressure at a corner.
 
     Under a profile, the pressure at a corner may still increase with refinement, although the
     largest pressure does not change: a corner that the profile just reaches carries ever more on
@@ -162,11 +167,11 @@ def _peak_at_corner(found: dict, fine: Patch, coarse: Patch) -> dict:
     """
     pressure = fine.pressure.sigma_n[[0, -1]].max()
     coarse_pressure = coarse.pressure.sigma_n[[0, -1]].max()
-    peak, fraction = (found[name] for name in PEAK_MEASURES)
+    peak, fraction = (measures_by_name[name] for name in PEAK_MEASURES)
     error = pressure + CORNER_RISE_FACTOR * abs(pressure - coarse_pressure) - peak.value
     if not pressure or error <= peak.error:
         return {}
-    fraction_error = contain_peak_error(fraction.value, fraction.error, error / peak.value)
+    fraction_error = include_peak_error(fraction.value, fraction.error, error / peak.value)
     return {
         "pressure_peak": replace(peak, error=float(error)),
         "loaded_fraction": replace(fraction, error=float(fraction_error)),
@@ -181,14 +186,14 @@ def converge(
     min_relative_error: float = MIN_ERROR,
     factor: float = 1.0,
 ) -> dict:
-    """Estimate the limits of static measures on nested meshes, and their errors.
+    """Estimate the limits and the errors of static measures on successively refined meshes.
 
     Parameters
     ----------
     series : list of dict
         Values on two meshes or more by name, coarse to fine; numbers or (q,).
     shared : dict
-        Errors by name that all meshes may share.
+        Errors by name that all meshes have in common.
     tolerance : float or None
         A value whose error is within it is not extrapolated; None: no value is.
     nested : bool
@@ -204,16 +209,16 @@ def converge(
         Estimate by name.
     """
     names = list(series[-1])
-    known = np.array([[values[name] for name in names] for values in series])
-    hidden, floors = np.zeros((2, *known.shape[1:]))
+    series_values = np.array([[values[name] for name in names] for values in series])
+    hidden, floors = np.zeros((2, *series_values.shape[1:]))
     for row, name in enumerate(names):
         hidden[row] = shared.get(name, 0.0)
         floors[row] = TABLE[name].floor
     allowed = np.inf
     if tolerance is not None:
-        allowed = compute_allowed_error(tolerance, known[-1], floors)
+        allowed = compute_allowed_error(tolerance, series_values[-1], floors)
     with np.errstate(invalid="ignore", divide="ignore"):  # patches that were not solved have NaN
-        limit = extrapolate(known, nested)
+        limit = extrapolate(series_values, nested)
         error = np.maximum(factor * limit.error, hidden)
         extrapolated_error = np.where(
             (limit.extrapolated != limit.value) & (error > allowed),
@@ -222,17 +227,17 @@ def converge(
         )
         best = np.where(extrapolated_error < error, limit.extrapolated, limit.value)
         error = np.minimum(extrapolated_error, error)
-        error = np.maximum(error, min_relative_error * np.abs(known[-1]))
-        out = dict(zip(names, map(Estimate, best, error, best != known[-1])))
+        error = np.maximum(error, min_relative_error * np.abs(series_values[-1]))
+        out = dict(zip(names, map(Estimate, best, error, best != series_values[-1])))
         peak, fraction = (out[name] for name in PEAK_MEASURES)
         relative = np.where(peak.value > 0, peak.error / peak.value, 0.0)
-        fraction_error = contain_peak_error(fraction.value, fraction.error, relative)
+        fraction_error = include_peak_error(fraction.value, fraction.error, relative)
         out["loaded_fraction"] = fraction._replace(error=fraction_error)
     return out
 
 
-def contain_peak_error(fraction, error, relative_peak_error):
-    """Return errors of loaded fractions that contain the relative error of the peak.
+def include_peak_error(fraction, error, relative_peak_error):
+    """Widen the errors of loaded fractions by the relative error of the pressure peak.
 
     The peak is the divisor of the fraction.
 
@@ -247,16 +252,18 @@ def contain_peak_error(fraction, error, relative_peak_error):
     )
 
 
-def max_error_ratio(found: dict, tolerance: float) -> float:
-    """Return the largest error of the decisive measures over the allowed error [1].
+def max_error_ratio(measures_by_name: dict, tolerance: float) -> float:
+    """Return the largest error of the decisive measures relative to the allowed error [1].
 
     Above 1, a measure misses the tolerance. A missing value or error counts as 0.
     """
-    return max(found[name].error_ratio(tolerance) for name in DECISIVE)
+    return max(measures_by_name[name].error_ratio(tolerance) for name in DECISIVE)
 
 
-def _why_unbounded(patch: Patch) -> str:
-    """Return the reason why the pressure of a patch diverges under refinement; "" if it does not.
+def _reason_for_unbounded_pressure(patch: Patch) -> str:
+    """Return the reason why the pressure of a patch diverges under mesh refinement.
+
+    It is "" if the pressure is bounded.
 
     A contact that ends at the edge of a step has the pressure of a punch with a sharp corner; a
     contact across a closed step is more singular. A skin makes the pressure bounded.
@@ -277,8 +284,8 @@ def _why_unbounded(patch: Patch) -> str:
     return ""
 
 
-def cells_halved(fine, coarse) -> bool:
-    """Return whether every cell of the coarse Pair was split in two."""
+def are_cells_halved(fine, coarse) -> bool:
+    """Return whether every cell of the coarser of two Pairs is split in two on the finer one."""
     bodies = ((fine.grid, coarse.grid), (fine.upper_grid, coarse.upper_grid))
     for fine_body, coarse_body in bodies:
         halved = fine_body.base_grid
@@ -291,7 +298,9 @@ def cells_halved(fine, coarse) -> bool:
 
 
 class Resolution(NamedTuple):
-    """How well a mesh resolves the contact of a patch, or of q patches: the errors it may hide.
+    """Resolution of a contact by its mesh: the cell lengths and pressures that may hide errors.
+
+    It describes one patch, or q patches.
 
     - length: length of the interface [m].
     - n_nodes: nodes in contact.
@@ -322,7 +331,7 @@ class Resolution(NamedTuple):
 
 
 def resolution_of_patches(pair, pieces, force, gap_range, can_rotate: bool) -> Resolution:
-    """Return the Resolution of q patches on one Pair.
+    """Return how well the mesh of a Pair resolves the contacts of q patches.
 
     Parameters
     ----------
@@ -345,7 +354,7 @@ def resolution_of_patches(pair, pieces, force, gap_range, can_rotate: bool) -> R
     cells = np.where(active[:, 1:] != active[:, :-1], np.diff(interface.x), 0.0)
     longest = cells.max(axis=1)
     corner_pressure = 0.0
-    if pieces is pair.compliance:  # a compliant layer of asperities (skin) bounds the pressure
+    if pieces is pair.compliance:  # A compliant layer of asperities (skin) bounds the pressure.
         ends = (force / interface.weight)[:, [0, -1]]
         corner_pressure = _missed_corner_pressure(pair, ends, np.diff(interface.x)[[0, -1]])
     return Resolution(
@@ -361,7 +370,7 @@ def resolution_of_patches(pair, pieces, force, gap_range, can_rotate: bool) -> R
 
 
 def _resolution_of_patch(patch: Patch, missed_peak: float) -> Resolution:
-    """Return the Resolution of a Patch under load.
+    """Return how well the mesh of a solved Patch resolves its contact.
 
     missed_peak: pressure [Pa] of `unresolved_rounding`.
     """
@@ -373,7 +382,7 @@ def _resolution_of_patch(patch: Patch, missed_peak: float) -> Resolution:
     out = Resolution(*(np.ravel(value)[0] for value in out))
     cells = edge_cells(patch.x, patch.active)
     first, last = ~patch.active[[0, -1]]
-    is_unresolved = out.n_nodes <= UNRESOLVED_NODES and cells.any()
+    is_unresolved = out.n_nodes <= MAX_UNRESOLVED_NODES and cells.any()
     return out._replace(
         edge_offset=out.edge_offset if patch.skin is None else None,
         wedge_pressure=_wedge_pressure(patch) if is_unresolved else 0.0,
@@ -383,10 +392,10 @@ def _resolution_of_patch(patch: Patch, missed_peak: float) -> Resolution:
     )
 
 
-def shared_errors(resolution: Resolution, finest: dict) -> dict:
-    """Return the errors by name that three meshes may share.
+def estimate_common_errors(resolution: Resolution, finest: dict) -> dict:
+    """Estimate the errors that are common to all three meshes of a patch, by measure name.
 
-    The changes from mesh to mesh do not show them. They are due to a contact of few nodes, the
+    Changes from mesh to mesh do not show these errors. They are due to a contact of few nodes, the
     layer at a loaded corner of a coating thinner than the cells there, a rounding smaller than the
     cells, and round-off.
 
@@ -405,11 +414,11 @@ def shared_errors(resolution: Resolution, finest: dict) -> dict:
     n_nodes = resolution.n_nodes
     load = finest["normal_load"]
     peak = finest["pressure_peak"]
-    # half the sum exceeds the longest cell only if the contact has many ends
+    # Half the sum of the edge cells exceeds the longest cell only if the contact has many ends.
     cell = np.maximum(resolution.longest_cell, resolution.edge_cells / 2)
-    is_unresolved = n_nodes <= UNRESOLVED_NODES
+    is_unresolved = n_nodes <= MAX_UNRESOLVED_NODES
     arm = np.where(is_unresolved, cell / (2 * n_nodes**2), 1e-3 * cell)
-    has_few_nodes = (cell > 0) & (n_nodes <= FEW_NODES)
+    has_few_nodes = (cell > 0) & (n_nodes <= MIN_RESOLVED_NODES)
     peak_error = resolution.corner_pressure + np.where(has_few_nodes, peak / (4 * n_nodes**2), 0.0)
     peak_error = np.maximum(peak_error, resolution.wedge_pressure)
     peak_error = np.maximum(peak_error, resolution.rounding_pressure - peak)
@@ -422,7 +431,7 @@ def shared_errors(resolution: Resolution, finest: dict) -> dict:
     )
     edge_offset = 0.0
     if resolution.edge_offset is not None:
-        # an edge of a contact of few nodes may lie anywhere in its cell
+        # An edge of a contact of few nodes may lie anywhere in its cell.
         min_offset = np.where(is_unresolved, 1.0, 1 / n_nodes**2)
         edge_offset = np.maximum(resolution.edge_offset, min_offset)
     outer_cells = resolution.edge_cells - resolution.inner_cells
@@ -442,7 +451,7 @@ def shared_errors(resolution: Resolution, finest: dict) -> dict:
 
 
 def _edge_offset(pair, cell):
-    """Return the error of the position of an edge between two nodes of a Pair, in cells.
+    """Return the position error, in cell lengths, of a contact edge between two nodes of a Pair.
 
     A soft coating thinner than the cells acts as a bed of springs, whose edge is where the pressure
     of a node vanishes. cell: longest cell in which the contact ends [m].
@@ -458,10 +467,10 @@ def _edge_offset(pair, cell):
 
 
 def _missed_corner_pressure(pair, sigma, cells):
-    """Return pressures (...) [Pa] that the free end of a coating may add at a loaded corner.
+    """Return the pressures (...) [Pa] that the mesh misses at loaded corners of a coating.
 
-    They are not resolved by cells longer than the thickness of the coating, and fall with the
-    square of the cells.
+    The free end of a coating adds them. Cells longer than the coating thickness do not resolve
+    them, and they fall with the square of the cell length.
 
     Parameters
     ----------
@@ -491,19 +500,19 @@ def _wedge_pressure(patch: Patch) -> float:
     return float(slopes[..., ends].max() / flexibility)
 
 
-def plane_band(patch_model, patch: Patch) -> list:
-    """Return a sentence, as a list, on the model error of the plane state of a patch.
+def plane_state_sentences(patch_model, patch: Patch) -> list:
+    """Return the sentence on the model error due to the assumed plane state, as a list.
 
-    There is none for a piece that is far wider than tall in plane strain, or far taller than wide
-    in plane stress. Otherwise no mesh reduces this error.
+    The list is empty for a piece that is far wider than tall in plane strain, or far taller than
+    wide in plane stress. Otherwise no mesh reduces this error.
     """
-    other_model = other_plane(patch_model)
+    other_model = with_opposite_plane_state(patch_model)
     if other_model is None:
         return []
     try:
         own_values = values(patch)
         pair = pair_on_same_meshes(other_model, patch.pair)
-        return band_words(patch_model, own_values, values(press_patch(other_model, pair)))
+        return format_plane_changes(patch_model, own_values, values(press_patch(other_model, pair)))
     except PatchfemError as error:
         return [
             f"{_plane_state_clause(patch_model)}; how much the two "
@@ -511,8 +520,8 @@ def plane_band(patch_model, patch: Patch) -> list:
         ]
 
 
-def other_plane(patch_model):
-    """Return the `PatchModel` in the other plane state; None if its own is clearly right."""
+def with_opposite_plane_state(patch_model):
+    """Return the model in the opposite plane state, or None if its state is clearly right."""
     pieces = patch_model.pieces
     ratio = pieces.width / pieces.height
     if pieces.plane == "strain":
@@ -521,16 +530,16 @@ def other_plane(patch_model):
         is_right = ratio <= 1 / MIN_PLANE_STRAIN_RATIO
     if is_right:
         return None
-    return replace(patch_model, pieces=replace(pieces, plane=_other_plane_name(pieces)))
+    return replace(patch_model, pieces=replace(pieces, plane=_opposite_plane_name(pieces)))
 
 
-def _other_plane_name(pieces) -> str:
-    """Return the name of the plane state that the pieces do not have."""
+def _opposite_plane_name(pieces) -> str:
+    """Return the name of the plane state that is opposite to that of the pieces."""
     return "stress" if pieces.plane == "strain" else "strain"
 
 
 def _plane_state_clause(patch_model) -> str:
-    """Return the clause on the assumed plane state."""
+    """Return the text on the plane state that is assumed for the pieces."""
     pieces = patch_model.pieces
     ratio = pieces.width / pieces.height
     return (
@@ -539,8 +548,8 @@ def _plane_state_clause(patch_model) -> str:
     )
 
 
-def band_words(patch_model, own_values: dict, other_values: dict) -> list:
-    """Return the sentence of `plane_band` from values by name in both plane states.
+def format_plane_changes(patch_model, own_values: dict, other_values: dict) -> list:
+    """Return the sentence on the change of the measures in the opposite plane state, as a list.
 
     Parameters
     ----------
@@ -565,13 +574,13 @@ def band_words(patch_model, own_values: dict, other_values: dict) -> list:
     if not changes:
         return []
     return [
-        f"{_plane_state_clause(patch_model)}; plane {_other_plane_name(patch_model.pieces)} would change "
+        f"{_plane_state_clause(patch_model)}; plane {_opposite_plane_name(patch_model.pieces)} would change "
         f"the results by these amounts: {', '.join(changes)}"
     ]
 
 
-def add_strip_errors(patch_model, patch: Patch, found: dict) -> dict:
-    """Return measures whose errors include the effect of the number of strips.
+def add_strip_errors(patch_model, patch: Patch, measures_by_name: dict) -> dict:
+    """Widen the errors of measures by the effect of the number of strips.
 
     It is the change to another number of strips on the mesh of `patch`, at second order. Measures
     without a value are not changed.
@@ -580,20 +589,20 @@ def add_strip_errors(patch_model, patch: Patch, found: dict) -> dict:
     ----------
     patch_model : PatchModel
     patch : Patch
-    found : dict
+    measures_by_name : dict
         Measures by name.
 
     Returns
     -------
     dict
     """
-    other_model, ratio = other_strips(patch_model)
+    other_model, ratio = with_other_strip_count(patch_model)
     if other_model is patch_model:
-        return found
+        return measures_by_name
     other_values = values(press_patch(other_model, patch.pair))
-    out = dict(found)
+    out = dict(measures_by_name)
     for name, value in values(patch).items():
-        measure = found[name]
+        measure = measures_by_name[name]
         if measure.value is not None:
             change = value - other_values[name]
             error = measure.error + errors.error_of_change(change, ratio, errors.MAX_ORDER)
@@ -601,8 +610,8 @@ def add_strip_errors(patch_model, patch: Patch, found: dict) -> dict:
     return out
 
 
-def other_strips(patch_model) -> tuple:
-    """Return the `PatchModel` with another number of strips, and the ratio of their widths.
+def with_other_strip_count(patch_model) -> tuple:
+    """Return the `PatchModel` with another number of strips, and the ratio of the strip widths.
 
     It has half as many strips, or twice as many if half as many would not reach to the load line.
     Without strips to halve it is the model itself.

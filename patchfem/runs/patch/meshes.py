@@ -1,4 +1,4 @@
-"""Meshes that all cases of a sweep share: fine wherever the pressure of one of them ends.
+"""Meshes shared by all cases of a sweep, fine wherever the contact of any case ends.
 
 In: the `PatchModel`s of the cases. Out: `SharedMeshes`. The mesh of a single case is graded to
 its own contact. The shared mesh has at each position the cells of the case that needs the
@@ -20,27 +20,29 @@ from . import grids, ladder
 from .condensed import condense, keep_pairs
 from .measures import max_error_ratio, measures
 from .press import press_patch
-from .static import max_error_ratios, patches_on
+from .static import max_error_ratios, solve_patches_on_pair
 
-MAX_CASES = 48  # most cases that choose the mesh; of more, those that lie farthest apart are taken
-CLIMBED_CASES = 5  # cases that are solved on their own ladders if a patch slips in part
-# most searches; each one has columns that are graded to the contacts of the previous one
+# Largest number of cases that determine the mesh; of more, the most different ones are taken.
+MAX_CASES = 48
+# Number of cases that are solved on meshes of their own if a patch slips partially.
+N_LADDER_CASES = 5
+# Largest number of searches; the columns of each are graded to the contacts of the previous one.
 MAX_SEARCHES = 4
-MAX_NODES = 400  # most nodes of the finest interface; a finer mesh would slow down every case
-# highest order at which errors of static measures fall; meshes that are too coarse by it are not
-# tried
+# Largest number of nodes of the finest interface, because a finer mesh slows down every case.
+MAX_NODES = 400
+# Highest convergence order of static measures; meshes too coarse even at this order are not tried.
 MAX_ORDER = 3.0
-# Cells of the coarsest mesh over those that a case needs. The longest are tried first, because
-# their meshes cost least; factors that are too large according to the last trial are skipped.
+# Coarsest cell over the cell that a case needs, in the order of trial: the longest cells cost
+# least. Factors that the last trial shows to be too large are skipped.
 CELL_FACTORS = (4.0, 2.8, 2.0, 1.5, 1.0)
-# ratio of the cells of neighbouring cases up to which a single band lies between them
+# Largest cell ratio of neighbouring cases that are joined by a single band.
 MAX_CELL_RATIO = 2.0
 
 
 def geometry_key(patch_model) -> tuple:
-    """Return the key of all that the meshes and pieces of a `PatchModel` depend on.
+    """Return a key of everything that the meshes and the stiffness of the pieces depend on.
 
-    It does not contain load and shapes, and is equal for patches that may share meshes.
+    It does not contain load and surface shapes, and is equal for patches that may share meshes.
     """
     mesh = patch_model.mesh
     gap = patch_model.gap
@@ -60,15 +62,15 @@ def geometry_key(patch_model) -> tuple:
     )
 
 
-def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes | None:
-    """Return the meshes for `PatchModel`s of one geometry, independent of their order.
+def shared_meshes(patches, tolerance: float, is_complete: bool = True) -> SharedMeshes | None:
+    """Return meshes that all `PatchModel`s of a geometry share, independent of their order.
 
     Parameters
     ----------
     patches : sequence of PatchModel
     tolerance : float
         Relative error of the static measures that all of them have to meet.
-    all_ : bool
+    is_complete : bool
         Whether there are no further cases that the meshes have to serve.
 
     Returns
@@ -78,23 +80,25 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
     """
     patch_model = patches[0]
     if not patch_model.mesh.is_automatic:
-        return with_digest(ladder.meshes_of_file(patch_model))
+        return name_by_digest(ladder.make_file_meshes(patch_model))
     cases, every = select_distinct_patches(patches)
     swept = [
         case.with_loading(load=share * case.loading.load)
         for case in cases
         if case.mesh.edge_motion == "load" and case.loading.load is not None
-        for share in grids.SWING
+        for share in grids.LOAD_RANGE_FACTORS
     ]
     slips = any(patch.interface.partial_slip for patch in patches)
-    halvings = _halvings(cases, tolerance) if slips else {}
-    # the halvings that all cases share are levels of the ladder
+    halvings = _count_halvings(cases, tolerance) if slips else {}
+    # The halvings that all cases have in common are levels of the ladder.
     common = min(halvings.values(), default=0)
-    layout = _layout(
-        [*cases, *swept], not (every and all_), {key: one - common for key, one in halvings.items()}
+    layout = _common_layout(
+        [*cases, *swept],
+        not (every and is_complete),
+        {key: one - common for key, one in halvings.items()},
     )
-    # the first state of a contact that moves later, or slips in part, says nothing about its
-    # measures
+    # The initial contact of a case that later moves or slips partially does not determine its
+    # measures.
     shares = CELL_FACTORS[-1:] if patch_model.mesh.edge_motion or slips else CELL_FACTORS
     own = None
     if layout is None:
@@ -105,13 +109,14 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
         bodies = grids.make_grids(patch_model, layout.scale_cells(share))
         if shares:
             own = own or grids.make_grids(patch_model, layout)
-            if bodies[0].x.size >= own[0].x.size:  # both already have the largest number of columns
+            # Both layouts already have the largest number of columns.
+            if bodies[0].x.size >= own[0].x.size:
                 continue
         pairs, missed_by = _refine_until_met(
             cases, bodies, tolerance, bool(shares), grids.MIN_LEVELS + common
         )
         if missed_by <= 1 or not shares:
-            found = with_digest(
+            found = name_by_digest(
                 [
                     (pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
                     for pair in pairs
@@ -119,13 +124,13 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
             )
             keep_pairs(cases[0], found, pairs)
             return found
-        # factor of the cells above which no mesh meets the tolerance
+        # Factor on the cells above which no mesh meets the tolerance.
         enough = share * missed_by ** (-1 / MAX_ORDER)
         shares = tuple(one for one in shares if one <= max(enough, CELL_FACTORS[-1]))
 
 
-def with_digest(levels) -> SharedMeshes:
-    """Return the SharedMeshes of some levels, named by the hash of their content."""
+def name_by_digest(levels) -> SharedMeshes:
+    """Return shared meshes of the given levels, named by the hash of their content."""
     digest = sha256()
     for body in chain.from_iterable(levels):
         if body is None:
@@ -141,35 +146,37 @@ def with_digest(levels) -> SharedMeshes:
     return SharedMeshes(tuple(levels), digest.hexdigest()[:32])
 
 
-def select_distinct_patches(patches, most: int = MAX_CASES) -> tuple:
-    """Return the patches that differ most in loads and shapes, and whether these are all.
+def select_distinct_patches(patches, max_patches: int = MAX_CASES) -> tuple:
+    """Select the patches that differ most in loads and shapes.
+
+    The second result tells whether these are all patches.
 
     Farthest-point selection; the result does not depend on their order.
 
     Parameters
     ----------
     patches : sequence of PatchModel
-    most : int
+    max_patches : int
         Largest number of patches.
     """
     rows = {_contact_numbers(patch): patch for patch in patches}
     keys = sorted(rows)
-    if len(keys) <= most:
+    if len(keys) <= max_patches:
         return [rows[key] for key in keys], True
     sizes = np.array(keys)
     scale = np.abs(sizes).min(axis=0, where=sizes != 0, initial=np.inf)
     at = np.arcsinh(np.divide(sizes, scale, out=np.zeros_like(sizes), where=np.isfinite(scale)))
     at = at / np.maximum(np.ptp(at, axis=0), 1e-300)
-    picked = [int(np.argmin(at.sum(axis=1)))]
-    apart = np.full(len(keys), np.inf)
-    while len(picked) < most:
-        apart = np.minimum(apart, np.abs(at - at[picked[-1]]).max(axis=1))
-        picked.append(int(np.argmax(apart)))
-    return [rows[keys[k]] for k in sorted(picked)], False
+    selected = [int(np.argmin(at.sum(axis=1)))]
+    distances = np.full(len(keys), np.inf)
+    while len(selected) < max_patches:
+        distances = np.minimum(distances, np.abs(at - at[selected[-1]]).max(axis=1))
+        selected.append(int(np.argmax(distances)))
+    return [rows[keys[k]] for k in sorted(selected)], False
 
 
 def _contact_numbers(patch_model) -> tuple:
-    """Return the numbers by which the contacts of two patches of one geometry differ."""
+    """Return the loads, shapes and other numbers that distinguish contacts of equal geometry."""
     shapes = [
         float(value)
         for _, part in patch_model.gap.shapes
@@ -181,7 +188,7 @@ def _contact_numbers(patch_model) -> tuple:
         for _, value in patch_model.interface.skin or ()
         if isinstance(value, (int, float)) or value is None
     ]
-    own = (
+    loading_numbers = (
         patch_model.loading.load,
         patch_model.loading.approach,
         patch_model.loading.offset,
@@ -191,35 +198,38 @@ def _contact_numbers(patch_model) -> tuple:
         *(patch_model.mesh.slip or ()),
         *(patch_model.interface.strips or ()),
     )
-    return (*(float(value or 0.0) for value in own), *shapes, *skin)
+    return (*(float(value or 0.0) for value in loading_numbers), *shapes, *skin)
 
 
-def _halvings(cases: list, tolerance: float) -> dict:
-    """Return how often a single run halves the cells of a case beyond the minimum of levels.
+def _count_halvings(cases: list, tolerance: float) -> dict:
+    """Return how often the mesh of each case is halved beyond the minimum, by solving it alone.
 
-    The keys are `_contact_numbers`. CLIMBED_CASES cases are tried.
+    The keys are `_contact_numbers`. N_LADDER_CASES cases are tried.
     """
     out = {}
-    for one in select_distinct_patches(cases, CLIMBED_CASES)[0]:
+    for case in select_distinct_patches(cases, N_LADDER_CASES)[0]:
         try:
-            out[_contact_numbers(one)] = (
-                len(ladder.solve_on_ladder(one, one.mesh.tolerance or tolerance)) - grids.MIN_LEVELS
+            out[_contact_numbers(case)] = (
+                len(ladder.solve_on_ladder(case, case.mesh.tolerance or tolerance))
+                - grids.MIN_LEVELS
             )
         except PatchfemError:  # the single run of this case reports the error
             continue
     return out
 
 
-def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
+def _common_layout(
+    cases: list, has_intermediate_cases: bool, halvings_by_case: dict
+) -> Layout | None:
     """Return the layout of the coarsest grids for all cases; None if no case can be solved.
 
     Parameters
     ----------
     cases : list of PatchModel
-    between : bool
+    has_intermediate_cases : bool
         Whether there are more cases, whose contacts end between those of neighbouring ones.
-    halvings : dict
-        `_halvings` beyond those of all cases; the cells of a case are shorter by these from the
+    halvings_by_case : dict
+        `_count_halvings` beyond those of all cases; the cells of a case are shorter by these from the
         first level.
     """
     first = cases[0]
@@ -227,28 +237,28 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
     layout = None
     for _ in range(MAX_SEARCHES):
         if layout is None:
-            pair = grids.search_pair(first)
+            pair = grids.condense_on_search_grid(first)
         else:
             pair = condense(first, *grids.make_grids(first, layout))
         layouts = []
         largest_ratio = 0.0
-        for case, patch in zip(cases, patches_on(cases, pair)):
+        for case, patch in zip(cases, solve_patches_on_pair(cases, pair)):
             extent = _contact_of_case(case, pair, patch)
             if extent is not None:
-                n_halvings = halvings.get(_contact_numbers(case), 0)
-                case_layout = grids.find_layout(case, [extent])
+                n_halvings = halvings_by_case.get(_contact_numbers(case), 0)
+                case_layout = grids.make_layout(case, [extent])
                 layouts.append(case_layout.scale_cells(0.5**n_halvings))
                 largest_ratio = max(largest_ratio, extent.cell / extent.width)
         if not layouts:
             return None
-        layout = _merge_layouts(layouts, between)
+        layout = _merge_layouts(layouts, has_intermediate_cases)
         if largest_ratio <= max_cell_ratio:
             break
     return layout
 
 
 def _contact_of_case(patch_model, pair, patch):
-    """Return the contact of a case, from `patch` or solved by itself; None if that fails.
+    """Return the contact region of a case from a given or a new solution; None if that fails.
 
     The single run of the case then reports the error.
     """
@@ -258,15 +268,15 @@ def _contact_of_case(patch_model, pair, patch):
         return None
 
 
-def _merge_layouts(layouts: list, between: bool) -> Layout:
-    """Return the layout whose cells are nowhere longer than those of any of `layouts`."""
+def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
+    """Return the layout with the shortest cell that any of the layouts has at each position."""
     bands = {
         band
         for layout in layouts
         for band in (*layout.bands, (*layout.span, layout.max_loaded_length))
     }
-    if between:
-        bands |= set(_bands_between(layouts))
+    if has_intermediate_cases:
+        bands |= set(_interpolate_bands(layouts))
     first = layouts[0]
     bands = sorted(bands, key=lambda band: (band[2], band))
     out = Layout(
@@ -279,26 +289,26 @@ def _merge_layouts(layouts: list, between: bool) -> Layout:
     )
     low, high, _ = np.array(bands).T
     places = np.linspace(low, high, 5, axis=1)
-    # only the bands that shorten some cell are kept, because most are redundant
+    # Only the bands that shorten some cell are kept, because most are redundant.
     size = out.cell_lengths(places)
-    kept = []
+    needed_bands = []
     for k, band in enumerate(bands):
         if (size[k] > band[2] * (1 + 1e-9)).any():
-            kept.append(band)
+            needed_bands.append(band)
             size = np.minimum(size, replace(out, bands=(band,)).cell_lengths(places))
-    return replace(out, bands=tuple(kept))
+    return replace(out, bands=tuple(needed_bands))
 
 
-def _bands_between(layouts: list) -> list:
-    """Return bands from each edge of a contact to that of the next case, with cells in between."""
+def _interpolate_bands(layouts: list) -> list:
+    """Return mesh bands between the contact edges of neighbouring cases, with graded cells."""
     out = []
     half = max(layout.stop for layout in layouts)
     for side in (-1, 1):
         ends = sorted(
             {
-                (low, least)
+                (low, min_cell)
                 for layout in layouts
-                for low, high, least in layout.bands
+                for low, high, min_cell in layout.bands
                 if low == high and low * side >= 0 and abs(low) < half
             }
         )
@@ -315,8 +325,10 @@ def _bands_between(layouts: list) -> list:
     return out
 
 
-def _refine_until_met(cases: list, bodies, tolerance: float, once: bool, least: int) -> tuple:
-    """Refine nested meshes until every case meets the tolerance or they are too expensive.
+def _refine_until_met(
+    cases: list, bodies, tolerance: float, is_level_count_fixed: bool, min_levels: int
+) -> tuple:
+    """Refine nested meshes until every case meets its tolerance or the cost limit is reached.
 
     Parameters
     ----------
@@ -324,9 +336,9 @@ def _refine_until_met(cases: list, bodies, tolerance: float, once: bool, least: 
     bodies : list
         Coarsest meshes.
     tolerance : float
-    once : bool
+    is_level_count_fixed : bool
         Whether to take no more than `least` levels.
-    least : int
+    min_levels : int
         Smallest number of levels.
 
     Returns
@@ -340,7 +352,7 @@ def _refine_until_met(cases: list, bodies, tolerance: float, once: bool, least: 
     while True:
         pairs.insert(0, condense(cases[0], *bodies))
         bodies = [body.refine() for body in bodies]
-        if len(pairs) < least:
+        if len(pairs) < min_levels:
             continue
         known = max_error_ratios(cases, pairs, tolerance)
         missed_by = max((by for by in known if by is not None), default=0.0)
@@ -355,13 +367,13 @@ def _refine_until_met(cases: list, bodies, tolerance: float, once: bool, least: 
             )
         dear = bodies[0].x.size > MAX_NODES or grids.predict_condensing_seconds(
             bodies
-        ) > ladder.most_seconds(cases[0], tolerance)
-        if missed_by <= 1 or once or dear:
+        ) > ladder.max_condensing_seconds(cases[0], tolerance)
+        if missed_by <= 1 or is_level_count_fixed or dear:
             return pairs, missed_by
 
 
 def _error_ratio(patch_model, pairs: list, tolerance: float) -> float:
-    """Return the largest error of a case over the tolerance; 0 if it cannot be solved at all."""
+    """Return the largest error of a case over the tolerance; 0 if the case cannot be solved."""
     try:
         return max_error_ratio(
             measures(*ladder.solve_on_pairs(patch_model, pairs), tolerance=tolerance), tolerance

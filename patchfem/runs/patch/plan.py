@@ -1,4 +1,4 @@
-"""Predicted sizes, cost, stiffness and dimensionless groups of a patch, before it is solved.
+"""Predicted mesh size, cost, stiffness and dimensionless groups of a patch.
 
 In: a `PatchModel` or a Model. Out: `Sizes`, `Cost`, the stiffness chain, and sentences for the
 plan.
@@ -16,32 +16,31 @@ from ...model.pieces import make_piece_meshes
 from ..cost import Cost, MemoryPart
 from . import skin, store
 from .grids import (
-    MAX_SECONDS,
+    MAX_CONDENSING_SECONDS,
     MIN_LEVELS,
-    OTHER_FACTOR,
-    base_grids,
+    UNSTRUCTURED_COST_FACTOR,
+    count_nodes,
     is_mirrored,
-    node_counts,
+    make_base_grids,
     predict_condensing_seconds,
 )
-from .ladder import comparison_meshes
+from .ladder import make_comparison_meshes
 
-PACKAGE_BYTES = 2e7  # memory of the packages that a run with elastic pieces imports [bytes]
-CONDENSING_BYTES_RATIO = 0.8  # measured bytes over the predicted bytes of condensing
-# memory per node of pieces that extend beyond the interface [bytes]
-BYTES_PER_OUTLINED_NODE = 4.6e3
-FRAMES_NODE = 3.5e3  # memory of the frames of a motion per node [bytes]
-STRIP_NODE = 3000.0  # memory per strip and node of the interface [bytes]
-# tolerance below which a contact with an end inside the interface, or over a jump, needs another
-# level
+PACKAGE_BYTES = 2e7  # Memory of the packages that a run with elastic pieces imports [bytes].
+CONDENSING_BYTES_RATIO = 0.8  # Ratio of measured to predicted memory of condensing.
+# Memory per node of pieces that extend beyond the interface [bytes].
+BYTES_PER_OVERHANG_NODE = 4.6e3
+FRAME_BYTES_PER_NODE = 3.5e3  # Memory of the frames of a motion per node [bytes].
+BYTES_PER_STRIP_NODE = 3000.0  # Memory per strip and interface node [bytes].
+# Tolerance below which a contact that ends inside the interface or over a jump needs another level.
 TIGHT_TOL = 2e-3
-# fraction of the tilt at which bars open: elastic pieces with height/length 0.08 to 4 open from
-# 0.77
-FULL = 0.7
+# Largest tilt, over the tilt at which bars open, with certain full contact. Elastic pieces with
+# height/length 0.08 to 4 open from 0.77.
+MAX_FULL_CONTACT_TILT = 0.7
 
 
 class Sizes(NamedTuple):
-    """Grids of a patch, as a plan counts them.
+    """Predicted sizes and cost of the nested grids of a patch.
 
     - points: nodes of the interface.
     - finest: (columns, rows) of nodes of the finest grid of each piece, a single entry if they are
@@ -60,44 +59,45 @@ class Sizes(NamedTuple):
 
     @property
     def nodes(self) -> float:
-        """Nodes of the finest grids."""
+        """Number of nodes of the finest grids of both pieces."""
         return float(sum(columns * rows for columns, rows in self.finest))
 
 
 def expected_grids(patch_model, tolerance: float) -> Sizes:
-    """Return the grids on which a `PatchModel` is expected to be solved at a tolerance.
+    """Predict the grids on which a `PatchModel` will be solved at a given tolerance.
 
     The coarsest grid is that of the run. A mesh file is not read and counts as an automatic grid.
     """
     levels = _expected_levels(patch_model, tolerance)
     bodies = [body for body in levels[0] if body is not None]
-    finest = tuple(map(node_counts, bodies))
+    finest = tuple(map(count_nodes, bodies))
     return Sizes(
         (bodies[0].base_grid or bodies[0]).x.size,
         finest,
         len(levels),
         sum(map(predict_condensing_seconds, levels))
-        * (OTHER_FACTOR if patch_model.mesh.file is not None else 1.0),
+        * (UNSTRUCTURED_COST_FACTOR if patch_model.mesh.file is not None else 1.0),
         sum(predict_bytes(*nodes, is_mirrored(body)) for nodes, body in zip(finest, bodies)),
         patch_model.pieces.has_overhang or patch_model.mesh.file is not None,
     )
 
 
 def _expected_levels(patch_model, tolerance: float) -> list:
-    """Return the bodies of each expected level, fine to coarse."""
+    """Return the bodies of each expected mesh level, fine to coarse."""
     if patch_model.mesh.shared is not None:
         return list(patch_model.mesh.shared.levels)
     if not patch_model.mesh.is_automatic:
         low, high = make_piece_meshes(patch_model.with_mesh(file=None))
-        return [(low, high), *comparison_meshes(low, high)]
-    bodies, contact = base_grids(patch_model)
+        return [(low, high), *make_comparison_meshes(low, high)]
+    bodies, contact = make_base_grids(patch_model)
     has_edges = bool(patch_model.gap.jumps or (contact is not None and contact.places))
     levels = [bodies]
     while len(levels) < MIN_LEVELS + (has_edges and tolerance < TIGHT_TOL):
         bodies = [body.refine() for body in bodies]
         if (
             len(levels) >= MIN_LEVELS
-            and predict_condensing_seconds(bodies) > MAX_SECONDS[patch_model.mesh.is_static]
+            and predict_condensing_seconds(bodies)
+            > MAX_CONDENSING_SECONDS[patch_model.mesh.is_static]
         ):
             break
         levels.insert(0, bodies)
@@ -105,7 +105,7 @@ def _expected_levels(patch_model, tolerance: float) -> list:
 
 
 def cost(model: Model) -> Cost:
-    """Return the cost of pressing the patches of a model and of its interfaces.
+    """Predict the cost of the contact solutions of all patches of a model.
 
     Equal patches of interfaces are pressed once.
     """
@@ -136,14 +136,16 @@ def cost(model: Model) -> Cost:
     parts = (
         MemoryPart(total.bytes, f"{points} nodes of the interface", key),
         MemoryPart(
-            STRIP_NODE * strips * points, f"{strips} strips of them", "contact.strips.count"
+            BYTES_PER_STRIP_NODE * strips * points,
+            f"{strips} strips of them",
+            "contact.strips.count",
         ),
     )
     return replace(total, parts=parts)
 
 
 def pressing_cost(patch_model, tolerance: float) -> Cost:
-    """Return the cost of pressing one `PatchModel`, and of its fields.
+    """Predict the cost of the contact solution of a `PatchModel`, including its fields.
 
     The work of condensing follows from the sizes of its grids; the time per unit of work, and that
     of the fields and files of the finest grid, was measured over random patches.
@@ -158,21 +160,21 @@ def pressing_cost(patch_model, tolerance: float) -> Cost:
         "fields": cost_model.FIELDS_SECONDS,
     }
     size = PACKAGE_BYTES + (
-        BYTES_PER_OUTLINED_NODE * found.nodes
+        BYTES_PER_OVERHANG_NODE * found.nodes
         if found.outlined
         else CONDENSING_BYTES_RATIO * found.bytes
     )
     if not patch_model.mesh.is_static:
         times["fields"] += cost_model.FRAMES_SECONDS + cost_model.FRAME_NODE_SECONDS * found.nodes
-        size += FRAMES_NODE * found.nodes
+        size += FRAME_BYTES_PER_NODE * found.nodes
     sizes = {"interface_points": found.points, "elastic_unknowns_about": int(2 * found.nodes)}
     return Cost(times, (MemoryPart(size, "pieces"),), sizes=sizes)
 
 
 def chain(patch_model) -> dict:
-    """Return the stiffness [N/m] of the links in series of a `PatchModel`, by name.
+    """Return the stiffness [N/m] by name of the elements in series in a `PatchModel`.
 
-    A link that the scene does not give is "rigid".
+    An element that the scene does not give is "rigid".
     """
     out = {
         "holder": patch_model.loading.tangential_stiffness or "rigid",
@@ -188,7 +190,7 @@ def chain(patch_model) -> dict:
         area = patch_model.pieces.length * patch_model.pieces.width * patch_model.pieces.pairs
         out["asperities"] = (
             patch_model.interface.skin.tangential_ratio
-            * skin.mean_stiffness(patch_model, patch_model.nominal_load / area)
+            * skin.mean_layer_stiffness(patch_model, patch_model.nominal_load / area)
             * area
         )
     return out
@@ -215,25 +217,27 @@ def groups(model: Model) -> dict:
     return out
 
 
-def face_words(name: str, one) -> list:
-    """Return sentences for a plan on the patch of an InterfaceLaw.
+def describe_patch(name: str, interface) -> list:
+    """Return the sentences of a plan on the patch of an interface.
 
     name: nodes of the interface.
     """
-    shears = format_length(one.numbers.static * one.load / one.patch.pieces.shear_stiffness, 3)
-    found = (
+    shears = format_length(
+        interface.numbers.static * interface.load / interface.patch.pieces.shear_stiffness, 3
+    )
+    sentence = (
         f"the pieces shear elastically by {shears} or more before the whole patch slips"
-        if one.partial_slip
+        if interface.partial_slip
         else (
             "the patch moves as one point under the same load; add [structure.interface.contact.shear] to let the patch "
             "slip part by part"
         )
     )
-    return [f"interface {name} has a patch of its own: {found}"]
+    return [f"interface {name} has a patch of its own: {sentence}"]
 
 
 def assembly_sentence(patch_model) -> str:
-    """Return the sentence on how the stiffness of the pieces of a `PatchModel` is assembled."""
+    """Return the sentence on how the stiffness matrices of the pieces are assembled."""
     if patch_model.mesh.file is not None:
         return (
             "scikit-fem assembles the stiffness of a piece in contact.mesh cell by cell, or, if the mesh of the "
@@ -246,8 +250,8 @@ def assembly_sentence(patch_model) -> str:
     )
 
 
-def verdict(found: dict, patch_model) -> list:
-    """Return sentences on the tilt, the skin and the assembly of a `PatchModel`.
+def verdict(dimensionless_groups: dict, patch_model) -> list:
+    """Return the sentences of a plan on tilt, asperity layer and assembly of a `PatchModel`.
 
     The tilt group determines the extent of the contact of flat pieces only.
     """
@@ -260,12 +264,16 @@ def verdict(found: dict, patch_model) -> list:
             / (patch_model.pieces.length * patch_model.pieces.width * patch_model.pieces.pairs),
         )
     )
-    return [*_tilt_sentence(found, patch_model), *rough, assembly_sentence(patch_model)]
+    return [
+        *_tilt_sentence(dimensionless_groups, patch_model),
+        *rough,
+        assembly_sentence(patch_model),
+    ]
 
 
-def _tilt_sentence(found: dict, patch_model) -> list:
-    """Return the sentence on the tilt, as a list."""
-    tilt = found.get("tilt_over_first_opening")
+def _tilt_sentence(dimensionless_groups: dict, patch_model) -> list:
+    """Return the sentence on the tilt over the tilt of first opening, as a list."""
+    tilt = dimensionless_groups.get("tilt_over_first_opening")
     gap = patch_model.gap
     if tilt is None:
         return []
@@ -275,7 +283,9 @@ def _tilt_sentence(found: dict, patch_model) -> list:
             "pieces are not flat"
         ]
     if tilt <= 1:
-        part = "the pieces touch everywhere" + ", except perhaps near an edge" * (tilt > FULL)
+        part = "the pieces touch everywhere" + ", except perhaps near an edge" * (
+            tilt > MAX_FULL_CONTACT_TILT
+        )
     else:
         part = f"the pieces touch along about {100 / sqrt(tilt):.0f} % of the length or less"
     return [f"the tilt is {tilt:.3g} times the tilt at which an edge starts to open: {part}"]

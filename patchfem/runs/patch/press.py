@@ -20,13 +20,13 @@ from . import strips as strip_press
 from .approach import press_to_approach_with_rotation
 from .condensed import Pair, condense
 
-# ripple of the pressure over its peak, on pieces whose nodes do not match, above which a note
-# states it
+# Smallest ripple of the pressure over its peak, on pieces with non-matching nodes, that a note
+# states.
 MIN_RIPPLE = 1e-2
 
 
 class Surface(NamedTuple):
-    """Pressure and gap of an interface on the points of its solution.
+    """Pressure and gap of an interface at the points of its solution.
 
     - x (n,): positions [m].
     - weight (n,): areas [m2].
@@ -43,7 +43,7 @@ class Surface(NamedTuple):
 
 
 class PointSolution(NamedTuple):
-    """Solution on the equally spaced points of a profile, finer than the mesh.
+    """Contact solution on equally spaced points of a profile, finer than the mesh.
 
     - measures: `measures.Estimate` by name; only those that these points resolve.
     - surface: Surface on the finest points.
@@ -61,7 +61,7 @@ class PointSolution(NamedTuple):
 
 
 class SolvedContact(NamedTuple):
-    """Solution of the contact on one gap.
+    """Contact solution of two pieces for a given unloaded gap.
 
     - pieces: Compliance with its skin; a smooth skin is linearised at the operating point.
     - pressure: ContactState; of a patch in strips, the means over the width.
@@ -77,7 +77,9 @@ class SolvedContact(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True, weakref_slot=True)
 class Patch:
-    """Solved patch; forces, areas and stiffnesses are those of all pairs together.
+    """Solved contact patch.
+
+    Forces, areas and stiffnesses are those of all pairs together.
 
     - model: PatchModel.
     - pair: condensed pieces.
@@ -117,17 +119,17 @@ class Patch:
 
     @property
     def normal_stress(self) -> np.ndarray:
-        """Normal stress on the nodes (m,) [Pa], compression positive; the mean over strips."""
+        """Normal stress at the nodes (m,) [Pa], compression positive; the mean over strips."""
         return self.pressure.sigma_n
 
     @property
     def gap(self) -> np.ndarray:
-        """Gap under load on the nodes (m,) [m]; the smallest of all strips."""
+        """Gap under load at the nodes (m,) [m]; the smallest of all strips."""
         return self.pressure.gap
 
     @property
     def shear_stress(self) -> np.ndarray | None:
-        """Shear stress on the nodes (m,) [Pa] at the end of the run, opposed to slip.
+        """Shear stress at the nodes (m,) [Pa] at the end of the run, opposed to slip.
 
         It is 0 in a static run, and None if the run has no traction on the nodes.
         """
@@ -142,30 +144,30 @@ class Patch:
         return self._last_frame("slip")
 
     def _last_frame(self, name: str) -> np.ndarray | None:
-        """Return the last frame (m,) of a field; 0 in a static run, None if it is unknown."""
+        """Return the last frame (m,) of a nodal field; 0 in a static run, None if it is unknown."""
         if name in self.frames:
             return self.frames[name][-1]
         return np.zeros(self.x.size) if self.model.mesh.is_static else None
 
     @property
     def surface(self) -> Surface:
-        """Surface on the nodes of the mesh."""
+        """Pressure and gap at the nodes of the mesh."""
         weight = self.pieces.interface.weight
         return Surface(self.x, weight, self.normal_stress, self.gap, self.unloaded_gap)
 
     @property
     def finest_surface(self) -> Surface:
-        """Surface of the finest solution: on the points of a profile, else on the mesh."""
+        """Pressure and gap of the finest solution, at profile points or else at mesh nodes."""
         return self.surface if self.points is None else self.points.surface
 
     @property
     def has_skin(self) -> bool:
-        """Whether a layer of asperities lies between the pieces."""
+        """Whether an asperity layer (skin) lies between the pieces."""
         return self.model.interface.skin is not None
 
     @property
     def skin_fraction(self) -> np.ndarray | None:
-        """Fraction (m,) [1] of the skin in the compliance of each node; None for bare pieces."""
+        """Fraction (m,) [1] of the asperity layer in the compliance of each node; None without it."""
         if not self.has_skin:
             return None
         bare = np.diag(self.pair.compliance.normal)
@@ -176,12 +178,12 @@ class Patch:
 
     @property
     def active(self) -> np.ndarray:
-        """Contact set (m,) of bool: the nodes that carry pressure."""
+        """Contact set (m,) of bool: True for nodes that carry pressure."""
         return self.pressure.sigma_n > 0
 
 
 def solve(patch_model, grid, upper_grid=None, fresh: bool = False) -> Patch:
-    """Assemble and condense the pieces of a `PatchModel`, and solve the contact.
+    """Assemble and condense the pieces of a `PatchModel`, and solve its contact.
 
     Parameters
     ----------
@@ -204,9 +206,9 @@ def solve(patch_model, grid, upper_grid=None, fresh: bool = False) -> Patch:
 
 
 def press_patch(patch_model, pair: Pair, worn=None) -> Patch:
-    """Solve the contact of a pair with the shapes, the load and the holder of a `PatchModel`.
+    """Solve the contact of a condensed Pair under the shapes and the load of a `PatchModel`.
 
-    A pair serves any number of models.
+    The same Pair serves any number of models.
 
     Parameters
     ----------
@@ -229,7 +231,7 @@ def press_patch(patch_model, pair: Pair, worn=None) -> Patch:
     gap = heights + pair.rise if worn is None else heights + pair.rise + worn
 
     def press_gap(unloaded_gap) -> Patch:
-        """Solve the contact on a gap (m,) [m]."""
+        """Solve the contact for an unloaded gap (m,) [m]."""
         begin = perf_counter()
         contact = solve_contact(patch_model, pair.compliance, unloaded_gap)
         times = seconds | {"press": perf_counter() - begin}
@@ -239,7 +241,7 @@ def press_patch(patch_model, pair: Pair, worn=None) -> Patch:
     has_ripple = (
         pair.joint is not None
         and pair.joint.ripple > MIN_RIPPLE
-        and zigzags(x, patch.normal_stress) > MIN_RIPPLE
+        and pressure_ripple(x, patch.normal_stress) > MIN_RIPPLE
     )
     if has_ripple:
         patch = replace(patch, notes=(*notes, f"contact.mesh: {pair.joint.reason}"))
@@ -253,13 +255,13 @@ def press_patch(patch_model, pair: Pair, worn=None) -> Patch:
     cell = float(np.diff(x[node - 1 : node + 2]).min())
     row_over_cell = 1.0 if pair.row is None else pair.row / cell
     lean = bare_fraction * edges.edge_offset_fraction(row_over_cell)
-    shifts = _shifts_at_step(node, gap if worn is None else gap - worn, half_steps, worn)
+    shifts = _gap_changes_at_step(node, gap if worn is None else gap - worn, half_steps, worn)
     parts = [(0.5 - side * lean, press_gap(gap + shift)) for side, shift in zip((-1, 1), shifts)]
     return replace(patch, either=tuple(parts))
 
 
-def _shifts_at_step(node: int, gap, half_steps, worn) -> tuple:
-    """Return the changes of the gap (m,) [m] for a step's node on its higher and lower side.
+def _gap_changes_at_step(node: int, gap, half_steps, worn) -> tuple:
+    """Return the gap changes (m,) [m] that put the node at a step on either side of the step.
 
     The worn depth of the node belongs to a gap at half the height of the step. If the node carries
     pressure, it has worn like its neighbour on the higher side of the step, else like the one on
@@ -279,11 +281,11 @@ def _shifts_at_step(node: int, gap, half_steps, worn) -> tuple:
     return tuple(shifts)
 
 
-def zigzags(x, sigma) -> float:
-    """Return the largest zigzag of pressures sigma (m,) [Pa] at x (m,) [m] over their peak.
+def pressure_ripple(x, sigma) -> float:
+    """Return the largest ripple of nodal pressures (m,) [Pa] relative to their peak [1].
 
     Three loaded nodes in sequence lie above, below and above the lines through their neighbours, or
-    the other way round; the zigzag is half the smallest distance from these lines.
+    the other way round. The ripple is half the smallest distance from these lines.
     """
     fraction = np.diff(x)[:-1] / (x[2:] - x[:-2])
     distance = sigma[1:-1] - (1 - fraction) * sigma[:-2] - fraction * sigma[2:]
@@ -298,7 +300,7 @@ def zigzags(x, sigma) -> float:
 def make_patch(
     patch_model, pair: Pair, gap, contact: SolvedContact, notes: tuple, seconds: dict
 ) -> Patch:
-    """Return the Patch of a solved contact.
+    """Assemble the Patch record of a solved contact.
 
     Parameters
     ----------
@@ -335,7 +337,7 @@ def make_patch(
 
 
 def areas(patch_model, interface) -> np.ndarray:
-    """Return the nodal areas (m,) [m2] of a `PatchModel` on an interface; (s, m) for strips."""
+    """Return the nodal areas (m,) [m2] of an interface; (s, m) for a patch in strips."""
     if patch_model.interface.strips is None:
         return interface.weight
     count = patch_model.interface.strips.count
@@ -343,7 +345,7 @@ def areas(patch_model, interface) -> np.ndarray:
 
 
 def make_force_function(patch_model, pair: Pair):
-    """Return a function that computes the contact forces on the worn faces of a `PatchModel`.
+    """Return a function that computes the contact forces of a `PatchModel` with worn surfaces.
 
     It maps worn depth (m,) [m], which is added to the gap, and softening (m,) [m/N], which is added
     to the diagonal of the compliance, to forces (m,) [N]; all are (s, m) for strips. Everything
@@ -369,10 +371,10 @@ def make_force_function(patch_model, pair: Pair):
 
 @dataclass(eq=False, slots=True)
 class PressedStrips:
-    """Solver of the contact of worn strips, each solution started from the previous contact set.
+    """Contact solver of worn strips that starts from the previous contact set.
 
-    `begin` sets the contact set of the start, so that a run after an interruption gives the same
-    bits.
+    `begin` sets the contact set of the start, so that a run that continues after an interruption
+    gives the same bits.
 
     - model: PatchModel.
     - bare: compliance of the pieces without skin.
@@ -386,7 +388,7 @@ class PressedStrips:
     warm_start: WarmStart = field(default_factory=WarmStart)
 
     def begin(self, force) -> None:
-        """Start the next solution from the contact set of forces (s, m) [N]."""
+        """Set the contact set of the next solution to the loaded nodes of forces (s, m) [N]."""
         self.warm_start.contact_set = np.asarray(force) > 0
 
     def __call__(self, worn, softening) -> np.ndarray:
@@ -399,7 +401,7 @@ class PressedStrips:
 def solve_contact(
     patch_model, pieces: Compliance, gap, added=None, warm_start=None
 ) -> SolvedContact:
-    """Solve the contact of pieces on a gap, with the skin, load and holder of a `PatchModel`.
+    """Solve the contact of two pieces with asperity layer, load and holder of a `PatchModel`.
 
     Parameters
     ----------
@@ -419,7 +421,7 @@ def solve_contact(
     skin = patch_model.interface.skin
     can_rotate = loading.can_rotate or loading.rotational_stiffness > 0
     if loading.approach is not None and can_rotate:
-        # the load is searched at which the approach is reached
+        # A search finds the load that gives the prescribed approach.
         under_load = partial(solve_contact, added=added, warm_start=warm_start)
         stiff = with_linear_skin(skin, pieces)
         return press_to_approach_with_rotation(patch_model, pieces, gap, under_load, stiff)
@@ -439,7 +441,7 @@ def solve_contact(
 
 
 def with_linear_skin(skin, pieces: Compliance) -> Compliance:
-    """Return the pieces in series with the diagonal compliance of a linear asperity layer.
+    """Return the compliance of the pieces in series with a linear asperity layer.
 
     Without a layer, or with another law, these are the pieces themselves. A layer without a
     tangential ratio is rigid in shear.

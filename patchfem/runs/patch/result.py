@@ -20,11 +20,13 @@ from ..results.patch_rows import TABLE
 from ..results.result import Result, RunInputs, at_rest
 from . import skin, store
 from .ladder import solve_all, solve_static_ladder
-from .measures import add_strip_errors, measures, plane_band
+from .measures import add_strip_errors, measures, plane_state_sentences
 from .values import reaches_steep_end, values
 
-MAX_POISSON = 0.499  # Poisson's ratio up to which the errors of cells that lock are reliable
-MAX_SMALL_STRAIN = 0.02  # largest small strain; effects of its second order are neglected
+# Poisson's ratio up to which the errors of volumetrically locking elements are reliable.
+MAX_POISSON = 0.499
+# Largest strain that counts as small; effects of its second order are neglected.
+MAX_SMALL_STRAIN = 0.02
 
 __all__ = [
     "bodies",
@@ -37,22 +39,25 @@ __all__ = [
     "warn_of_strains",
 ]
 MIN_COUPLING_RATIO = (
-    0.02  # closing by shear over the tangential compliance, above which a note states it
+    0.02  # smallest normal closing due to shear over the tangential compliance that a note states
 )
-# load over the buckling load of a tall piece; its sideways motion lacks about this fraction
+# Smallest load over the buckling load of a tall piece that a note states; its sideways motion lacks
+# about this fraction.
 MIN_BUCKLING_RATIO = 0.02
-# fraction of a far face that counts as complete, because a mesh file has few digits
+# Fraction of a far face that counts as the complete face, because a mesh file has few digits.
 MIN_COMPLETE_FRACTION = 1 - 1e-6
 
 
 def static_measures_without_errors(model) -> dict:
-    """Return the static measures of the patch of a model, without errors."""
+    """Return the static measures of the patch of a model, without error estimates."""
     with locate_errors(model.source):
         return values(solve_all(model.patch, model.accuracy.tolerance, False)[0])
 
 
 def bodies(model) -> tuple:
-    """Return the meshes of the pieces of a model, (lower, upper or None if they are alike).
+    """Return the meshes of the lower and the upper piece of a model.
+
+    The upper one is None if the pieces are alike.
 
     If the tolerance chooses the mesh, it is the one of a run.
     """
@@ -64,9 +69,9 @@ def bodies(model) -> tuple:
 
 
 def static_measures(model, patch, coarse) -> dict:
-    """Return the static measures of the patch of a model.
+    """Return the static measures of the patch of a model, with error estimates.
 
-    If the tolerance chose the mesh, measures that miss it are extrapolated.
+    If the tolerance chose the mesh, measures whose error exceeds it are extrapolated.
 
     Parameters
     ----------
@@ -85,28 +90,28 @@ def static_measures(model, patch, coarse) -> dict:
     if patch_model.mesh.is_automatic:
         tolerance = patch_model.mesh.tolerance or model.accuracy.tolerance
     if patch_model.solved is not None:
-        found = patch_model.solved.measures
+        measures_by_name = patch_model.solved.measures
     else:
         patches = (patch, *coarse)
-        found = store.reuse_in_sweep(
+        measures_by_name = store.reuse_in_sweep(
             patch_model,
             ("measures", patches, tolerance),
             lambda: measures(*patches, tolerance=tolerance),
         )
-    values_by_name = {name: measure.value for name, measure in found.items()}
+    values_by_name = {name: measure.value for name, measure in measures_by_name.items()}
     min_floors = floors(patch_model, model.accuracy.tolerance, values_by_name)
-    found = {
+    measures_by_name = {
         name: replace(measure, floor=max(measure.floor, min_floors[name]))
-        for name, measure in found.items()
+        for name, measure in measures_by_name.items()
     }
-    # for worn strips, `wear.measures` adds the error due to their number
+    # For worn strips, `wear.measures` adds the error due to their number.
     if patch.strips is None or coarse[0] is None or model.wear is not None:
-        return found
-    return add_strip_errors(patch_model, coarse[0], found)
+        return measures_by_name
+    return add_strip_errors(patch_model, coarse[0], measures_by_name)
 
 
 def floors(patch_model, tolerance: float, values: dict) -> dict:
-    """Return the floor of each static measure by name, for values that are numbers or (q,).
+    """Return the floor of each static measure by name, as numbers or (q,) for q patches.
 
     The floor of a measure that is a difference of larger terms is the tolerance times these: for
     the approach the rotation times half the length, for the centre of pressure half the length,
@@ -135,7 +140,7 @@ def floors(patch_model, tolerance: float, values: dict) -> dict:
 
 
 def static(inputs: RunInputs) -> Result:
-    """Return the Result of a plan whose patch does not move, or of a patch without contact."""
+    """Return the Result of a static patch, or of a patch without contact."""
     patch = inputs.patch
     pressure = patch.pressure
     extra = {"residuals": dict(pressure.residuals), "iterations": pressure.iterations}
@@ -157,7 +162,7 @@ def static(inputs: RunInputs) -> Result:
 
 
 def warn_of_strains(patch_model, patch) -> list:
-    """Return warnings on large strains, on cells of a given size that lock, and on the gap."""
+    """Return warnings on large strains, locking elements and an excessive gap."""
     steep_end = []
     if reaches_steep_end(patch):
         steep_end = [
@@ -174,7 +179,7 @@ def warn_of_strains(patch_model, patch) -> list:
 def strain_warnings(
     patch_model, largest_pressure: float, approach: float, other_warnings=()
 ) -> list:
-    """Return the warnings of `warn_of_strains` on strains and locking.
+    """Return warnings on large strains and on volumetric locking of the elements.
 
     Parameters
     ----------
@@ -217,21 +222,21 @@ def strain_warnings(
 
 
 def exceeds_small_strains(patch_model, largest_pressure, approach):
-    """Return whether `strain_warnings` may have a warning, for one patch or arrays of many."""
+    """Return whether the strains of one patch, or of any of many, may cause a warning."""
     if not patch_model.mesh.is_automatic:
         return np.ones(np.shape(largest_pressure), bool)
     return np.maximum(*_strains(patch_model, largest_pressure, approach)) > MAX_SMALL_STRAIN
 
 
 def _strains(patch_model, largest_pressure, approach) -> tuple:
-    """Return peak pressure over lowest Young's modulus, and approach over height of the pieces."""
+    """Return peak pressure/lowest Young's modulus and approach/height as measures of strain."""
     young = min(material.young for material in _materials(patch_model))
     height = patch_model.pieces.lower.height + patch_model.pieces.upper.height
     return largest_pressure / young, approach / height
 
 
 def _materials(patch_model) -> list:
-    """Return the materials of the pieces and their coatings."""
+    """Return the materials of the pieces and of their coatings."""
     out = []
     for piece in (patch_model.pieces.lower, patch_model.pieces.upper):
         out.append(piece.substrate)
@@ -241,7 +246,7 @@ def _materials(patch_model) -> list:
 
 
 def notes_on_neglected_effects(model, patch, coarse) -> list:
-    """Return notes on a pressed patch that hold for any motion.
+    """Return notes on the effects that the model of a pressed patch neglects in any motion.
 
     Parameters
     ----------
@@ -287,19 +292,21 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
             "the largest slide"
         )
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
-        # an unstructured mesh has no coarser one: its second patch is finer than its first
+        # An unstructured mesh has no coarser one: its second patch is finer than its first.
         other = patch if coarse[-1] is None else coarse[0]
         if patch_model.solved is not None:
             out += patch_model.solved.plane_sentences
         else:
             out += store.reuse_in_sweep(
-                patch_model, ("plane band", other), lambda: plane_band(patch_model, other)
+                patch_model,
+                ("plane band", other),
+                lambda: plane_state_sentences(patch_model, other),
             )
     return out
 
 
 def _mesh_clause(model, patch) -> str:
-    """Return the clause on results that are computed on the mesh, not on points of a profile."""
+    """Return the text on results that are evaluated on the mesh, not on points of a profile."""
     largest = format_quantity(float(patch.pressure.sigma_n.max()), "Pa", 3)
     where = f"the mesh of {patch.x.size} interface points, whose largest pressure is {largest}"
     if model.kind == "patch":
@@ -311,7 +318,7 @@ def _mesh_clause(model, patch) -> str:
 
 
 def note_on_perfect_stick(patch_model, patch) -> list:
-    """Return a note, as a list, on unlike pieces: Dundurs' beta and the effect of perfect stick.
+    """Return a note on Dundurs' beta of unlike pieces and the effect of perfect stick.
 
     Faces of unlike pieces slide on each other under pressure. Stick prevents this by shear
     stresses, which stiffen the contact.
@@ -335,7 +342,7 @@ def note_on_perfect_stick(patch_model, patch) -> list:
 
 
 def _compute_dundurs_beta(patch_model) -> float:
-    """Return Dundurs' beta of the two faces."""
+    """Compute Dundurs' beta of the materials at the two surfaces."""
     is_plane_strain = patch_model.pieces.plane == "strain"
     shear = []
     kappa = []
@@ -350,10 +357,10 @@ def _compute_dundurs_beta(patch_model) -> float:
 
 
 def notes_on_mesh_file(pair) -> list:
-    """Return notes on pieces of a mesh file with holes or a partly clamped far face."""
+    """Return notes on pieces of a mesh file that have holes or a partly clamped far face."""
     out = []
     for side, body in (("lower", pair.grid), ("upper", pair.upper_grid)):
-        if body.base_grid is not None:  # a grid has no holes, and its whole last row is clamped
+        if body.base_grid is not None:  # A grid has no holes, and its complete last row is clamped.
             continue
 
         count, area = recognise.find_holes(body)
@@ -372,7 +379,7 @@ def notes_on_mesh_file(pair) -> list:
 
 
 def notes_on_tall_pieces(patch_model, mean: float) -> list:
-    """Return a note for each tall piece whose bending moves the load sideways, as a list.
+    """Return a note, as a list, on each tall piece whose bending moves the load sideways.
 
     The model neglects that the lever arm increases. The measure is the load over the buckling load
     of the piece, clamped at the holder and free at the patch (Euler, pi^2 E' L^2/48 H^2 as a mean

@@ -1,4 +1,4 @@
-"""Asperity layer (skin) with a smooth law between the pieces of a patch: law and solution.
+"""Asperity layer (skin) with a smooth pressure law between the pieces of a patch.
 
 In: a `PatchModel` with a skin. Out: the skin law, the pressure through it, the compliance
 linearised at the operating point, and a note on the stiffness of peaks from a profile.
@@ -20,7 +20,7 @@ from ...surface.roughness import peaks
 
 
 def skin_law(patch_model):
-    """Return the pressure law of the asperity layer of a patch."""
+    """Return the law of pressure over separation of the asperity layer of a patch."""
     skin = patch_model.interface.skin
     if skin.law == "linear":
         return asperity_laws.LinearAsperities(skin.normal_stiffness)
@@ -37,8 +37,8 @@ def skin_law(patch_model):
     return asperity_laws.HertzAsperities(skin.radius, skin.density, skin.height_deviation, modulus)
 
 
-def mean_stiffness(patch_model, pressure: float) -> float:
-    """Return the normal stiffness [Pa/m] of the asperity layer under a uniform `pressure` [Pa].
+def mean_layer_stiffness(patch_model, pressure: float) -> float:
+    """Return the normal stiffness [Pa/m] of the asperity layer under a uniform pressure [Pa].
 
     It is 0 for a smooth skin without pressure.
     """
@@ -51,9 +51,10 @@ def mean_stiffness(patch_model, pressure: float) -> float:
 
 
 def note_on_peak_stiffness(patch_model, pressure: float) -> list:
-    """Return a sentence, as a list, on how reliable the stiffness of peaks from a profile is.
+    """Return a sentence, as a list, on the reliability of an asperity stiffness from a profile.
 
-    Also for peaks from root mean squares; [] for any other skin. pressure: mean pressure [Pa].
+    It also covers peaks from root mean squares, and is [] for any other layer. pressure: mean
+    pressure [Pa].
     """
     skin = patch_model.interface.skin
     if skin is None or skin.law != "hertz" or skin.rms_height is None or not pressure > 0:
@@ -64,7 +65,7 @@ def note_on_peak_stiffness(patch_model, pressure: float) -> list:
     waves = f" of the waves below {format_quantity(skin.cutoff, 'm', 3)}" if skin.cutoff else ""
     if skin.from_ is not None:
         moments = traces.read_spectral_moments(Path(skin.from_), skin.cutoff)
-        half = f" (from every second sample: {_half(patch_model, moments.coarse, pressure)})"
+        half = f" (from every second sample: {_format_coarse_stiffness(patch_model, moments.coarse, pressure)})"
         texts = (*moments.dust, moments.not_gaussian)
         remarks = [f"contact.asperities: {text}" for text in texts if text]
     elif patch_model.gap.profile is not None and skin.cutoff is None:
@@ -75,16 +76,16 @@ def note_on_peak_stiffness(patch_model, pressure: float) -> list:
         ]
     return [
         f"contact.asperities: under the mean pressure of {format_quantity(pressure, 'Pa', 3)} the peaks{waves} have "
-        f"a stiffness of {mean_stiffness(patch_model, pressure):.3g} Pa/m{half}; Persson's theory, which includes waves "
-        "of all lengths, "
+        f"a stiffness of {mean_layer_stiffness(patch_model, pressure):.3g} Pa/m{half}; Persson's theory, which includes "
+        "waves of all lengths, "
         f'gives {soft:.3g} to {stiff:.3g} Pa/m; to use the stiffness of that theory, set law = "exponential" and '
         f'decay_length = "{sum(peaks.PERSSON) / 2 * skin.rms_height * 1e6:.3g} um"',
         *remarks,
     ]
 
 
-def _half(patch_model, coarse, pressure: float) -> str:
-    """Return the stiffness of the peaks from every second sample of the profile, as text."""
+def _format_coarse_stiffness(patch_model, coarse, pressure: float) -> str:
+    """Return the asperity stiffness from every second sample of the profile, as text."""
     try:
         surface_peaks = peaks.gaussian_peaks(coarse) if coarse else None
     except PatchfemError:
@@ -99,11 +100,11 @@ def _half(patch_model, coarse, pressure: float) -> str:
     interface = replace(
         patch_model.interface, skin=patch_model.interface.skin.model_copy(update=new)
     )
-    return f"{mean_stiffness(replace(patch_model, interface=interface), pressure):.3g} Pa/m"
+    return f"{mean_layer_stiffness(replace(patch_model, interface=interface), pressure):.3g} Pa/m"
 
 
 def cut_off_pressure(pressure) -> np.ndarray:
-    """Return the pressure (..., m) [Pa] of a smooth layer, with 0 below MIN_RELATIVE_PRESSURE.
+    """Set the pressures (..., m) [Pa] of a smooth layer below MIN_RELATIVE_PRESSURE to 0.
 
     The law never reaches 0, but the pressure that is cut off is below the residual of the load
     balance, and underflows farther out. The limit is relative to the largest pressure.
@@ -112,7 +113,7 @@ def cut_off_pressure(pressure) -> np.ndarray:
 
 
 def press_through_asperities(patch_model, pieces: Compliance, gap) -> tuple:
-    """Solve the contact of a pair through an asperity layer with a smooth law.
+    """Solve the contact of two pieces through an asperity layer with a smooth pressure law.
 
     The gap of the ContactState is the separation of the mean planes, which is negative if the skin
     is crushed.
@@ -151,7 +152,7 @@ def press_through_asperities(patch_model, pieces: Compliance, gap) -> tuple:
         state.residuals,
     )
     stiffness = np.maximum(state.stiffness[0] * interface.weight, 1e-300)
-    # the lower bound keeps the compliance of unloaded nodes finite
+    # The lower bound keeps the compliance of unloaded nodes finite.
     crush = np.diag(1 / np.maximum(stiffness, MIN_RELATIVE_PRESSURE * stiffness.max()))
     ratio = patch_model.interface.skin.tangential_ratio
     tangential = pieces.tangential + crush / ratio if ratio is not None else pieces.tangential

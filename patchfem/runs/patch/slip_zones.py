@@ -1,4 +1,4 @@
-"""Zones of a patch that slip under a prescribed slide, and the errors of their work.
+"""Slip zones of a patch under a prescribed displacement, and the errors of their work.
 
 In: pressed patches and the `PrescribedSlip`. Out: slip zones for the grading of the mesh, and
 the error of work and force of the slip over the tolerance.
@@ -14,9 +14,10 @@ from .jenkins_elements import elements
 
 
 def slip_zones(patch, slip, ends: list) -> tuple:
-    """Return the parts (start, end) [m] of a patch that yield below the amplitude of a slide.
+    """Return the zones (start, end) [m] that slip at the amplitude of a prescribed displacement.
 
-    The slide at which points yield is interpolated linearly between nodes. At an end of the contact
+    The displacement at which points yield is interpolated linearly between nodes. At an end of the
+    contact
     between two nodes the pressure vanishes, so that Coulomb points yield at once.
 
     Parameters
@@ -30,11 +31,11 @@ def slip_zones(patch, slip, ends: list) -> tuple:
     """
     if patch.strips is not None or not patch.active.any():
         return ()
-    found = elements(patch, slip.static, slip.bond_length)
-    yields = dict(zip(found.points.tolist(), found.point_yields.tolist()))
+    zones = elements(patch, slip.static, slip.bond_length)
+    yields = dict(zip(zones.points.tolist(), zones.point_yields.tolist()))
     beyond = {(end.node, end.side): end.position for end in ends}
     out = []
-    for stretch in np.split(found.points, 1 + np.flatnonzero(np.diff(found.points) > 1)):
+    for stretch in np.split(zones.points, 1 + np.flatnonzero(np.diff(zones.points) > 1)):
         places = patch.x[stretch].tolist()
         slides = [yields[node] for node in stretch.tolist()]
         if slip.bond_length == 0:
@@ -51,7 +52,7 @@ def slip_zones(patch, slip, ends: list) -> tuple:
 
 
 def _intervals_below(x, slides, amplitude: float) -> list:
-    """Return the intervals of x (k,) [m] in which slides (k,) [m] are below an amplitude [m]."""
+    """Return the intervals of x [m] in which the yield displacement is below an amplitude."""
     yields = slides < amplitude
     starts = np.flatnonzero(yields & ~np.append(False, yields[:-1]))
     stops = np.flatnonzero(yields & ~np.append(yields[1:], False))
@@ -60,33 +61,35 @@ def _intervals_below(x, slides, amplitude: float) -> list:
         low = float(x[first])
         high = float(x[last])
         if first > 0:
-            low = _crossing(x[first - 1 : first + 1], slides[first - 1 : first + 1], amplitude)
+            low = _interpolate_zone_end(
+                x[first - 1 : first + 1], slides[first - 1 : first + 1], amplitude
+            )
         if last < x.size - 1:
-            high = _crossing(x[last : last + 2], slides[last : last + 2], amplitude)
+            high = _interpolate_zone_end(x[last : last + 2], slides[last : last + 2], amplitude)
         if high > low:
             out.append((low, high))
     return out
 
 
-def _crossing(x, slides, amplitude: float) -> float:
-    """Return the position [m] between two nodes at which the slide of yielding is the amplitude."""
-    share = (amplitude - slides[0]) / (slides[1] - slides[0])
-    return float(x[0] + share * (x[1] - x[0]))
+def _interpolate_zone_end(x, slides, amplitude: float) -> float:
+    """Interpolate the position [m] at which the yield displacement equals the amplitude."""
+    fraction = (amplitude - slides[0]) / (slides[1] - slides[0])
+    return float(x[0] + fraction * (x[1] - x[0]))
 
 
-def cycle_work(found: JenkinsSet, amplitude: float) -> float:
-    """Return the work [J] of parallel elements in a cycle between -amplitude and amplitude [m]."""
-    beyond = np.maximum(amplitude - found.yield_displacement, 0.0)
-    return float(4 * (found.stiffness * found.yield_displacement) @ beyond)
+def cycle_work(jenkins_set: JenkinsSet, amplitude: float) -> float:
+    """Return the friction work [J] of parallel elements in a cycle of given amplitude [m]."""
+    beyond = np.maximum(amplitude - jenkins_set.yield_displacement, 0.0)
+    return float(4 * (jenkins_set.stiffness * jenkins_set.yield_displacement) @ beyond)
 
 
-def peak_force(found: JenkinsSet, amplitude: float) -> float:
-    """Return the force [N] of parallel elements at a first slide of `amplitude` [m]."""
-    return float(found.stiffness @ np.minimum(found.yield_displacement, amplitude))
+def peak_force(jenkins_set: JenkinsSet, amplitude: float) -> float:
+    """Return the force [N] of parallel elements on initial loading to `amplitude` [m]."""
+    return float(jenkins_set.stiffness @ np.minimum(jenkins_set.yield_displacement, amplitude))
 
 
-def slip_missed(patches, slip, tolerance: float) -> float:
-    """Return the largest error of work and force of the slip over the allowed error [1].
+def max_slip_error_ratio(patches, slip, tolerance: float) -> float:
+    """Return the largest error of friction work and force relative to the allowed error [1].
 
     Parameters
     ----------
@@ -97,11 +100,11 @@ def slip_missed(patches, slip, tolerance: float) -> float:
     """
     values = []
     for patch in patches:
-        found = elements(patch, slip.static, slip.bond_length)
+        jenkins_set = elements(patch, slip.static, slip.bond_length)
         values.append(
             {
-                "loop_area": cycle_work(found, slip.amplitude),
-                "friction_force_peak": peak_force(found, slip.amplitude),
+                "loop_area": cycle_work(jenkins_set, slip.amplitude),
+                "friction_force_peak": peak_force(jenkins_set, slip.amplitude),
             }
         )
     errors = convergence_errors(*values)

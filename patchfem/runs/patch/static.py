@@ -1,4 +1,4 @@
-"""Static measures of many patches on shared condensed pieces, equal to those of `measures`.
+"""Static measures of many patches solved in one batch on shared condensed pieces.
 
 In: `PatchModel`s with shared meshes. Out: measures with errors, (q,) for q patches. This module
 treats bare pieces, or pieces with a linear asperity layer, under a load, whose contact is a single
@@ -20,28 +20,28 @@ from ...mesh.tensor import TensorGrid
 from .condensed import Pair, shared_pair, shared_pairs
 from .edge_values import EdgeValues
 from .measures import (
+    MAX_UNRESOLVED_NODES,
     MIN_ERROR,
-    UNRESOLVED_NODES,
-    band_words,
-    cells_halved,
+    are_cells_halved,
     converge,
+    estimate_common_errors,
+    format_plane_changes,
     max_error_ratio,
-    other_plane,
     resolution_of_patches,
-    shared_errors,
+    with_opposite_plane_state,
 )
 from .press import SolvedContact, make_patch, with_linear_skin
 from .values import peak_pressures, static_values
 
-# cells beyond the end of a contact on the coarser mesh within which it may end on this one
+# Number of cells beyond the contact end on the coarser mesh within which the end is searched for.
 MAX_END_CELLS = 2
 
 
 class SolvedPatch(NamedTuple):
-    """Patch that was solved together with others.
+    """Solution of a patch that was computed in a batch with others.
 
     - measures: static measures by name.
-    - plane_sentences: sentences on the plane state (`measures.plane_band`).
+    - plane_sentences: sentences on the plane state (`measures.plane_state_sentences`).
     - patches: the solved Patch on all meshes, fine to coarse.
     """
 
@@ -51,7 +51,7 @@ class SolvedPatch(NamedTuple):
 
 
 class PatchLoads(NamedTuple):
-    """Loads and shapes of q patches that are alike in their pieces and in `pressing_kind`.
+    """Loads and surface shapes of q patches that are solved in one batch.
 
     - first: PatchModel of the first one.
     - load (q,): [N].
@@ -69,14 +69,14 @@ class PatchLoads(NamedTuple):
     shapes: tuple
 
     def gaps(self, x) -> np.ndarray:
-        """Return the gaps (q, m) [m] at x (m,) [m]."""
+        """Return the unloaded gaps (q, m) [m] at positions x (m,) [m]."""
         if len(self.shapes) == self.load.size:
             return np.array([gap.evaluate(x).heights for gap in self.shapes])
         return np.broadcast_to(self.shapes[0].evaluate(x[:, None])[0].T, (self.load.size, x.size))
 
 
 class Level(NamedTuple):
-    """q patches solved on one mesh.
+    """Contact solutions of q patches on a single mesh.
 
     - values: static measures by name, (q,) each.
     - pressure: ContactState whose fields have a row or a number for each patch.
@@ -93,12 +93,12 @@ class Level(NamedTuple):
 
     @property
     def is_solved(self) -> np.ndarray:
-        """Whether the contact of each patch (q,) is a single interval and was found."""
+        """Whether the contact (q,) of each patch was found and is a single interval."""
         return self.contacts.residual <= RESIDUAL_TOL
 
 
 class BatchSolution(NamedTuple):
-    """Static measures of q patches that were solved together.
+    """Static measures of q patches that were solved in one batch.
 
     - estimates: Estimate (q,) by name.
     - is_solved (q,): whether the patch was solved together with the others.
@@ -123,17 +123,17 @@ class BatchSolution(NamedTuple):
         return self.levels[0].pressure.sigma_n.max(axis=1)
 
     def plane_sentences(self, patch_model, case: int) -> list:
-        """Return the sentence of `measures.plane_band` on a patch."""
+        """Return the sentence on the plane state of a single patch of the batch, as a list."""
         if not self.plane_values:
             return []
         own_values, other_values = (
             {name: float(column[case]) for name, column in values.items()}
             for values in self.plane_values
         )
-        return band_words(patch_model, own_values, other_values)
+        return format_plane_changes(patch_model, own_values, other_values)
 
     def measures(self, case: int, floors: Mapping | None = None) -> dict:
-        """Return the measures of a patch by name.
+        """Return the measures of a single patch of the batch by name.
 
         floors: floors (q,) by name that replace those of the table.
         """
@@ -145,8 +145,11 @@ class BatchSolution(NamedTuple):
         }
 
 
-def not_together(patch_model) -> str:
-    """Return the reason why a `PatchModel` is not solved with others; "" if it may be."""
+def reason_not_batched(patch_model) -> str:
+    """Return the reason why a `PatchModel` cannot be solved in a batch with others.
+
+    It is "" if it can.
+    """
     if patch_model.mesh.shared is None:
         return "the case has a mesh of its own"
     if not all(
@@ -157,16 +160,16 @@ def not_together(patch_model) -> str:
         return "the meshes of the pieces are not plain grids"
     if patch_model.gap.profile is not None:
         return "a profile has its own averaging length"
-    if reason := _not_of_one_stretch(patch_model):
+    if reason := _reason_for_several_intervals(patch_model):
         return reason
     has_levels = len(patch_model.mesh.shared.levels) > 2
     return "" if has_levels else "the mesh of the case cannot be made coarser"
 
 
-def _not_of_one_stretch(patch_model) -> str:
-    """Return the reason why a `PatchModel` on plain grids cannot have a contact of one interval.
+def _reason_for_several_intervals(patch_model) -> str:
+    """Return the reason why the contact of a `PatchModel` may not be a single interval.
 
-    "" if it can.
+    It is "" if it is one.
     """
     skin = patch_model.interface.skin
     if patch_model.interface.strips is not None or (skin is not None and skin.law != "linear"):
@@ -177,12 +180,12 @@ def _not_of_one_stretch(patch_model) -> str:
     return "the pressure of the case may be unbounded" if is_unbounded else ""
 
 
-def pressing_kind(patch_model) -> tuple:
-    """Return the properties that patches solved together share, apart from their pieces."""
-    return patch_model.mesh.shared.name, *_kind(patch_model)
+def batch_key(patch_model) -> tuple:
+    """Return the mesh name and properties that patches of a batch have in common."""
+    return patch_model.mesh.shared.name, *_layer_and_rotation(patch_model)
 
 
-def _kind(patch_model) -> tuple:
+def _layer_and_rotation(patch_model) -> tuple:
     """Return the numbers of the linear asperity layer, and whether the rotation is fixed."""
     skin = patch_model.interface.skin
     numbers = None if skin is None else (skin.normal_stiffness, skin.tangential_ratio)
@@ -190,7 +193,7 @@ def _kind(patch_model) -> tuple:
 
 
 def collect_loads(patches: Sequence) -> PatchLoads:
-    """Return the `PatchLoads` of some `PatchModel`s."""
+    """Collect the loads and shapes of several `PatchModel`s in a record of arrays."""
     loadings = [patch.loading for patch in patches]
     moment = None
     if loadings[0].moment is not None:
@@ -205,8 +208,8 @@ def collect_loads(patches: Sequence) -> PatchLoads:
     )
 
 
-def loads_by_columns(patch_model, count: int) -> PatchLoads:
-    """Return the `PatchLoads` of `count` patches, given as one PatchModel with columns of numbers."""
+def loads_from_columns(patch_model, count: int) -> PatchLoads:
+    """Return the loads of `count` patches given by a single PatchModel with columns of numbers."""
 
     def column(number) -> np.ndarray:
         """Return a number as a column (q,)."""
@@ -223,8 +226,8 @@ def loads_by_columns(patch_model, count: int) -> PatchLoads:
     )
 
 
-def patches_on(patch_models, pair: Pair) -> list:
-    """Solve `PatchModel`s of one geometry on a Pair.
+def solve_patches_on_pair(patch_models, pair: Pair) -> list:
+    """Solve the contacts of several `PatchModel`s of the same geometry on a Pair.
 
     Parameters
     ----------
@@ -234,7 +237,7 @@ def patches_on(patch_models, pair: Pair) -> list:
     Returns
     -------
     list of Patch
-        None for each that this module cannot solve.
+        None for each patch that cannot be solved in a batch.
     """
     out = [None] * len(patch_models)
     if not _has_plain_grids(pair) or pair.closing.any():
@@ -244,30 +247,30 @@ def patches_on(patch_models, pair: Pair) -> list:
         with one_thread():
             level = solve_on_pair(collect_loads(alike), pair)
         for row, case in enumerate(cases):
-            if level.is_solved[row] and level.contacts.n_nodes[row] > UNRESOLVED_NODES:
+            if level.is_solved[row] and level.contacts.n_nodes[row] > MAX_UNRESOLVED_NODES:
                 out[case] = _make_patch(patch_models[case], pair, level, row)
     return out
 
 
 def _has_plain_grids(pair: Pair) -> bool:
-    """Return whether the meshes of both pieces are plain grids."""
+    """Return whether the meshes of both pieces are plain tensor grids."""
     return isinstance(pair.grid, TensorGrid) and isinstance(pair.upper_grid, TensorGrid)
 
 
 def _group_alike(patch_models) -> list:
-    """Return lists of the indices of `PatchModel`s of one geometry that can be solved together."""
+    """Group the indices of `PatchModel`s of the same geometry that can be solved in one batch."""
     groups = {}
     for case, patch_model in enumerate(patch_models):
-        if not _not_of_one_stretch(patch_model):
-            key = (patch_model.mesh.tolerance, *_kind(patch_model))
+        if not _reason_for_several_intervals(patch_model):
+            key = (patch_model.mesh.tolerance, *_layer_and_rotation(patch_model))
             groups.setdefault(key, []).append(case)
     return list(groups.values())
 
 
 def solved_patches(patch_models, tolerance: float) -> list:
-    """Return each of alike `PatchModel`s as SolvedPatch; None for those not solved here.
+    """Solve similar `PatchModel`s in one batch; None for each that this cannot solve.
 
-    They are alike in their pieces and in `pressing_kind`. tolerance: see `solve_together`.
+    They share their pieces and `batch_key`. tolerance: see `solve_together`.
     """
     pairs = shared_pairs(patch_models[0])
     solution = solve_together(collect_loads(patch_models), tolerance)
@@ -286,7 +289,7 @@ def solved_patches(patch_models, tolerance: float) -> list:
 
 
 def max_error_ratios(patch_models, pairs: list, tolerance: float) -> list:
-    """Return the largest error over the tolerance of each `PatchModel`; None if not solved here.
+    """Return the largest error over the tolerance for each `PatchModel`; None if not solved.
 
     Parameters
     ----------
@@ -304,7 +307,8 @@ def max_error_ratios(patch_models, pairs: list, tolerance: float) -> list:
     if len(pairs) < 3 or not all(map(_has_plain_grids, pairs)):
         return out
     for cases in _group_alike(patch_models):
-        if patch_models[cases[0]].gap.profile is not None:  # equal for one geometry
+        # This property is equal for all patches of a geometry.
+        if patch_models[cases[0]].gap.profile is not None:
             continue
         alike = [patch_models[case] for case in cases]
         solution = solve_together(collect_loads(alike), tolerance, pairs)
@@ -314,7 +318,7 @@ def max_error_ratios(patch_models, pairs: list, tolerance: float) -> list:
 
 
 def solve_together(loads: PatchLoads, tolerance: float, pairs: list | None = None) -> BatchSolution:
-    """Solve patches on the meshes that they share, and estimate their errors.
+    """Solve the contacts of q patches in one batch on shared meshes, with error estimates.
 
     Parameters
     ----------
@@ -330,7 +334,7 @@ def solve_together(loads: PatchLoads, tolerance: float, pairs: list | None = Non
     BatchSolution
     """
     first = loads.first
-    other_model = other_plane(first) if pairs is None else None
+    other_model = with_opposite_plane_state(first) if pairs is None else None
     pairs = pairs or shared_pairs(first)
     levels = []
     other_level = None
@@ -341,7 +345,7 @@ def solve_together(loads: PatchLoads, tolerance: float, pairs: list | None = Non
             other_loads = loads._replace(first=other_model)
             other_level = solve_on_pair(other_loads, shared_pair(other_model, 1), levels[1])
     fine = levels[0]
-    is_solved = fine.contacts.n_nodes > UNRESOLVED_NODES
+    is_solved = fine.contacts.n_nodes > MAX_UNRESOLVED_NODES
     for level in levels if other_level is None else (*levels, other_level):
         is_solved = is_solved & level.is_solved
     if any(pair.closing.any() for pair in pairs):
@@ -355,9 +359,9 @@ def solve_together(loads: PatchLoads, tolerance: float, pairs: list | None = Non
     )
     estimates = converge(
         [level.values for level in reversed(levels)],
-        shared_errors(resolution, fine.values),
+        estimate_common_errors(resolution, fine.values),
         (first.mesh.tolerance or tolerance) if first.mesh.is_automatic else None,
-        all(cells_halved(a, b) for a, b in pairwise(pairs)),
+        all(are_cells_halved(a, b) for a, b in pairwise(pairs)),
         max(MIN_ERROR, pairs[0].round_off_error),
     )
     plane_values = () if other_level is None else (levels[1].values, other_level.values)
@@ -365,7 +369,7 @@ def solve_together(loads: PatchLoads, tolerance: float, pairs: list | None = Non
 
 
 def _make_patch(patch_model, pair: Pair, level: Level, case: int):
-    """Return a patch of a level as `press.press_patch` returns it."""
+    """Return a single patch of a batch as a Patch, as `press.press_patch` returns it."""
     gap, notes, seconds = patch_model.gap.evaluate(level.x)
     rows = level.pressure
     pressure = ContactState(
@@ -385,7 +389,7 @@ def _make_patch(patch_model, pair: Pair, level: Level, case: int):
 
 
 def solve_on_pair(loads: PatchLoads, pair: Pair, coarse: Level | None = None) -> Level:
-    """Solve patches on one Pair.
+    """Solve the contacts of q patches in one batch on a single Pair.
 
     Parameters
     ----------
@@ -406,7 +410,7 @@ def solve_on_pair(loads: PatchLoads, pair: Pair, coarse: Level | None = None) ->
     gap = loads.gaps(x) + pair.rise
     gap_range = np.ptp(gap, axis=1)
     angle = np.zeros(loads.load.size) if has_fixed_rotation else loads.angle
-    # the rotation of a free piece is measured from zero, so that it keeps its digits
+    # The rotation of a free piece is measured from zero, so that it keeps its digits.
     gap = gap - angle[:, None] * x
     min_gap = gap.min(axis=1)
     normal = Intervals(pieces.normal, x)
@@ -416,7 +420,7 @@ def solve_on_pair(loads: PatchLoads, pair: Pair, coarse: Level | None = None) ->
         loads.load,
         None if has_fixed_rotation else loads.moment - loads.spring * angle,
         loads.spring,
-        coarse and _about(x, coarse),
+        coarse and _contact_node_range(x, coarse),
     )
     tangential.fill_sums(contacts.first)
     sigma = contacts.force / bare.interface.weight
@@ -448,10 +452,10 @@ def solve_on_pair(loads: PatchLoads, pair: Pair, coarse: Level | None = None) ->
     return Level(values, pressure, contacts, gap_range, x)
 
 
-def _about(x, coarse: Level) -> tuple:
-    """Return the nodes at x (m,) [m] between which contacts known on coarser cells lie.
+def _contact_node_range(x, coarse: Level) -> tuple:
+    """Return the node range at x (m,) [m] in which contacts known from coarser cells lie.
 
-    They are the first node (q,) and the node (q,) after the last one.
+    The range is the first node (q,) and the node (q,) after the last one.
     """
     known = coarse.contacts
     solved = coarse.is_solved

@@ -1,4 +1,4 @@
-"""Results that the runs of one process share: condensed pieces, pressed patches, measures.
+"""Cache of results that the runs of a process share: condensed pieces, patches, measures.
 
 In: a key of plain values, equal for equal patches of different models, and a function that
 computes the result. Out: the result, computed once. For example, all levels and frequencies of
@@ -8,21 +8,22 @@ a sweep use the same patch. A result is discarded after MAX_ENTRIES other result
 from collections.abc import Callable
 from dataclasses import replace
 
-# A patch with its measures and elements has about seven entries, and its meshes have four to nine.
+# Largest number of cached results. A patch with its measures and elements has about seven, its
+# meshes have four to nine.
 MAX_ENTRIES = 64
 
-_RESULTS: dict = {}  # ordered from the least to the most recently used
+_RESULTS: dict = {}  # The dict is ordered from the least to the most recently used result.
 
 
 def reuse(key: tuple, make: Callable):
-    """Return the result of a key; compute and keep it on the first call."""
+    """Return the cached result of a key, computing and storing it on the first call."""
     result = _RESULTS[key] if key in _RESULTS else make()
     keep(key, result)
     return result
 
 
 def reuse_in_sweep(patch_model, key: tuple, make: Callable):
-    """Return the result of a key, kept only if other cases of a sweep may need it (`may_be_shared`).
+    """Return the result of a key, cached only if other cases of a sweep may need it.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ def reuse_in_sweep(patch_model, key: tuple, make: Callable):
 
 
 def keep(key: tuple, result) -> None:
-    """Keep a result under a key as the most recently used one.
+    """Store a result under a key as the most recently used entry of the cache.
 
     Beyond MAX_ENTRIES, the least recently used result is discarded.
     """
@@ -47,12 +48,12 @@ def keep(key: tuple, result) -> None:
 
 
 def clear() -> None:
-    """Discard all results."""
+    """Discard all cached results."""
     _RESULTS.clear()
 
 
 def content_key(patch_model) -> tuple:
-    """Return a key that is equal for all `PatchModel`s with the same content."""
+    """Return a cache key that is equal for all `PatchModel`s with the same content."""
     gap = patch_model.gap
     mesh = patch_model.mesh
     interface = patch_model.interface
@@ -72,7 +73,7 @@ def content_key(patch_model) -> tuple:
 
 
 def may_be_shared(patch_model) -> bool:
-    """Return whether the results of a `PatchModel` may be reused by other cases of a sweep.
+    """Return whether results of a `PatchModel` may be reused by other cases of a sweep.
 
     This requires shared meshes, and neither a mesh nor a profile from a file.
     """

@@ -12,7 +12,7 @@ YIELDING_NEGLECTED = "the run is elastic and neglects yielding"
 
 
 class Strength(NamedTuple):
-    """Yield strength of a material.
+    """Yield strength of a material, with the source of the number.
 
     - material: its name; "material" without a name.
     - pressure: strength [Pa].
@@ -25,12 +25,12 @@ class Strength(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Strength with its source, as a clause."""
+        """Return the strength and its source as text."""
         return f"the yield strength is {self.pressure / 1e6:.4g} MPa ({self.source})"
 
 
 def yield_strength(material) -> Strength | None:
-    """Return the yield strength of a Material, from the scene or else from the table.
+    """Return the yield strength of a Material from the scene, else from the material table.
 
     None if neither has it.
     """
@@ -42,13 +42,13 @@ def yield_strength(material) -> Strength | None:
         material.name not in YIELD_STRENGTHS
         or (material.young, material.poisson) != MATERIALS[material.name][:2]
     ):
-        return None  # a known name with other elastic constants is a different material
+        return None  # A known name with other elastic constants is a different material.
     known = YIELD_STRENGTHS[material.name]
     return Strength(material.name, known.strength, known.source[:-1])
 
 
 def min_stress_ratio(poisson: float, plane: str) -> float:
-    """Compute the smallest von Mises stress per unit of normal stress at a frictionless face.
+    """Return the smallest von Mises stress per normal stress at a frictionless surface [1].
 
     The stress along the face is not known from the pressure alone; the value is the minimum over it. In plane strain
     sqrt(3)/2 (1 - 2 nu)/sqrt(1 - nu + nu^2), in plane stress sqrt(3)/2.
@@ -59,7 +59,7 @@ def min_stress_ratio(poisson: float, plane: str) -> float:
 
 
 def yielding_faces(patch_model, peak: float) -> dict:
-    """Return a note for each material of a face that yields under a pressure.
+    """Return notes on the surface materials that yield under a given pressure, by Strength.
 
     Parameters
     ----------

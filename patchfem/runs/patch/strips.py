@@ -1,4 +1,4 @@
-"""Patch in strips over its width, pressed by a holder that may roll.
+"""Contact of a patch in strips over its width, pressed by a holder that may roll.
 
 In: a `PatchModel` with strips and its condensed pieces. Out: the contact of all strips, and its
 extent and stiffness.
@@ -26,9 +26,9 @@ from .skin import MIN_RELATIVE_PRESSURE, cut_off_pressure, skin_law
 def press_strips_of_patch(
     patch_model, pieces: Compliance, gap, added=None, warm_start=None
 ) -> tuple:
-    """Solve the contact of a pair in strips.
+    """Solve the contact of two pieces that are divided in strips over their width.
 
-    Measures of stiffness are computed from the strips.
+    The stiffnesses are computed from the strips.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def press_strips_of_patch(
     return mean_state, skin if is_smooth else None, state
 
 
-def rotational_stiffness(state, c, x, weight) -> float:
+def rotational_stiffness(state, strip_compliance, x, weight) -> float:
     """Return the rotational stiffness [N m/rad] of strips with a smooth asperity layer.
 
     The approach is fixed.
@@ -82,7 +82,7 @@ def rotational_stiffness(state, c, x, weight) -> float:
     Parameters
     ----------
     state : StripsState
-    c : (m, m)
+    strip_compliance : (m, m)
         Compliance of one strip [m/N].
     x : (m,)
         Positions [m].
@@ -95,21 +95,21 @@ def rotational_stiffness(state, c, x, weight) -> float:
         active = stiff > 1e-12 * (state.stiffness.max() * weight.max())
         if active.any():
             out += stiffness.rotational_stiffness(
-                c + np.diag(1 / np.where(active, stiff, 1.0)), x, active
+                strip_compliance + np.diag(1 / np.where(active, stiff, 1.0)), x, active
             )
     return out
 
 
 def strip_edge_values(patch) -> EdgeValues:
-    """Return the extent of contact and the stiffnesses of a pressed patch in strips."""
+    """Return the contact length and the stiffnesses of a solved patch in strips."""
     weight = patch.pair.compliance.interface.weight / len(patch.strips.offsets)
     if isinstance(patch.skin, SmoothAsperities):
-        return _behind_skin(patch, weight)
-    return _between_nodes(patch, weight)
+        return _edge_values_with_skin(patch, weight)
+    return _edge_values_between_nodes(patch, weight)
 
 
-def _behind_skin(patch, weight) -> EdgeValues:
-    """Return the edge values of strips with a smooth asperity layer."""
+def _edge_values_with_skin(patch, weight) -> EdgeValues:
+    """Return contact length and stiffnesses of strips with a smooth asperity layer."""
     state = patch.strips
     x = patch.x
     count = len(state.offsets)
@@ -134,8 +134,8 @@ def _behind_skin(patch, weight) -> EdgeValues:
     )
 
 
-def _between_nodes(patch, weight) -> EdgeValues:
-    """Return the edge values of strips whose contact ends between nodes (`contact.edges`)."""
+def _edge_values_between_nodes(patch, weight) -> EdgeValues:
+    """Return contact length and stiffnesses of strips whose contact ends between nodes."""
     state = patch.strips
     x = patch.x
     count = len(state.offsets)

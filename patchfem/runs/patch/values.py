@@ -14,14 +14,14 @@ from . import strips
 from .edge_values import EdgeValues
 from .press import Patch
 
-# a parabola may have at most this many times the curvature of its neighbour on a smooth curve
+# Largest curvature of a parabola over that of its neighbour on a smooth pressure curve.
 MAX_CURVATURE_RATIO = 2.0
-# cells within the contact on a rounding with which its peak converges
+# Smallest number of contact cells on a rounding for which its pressure peak converges.
 MIN_ROUNDING_CELLS = 4
 
 
 def peak_pressures(x, sigma, node_fraction=None) -> np.ndarray:
-    """Return the largest pressures (q,) [Pa] of patches from their nodal pressures.
+    """Estimate the largest pressures (q,) [Pa] of q patches from their nodal pressures.
 
     Inside the interface it is the vertex of the parabola through the largest node and its
     neighbours. At an end of the interface the nodal forces of bare pieces are means over half a
@@ -38,19 +38,19 @@ def peak_pressures(x, sigma, node_fraction=None) -> np.ndarray:
         Weight [1] of the pressure of a node at an end: the fraction of the skin in its compliance.
         None for bare pieces.
     """
-    top = np.argmax(sigma, axis=1)
+    peak_node = np.argmax(sigma, axis=1)
     peaks = sigma.max(axis=1)
-    is_inner = (top > 0) & (top < x.size - 1)
-    peaks[is_inner] = _vertices(x, sigma[is_inner], top[is_inner])
+    is_inner = (peak_node > 0) & (peak_node < x.size - 1)
+    peaks[is_inner] = _parabola_vertices(x, sigma[is_inner], peak_node[is_inner])
     for border, step in ((0, 1), (x.size - 1, -1)):
-        rows = np.flatnonzero(top == border)
-        bare = _border_pressures(np.abs(x[::step] - x[border]), sigma[rows, ::step])
+        rows = np.flatnonzero(peak_node == border)
+        bare = _extrapolate_to_ends(np.abs(x[::step] - x[border]), sigma[rows, ::step])
         fraction = 0.0 if node_fraction is None else node_fraction[border]
         peaks[rows] = fraction * peaks[rows] + (1 - fraction) * bare
     return peaks
 
 
-def _vertices(x, sigma, top) -> np.ndarray:
+def _parabola_vertices(x, sigma, peak_node) -> np.ndarray:
     """Return the vertices (q,) [Pa] of parabolas through the largest nodal pressures.
 
     A parabola passes through the largest node and its neighbours, if the parabolas of the next
@@ -63,12 +63,12 @@ def _vertices(x, sigma, top) -> np.ndarray:
         Positions of the nodes [m].
     sigma : (q, m)
         Nodal pressures [Pa].
-    top : (q,)
+    peak_node : (q,)
         Inner nodes with the largest pressure.
     """
-    # at an end of the interface, the parabola itself replaces its missing neighbour
-    rows = np.arange(top.size)
-    nodes = np.clip(top[:, None] + [-1, 0, 1], 1, x.size - 2)
+    # At an end of the interface, the parabola itself replaces its missing neighbour.
+    rows = np.arange(peak_node.size)
+    nodes = np.clip(peak_node[:, None] + [-1, 0, 1], 1, x.size - 2)
     left = x[nodes] - x[nodes - 1]
     right = x[nodes + 1] - x[nodes]
     pressure = sigma[rows[:, None], nodes]
@@ -76,21 +76,23 @@ def _vertices(x, sigma, top) -> np.ndarray:
     slope_right = (sigma[rows[:, None], nodes + 1] - pressure) / right
     curvature = (slope_right - slope_left) / (left + right)
     slope = (slope_left * right + slope_right * left)[:, 1] / (left + right)[:, 1]
-    has_vertex = (sigma[rows, top - 1] > 0) & (sigma[rows, top + 1] > 0) & (curvature[:, 1] < 0)
+    has_vertex = (
+        (sigma[rows, peak_node - 1] > 0) & (sigma[rows, peak_node + 1] > 0) & (curvature[:, 1] < 0)
+    )
     middle = np.where(has_vertex, curvature[:, 1], -1.0)
     similar = np.minimum(curvature[:, 0] / middle, curvature[:, 2] / middle)
     fraction = np.clip(MAX_CURVATURE_RATIO * similar, 0.0, 1.0)
     rise = np.where(has_vertex, fraction * slope**2 / (-4 * middle), 0.0)
-    return sigma[rows, top] + rise
+    return sigma[rows, peak_node] + rise
 
 
-def _border_pressures(x, sigma) -> np.ndarray:
-    """Return the pressures (q,) [Pa] at the end of curves whose means are nodal pressures.
+def _extrapolate_to_ends(x, sigma) -> np.ndarray:
+    """Extrapolate nodal pressures, as cell averages, to the end of the interface (q,) [Pa].
 
-    The curve is a parabola through three loaded nodes, or a line through two.
+    The averaged curve is a parabola through three loaded nodes, or a line through two.
     """
     peaks = sigma[:, 0].copy()
-    # number of loaded nodes from the end of the interface to the first open one
+    # This is the number of loaded nodes from the end of the interface to the first open one.
     n_loaded = np.argmin(np.pad(sigma > 0, ((0, 0), (0, 1))), axis=1)
     n_used = np.minimum(n_loaded, min(3, x.size - 1))
     for count in (2, 3):
@@ -104,7 +106,7 @@ def _border_pressures(x, sigma) -> np.ndarray:
 
 
 def static_values(length: float, area: float, state, peak, edge_values: EdgeValues) -> dict:
-    """Return the values of the static measures by name, numbers or (q,) of q patches.
+    """Return the static contact measures by name, as numbers or (q,) for q patches.
 
     Parameters
     ----------
@@ -123,7 +125,7 @@ def static_values(length: float, area: float, state, peak, edge_values: EdgeValu
     is_loaded = np.greater(state.load, 0)
 
     def quotient(divisor, numerator):
-        """Return a quotient; 0 without a load."""
+        """Return numerator/divisor, with 0 for patches without a load."""
         zero = np.zeros(np.shape(peak))
         return np.divide(numerator, divisor, out=zero, where=is_loaded)[()]
 
@@ -144,7 +146,7 @@ def static_values(length: float, area: float, state, peak, edge_values: EdgeValu
 
 
 def values(patch: Patch) -> dict:
-    """Return the value of every static measure of a pressed patch by name, in SI units.
+    """Return the value of every static measure of a solved patch by name, in SI units.
 
     A node at the edge of a step represents half a cell on either side: the value is the weighted
     mean of the patches with and without contact of this node. `patch_rows` has the definitions.
@@ -158,7 +160,7 @@ def values(patch: Patch) -> dict:
 
 
 def _values(patch: Patch) -> dict:
-    """Return the values of a patch without a node at a step."""
+    """Return the static measures of a patch that has no node at a step of the gap."""
     state = patch.strips
     sigma = patch.pressure.sigma_n[None] if state is None else state.pressure
     edge_values = EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0)
@@ -184,7 +186,7 @@ def _values(patch: Patch) -> dict:
 
 
 def _edge_values(patch: Patch) -> EdgeValues:
-    """Return the quantities of a patch without strips that depend on where its contact ends."""
+    """Return contact length and stiffnesses of a patch without strips."""
     x = patch.x
     ends = contact_ends(patch)
     intervals = contact_intervals(patch, ends)
@@ -198,7 +200,7 @@ def _edge_values(patch: Patch) -> EdgeValues:
 
 
 def contact_intervals(patch: Patch, ends: list) -> np.ndarray:
-    """Return the parts of the interface in contact (k, 2) [m], by increasing x.
+    """Return the contact intervals (k, 2) [m] of the interface, by increasing x.
 
     ends: ends of the contact from `contact_ends`.
     """
@@ -207,7 +209,7 @@ def contact_intervals(patch: Patch, ends: list) -> np.ndarray:
 
 
 def contact_ends(patch: Patch) -> list:
-    """Return the ends of the contact between the nodes, as a list of `ContactEdge`.
+    """Return the contact ends between nodes as a list of `ContactEdge`.
 
     The list is empty for means over strips.
     """
@@ -228,7 +230,7 @@ def contact_ends(patch: Patch) -> list:
 
 
 def _shear_stiffness(patch: Patch, ends: list) -> float:
-    """Return the tangential stiffness dT/d(slide) [N/m] in stick.
+    """Return the tangential contact stiffness dT/dq [N/m] in full stick.
 
     Approach and rotation are fixed. For unlike pieces it contains the closing that shear causes.
     ends: ends of the contact.
@@ -238,7 +240,7 @@ def _shear_stiffness(patch: Patch, ends: list) -> float:
         return edges.set_stiffness(patch.pieces.tangential, active, np.ones(patch.x.size), ends)
 
     def coupled_stiffness(contact_set) -> float:
-        """Return the stiffness [N/m] of a contact set (m,)."""
+        """Return the tangential stiffness [N/m] for a contact set (m,) of nodes."""
         return stiffness.coupled_stiffness(patch.pieces, patch.pair.closing, contact_set)
 
     at_nodes = coupled_stiffness(active)
@@ -262,7 +264,9 @@ def edge_cells(x, active) -> np.ndarray:
 
 
 def unresolved_rounding(patch: Patch) -> float:
-    """Return the largest pressure [Pa] of rounded ends that the mesh does not resolve; else 0.
+    """Return the largest pressure [Pa] at rounded ends that the mesh does not resolve.
+
+    It is 0 if there is no such end.
 
     The cells where the contact ends carry the pressure of a sharp end, K = sigma_n sqrt(cell); a
     rounding smaller than these cells has the peak of `rounded_corner_contact`.
@@ -272,7 +276,7 @@ def unresolved_rounding(patch: Patch) -> float:
     sigma = patch.pressure.sigma_n
     rounded = _rounded_bodies(pair)
     loaded = np.flatnonzero(patch.active)
-    # a compliant layer of asperities (skin) bounds the pressure
+    # A compliant layer of asperities (skin) bounds the pressure.
     if not rounded or not loaded.size or patch.pieces is not pair.compliance:
         return 0.0
     flat = min(body.half_flat_length for body in rounded)
@@ -282,7 +286,7 @@ def unresolved_rounding(patch: Patch) -> float:
     largest = 0.0
     for node in (loaded[0], loaded[-1]):
         cell = np.diff(x)[max(node - 1, 0) : node + 1].max()
-        if abs(abs(x[node]) - flat) > 2 * cell:  # the contact does not end at the rounding
+        if abs(abs(x[node]) - flat) > 2 * cell:  # The contact does not end at the rounding.
             continue
         sharp_end = sigma[max(node - 2, 0) : node + 3].max() * np.sqrt(cell)
         reach, peak = contact.rounded_corner_contact(sharp_end, radius, modulus)
@@ -292,7 +296,7 @@ def unresolved_rounding(patch: Patch) -> float:
 
 
 def open_ends(patch: Patch) -> float:
-    """Return the length [m] of rounded face, both ends together, in which the contact may end.
+    """Return the total length [m] of rounded surface at which the contact may end.
 
     It counts an end whose last node is in contact.
     """
@@ -304,7 +308,7 @@ def open_ends(patch: Patch) -> float:
 
 
 def reaches_steep_end(patch: Patch) -> bool:
-    """Return whether the contact continues where a rounded end is too steep for the model.
+    """Return whether the contact reaches a rounded end that is too steep for the model.
 
     A single loaded node whose cell is longer than the whole rounding does not count.
     """

@@ -1,4 +1,4 @@
-"""Checks of a run by itself: two computations of one number, the second from the scene.
+"""Self-checks of a run: a result compared with a second computation from the scene.
 
 A wrong factor in the chain from the mesh to the summary leaves the energy balance closed,
 because both of its sides use the same wrong number. Each check recomputes a number from the

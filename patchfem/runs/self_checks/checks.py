@@ -1,4 +1,4 @@
-"""Table of all checks, and the result of a run whose checks failed.
+"""Table of all self-checks, and the result of a run whose checks failed.
 
 In: a Result. Out: its failed Findings, and the Result as `not_converged` if there are any.
 """
@@ -27,13 +27,15 @@ CHECKS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (
 
 
 def failed_findings(result: Result) -> list:
-    """Return all Findings of a Result that exceed their thresholds."""
+    """Return all findings of a Result whose difference exceeds the threshold."""
     run = Evidence(result)
     return [finding for check in CHECKS for finding in check(run) if finding.has_failed]
 
 
 def with_self_checks(result: Result) -> Result:
-    """Return the result, as `not_converged` with a sentence for each of CHECKS that failed.
+    """Return the result, marked as `not_converged` if any of its self-checks fails.
+
+    Every failed check of CHECKS adds a sentence.
 
     A model that was changed after it was built from its scene is not compared with the scene.
     """

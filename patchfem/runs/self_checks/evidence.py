@@ -14,11 +14,11 @@ from ..results.result import Result
 from ..rig import engines
 from .finding import CUBIC_QUADRATURE
 
-MIN_CYCLE_SAMPLES = 40  # samples per cycle; a window with fewer is not used
+MIN_CYCLE_SAMPLES = 40  # Smallest number of samples per cycle of a window that the checks use.
 
 
 class Evidence:
-    """Result, and its scene as a table of numbers in SI units."""
+    """Result of a run together with its scene as a table of numbers in SI units."""
 
     def __init__(self, result: Result):
         self.result = result
@@ -26,7 +26,7 @@ class Evidence:
         self.scene = tomllib.loads(self.model.source.resolved)
 
     def number(self, *keys) -> float | None:
-        """Return the value of a key of the scene in SI units; None if the scene does not have it."""
+        """Return the value of a scene key in SI units; None if the scene does not have it."""
         value = self.scene
         for key in keys:
             if not isinstance(value, dict) or key not in value:
@@ -56,12 +56,12 @@ class Evidence:
 
     @cached_property
     def load(self) -> float | None:
-        """Normal load [N] of the scene; None if it gives an approach instead."""
+        """Normal load [N] of the scene; None if the scene gives an approach instead."""
         return self.number("normal", "load") or self.number("contact", "load")
 
     @cached_property
     def has_plain_friction(self) -> bool:
-        """Whether a single interface slides under a constant load with constant coefficients."""
+        """Whether a single interface slides under constant load with constant coefficients."""
         friction = self.scene.get("friction")
         model = self.model
         if (
@@ -83,9 +83,9 @@ class Evidence:
 
     @cached_property
     def modes(self) -> "SceneModes | None":
-        """Modes of [[structure.mode]]; None if the engine moves others.
+        """Modes of [[structure.mode]]; None if the engine uses other modes.
 
-        Reduction, or a bonded spring, replaces them.
+        Reduction, or a bonded spring, replaces the modes of the scene.
         """
         structure = self.scene.get("structure", {})
         if (
@@ -111,9 +111,9 @@ class Evidence:
 
     @cached_property
     def window(self):
-        """Last cycles of a run under a sine, as a Response or LastCycle; else None.
+        """Last cycles of a run under sinusoidal drive, as a Response or LastCycle; else None.
 
-        None also for too few samples.
+        It is also None for too few samples.
         """
         window = self.result.window
         frequency = self.frequency
@@ -131,7 +131,7 @@ class Evidence:
 
     @cached_property
     def frequency(self) -> float | None:
-        """Frequency [Hz] of a drive or a slide that is a sine to the end; None for any other."""
+        """Frequency [Hz] of a drive or displacement that stays sinusoidal to the end; else None."""
         drive = self.scene.get("drive")
         slide = self.scene.get("slide", {})
         if drive is None:
@@ -141,7 +141,10 @@ class Evidence:
 
     @cached_property
     def balance(self) -> "ForceBalance | None":
-        """Friction by the equation of motion and by its samples; None if other forces act as well."""
+        """Friction force from the equation of motion and from its samples, as first harmonics.
+
+        It is None if other forces act as well.
+        """
         rig = self.model.rig
         modes = self.modes
         window = self.window
@@ -160,7 +163,7 @@ class Evidence:
             return None
         size = self.number("drive", "acceleration")
         force = self.number("drive", "force")
-        # the drive has another kind, for example a displacement of the base
+        # The drive has another kind, for example a displacement of the base.
         if size is None and force is None:
             return None
         drive = force / modes.mass if size is None else size
@@ -168,7 +171,7 @@ class Evidence:
 
 
 class LastCycle(NamedTuple):
-    """Time [s], slide [m] and friction force [N] of the last cycle of a bench, (k,) each."""
+    """Time [s], displacement [m] and friction force [N] (k,) of the last cycle of a bench."""
 
     time: np.ndarray
     slide: np.ndarray
@@ -176,7 +179,7 @@ class LastCycle(NamedTuple):
 
 
 class SceneModes(NamedTuple):
-    """Modes as in the scene.
+    """Natural frequencies, damping and participations of the modes in the scene.
 
     omega [rad/s], zeta, slide, base and output [1], (n,) each, and the mass [kg].
     """
@@ -190,7 +193,7 @@ class SceneModes(NamedTuple):
 
 
 class ForceBalance(NamedTuple):
-    """First harmonics of the friction force by two methods, and of the slide.
+    """First harmonics of displacement and friction force, the force computed in two ways.
 
     - from_motion: harmonic of the force by the equation of motion [N].
     - from_samples: harmonic of the force by its samples [N].
@@ -207,12 +210,12 @@ class ForceBalance(NamedTuple):
 
     @property
     def threshold(self) -> float:
-        """Largest difference [N] of the two first harmonics in a correct run."""
+        """Largest difference [N] of the two force harmonics in a correct run."""
         return self.sampling + CUBIC_QUADRATURE * self.terms
 
 
 def quantity(value) -> float | None:
-    """Return the number of a value in a resolved scene, such as 0.3 or "700.0 N", else None."""
+    """Return the number of a scene value such as 0.3 or "700.0 N"; None for other values."""
     if isinstance(value, str):
         head = value.split()[0] if value else ""
         try:
@@ -223,7 +226,9 @@ def quantity(value) -> float | None:
 
 
 def cubic_harmonic(time, value, rate, omega: float) -> complex:
-    """Compute 2/T int y exp(-i omega t) dt of cubics through samples (k,), by Simpson's rule.
+    """Compute the Fourier coefficient 2/T int y exp(-i omega t) dt of sampled y.
+
+    The samples (k,) are joined by cubics and integrated by Simpson's rule.
 
     Parameters
     ----------
@@ -242,7 +247,7 @@ def cubic_harmonic(time, value, rate, omega: float) -> complex:
 
 
 def energy_balance(modes: SceneModes, window, acceleration: float, omega: float) -> ForceBalance:
-    """Compute the first harmonic of the friction force by two methods.
+    """Compute the first harmonic of the friction force from the motion and from its samples.
 
     The equation of motion times exp(-i omega t) is integrated by parts over the window: the
     harmonic of z'' is [v e + i omega z e] 2/T - omega^2 z1, that of v is [z e] 2/T + i omega z1.

@@ -1,4 +1,4 @@
-"""Checks of a motion: friction force, loop, amplitudes, energies.
+"""Self-checks of a motion: friction force, loop area, amplitudes and energy balance.
 
 In: `Evidence`. Out: Findings.
 """
@@ -20,18 +20,18 @@ from .finding import (
     Finding,
 )
 
-# relative; error of a peak between two of 40 samples per cycle of the fastest motion
+# Relative error of a peak between two of 40 samples per cycle of the fastest motion.
 SAMPLED_PEAK = 0.05
 LIMITED_LAWS = ("coulomb", "tanh", "elastic-plastic", "iwan", "bouc-wen", "convolution")
-# relative; error of the equivalent damping of a window whose cycles differ slightly
+# Relative error of the equivalent damping of a window whose cycles differ slightly.
 MAX_SLIP_CORRECTION = 0.05
 
 
 def check_friction_harmonic(run: Evidence) -> Iterator[Finding]:
-    """Compare the first harmonic of the friction force by two methods.
+    """Compare the first harmonic of the friction force from the motion and from samples.
 
-    They are the equation of motion and the samples; see `energy_balance` for both and for the
-    threshold. `equivalent_stiffness` is Re(F1/q1) by definition.
+    See `energy_balance` for both computations and for the threshold. `equivalent_stiffness` is
+    Re(F1/q1) by definition.
     """
     balance = run.balance
     if balance is None:
@@ -49,7 +49,7 @@ def check_friction_harmonic(run: Evidence) -> Iterator[Finding]:
     stiffness = run.value("equivalent_stiffness")
     if stiffness is not None and abs(balance.slide) > 0:
         expected = (balance.from_samples / balance.slide).real
-        # the slide is a divisor, so that the error of its quadrature counts in proportion
+        # The displacement is a divisor, so that the error of its quadrature counts in proportion.
         slack = (balance.threshold + CUBIC_QUADRATURE * size) / abs(balance.slide)
         yield Finding(
             "equivalent_stiffness",
@@ -61,7 +61,7 @@ def check_friction_harmonic(run: Evidence) -> Iterator[Finding]:
 
 
 def check_friction_limit(run: Evidence) -> Iterator[Finding]:
-    """Compare `friction_force_peak` with static × load, the limit of the friction force.
+    """Compare the peak friction force with the friction limit, static x load.
 
     Laws that exceed it (lugre, growing bonds) are left out. A Coulomb contact of rigid pieces that
     slips carries at least kinetic × load; an elastic-plastic one that slides 4 bond lengths in a
@@ -71,7 +71,7 @@ def check_friction_limit(run: Evidence) -> Iterator[Finding]:
     if (
         peak is None
         or run.result.outcome
-        is Outcome.GROWS  # the motion is unbounded, so that the error of the peak is not known
+        is Outcome.GROWS  # The motion is unbounded, so that the error of the peak is not known.
         or not run.has_plain_friction
         or run.scene["friction"]["law"] not in LIMITED_LAWS
     ):
@@ -107,11 +107,12 @@ def check_friction_limit(run: Evidence) -> Iterator[Finding]:
 
 
 def check_loop_area(run: Evidence) -> Iterator[Finding]:
-    """Compare `loop_area` with the trapezoidal rule over slide and force, and with the damping.
+    """Compare the loop area with a trapezoidal sum of force over displacement.
 
-    Between two samples force and slide are assumed to be monotonic, so that the error of a step is
-    at most |change of F| |change of q|/2; twice as much is allowed. `equivalent_damping` is
-    loop_area/(2 pi K A^2) with K and A of the first mode of the scene.
+    The equivalent damping is compared as well. Between two samples force and displacement are
+    assumed to be monotonic, so that the error of a step is at most |change of F| |change of q|/2;
+    twice as much is allowed. `equivalent_damping` is loop_area/(2 pi K A^2) with K and A of the
+    first mode of the scene.
     """
     window = run.window
     area = run.value("loop_area")
@@ -159,7 +160,7 @@ def check_loop_area(run: Evidence) -> Iterator[Finding]:
 
 
 def check_motion_measures(run: Evidence) -> Iterator[Finding]:
-    """Compare amplitude and acceleration with those from modal coordinates and participations.
+    """Compare displacement amplitude and acceleration with those from modal coordinates.
 
     Half the range of sum output_i z_i over the samples is at most the amplitude, and at most a few
     percent less; the same holds for the largest absolute acceleration. The acceleration of a sample
@@ -225,7 +226,7 @@ def check_motion_measures(run: Evidence) -> Iterator[Finding]:
 
 
 def check_energy_balance(run: Evidence) -> Iterator[Finding]:
-    """Compare the energy balance of a bench with zero.
+    """Compare the residual of the energy balance of a bench with zero.
 
     Work = change of the stored energy + dissipated - created. A bench integrates each of them by
     the same rule, so that the error falls with the steps; a hundredth of the exchanged energy is

@@ -1,4 +1,4 @@
-"""Checks of a pressed patch: area, load, stiffness, pressure.
+"""Self-checks of a pressed patch: area, load, stiffness and pressure.
 
 In: `Evidence`. Out: Findings.
 """
@@ -12,7 +12,7 @@ from .finding import AT_LEAST, AT_MOST, CONTACT_RESIDUAL, READING, ROUND_OFF, ST
 
 
 def check_interface_area(run: Evidence) -> Iterator[Finding]:
-    """Compare the sum of the nodal areas with length × width × pairs.
+    """Compare the sum of the nodal areas with length x width x number of pairs.
 
     The nodal areas integrate a constant exactly, so that both differ by round-off; coordinates of a
     mesh file have about seven digits.
@@ -25,7 +25,7 @@ def check_interface_area(run: Evidence) -> Iterator[Finding]:
 
 
 def check_normal_load(run: Evidence) -> Iterator[Finding]:
-    """Compare the integral of the pressure, and the measure `normal_load`, with the load.
+    """Compare the integral of the pressure and the measure `normal_load` with the load.
 
     This is the equilibrium of the upper piece, which the contact solver satisfies to its residual.
     """
@@ -126,7 +126,7 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
 
 
 def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
-    """Compare the measures of the pressure with the nodal pressures and the mean pressure.
+    """Compare the pressure measures with the nodal pressures and the mean pressure.
 
     By definition loaded_fraction × pressure_peak is the mean, load/(length × width); the moment is
     the sum of force × x; each edge of the contact lies within one cell of its last node. Measures

@@ -1,4 +1,4 @@
-"""Check of the modes that an engine moves.
+"""Self-check of the modes that an engine uses.
 
 In: `Evidence`. Out: Findings on modes, or on masses and springs, of the scene.
 """
@@ -12,7 +12,7 @@ from .finding import ROUND_OFF, Finding
 
 
 def check_modes(run: Evidence) -> Iterator[Finding]:
-    """Compare the modes that the engine moves with those of the scene.
+    """Compare the modes that an engine uses with those of the scene.
 
     [[structure.mode]]: frequency, damping ratio and participations of each. Masses and springs: the
     sum of omega^2 is the trace of M^-1 K, the sum of spring stiffness/mass over the masses that a

@@ -1,4 +1,4 @@
-"""Patch over many cycles of wear: contact, motion and worn depth advance in jumps.
+"""Wear of a patch over many cycles: contact, motion and worn depth advance in jumps.
 
 In: a model with [wear], its pressed patch and the same on coarser meshes. Out: `Evolved`. The
 state is saved after every jump, and an interrupted run that continues from it gives the same
@@ -22,24 +22,25 @@ from ...disk.atomic_write import write_atomically
 from ...effects import describe_unsupported
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, replay_jumps, start_wear, take_jump
-from ..patch.measures import other_strips
+from ..patch.measures import with_other_strip_count
 from ..patch.press import areas, make_force_function, press_patch
 from ..patch.values import values
 from ..rig import numerics
 from .slip import CycleSlip, frames_for, slip_of_cycle, slips_uniformly, strips_slide_independently
 
-STATE_FIELDS = tuple(WearState.__slots__)  # fields of the state in a saved file
-MOMENT_FIELDS = ("cycle", "depth", "used", "pressure", "gap", "miss")  # arrays of a saved moment
-# fraction of the thickness of a coating that may remain where it counts as worn through
+STATE_FIELDS = tuple(WearState.__slots__)  # Fields of the wear state in a saved file.
+MOMENT_FIELDS = ("cycle", "depth", "used", "pressure", "gap", "miss")  # Arrays of a saved Moment.
+# Fraction of the thickness of a coating that may remain where it counts as worn through.
 THIN_FRACTION = 1e-6
-MAX_SEARCH_JUMPS = 60  # most jumps of the search for the cycle at which a coating is worn through
-# of the distance of two rows of the table of friction; a nearer row is passed
+# Largest number of jumps of the search for the cycle at which a coating is worn through.
+MAX_SEARCH_JUMPS = 60
+# Distance to the next row of the friction table over the row distance; a nearer row is passed.
 MIN_ROW_DISTANCE = 0.1
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Moment:
-    """Interface after a number of cycles.
+    """State of the worn interface after a number of cycles.
 
     - cycle: number of cycles.
     - depth: worn depth (m,), of strips (s, m) [m].
@@ -61,14 +62,14 @@ class Moment:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Evolved:
-    """Worn patch with those on coarser meshes, and the history of the wear.
+    """Worn patch on its mesh and on coarser ones, with the history of its wear.
 
     - patch, coarse: worn patch, and those on coarser meshes (None for a missing one).
     - state: at the end; None if nothing was worn.
     - moments: after every jump; the first one is before any wear.
     - depths: worn depths (k,), of strips (s, k) [m], on the nodes of each coarser mesh.
     - stripped: (patch, depth (t, m) [m]) in another number of strips, by the same jumps
-      (`measures.other_strips`); None without strips.
+      (`measures.with_other_strip_count`); None without strips.
     - frame_error: relative error of the slip path due to the number of frames.
     - seconds: CPU seconds.
     - stopped: reason of an early end, else "".
@@ -86,11 +87,11 @@ class Evolved:
 
 
 class _Unbounded(Exception):
-    """The motion has no periodic cycle."""
+    """Exception for a motion without a periodic cycle."""
 
 
 class _Motion:
-    """Slip path of a model on its worn patch.
+    """Function that computes the slip path per cycle of a model on its worn patch.
 
     A motion that does not depend on wear is computed once, on the unworn patch, so that a run that
     continues from a saved state gives the same bits.
@@ -109,7 +110,7 @@ class _Motion:
         self.last: CycleSlip | None = None
 
     def __call__(self, worn) -> np.ndarray:
-        """Return the slip path (m,), of strips (s, m) [m], per cycle at a worn depth [m]."""
+        """Return the slip path [m] per cycle, (m,) or (s, m) for strips, at a worn depth [m]."""
         if self.last is None or not self.same:
             worn = np.zeros_like(worn) if self.same else worn
             patch = press_patch(self.model.patch, self.pair, worn)
@@ -121,7 +122,10 @@ class _Motion:
 
 
 def mean_depth(patch, depth) -> float:
-    """Return the worn volume over the area of the patch [m]; depth: (m,), of strips (s, m) [m]."""
+    """Return the mean worn depth [m] of a patch: worn volume over area.
+
+    depth: (m,), of strips (s, m) [m].
+    """
     area = patch.pieces.interface.weight
     return float(np.atleast_2d(depth).mean(axis=0) @ area / area.sum())
 
@@ -154,7 +158,7 @@ def worn_model(model, patch, depth):
 
 
 def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep=None) -> Evolved:
-    """Wear the patch of a model with [wear] over all its cycles.
+    """Compute the wear of a patch over all cycles of a model with [wear].
 
     Parameters
     ----------
@@ -168,7 +172,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
     begin : tuple, optional
         (state, moments) of an interrupted run.
     keep : callable, optional
-        Called with state and moments after every jump.
+        Called with state and moments after every jump to store them.
 
     Returns
     -------
@@ -225,7 +229,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
     replayed = [
         _replay(model.patch, model, patch, mesh, moments) for mesh in coarse if mesh is not None
     ]
-    strips_model, _ = other_strips(model.patch)
+    strips_model, _ = with_other_strip_count(model.patch)
     stripped = None
     if replayed and strips_model is not model.patch:
         stripped = _replay(strips_model, model, patch, patch, moments)
@@ -243,7 +247,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
 
 
 class WornCoating(NamedTuple):
-    """Coating of a piece.
+    """Coating of a piece with its worn fraction.
 
     - fraction: worn fraction at the deepest point.
     - piece: "upper" or "lower".
@@ -256,7 +260,7 @@ class WornCoating(NamedTuple):
 
 
 def worn_through(model, depth) -> WornCoating | None:
-    """Return the coating that is worn through, else None.
+    """Return the coating that is worn through at a worn depth; None if there is none.
 
     depth: depth worn off both pieces, (m,) or (s, m) [m].
     """
@@ -265,7 +269,10 @@ def worn_through(model, depth) -> WornCoating | None:
 
 
 def _most_worn_coating(model, depth) -> WornCoating:
-    """Return the coating of which the largest fraction is worn; of fraction 0 without coatings."""
+    """Return the coating of which the largest fraction is worn.
+
+    Its fraction is 0 without coatings.
+    """
     max_depth = float(depth.max(initial=0.0))
     upper_share = model.wear.upper_share
     pieces = model.patch.pieces
@@ -281,7 +288,7 @@ def _most_worn_coating(model, depth) -> WornCoating:
 
 
 def _jump(model, problem: WearProblem, state: WearState) -> WearState:
-    """Return the state after the next jump, or where a coating is worn through.
+    """Compute the wear state after the next jump, or when a coating is worn through.
 
     The latter is found by the Illinois variant of regula falsi.
     """
@@ -291,7 +298,7 @@ def _jump(model, problem: WearProblem, state: WearState) -> WearState:
         return _most_worn_coating(model, state.depth).fraction - 1
 
     def jump_to(cycle: float) -> WearState:
-        """Return the state after a jump up to a cycle, or less far."""
+        """Compute the wear state after a jump that ends at a given cycle or earlier."""
         return take_jump(problem, state, model.accuracy.tolerance, model.wear.jumps, until=cycle)
 
     if model.patch.interface.strips is not None:
@@ -324,11 +331,10 @@ def _jump(model, problem: WearProblem, state: WearState) -> WearState:
 
 
 def next_row(wear, problem: WearProblem, state: WearState) -> float:
-    """Return the cycle up to which an automatic jump may go, to use each row of friction.
+    """Return the largest end cycle of a jump that passes no row of the friction table.
 
-    It is the cycle at which the current wear rate reaches the next row of the table, or the row
-    after it if the next one is nearer than a tenth of their distance. A jump past a row would miss
-    its values.
+    At this cycle the current wear rate reaches the next row of the table, or the row after it if
+    the next one is nearer than a tenth of their distance. A jump past a row would miss its values.
 
     Parameters
     ----------
@@ -358,9 +364,9 @@ def next_row(wear, problem: WearProblem, state: WearState) -> float:
 
 
 def _with_earlier_wear(model, patch):
-    """Return the patch with the depth that was worn before the first cycle.
+    """Return the patch with the depth that earlier runs have worn off.
 
-    It is unchanged if there is none.
+    It is unchanged if there is no earlier wear.
 
     Raises
     ------
@@ -383,13 +389,16 @@ def _with_earlier_wear(model, patch):
 
 
 def _start_state(model, patch, problem: WearProblem, motion: _Motion) -> tuple:
-    """Return (state, moments) before any wear except that of `_with_earlier_wear`."""
+    """Return the initial wear state and the initial history of a patch.
+
+    It includes earlier wear only.
+    """
     state = start_wear(problem, model.wear.compute_earlier_depth(patch.x, problem.area))
     return state, (_record_moment(patch, state, motion),)
 
 
 def _record_moment(patch, state: WearState, motion: _Motion) -> Moment:
-    """Return the Moment of a worn patch."""
+    """Return the contact, slip path and measures of a worn patch as a Moment."""
     model = motion.model
     area = areas(model.patch, patch.pieces.interface)
     worn = worn_model(model, patch, state.depth)
@@ -414,9 +423,10 @@ def _record_moment(patch, state: WearState, motion: _Motion) -> Moment:
 
 
 def _replay(patch_model, model, patch, other, moments) -> tuple:
-    """Wear another mesh, or the same in other strips, by the same jumps and slip paths.
+    """Compute the wear of a patch on another mesh with the jumps and slip paths of a given run.
 
-    Return its worn patch and its worn depth [m].
+    The other patch may also have another number of strips. Return its worn patch and its worn depth
+    [m].
 
     Parameters
     ----------
@@ -430,7 +440,7 @@ def _replay(patch_model, model, patch, other, moments) -> tuple:
     area = areas(patch_model, other.pieces.interface)
 
     def interpolate(path) -> np.ndarray:
-        """Return a slip path on the nodes and strips of the other patch."""
+        """Interpolate a slip path to the nodes and strips of the other patch."""
         if patch_model.interface.strips is None:
             return np.interp(other.x, patch.x, path)
         rows = np.array([np.interp(other.x, patch.x, row) for row in path])
@@ -453,12 +463,12 @@ def _replay(patch_model, model, patch, other, moments) -> tuple:
 
 
 def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved:
-    """Wear the patch of a model as `evolve` does, and save the state after every jump.
+    """Compute the wear of a patch and save its state after every jump.
 
     Parameters
     ----------
     kept
-        Where the state is saved; None: nowhere.
+        Storage of the state; None: the state is not saved.
     key : str
         Identifies what the state belongs to.
     model, patch, coarse, progress
@@ -471,7 +481,7 @@ def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved
 
 
 def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
-    """Save a state and the moments so far; an earlier file is replaced atomically.
+    """Save a wear state and its history; an earlier file is replaced atomically.
 
     Parameters
     ----------
@@ -492,7 +502,10 @@ def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
 
 
 def nothing_kept(path: Path) -> PatchfemError:
-    """Return the error that there is no saved state; path: of the state, in the folder of a run."""
+    """Return the error that a run folder has no saved wear state.
+
+    path: file of the state.
+    """
     return PatchfemError(
         f"{path.parent.name.removesuffix('.partial')}: this folder contains no interrupted run; run "
         "without --resume"
@@ -500,7 +513,7 @@ def nothing_kept(path: Path) -> PatchfemError:
 
 
 def load_state(path: Path, key: str) -> tuple:
-    """Return (state, moments) from a saved file.
+    """Load a wear state and its history from a saved file.
 
     Raises
     ------
@@ -529,7 +542,7 @@ def load_state(path: Path, key: str) -> tuple:
         raise nothing_kept(path) from None
     except PatchfemError:
         raise
-    except Exception as error:  # a damaged archive can fail in many ways
+    except Exception as error:  # A damaged archive can fail in many ways.
         raise PatchfemError(
             f"{path.parent.name}: the state saved there cannot be read ({error}); run without "
             "--resume"

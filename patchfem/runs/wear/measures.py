@@ -1,4 +1,4 @@
-"""Measures of wear with their errors, and the history of wear as arrays over the cycles.
+"""Measures of wear with their errors, and the history of wear over the cycles.
 
 In: the Result of a run on the worn patch, and its `Evolved`. Out: the Result with the measures,
 fields, warnings and notes of wear.
@@ -12,25 +12,25 @@ import numpy as np
 from ...core import Measure, Outcome, frozen_array
 from ...formatting import format_length, format_number
 from ...response.errors import convergence_errors, error_of_change
-from ..patch.measures import other_strips
+from ..patch.measures import with_other_strip_count
 from ..patch.press import areas, press_patch
 from ..patch.values import values
 from ..results.patch_rows import TABLE, WORN_SOURCE
 from .evolve import THIN_FRACTION, mean_depth, worn_through
 from .slip import UNBOUNDED_OUTCOMES, slip_path_of_point
 
-N_FRAMES = 24  # frames of the interface during the wear
-EDGE_PEAK = "pressure_peak_at_edge"  # name of the peak at an edge of the contact in the history
-N_EDGE_NODES = 2  # nodes next to an edge of the contact that count as the edge
-# worn depth over the thickness of a coating, or the height of a piece, above which the stiffness of
-# the unworn piece is not valid
+N_FRAMES = 24  # Number of frames of the interface during the wear.
+EDGE_PEAK = "pressure_peak_at_edge"  # Name of the pressure peak at a contact edge in the history.
+N_EDGE_NODES = 2  # Number of nodes next to a contact edge that count as the edge.
+# Worn depth over the thickness of a coating, or over the height of a piece, above which the
+# stiffness of the unworn piece is not valid.
 MAX_WORN_FRACTION = 0.2
-ROUND_OFF = 1e-12  # relative error of a worn volume or depth due to round-off
+ROUND_OFF = 1e-12  # Relative error of a worn volume or depth due to round-off.
 HOLDER = {"closing": "approach", "rotation": "rotation"}
 
 
 def add_wear_measures(result, evolved, estimate: bool = True):
-    """Return the Result of a run on the worn patch with the measures of wear.
+    """Return the Result of a run on the worn patch, extended by the measures of wear.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
 
 
 def _make_measure(name: str, value: float, error: float | None, engine: str = "") -> Measure:
-    """Return a measure of wear.
+    """Return a measure of wear with its unit from the table of measures.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def _make_measure(name: str, value: float, error: float | None, engine: str = ""
 
 
 def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
-    """Return worn_through_cycle by name if a coating is worn through.
+    """Return the cycle at which a coating is worn through as a measure, if there is any.
 
     error: of the largest depth [m].
     """
@@ -102,12 +102,12 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
 
 
 def _note_on_start(model) -> list:
-    """Return a note on the earlier run from which this one continues."""
+    """Return a note on the earlier run whose worn state is the initial state."""
     return [] if model.wear.start is None else [model.wear.start.sentence]
 
 
 def _note_on_coating(model, evolved) -> list:
-    """Return a note on the coating that is worn through."""
+    """Return a note on the coating that is worn through, and in which cycle."""
     depth = evolved.state.depth
     coating = worn_through(model, depth)
     strip, node = divmod(int(np.argmax(depth)), evolved.patch.x.size)
@@ -124,11 +124,11 @@ def _note_on_coating(model, evolved) -> list:
 
 
 def _widen_by_jumps(result, evolved):
-    """Return the Result of the worn patch with errors that include those due to the jumps.
+    """Return the Result with errors that include those due to the jumps over cycles.
 
-    They follow, at first order, from the change if the depth is computed by the same jumps without
-    subdivision, and from the change to another number of strips: an edge of contact that moves
-    during a jump leaves nodes that just came into contact too high.
+    They follow at first order from the change if the same jumps are computed without subdivision,
+    and from the change to another number of strips: an edge of contact that moves during a jump
+    leaves nodes too high that just came into contact.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def _widen_by_jumps(result, evolved):
     coarse = values(press_patch(patch_model, evolved.patch.pair, coarse_depth))
     fine = values(evolved.patch)
     other = values(evolved.stripped[0]) if evolved.stripped else fine
-    ratio = other_strips(patch_model)[1]
+    ratio = with_other_strip_count(patch_model)[1]
     measures = dict(result.measures)
     for name, value in fine.items():
         measure = measures.get(name)
@@ -152,9 +152,10 @@ def _widen_by_jumps(result, evolved):
 
 
 def find_period(model, result) -> float:
-    """Return the duration of one cycle of wear [s].
+    """Return the duration [s] of a wear cycle.
 
-    It is the period of the drive or of the slide, or the duration of a path that does not repeat.
+    It is the period of the drive or of the prescribed displacement, or the duration of a path that
+    does not repeat.
     """
     if model.rig is not None:
         return model.rig.drive.signal.period
@@ -181,9 +182,9 @@ def _warn_of_depth(model, evolved) -> list:
 
 
 def _slip_error(measures: dict) -> float:
-    """Return the relative error of the slip of a run.
+    """Return the relative error of the slip amplitude of a run.
 
-    It is that of the slip amplitude, or else of the displacement.
+    It is that of the measured slip amplitude, or else of the displacement.
     """
     for name in ("slip_amplitude", "relative_displacement_amplitude"):
         measure = measures.get(name)
@@ -212,7 +213,7 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
         _measure_depths(model.patch, patch, depth)
         for patch, depth in zip(evolved.coarse, evolved.depths)
     ]
-    other_model, ratio = other_strips(model.patch)
+    other_model, ratio = with_other_strip_count(model.patch)
     strips = fine
     if evolved.stripped:
         strips = _measure_depths(other_model, *evolved.stripped)
@@ -249,7 +250,7 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
 
 
 def _measure_worn_friction(model, evolved, motion: dict, error: float | None) -> dict:
-    """Return the parameters of the friction law after wear, and measures with wider errors.
+    """Return the friction parameters after wear, and measures with errors due to the worn depth.
 
     The error of the mean depth changes the measures of the motion, at the rate of the last two
     jumps.
@@ -323,7 +324,7 @@ def _warn_of_table(model, evolved) -> list:
 
 
 def _measure_depths(patch_model, patch, depth) -> dict:
-    """Return worn volume [m3] and largest depth [m] of a `PatchModel` by name."""
+    """Return worn volume [m3] and largest worn depth [m] of a patch by name."""
     return {
         "worn_volume": float(np.vdot(depth, areas(patch_model, patch.pieces.interface))),
         "worn_depth_max": float(depth.max(initial=0.0)),
@@ -331,7 +332,7 @@ def _measure_depths(patch_model, patch, depth) -> dict:
 
 
 def _change_of_slip(evolved, motion: dict) -> float:
-    """Return the relative difference of the slip in the last cycle of wear from that of the run.
+    """Return the relative difference of the slip in the last wear cycle from the final run.
 
     The run on the worn patch may have used smaller steps for its tolerance.
     """
@@ -343,7 +344,7 @@ def _change_of_slip(evolved, motion: dict) -> float:
 
 
 def _measure_volume_of_point(model, result, *, estimate: bool = True) -> dict:
-    """Return worn_volume of a single point under [normal] by name.
+    """Return the worn volume of a single point under [normal] by name.
 
     It is coefficient times load times slip path, over all cycles of wear.
 
@@ -364,7 +365,7 @@ def _measure_volume_of_point(model, result, *, estimate: bool = True) -> dict:
 
 
 def _add_frames(result, evolved):
-    """Return the Result with the fields (frame, x) of the wear before those of the last cycle.
+    """Return the Result with the fields of the wear history before those of the last cycle.
 
     The states after some of the jumps come first, then the motion. The time of a state is its cycle
     times the period, and the last cycle follows. The worn depth of strips is (frame, strip, x).
@@ -402,9 +403,9 @@ def _add_frames(result, evolved):
 
 
 def _history(evolved) -> dict:
-    """Return measures over the cycles (j,) by name, with `cycle` and `EDGE_PEAK`.
+    """Return the measures over the cycles (j,) by name that all moments have.
 
-    They are those that all moments have.
+    The entries `cycle` and `EDGE_PEAK` are included.
     """
     moments = evolved.moments
     history = {"cycle": np.array([moment.cycle for moment in moments])}
@@ -416,7 +417,7 @@ def _history(evolved) -> dict:
 
 
 def edge_peak(pressure) -> float:
-    """Return by how much [Pa] the pressure at an edge of the contact exceeds that inside.
+    """Return the excess pressure [Pa] at a contact edge over the pressure inside.
 
     It is 0 if the largest pressure is inside, or if the contact ends with the piece. A contact edge
     between two nodes moves as the pieces wear, and the element at the edge carries part of the load

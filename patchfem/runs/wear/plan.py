@@ -12,27 +12,28 @@ from ...wear.jumps import WearProblem, start_wear, take_jump
 from ..cost import Cost
 from .evolve import next_row
 
-SOLVES_PER_JUMP = 20  # contact solutions per jump, with its corrections
-# contact solutions per jump and strip, because each starts from the previous one
+SOLVES_PER_JUMP = 20  # Number of contact solutions per jump, with its corrections.
+# Number of contact solutions per jump and strip, fewer because each starts from the previous one.
 SOLVES_PER_STRIP = 7
-# fraction of the cost of a motion with its coarse runs that the fine run has; includes more active
-# nodes by wear
+# Cost of the fine run over that of a motion with its coarse runs. It includes the larger number of
+# active nodes due to wear.
 FINE_RUN_FRACTION = 0.7
-# CPU seconds per squared number of interface points of a contact solution, including its measures
+# CPU time [s] of a contact solution over the squared number of interface points, including
+# measures.
 SOLVE_SECONDS = 1.2e-8
-JUMP_SECONDS = 5e-3  # CPU seconds of a jump besides its contact solutions
-N_SPRINGS = 192  # springs of the row whose jumps are counted
-MAX_SPRINGS = 1000  # most springs of the row for a prescribed mesh
-# thickness of the springs over the length in contact, inside a patch
+JUMP_SECONDS = 5e-3  # CPU time [s] of a jump besides its contact solutions.
+N_SPRINGS = 192  # Number of springs of the spring row with which jumps are counted.
+MAX_SPRINGS = 1000  # Largest number of springs of this row for a prescribed mesh.
+# Spring thickness inside a patch over the length in contact.
 INNER_THICKNESS_RATIO = 0.3
-# the same at an end of it, over the root of this length and the height of a piece
+# Spring thickness at an end of a patch over the root of contact length times piece height.
 END_THICKNESS_RATIO = 0.44
-N_SMOOTH_JUMPS = 8  # jumps of a patch whose asperities touch everywhere
-MAX_COUNTED_JUMPS = 1500  # most jumps that are counted
+N_SMOOTH_JUMPS = 8  # Number of jumps of a patch whose asperities touch everywhere.
+MAX_COUNTED_JUMPS = 1500  # Largest number of jumps that are counted.
 
 
 def jumps_about(model) -> int:
-    """Return the number of wear jumps: the prescribed one, or an estimate for automatic jumps.
+    """Return the number of wear jumps, prescribed or estimated for automatic jumps.
 
     The estimate was within a factor of 1.5 in 54 of 56 cases, and of 2 in all. Automatic jumps are those of a
     row of springs as stiff as the pieces, with the path of the slide, or of a mass that moves
@@ -58,7 +59,7 @@ def jumps_about(model) -> int:
         path = path * law.static
 
     def slip_path(depth):
-        """Return the slip path with the friction coefficient at the mean worn depth."""
+        """Return the slip path (m,) [m] with the friction coefficient at the mean worn depth."""
         if not wear.uses_friction_work or wear.friction is None or not law.static:
             return path
         mean = float(depth @ area / area.sum())
@@ -75,7 +76,7 @@ def jumps_about(model) -> int:
 
 
 def _path_about(model) -> float:
-    """Return the slip path [m] of a cycle, without friction on the mass of a rig."""
+    """Return the slip path [m] per cycle, without friction on the mass of a rig."""
     if model.rig is None:
         return (4.0 if model.slide.period else 1.0) * model.slide.amplitude
     signal = model.rig.drive.signal
@@ -83,7 +84,7 @@ def _path_about(model) -> float:
 
 
 class _SpringRow:
-    """Row of springs that carries the load of a patch.
+    """Row of independent springs that represents the contact of a patch in a plan.
 
     Parameters
     ----------
@@ -103,7 +104,7 @@ class _SpringRow:
             lambda m: (1 + m.poisson) * (1 - 2 * m.poisson) / (1 - m.poisson) / m.young
         )
         height = max(pieces.lower.height, pieces.upper.height)
-        # the depth that deforms is proportional to the length in contact
+        # The depth of material that deforms is proportional to the contact length.
         fraction = 1.0
         unworn = np.zeros_like(x)
         for _ in range(12):
@@ -117,7 +118,7 @@ class _SpringRow:
             fraction = (fraction + new_fraction) / 2
 
     def press(self, worn, softening) -> np.ndarray:
-        """Return the forces (m,) [N] at a worn depth (m,) [m].
+        """Return the spring forces (m,) [N] at a worn depth (m,) [m].
 
         softening: additional compliance (m,) [m/N].
         """
@@ -135,7 +136,7 @@ def _row_gap(patch, x) -> np.ndarray:
     """Return the gap (m,) [m] of a row of springs, without its tilt if the piece can rotate."""
     try:
         gap = patch.gap.evaluate(x).heights
-    except PatchfemError:  # the profile is too fine for the row
+    except PatchfemError:  # The profile is too fine for the row of springs.
         return np.zeros_like(x)
     if patch.loading.can_rotate:
         gap = gap - np.polyval(np.polyfit(x, gap, 1), x)
@@ -143,7 +144,7 @@ def _row_gap(patch, x) -> np.ndarray:
 
 
 def _changes_motion(model) -> bool:
-    """Return whether wear changes the motion."""
+    """Return whether wear changes the motion of a model."""
     return (
         bool(model.partial_slip)
         or model.side == "lower"
@@ -153,7 +154,7 @@ def _changes_motion(model) -> bool:
 
 
 def cost(model, points: int, motion: float) -> Cost:
-    """Return the cost of all jumps.
+    """Predict the cost of all jumps of a wear run.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Slip path of every interface node in one cycle of a converged bench or rig.
+"""Slip path of every interface node in a converged cycle of a bench or a rig.
 
 In: a model and its worn patch. Out: `CycleSlip` with the path, its error and the outcome.
 """
@@ -23,14 +23,14 @@ UNBOUNDED_OUTCOMES = (
     Outcome.LEAVES_GROOVES,
     Outcome.NOT_CONVERGED,
 )
-MIN_FRAMES = 64  # smallest number of frames per cycle
-MAX_FRAMES = 800  # largest number of frames per cycle
-# error by reversals between samples over the mean change without two of three samples (`_thinned_error`)
+MIN_FRAMES = 64  # Smallest number of interface frames per cycle.
+MAX_FRAMES = 800  # Largest number of interface frames per cycle.
+# Error by reversals between samples over the mean change without two of three samples.
 THINNING_FACTOR = 1.5
 
 
 class CycleSlip(NamedTuple):
-    """Slip of the interface in one cycle of a motion.
+    """Slip path of the interface nodes in a single cycle of a motion.
 
     - path: slip path of each node (m,), of strips (s, m) [m]. With form 'energy' it is friction
       work per area over pressure, and over grooves it is along their flanks.
@@ -47,15 +47,15 @@ class CycleSlip(NamedTuple):
 
 
 def frames_for(tolerance: float) -> int:
-    """Return the frames per cycle with which the slip path has an error of tolerance/100.
+    """Return the frames per cycle for which the slip path has an error of tolerance/100.
 
-    A reversal between two of k frames of a sine hides up to (pi/k)^2/2 of the amplitude.
+    A reversal between two of k frames of a sinusoid hides up to (pi/k)^2/2 of the amplitude.
     """
     return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), MIN_FRAMES, MAX_FRAMES))
 
 
 def slips_uniformly(model, per_point: bool = False) -> bool:
-    """Return whether all points of the patch, or of each of its strips, have the same slip."""
+    """Return whether all points of a patch, or of each of its strips, slip equally."""
     return (
         not model.partial_slip
         and model.side == "upper"
@@ -64,19 +64,19 @@ def slips_uniformly(model, per_point: bool = False) -> bool:
 
 
 def strips_slide_independently(model) -> bool:
-    """Return whether strips slide independently, which changes with wear."""
+    """Return whether strips slide independently, so that wear changes their motion."""
     return model.rig is not None and model.rig.friction.strips_slide_apart
 
 
 def slip_of_cycle(model, patch, frames: int) -> CycleSlip:
-    """Return the slip of one converged cycle of a model on a patch.
+    """Return the slip path of the interface nodes in a converged cycle of a model.
 
     Parameters
     ----------
     model : Model
     patch : Patch
     frames : int
-        Number of frames of the interface from which it is computed.
+        Number of frames of the interface from which the path is computed.
     """
     if model.rig is None:
         return _slip_of_bench(model, patch, frames)
@@ -84,7 +84,7 @@ def slip_of_cycle(model, patch, frames: int) -> CycleSlip:
 
 
 class _Cycle(NamedTuple):
-    """Samples (k,) of a cycle.
+    """Displacement, slip and forces of a cycle at k samples.
 
     - slide, slip: [m].
     - force, load: [N].
@@ -97,7 +97,7 @@ class _Cycle(NamedTuple):
 
 
 class Frames(NamedTuple):
-    """Frames of the interface in a cycle, in its f samples.
+    """Slip and shear stress of the interface nodes in f frames of a cycle.
 
     - slip, tau (f, m): local slip [m] and shear stress [Pa].
     - is_closed: whether the last frame is followed by the first one.
@@ -109,7 +109,7 @@ class Frames(NamedTuple):
 
 
 def _slip_of_bench(model, patch, frames: int) -> CycleSlip:
-    """Return the slip of the last cycle of a bench."""
+    """Return the slip path of the nodes in the last cycle of a bench."""
     cycles = max(1, round(model.slide.cycles or 1))
     is_uniform = slips_uniformly(model)
     run = bench.run(model, patch, steps_per_cycle(model), 0 if is_uniform else frames * cycles)
@@ -127,7 +127,7 @@ def _slip_of_bench(model, patch, frames: int) -> CycleSlip:
         local = np.concatenate([start, local])
         tau = np.concatenate([start, tau])
         slide = np.append(0.0, slide)
-        if model.grooves is not None:  # at the start the load rests on the flank of a groove
+        if model.grooves is not None:  # At the start the load rests on the flank of a groove.
             tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
     if model.grooves is not None:
         load = np.full(slide.size, patch.pressure.load)
@@ -137,7 +137,7 @@ def _slip_of_bench(model, patch, frames: int) -> CycleSlip:
 
 
 def _slip_of_rig(model, patch, frames: int) -> CycleSlip:
-    """Return the slip of the last cycle of a rig."""
+    """Return the slip path of the nodes in the last cycle of a rig."""
     chosen = numerics.choose(model)
     is_uniform = slips_uniformly(model, chosen.per_point and model.grooves is None)
     solution = solve.solve(model, chosen, patch, 0 if is_uniform else frames)
@@ -179,9 +179,9 @@ def _slip_of_rig(model, patch, frames: int) -> CycleSlip:
 
 
 def _beat_error(values: dict, cycle: _Cycle) -> float:
-    """Return the relative difference between the slip amplitudes of the last cycle and the window.
+    """Return the relative difference of the slip amplitudes of the last cycle and the window.
 
-    It is due to a mode that still beats.
+    A mode that still beats causes this difference.
     """
     amplitude = float(np.ptp(cycle.slip)) / 2
     window_amplitude = values.get("slip_amplitude")
@@ -191,9 +191,9 @@ def _beat_error(values: dict, cycle: _Cycle) -> float:
 
 
 def slip_path_of_point(model, window, values: dict) -> tuple[float, float]:
-    """Return the slip path [m] of one cycle of a point under [normal], and its relative error.
+    """Return the slip path [m] of a point in a cycle under [normal], and its relative error.
 
-    It is weighted with the load if that changes. The error is that by differences between the
+    It is weighted with the load if that changes. The error comes from differences between the
     cycles.
 
     Parameters
@@ -215,13 +215,16 @@ def slip_path_of_point(model, window, values: dict) -> tuple[float, float]:
 
 
 def _last_bench_cycle(run) -> _Cycle:
-    """Return the last cycle of a bench."""
+    """Return displacement, slip and forces of the last cycle of a bench."""
     histories = (run.slide, run.slip, run.force, run.load)
     return _Cycle(*(history[run.first :] for history in histories))
 
 
 def _last_rig_cycle(model, window, load: float) -> _Cycle:
-    """Return the last cycle of a rig under a load [N]; over grooves it is the vertical force."""
+    """Return displacement, slip and forces of the last cycle of a rig.
+
+    load: constant load [N]; over grooves it is the vertical force.
+    """
     is_last = _is_in_last_cycle(model, window)
     loads = window.extra.get("normal_load", np.full(window.time.size, load))
     histories = (window.slide, window.slip, window.force, loads)
@@ -229,13 +232,13 @@ def _last_rig_cycle(model, window, load: float) -> _Cycle:
 
 
 def _is_in_last_cycle(model, window) -> np.ndarray:
-    """Return which samples of a window are in its last cycle."""
+    """Return a mask of the samples of a window that lie in its last cycle."""
     period = model.rig.drive.signal.period
     return window.time >= window.time[-1] - period * (1 + 1e-9)
 
 
 def _slip_of_strips(model, patch, window) -> CycleSlip:
-    """Return the slip of every strip of a rig with yaw, along x.
+    """Return the slip path along x of every strip of a rig with yaw.
 
     An open strip has the slip of the nearest strip in contact.
     """
@@ -248,7 +251,7 @@ def _slip_of_strips(model, patch, window) -> CycleSlip:
         weight = np.abs(forces) / np.where(loads > 0, loads, 1.0)
 
     def path(samples) -> np.ndarray:
-        """Return the slip path (s,) [m] of the strips from some samples."""
+        """Return the slip path (s,) [m] of the strips from selected samples."""
         columns = zip(slips[samples].T, weight[samples].T)
         return np.array([_integrate(slip, strip_weight) for slip, strip_weight in columns])
 
@@ -259,7 +262,7 @@ def _slip_of_strips(model, patch, window) -> CycleSlip:
 
 
 def _thinned_error(path, count: int, fine, weight, is_closed: bool = False) -> float:
-    """Return the relative error of a slip path by reversals between samples.
+    """Estimate the relative error of a slip path due to reversals between samples.
 
     A reversal between two samples hides f(d) of the path, d <= 1/2 of their distance. Every third
     sample hides f(d), f(1 - d) or f(1 + d), for the first, second or third choice: 3/2 of the mean
@@ -288,9 +291,9 @@ def _thinned_error(path, count: int, fine, weight, is_closed: bool = False) -> f
 
 
 def _uniform_slip(model, patch, cycle: _Cycle, load: float) -> CycleSlip:
-    """Return the slip of a cycle that is the same at every point, over a load [N]."""
+    """Return the slip path of a cycle in which all points slip equally under a load [N]."""
     slip = cycle.slip
-    # friction opposes the slip, also in a step with a reversal
+    # Friction opposes the slip, also in a step with a reversal.
     weight = np.abs(cycle.force) if model.wear.uses_friction_work else cycle.load
     error = 0.0
     if model.grooves is not None:
@@ -303,12 +306,12 @@ def _uniform_slip(model, patch, cycle: _Cycle, load: float) -> CycleSlip:
 
 
 def _integrate(slip, weight) -> float:
-    """Return the integral of the weight over |slip| by the trapezoidal rule."""
+    """Integrate a weight over |slip| by the trapezoidal rule."""
     return float(np.sum(np.abs(np.diff(slip)) * (weight[1:] + weight[:-1]) / 2))
 
 
 def along_flanks(model, slide, force, load) -> np.ndarray:
-    """Return the force per slide (k,) [N] that wears the flanks of grooves.
+    """Return the wearing force per displacement (k,) [N] on the flanks of grooves.
 
     It is R ds/dq = V + F t of the normal force R, or with form 'energy' |f| ds/dq = |F - V t| of
     the friction force f along the flank, with the slope t.
@@ -349,7 +352,8 @@ def slip_path(model, patch, slide, vertical, local, tau) -> tuple:
     grooves = model.grooves
     sigma = patch.pressure.sigma_n
     slope = grooves.slope(slide)[:, None]
-    stretch = np.sqrt(1 + slope**2)  # length of the flank over the slide
+    # This is the length of the flank over the relative displacement.
+    stretch = np.sqrt(1 + slope**2)
     carried = (vertical / patch.pressure.load)[:, None] * sigma
     steps = integrate_steps(slide, lambda places: np.hypot(1, grooves.slope(places)))
     path = np.append(0.0, np.cumsum(steps))
@@ -361,11 +365,11 @@ def slip_path(model, patch, slide, vertical, local, tau) -> tuple:
 
 
 def slip_of_frames(model, patch, frames: Frames) -> CycleSlip:
-    """Return the slip path of every node; over grooves, the frames are those of `slip_path`."""
+    """Return the slip path of every node from frames of slip and shear stress."""
     count = len(frames.slip)
 
     def path(indices) -> np.ndarray:
-        """Return the slip path (m,) [m] of the nodes from some frames."""
+        """Return the slip path (m,) [m] of the nodes from selected frames."""
         return _path(model, patch, frames, indices)
 
     paths = path(np.arange(count))
@@ -374,7 +378,7 @@ def slip_of_frames(model, patch, frames: Frames) -> CycleSlip:
 
 
 def _path(model, patch, frames: Frames, indices) -> np.ndarray:
-    """Return the slip path (m,) [m] of the nodes from some frames."""
+    """Integrate the slip path (m,) [m] of the nodes over selected frames."""
     if frames.is_closed:
         indices = np.append(indices[-1:], indices)
     steps = np.abs(np.diff(frames.slip[indices], axis=0))
@@ -388,7 +392,7 @@ def _path(model, patch, frames: Frames, indices) -> np.ndarray:
 
 
 def _nearest(x, active) -> np.ndarray:
-    """Return the index (m,) of the nearest node in contact.
+    """Return the index (m,) of the nearest node in contact for every node.
 
     A node that comes into contact during a jump has the slip of this neighbour.
     """
