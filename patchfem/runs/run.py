@@ -26,7 +26,7 @@ from .plan import Plan, compiled_kind, plan, refuse_size
 from .results.patch_rows import unknown_measures
 from .results.result import Result, RunInputs, shorten_file_names, with_meanings
 from .rig import engines, rig
-from .self_checks.checks import with_self_checks
+from .self_checks.checks import mark_failed_checks
 from .wear import evolve, measures
 
 __all__ = ["Plan", "Result", "StateFile", "plan", "run"]
@@ -161,7 +161,7 @@ def _run(
             result = measures.add_wear_measures(replace(result, plan=what), evolved, estimate)
     if what.compile_seconds and estimate:
         compiled.record_run(compiled_kind(model, what.engine, what.unknowns))
-    return _complete_result(with_self_checks(result), notes, begin, meshes)
+    return _complete_result(mark_failed_checks(result), notes, begin, meshes)
 
 
 def _press(model: Model, *, estimate: bool, fresh: bool) -> PatchMeshes:
@@ -233,7 +233,7 @@ def _evolve(inputs: RunInputs, kept: StateFile | None):
     model = inputs.plan.model
     patch = inputs.patch
     key = kept and state_key(model, patch, kept.version)
-    return evolve.evolved_with(kept, key, model, patch, inputs.coarse[:2], inputs.progress)
+    return evolve.evolve_and_save(kept, key, model, patch, inputs.coarse[:2], inputs.progress)
 
 
 def _worn_inputs(inputs: RunInputs, evolved) -> RunInputs:
@@ -328,7 +328,7 @@ def _saving_context(kept: StateFile | None, what: Plan, patch):
         return kept.path.parent / f"march_{number}.npz"
 
     if kept.resume and model.wear is None and not path_of_march(1).is_file():
-        raise evolve.nothing_kept(kept.path)
+        raise evolve.no_saved_state_error(kept.path)
     return checkpoint.store_checkpoints(
         checkpoint.CheckpointFiles(
             path_of_march, state_key(model, patch, kept.version), kept.resume

@@ -10,7 +10,7 @@ from patchfem.core import Missing
 from patchfem.friction import MAX_LIST_SECONDS, steady_loop
 from patchfem.runs import PassOptions, solve_all
 from patchfem.runs.bench import bench
-from patchfem.runs.bench.ledger import BLOCK, Slide
+from patchfem.runs.bench.ledger import N_BLOCK_SAMPLES, Slide
 from patchfem.runs.bench.stepped import slide_step_by_step
 from patchfem.runs.run import run
 from patchfem.scene import loads
@@ -194,7 +194,7 @@ def test_always_the_done_share_grows_to_one(law, where):
         estimate=False,
     )
     assert told[-1] == 1.0 and (np.diff([0.0, *told]) >= 0).all()
-    assert len(told) >= (1 if law == EXACT["coulomb"] else 12000 // BLOCK)
+    assert len(told) >= (1 if law == EXACT["coulomb"] else 12000 // N_BLOCK_SAMPLES)
 
 
 def test_always_an_interrupt_ends_a_bench_between_two_blocks():
@@ -207,7 +207,7 @@ def test_always_an_interrupt_ends_a_bench_between_two_blocks():
 
     with pytest.raises(KeyboardInterrupt):
         run(model_of(BONDS, "sine", "accuracy.steps_per_cycle=20000"), progress=stop)
-    assert told[-1] <= 0.5 + BLOCK / 40000
+    assert told[-1] <= 0.5 + N_BLOCK_SAMPLES / 40000
 
 
 # ---- two books of energy

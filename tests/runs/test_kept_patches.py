@@ -25,7 +25,7 @@ def models(angles=(2e-5, 3e-4), levels=(3.0, 5.0, 8.0)) -> list:
 
 
 @pytest.fixture(autouse=True)
-def nothing_kept():
+def no_saved_state_error():
     store.clear()
 
 

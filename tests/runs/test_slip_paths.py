@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchfem.runs.wear.slip import Frames, frames_for, slip_of_frames
+from patchfem.runs.wear.slip import Frames, compute_frame_slip, count_frames
 
 PHASES = np.linspace(0, 1, 41)
 
@@ -40,14 +40,14 @@ def test_always_the_error_of_a_path_holds_what_its_frames_hide(slip, path, energ
             angle = 2 * np.pi * (np.arange(count) + phase) / count
             local = np.outer(slip(angle), [1.0, 1.0])
             tau = np.tile(patch.pressure.sigma_n, (count, 1))
-            found = slip_of_frames(model, patch, Frames(local, tau, is_closed=True))
+            found = compute_frame_slip(model, patch, Frames(local, tau, is_closed=True))
             off = abs(found.path[0] / path - 1)
             assert off <= found.error + 1e-12 and found.error < 5 / count
             assert found.path[1] == pytest.approx(found.path[0], rel=1e-12)
 
 
 def test_order_frames_grow_as_the_root_of_the_tolerance():
-    assert frames_for(1e-2) == 223 and frames_for(1e-3) / frames_for(1e-2) == pytest.approx(
+    assert count_frames(1e-2) == 223 and count_frames(1e-3) / count_frames(1e-2) == pytest.approx(
         10**0.5, rel=0.01
     )
-    assert frames_for(1e-9) == 800
+    assert count_frames(1e-9) == 800

@@ -4,7 +4,7 @@ import pytest
 
 from patchfem import build
 from patchfem.runs.bench.engine import bench_engine
-from patchfem.runs.bench.errors import sum_error
+from patchfem.runs.bench.errors import bond_sum_error
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -45,7 +45,7 @@ def test_exact_the_bound_of_every_engine_that_sums_bonds():
 
     def bound(*sets, where=text):
         model = build(loads(where, sets=sets))
-        return sum_error(model, bench_engine(model, model.slide.samples(100)[1]))
+        return bond_sum_error(model, bench_engine(model, model.slide.samples(100)[1]))
 
     assert bound() == 1e-6 and bound("accuracy.tail=0.05") == 0.05
     assert bound("accuracy.quadrature=direct") == bound("friction.order=1") == 0.0

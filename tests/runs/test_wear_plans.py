@@ -5,7 +5,7 @@ import pytest
 import patchfem as pf
 from patchfem.runs import evolve
 from patchfem.runs.patch.result import solve_all
-from patchfem.runs.wear.plan import N_SMOOTH_JUMPS, jumps_about
+from patchfem.runs.wear.plan import N_SMOOTH_JUMPS, estimate_jumps
 
 SCENE = """
 [contact]
@@ -48,10 +48,10 @@ def test_always_a_plan_estimates_the_jumps_of_wear_within_half(shape, cycles):
     model = model_of(shape, f"cycles = {cycles:g}\n")
     patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]
     taken = len(evolve(model, patch, (None, None)).moments) - 1
-    assert 1 / 1.5 < jumps_about(model) / taken < 1.5
+    assert 1 / 1.5 < estimate_jumps(model) / taken < 1.5
 
 
 def test_exact_jumps_of_a_scene_and_of_asperities_in_full_contact():
-    assert jumps_about(model_of(TILT.format("0.1 mrad"), "cycles = 1e8\njumps = 7\n")) == 7
+    assert estimate_jumps(model_of(TILT.format("0.1 mrad"), "cycles = 1e8\njumps = 7\n")) == 7
     rough = '[contact.asperities]\nlaw = "exponential"\nnormal_stiffness = "1e13 Pa/m"\ndecay_length = "2.5 um"\n'
-    assert jumps_about(model_of(rough, "cycles = 1e8\n")) == N_SMOOTH_JUMPS
+    assert estimate_jumps(model_of(rough, "cycles = 1e8\n")) == N_SMOOTH_JUMPS

@@ -8,7 +8,7 @@ import patchfem as pf
 from patchfem import SceneError
 from patchfem.runs import evolve
 from patchfem.runs.patch.result import solve_all
-from patchfem.runs.wear.plan import jumps_about
+from patchfem.runs.wear.plan import estimate_jumps
 from patchfem.scene import loads
 
 LOAD, AREA, PATH = 26 * 4.4482216152605, 12.7e-3**2, 40e-6
@@ -93,7 +93,7 @@ def test_always_jumps_do_not_pass_a_row_unseen():
     patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]
     moments = evolve(model, patch, (None, None)).moments
     assert max(one.values["static_coefficient"] for one in moments) > 1.4 * MU
-    assert 1 / 1.5 < jumps_about(model) / (len(moments) - 1) < 1.5
+    assert 1 / 1.5 < estimate_jumps(model) / (len(moments) - 1) < 1.5
     few = ran(*TABLE, "wear.cycles=2e6", "wear.jumps=2")
     assert [
         one

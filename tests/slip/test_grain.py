@@ -5,7 +5,7 @@ import pytest
 
 import patchfem as pf
 from patchfem import build
-from patchfem.runs.bench.engine import slips_by_elements
+from patchfem.runs.bench.engine import uses_parallel_elements
 from patchfem.scene import loads
 from patchfem.slip import spread_elements
 
@@ -70,6 +70,6 @@ def test_exact_what_yields_together_stays_together():
 def test_exact_only_benches_of_elements_have_a_grain():
     """Bonds behind shear modes move points."""
     text = pf.new("joint")
-    assert slips_by_elements(build(loads(text, "joint.toml")))
+    assert uses_parallel_elements(build(loads(text, "joint.toml")))
     bonds = text.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')
-    assert not slips_by_elements(build(loads(bonds, "joint.toml")))
+    assert not uses_parallel_elements(build(loads(bonds, "joint.toml")))

@@ -13,18 +13,18 @@ from ...effects import describe_unsupported, import_effect, law_has_trait
 EQUAL_LIMITS_TOL = 1e-9
 
 
-def _law():
+def _averaged_law_module():
     """Return the module of the averaged friction law, imported on first use."""
     return import_effect("friction.law=convolution")
 
 
-def law_on(model, patch):
+def make_averaged_law(model, patch):
     """Return the averaged friction law of a model on its patch.
 
     patch: None under [normal].
     """
     f = model.friction
-    law = _law()
+    law = _averaged_law_module()
     if patch is None:
         return law.Convolution(f.static, f.bond_length, f.order)
 
@@ -32,7 +32,7 @@ def law_on(model, patch):
     return law.Convolution(f.static, f.bond_length, f.order, patch.x, pattern)
 
 
-def limit_share(model, patch) -> float:
+def rigid_limit_ratio(model, patch) -> float:
     """Return the limit friction force of a rigid block over static friction x load [1].
 
     Raises
@@ -45,7 +45,9 @@ def limit_share(model, patch) -> float:
         return 1.0
     weight = patch.pieces.interface.weight
     sigma = patch.pressure.sigma_n
-    forward, back = _law().sliding_limits(patch.x, sigma, weight, f.bond_length, f.order)
+    forward, back = _averaged_law_module().sliding_limits(
+        patch.x, sigma, weight, f.bond_length, f.order
+    )
     if abs(forward - back) > EQUAL_LIMITS_TOL * max(forward, back):
         raise PatchfemError(
             describe_unsupported(
@@ -81,7 +83,7 @@ def limit_tractions(model, patch, force) -> np.ndarray:
     weight = patch.pieces.interface.weight
     unit_tractions = []
     for direction in (1.0, -1.0):
-        average = _law().average_pressure(
+        average = _averaged_law_module().average_pressure(
             x, x, sigma, direction, friction.bond_length, friction.order
         )
         traction = np.where(sigma > 0, average, 0.0)

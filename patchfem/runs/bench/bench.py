@@ -23,7 +23,7 @@ from ...response.measures import (
     work_difference,
 )
 from . import rigid, shear
-from .closed import closed_form
+from .closed import slide_in_closed_form
 from .engine import BenchEngine, Method, bench_engine
 from .ledger import DEFAULT_OPTIONS, PassOptions, Slide, SlideHistories
 from .stepped import slide_in_plane, slide_step_by_step
@@ -121,7 +121,7 @@ def _solve(task: Slide) -> tuple[SlideHistories, dict]:
     if task.engine.method is Method.STEPPED:
         return slide_step_by_step(task), {}
     if task.engine.method is Method.CLOSED:
-        return closed_form(task), {}
+        return slide_in_closed_form(task), {}
     return rigid.slide_rigidly(task), {}
 
 

@@ -7,19 +7,19 @@ of the slide.
 
 import numpy as np
 
-from .law import ends_of_rest, law_for, nodal_pressure
+from .law import find_rest_ends, make_numpy_law, nodal_pressure
 from .ledger import Slide, SlideHistories, elastic_slip, local_slip, make_ledger
 
 N_GAUSS_POINTS = 8  # Number of Gauss points per step along the flank of a groove.
 
 
-def closed_form(task: Slide) -> SlideHistories:
+def slide_in_closed_form(task: Slide) -> SlideHistories:
     """Compute the histories of rigid sliding with a law without memory, in closed form."""
     if task.model.grooves is not None:
-        return _closed_form_on_grooves(task)
+        return _slide_over_grooves_in_closed_form(task)
     slide = task.slide
     sigma, weight = nodal_pressure(task.model, task.patch)
-    law = law_for(task.model, task.patch)
+    law = make_numpy_law(task.model, task.patch)
     limits = np.stack([law.limit(sigma, -1.0), law.limit(sigma, 1.0)])
     increments = np.diff(slide)
     fraction = law.limit_fraction(increments, np.diff(task.time))
@@ -33,7 +33,7 @@ def closed_form(task: Slide) -> SlideHistories:
     losses = np.stack([np.zeros(fraction.size), work], axis=1)
     frames = task.frame_numbers
     tau = fraction[frames, None] * limits[direction[frames]]
-    for sample, sign in ends_of_rest(task.model, slide).items():
+    for sample, sign in find_rest_ends(task.model, slide).items():
         breakaway = law.breakaway_traction(sigma, sign)
         force[sample] = weight @ breakaway
         tau[frames == sample] = breakaway
@@ -50,7 +50,7 @@ def closed_form(task: Slide) -> SlideHistories:
     )
 
 
-def _closed_form_on_grooves(task: Slide) -> SlideHistories:
+def _slide_over_grooves_in_closed_form(task: Slide) -> SlideHistories:
     """Compute the histories of slow rigid sliding over grooves, in closed form.
 
     The force is N (t + phi)/(1 - phi t), with the slope t and phi = f/R along the flank. The lift
@@ -61,7 +61,7 @@ def _closed_form_on_grooves(task: Slide) -> SlideHistories:
     slide = task.slide
     grooves = model.grooves
     sigma, weight = nodal_pressure(model, task.patch)
-    law = law_for(model, task.patch)
+    law = make_numpy_law(model, task.patch)
     load = float(weight @ sigma)
     increments = np.diff(slide)
     if law.has_force_at_rest:
@@ -87,7 +87,7 @@ def _closed_form_on_grooves(task: Slide) -> SlideHistories:
 
         loss = integrate_steps(slide, dissipated_force)
     rise = load * grooves.height_difference(slide[:-1], slide[1:])
-    for sample, sign in ends_of_rest(model, slide).items():
+    for sample, sign in find_rest_ends(model, slide).items():
         ratio[sample] = grooves.force_ratio(slide[sample], sign, model.friction.static)
     frames = task.frame_numbers
     task.options.report(1.0)

@@ -21,11 +21,11 @@ from ...slip import shear_modes
 from ..cost import MARCH_CODE, NO_CODE, SHORT_CODE, Cost, MemoryPart
 
 MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
-GROOVE_SAMPLES = 20  # Number of samples per radian of the groove phase.
-SAMPLE_BYTES = 250.0  # Memory of a sample of the histories [bytes].
+N_SAMPLES_PER_RADIAN = 20  # Number of samples per radian of the groove phase.
+BYTES_PER_SAMPLE = 250.0  # Memory of a sample of the histories [bytes].
 # List passes per step over those in a rig. A prescribed displacement needs no search for the
 # increment of the displacement.
-LIST_PASSES = 1 / 3
+LIST_PASS_RATIO = 1 / 3
 
 
 class Method(Enum):
@@ -102,7 +102,7 @@ def bench_engine(
         return BenchEngine(Method.PLANE, _stepped_seconds(model, slide, 1))
     if model.partial_slip and (law_has_trait(f.law, "bonds") or model.grooves is not None):
         modes = model.accuracy.shear_modes or shear_modes.N_SHEAR_MODES
-        varies = model.grooves is not None or pressure_changes(model)
+        varies = model.grooves is not None or has_changing_pressure(model)
         if model.grooves is None and (
             is_bond_list(f) or requested_engine(model) not in ("auto", "recursion")
         ):
@@ -114,7 +114,7 @@ def bench_engine(
         return BenchEngine(
             Method.ELEMENTS, cost_model.SLIP_NODE_SECONDS * points + cost_model.SAMPLE_SECONDS
         )
-    if pressure_changes(model) and model.grooves is None:
+    if has_changing_pressure(model) and model.grooves is None:
         return _stepped_engine(model, slide, points)
     if law_has_trait(f.law, "memoryless"):
         return BenchEngine(Method.CLOSED, cost_model.SAMPLE_SECONDS)
@@ -132,10 +132,10 @@ def steps_per_cycle(model) -> int:
         return steps
     path = float(np.abs(np.diff(slide.samples(steps)[1])).sum()) / max(1.0, slide.cycles or 1.0)
     phase = model.grooves.wave_number * path
-    return max(steps, min(4 * ceil(GROOVE_SAMPLES * phase / 4), MAX_GROOVE_STEPS))
+    return max(steps, min(4 * ceil(N_SAMPLES_PER_RADIAN * phase / 4), MAX_GROOVE_STEPS))
 
 
-def pressure_changes(model) -> bool:
+def has_changing_pressure(model) -> bool:
     """Return whether the pressure of a point changes during the motion.
 
     It changes with the load, or if the point moves over the pressure distribution of the other
@@ -166,13 +166,15 @@ def requested_engine(model) -> str:
     "merged" replaces it if every point has its own list and bonds keep the pressure at which they
     formed while it changes, because each step then leaves a strip.
     """
-    named = model.accuracy.quadrature
+    scene_engine = model.accuracy.quadrature
     f = model.friction
     rig = model.rig is not None
-    apart = (model.side == "lower" and (model.partial_slip or (rig and is_bond_list(f)))) or (
-        rig and model.load_varies and is_bond_list(f)
+    has_separate_lists = (
+        model.side == "lower" and (model.partial_slip or (rig and is_bond_list(f)))
+    ) or (rig and model.load_varies and is_bond_list(f))
+    return (
+        "merged" if has_separate_lists and scene_engine in ("auto", "recursion") else scene_engine
     )
-    return "merged" if apart and named in ("auto", "recursion") else named
 
 
 def choose_smooth_bond_sum(model, slide) -> "bond_engines.EngineChoice | None":
@@ -217,7 +219,7 @@ def _choose_sum_engine(
     size = slide.size
     max_move = float(np.abs(np.diff(slide)).max())
     strips = min(choice.strips, size * max(1.0, 4 * max_move / law.length))
-    seconds = (LIST_PASSES if lists == 1 else lists) * choice.seconds
+    seconds = (LIST_PASS_RATIO if lists == 1 else lists) * choice.seconds
     if choice.strips:
         seconds *= strips / choice.strips
     if size * seconds > parameters.MAX_LIST_SECONDS:
@@ -243,8 +245,8 @@ def _stepped_seconds(model, slide, points: int) -> float:
     f = model.friction
     if not is_bond_list(f):
         return cost_model.LAW_STEP_SECONDS
-    moved = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
-    strips = min(slide.size / 2, 40 * f.bond_length / moved + 64)
+    mean_step = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
+    strips = min(slide.size / 2, 40 * f.bond_length / mean_step + 64)
     return (3 if model.load_varies else 1) * (
         cost_model.PATH_STEP_SECONDS
         + cost_model.PATH_STRIP_SECONDS * strips
@@ -252,7 +254,7 @@ def _stepped_seconds(model, slide, points: int) -> float:
     )
 
 
-def slips_by_elements(model) -> bool:
+def uses_parallel_elements(model) -> bool:
     """Return whether parallel elements represent the partial slip of a bench."""
     simple = model.grooves is None and model.slide.across is None
     return model.partial_slip and simple and not law_has_trait(model.friction.law, "bonds")
@@ -278,7 +280,7 @@ def cost(model, points: int) -> Cost:
     passes = 3 if has_cells else 2
     steps = passes * time.size
     samples = MemoryPart(
-        SAMPLE_BYTES * steps / 2, f"{steps // 2} samples of the slide", _samples_key(model)
+        BYTES_PER_SAMPLE * steps / 2, f"{steps // 2} samples of the slide", _samples_key(model)
     )
     sizes = {}
     lists = ()

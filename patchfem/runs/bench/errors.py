@@ -21,7 +21,7 @@ from ...response.errors import (
 )
 from ...slip import shear_modes
 from . import bench, rigid, shear
-from .engine import LIST_METHODS, Method, slips_by_elements
+from .engine import LIST_METHODS, Method, uses_parallel_elements
 from .law import estimate_tail_loss
 from .ledger import PassOptions
 
@@ -61,7 +61,7 @@ class PassErrors(NamedTuple):
     open_kinds: dict
 
 
-def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> PassErrors:
+def estimate_pass_errors(model, patches: list, fine_run, steps: int, say=None) -> PassErrors:
     """Estimate the errors of a bench from coarser computations along its path.
 
     Parameters
@@ -69,7 +69,7 @@ def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> Pa
     model : Model
     patches : list of Patch
         The patch on nested meshes, fine to coarse; [None] without a patch.
-    fine : BenchRun
+    fine_run : BenchRun
         The computation whose errors are estimated.
     steps : int
         Its number of steps per cycle.
@@ -82,18 +82,18 @@ def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> Pa
         watch = PassOptions(variant.choice, say, springs=variant.springs, modes=variant.modes)
         return bench.run(model, patches[variant.level], variant.steps, watch=watch)
 
-    ladder = list_coarse_passes(model, patches, fine, steps)
+    ladder = list_coarse_passes(model, patches, fine_run, steps)
     coarse_passes = {}
-    errors, seconds = estimate_errors(solve, fine.values, ladder, coarse_passes)
+    errors, seconds = estimate_errors(solve, fine_run.values, ladder, coarse_passes)
     kinds = [coarser.of for coarser in ladder]
-    if sum_error(model, fine.engine):
-        errors = [*errors, _sum_errors(model, fine)]
+    if bond_sum_error(model, fine_run.engine):
+        errors = [*errors, _bond_sum_errors(model, fine_run)]
         kinds = [*kinds, "bonds"]
-    runs = [fine.values, *(coarse_passes[run].values for run in ladder[0].runs)]
+    runs = [fine_run.values, *(coarse_passes[run].values for run in ladder[0].runs)]
     return PassErrors(errors, seconds, find_open_kinds(kinds, errors, runs))
 
 
-def list_coarse_passes(model, patches: list, fine, steps: int) -> list:
+def list_coarse_passes(model, patches: list, fine_run, steps: int) -> list:
     """List the coarser computations of a bench from which its errors are estimated.
 
     They have half and a quarter of the steps. At a quarter of the steps they also have the coarser
@@ -105,41 +105,45 @@ def list_coarse_passes(model, patches: list, fine, steps: int) -> list:
     ----------
     model : Model
     patches : list of Patch
-    fine : BenchRun
+    fine_run : BenchRun
     steps : int
         Steps per cycle of the fine pass.
     """
-    choice = fine.engine.choice
-    half = Pass(max(4, steps // 8 * 4), 0, choice)
-    few = Pass(max(4, steps // 16 * 4), 0, choice)
+    choice = fine_run.engine.choice
+    halved = Pass(max(4, steps // 8 * 4), 0, choice)
+    quarter = Pass(max(4, steps // 16 * 4), 0, choice)
     # Parallel elements follow any path exactly, so that the sampling affects the harmonics only.
-    rule = convergence_errors if slips_by_elements(model) else partial(step_errors, steps=steps)
-    out = [CoarserRuns((half, few), rule, of="steps")]
+    rule = (
+        convergence_errors if uses_parallel_elements(model) else partial(step_errors, steps=steps)
+    )
+    out = [CoarserRuns((halved, quarter), rule, of="steps")]
     meshed = len(patches) > 1
     patch = patches[0]
-    if meshed and slips_by_elements(model):
+    if meshed and uses_parallel_elements(model):
         length = model.friction.bond_length
         same = model.slide.steps(MESH_TOL, model.accuracy.steps_per_cycle, length)
-        out.append(shear.coarser_elements(len(patches) - 1, few._replace(steps=same)))
+        out.append(shear.list_coarser_element_runs(len(patches) - 1, quarter._replace(steps=same)))
     elif meshed:
         # The number of modes is fixed, so that only the mesh changes.
         count = shear.count_shear_modes(model, patch) if model.partial_slip else None
-        out.append(make_coarser_space(few._replace(level=1, modes=count), few))
+        out.append(make_coarser_space(quarter._replace(level=1, modes=count), quarter))
         if count:
             out.append(
                 make_coarser_space(
-                    few._replace(modes=shear_modes.comparison_mode_count(count)), few, "modes"
+                    quarter._replace(modes=shear_modes.comparison_mode_count(count)),
+                    quarter,
+                    "modes",
                 )
             )
-    if law_has_trait(model.friction.law, "cells") and fine.engine.method is Method.ELEMENTS:
-        out.append(rigid.coarser_cells(few))
-    if fine.engine.method in LIST_METHODS and choice.merge > 0:
-        narrow = few._replace(choice=replace(choice, merge=FINER_MERGE_FACTOR * choice.merge))
-        out.append(CoarserRuns((narrow,), finer_errors, few, "bonds"))
+    if law_has_trait(model.friction.law, "cells") and fine_run.engine.method is Method.ELEMENTS:
+        out.append(rigid.list_merged_cell_runs(quarter))
+    if fine_run.engine.method in LIST_METHODS and choice.merge > 0:
+        narrow = quarter._replace(choice=replace(choice, merge=FINER_MERGE_FACTOR * choice.merge))
+        out.append(CoarserRuns((narrow,), finer_errors, quarter, "bonds"))
     return out
 
 
-def sum_error(model, engine) -> float:
+def bond_sum_error(model, engine) -> float:
     """Return the error bound of the sum over bonds relative to the friction limit [1].
 
     It is 0 for a law without such a sum.
@@ -151,15 +155,15 @@ def sum_error(model, engine) -> float:
     return 0.0
 
 
-def _sum_errors(model, fine) -> dict:
+def _bond_sum_errors(model, fine_run) -> dict:
     """Return the errors of the bench measures due to the sum over bonds, by measure name."""
-    work = np.abs(np.diff(fine.ledger[0]))
+    work = np.abs(np.diff(fine_run.ledger[0]))
     friction = model.friction
     scale = FrictionScale(
         friction.static,
-        friction.static * float(fine.load.max()),
+        friction.static * float(fine_run.load.max()),
         friction.bond_length,
         float(work.sum()),
-        float(work[fine.first :].sum()),
+        float(work[fine_run.first :].sum()),
     )
-    return friction_errors(fine.values, sum_error(model, fine.engine), scale)
+    return friction_errors(fine_run.values, bond_sum_error(model, fine_run.engine), scale)

@@ -1,6 +1,6 @@
 """Response of a compiled contact model to a prescribed displacement, in blocks of samples.
 
-In: a ContactModel and a `Slide`. Out: `Followed`.
+In: a ContactModel and a `Slide`. Out: `PathResponse`.
 """
 
 from itertools import pairwise
@@ -12,10 +12,10 @@ from ...core import NotConverged
 from ...dynamics.march.capacity import copy_state, enlarge_list, is_full
 from ...dynamics.march.faces import STEP_TOL
 from ...dynamics.march.models import load_instances
-from .ledger import BLOCK, Slide, SlideHistories, make_ledger
+from .ledger import N_BLOCK_SAMPLES, Slide, SlideHistories, make_ledger
 
 
-class Followed(NamedTuple):
+class PathResponse(NamedTuple):
     """Histories of a contact model under a prescribed displacement, at k samples.
 
     - force, slip (k,): [N], [m].
@@ -54,14 +54,14 @@ class Followed(NamedTuple):
         return SlideHistories(self.force, loads, self.slip, self.ledger, self.frames, tau, local)
 
 
-def follow_path(model, task: Slide, paced: bool = False) -> Followed:
+def follow_path(model, task: Slide, depends_on_speed: bool = False) -> PathResponse:
     """Compute the response of a ContactModel to the displacement path of a bench.
 
     Parameters
     ----------
     model : ContactModel
     task : Slide
-    paced : bool
+    depends_on_speed : bool
         Whether the law depends on the speed.
 
     Raises
@@ -74,9 +74,11 @@ def follow_path(model, task: Slide, paced: bool = False) -> Followed:
     slide = task.slide
     contact = model.build()
     frames = task.frame_numbers
-    pace_changes = _pace_changes(time) if paced else np.zeros(0, int)
+    pace_changes = _pace_changes(time) if depends_on_speed else np.zeros(0, int)
     last = slide.size - 1
-    ends = np.unique(np.concatenate([np.arange(0, last, BLOCK), frames, pace_changes, [last]]))
+    ends = np.unique(
+        np.concatenate([np.arange(0, last, N_BLOCK_SAMPLES), frames, pace_changes, [last]])
+    )
     forces = np.zeros((slide.size, 3))
     energies = np.zeros((slide.size, 2))
 
@@ -105,7 +107,7 @@ def follow_path(model, task: Slide, paced: bool = False) -> Followed:
         n_failed += n_failed_in_block
         if end in frames:
             states.append((slide[end], next(iter(model.picture_fields(contact).values()), None)))
-        if end == last or end - reported >= BLOCK:
+        if end == last or end - reported >= N_BLOCK_SAMPLES:
             task.options.report(end / last)
             reported = end
     work = np.concatenate([[0.0], np.cumsum(forces[:-1, 1] * np.diff(slide))])
@@ -113,7 +115,7 @@ def follow_path(model, task: Slide, paced: bool = False) -> Followed:
     losses[1:, 0] = -np.minimum(energies[:-1, 0], 0.0)
     losses[1:, 1] = np.maximum(energies[:-1, 0], 0.0)
     ledger = make_ledger(work, energies[:, 1], losses)
-    return Followed(forces[:, 0], forces[:, 2], ledger, frames, states, n_failed)
+    return PathResponse(forces[:, 0], forces[:, 2], ledger, frames, states, n_failed)
 
 
 def _pace_changes(time) -> np.ndarray:

@@ -12,14 +12,14 @@ from ...friction.record import make_law
 from . import averaged
 
 
-def law_for(model, patch=None):
+def make_numpy_law(model, patch=None):
     """Return the NumPy object of the friction law of a model.
 
     Only an averaged law depends on the patch.
     """
     f = model.friction
     if law_has_trait(f.law, "averaged"):
-        return averaged.law_on(model, patch)
+        return averaged.make_averaged_law(model, patch)
     if not law_has_trait(f.law, "bonds"):
         return make_law(f, patch.pressure.load if patch is not None else model.point.load)
 
@@ -49,7 +49,7 @@ def nodal_pressure(model, patch) -> tuple:
     return patch.pressure.sigma_n, patch.pieces.interface.weight
 
 
-def ends_of_rest(model, slide) -> dict:
+def find_rest_ends(model, slide) -> dict:
     """Return the samples where motion starts from rest with static above kinetic friction.
 
     They are the first sample of the path and the last one of every rest; the values are the signs

@@ -13,7 +13,7 @@ from ...effects import law_has_trait
 
 # Number of samples between two progress reports. With so many, the cost of calling compiled code is
 # negligible.
-BLOCK = 4096
+N_BLOCK_SAMPLES = 4096
 # Created energy over dissipated energy below which the created energy is round-off.
 ROUND_OFF_FRACTION = 1e-13
 
@@ -52,7 +52,7 @@ def make_ledger(work, stored, losses) -> np.ndarray:
     return np.stack([work, stored, dissipated, created])
 
 
-def gains_and_losses(losses) -> tuple:
+def created_and_dissipated(losses) -> tuple:
     """Return the created and the dissipated energy, summed over m points.
 
     losses (..., m): dissipated energy of each point; a negative one is created energy.
@@ -71,7 +71,7 @@ def elastic_slip(model, slide, force, load) -> np.ndarray:
     slide, force, load : (k,)
         [m], [N], [N].
     """
-    length = _length(model)
+    length = _bond_length(model)
     static = model.friction.static
     stretch = length * np.divide(
         force, static * load, out=np.zeros_like(force), where=static * load > 0
@@ -93,12 +93,12 @@ def local_slip(model, slide, tau, sigma) -> np.ndarray:
         Pressures [Pa].
     """
     limit = np.broadcast_to(model.friction.static * sigma, tau.shape)
-    return slide[:, None] - _length(model) * np.divide(
+    return slide[:, None] - _bond_length(model) * np.divide(
         tau, limit, out=np.zeros_like(tau), where=limit > 0
     )
 
 
-def _length(model) -> float:
+def _bond_length(model) -> float:
     """Return the bond length [m]; 0 for a law without elastic stretch."""
     if law_has_trait(model.friction.law, "averaged"):
         return 0.0

@@ -43,12 +43,12 @@ MAX_EXTRA_CYCLES = 4  # Largest number of further cycles in which a steady loop 
 MAX_EVALUATIONS = 2e6  # Largest number of evaluations (points times samples) of this search.
 
 
-def run_prescribed(what, patch, coarse, seconds, warnings, say, progress, estimate) -> Result:
+def run_prescribed(plan, patch, coarse, seconds, warnings, say, progress, estimate) -> Result:
     """Run the plan of a bench and return its Result.
 
     Parameters
     ----------
-    what : Plan
+    plan : Plan
     patch : Patch or None
         None under [normal].
     coarse : sequence of Patch or None
@@ -60,7 +60,7 @@ def run_prescribed(what, patch, coarse, seconds, warnings, say, progress, estima
     say, progress, estimate
         See `run.run`.
     """
-    model = what.model
+    model = plan.model
     steps = steps_per_cycle(model)
     frames = FRAMES if patch is not None else 0
     fine = bench.run(model, patch, steps, frames, watch=PassOptions(None, say, progress))
@@ -97,7 +97,7 @@ def run_prescribed(what, patch, coarse, seconds, warnings, say, progress, estima
     if model.partial_slip and (count := shear.count_shear_modes(model, patch)):
         extra["shear_modes"] = count
     return Result(
-        what,
+        plan,
         outcome_on_piece(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral),
         set_final_floors(measures, model.accuracy.tolerance),
         fine,
@@ -151,7 +151,7 @@ def _growth_notes(model, fine) -> list:
     return growth_notes(model.bonds, peak)
 
 
-def _closing_gap(fine) -> float:
+def _loop_closing_error(fine) -> float:
     """Return the relative mismatch of start and end of the last cycle [1].
 
     It is the larger of two changes over the cycle: that of the force over its peak, and that of the
@@ -180,7 +180,7 @@ def _warn_if_open(model, patch, fine, steps: int) -> list:
     cycles = model.slide.cycles
     if period is None or cycles < 1 or not fine.values.get("loop_area"):
         return []
-    if (gap := _closing_gap(fine)) <= tolerance:
+    if (gap := _loop_closing_error(fine)) <= tolerance:
         return []
     text = (
         f"{OPEN_LOOP}: it misses by {100 * gap:.2g} % (limit {100 * tolerance:g} %), so loop_area, the friction "
@@ -195,12 +195,12 @@ def _warn_if_open(model, patch, fine, steps: int) -> list:
     )
     ends = longer.time[-1] - period * np.arange(MAX_EXTRA_CYCLES + 1, -1, -1)
     loops = np.diff(np.interp(ends, longer.time, longer.ledger[0]))
-    near = np.abs(loops - loops[-1]) <= tolerance * np.abs(loops[-1])
-    if near[0]:
+    is_near_last = np.abs(loops - loops[-1]) <= tolerance * np.abs(loops[-1])
+    if is_near_last[0]:
         return []
-    if not near[-2]:
+    if not is_near_last[-2]:
         return [f"{text}; no steady loop is reached within {cycles + MAX_EXTRA_CYCLES:g} cycles"]
-    count = int(np.flatnonzero(~near)[-1]) + 1
+    count = int(np.flatnonzero(~is_near_last)[-1]) + 1
     return [
         f"{text}, which is {format_quantity(float(loops[-1]), 'J', 4)}; set slide.cycles = {cycles + count:g}"
     ]
@@ -217,10 +217,10 @@ def _warn_of_overhang(patch_model, patch, fine) -> list:
             f"the slide across the sliding direction is {lateral:.2g} of the width of the pieces, but the "
             "computation assumes that the pieces still overlap over their whole width"
         )
-    lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
-    if lost > 0.01:
+    load_loss = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
+    if load_loss > 0.01:
         warnings.append(
             "the upper piece slides off the pressed area: at worst the computed contact carries "
-            f"{100 * lost:.0f} % less than the given load"
+            f"{100 * load_loss:.0f} % less than the given load"
         )
     return [*warnings, *warn_of_large_slide(patch, fine.slide)]

@@ -36,7 +36,7 @@ def slide_rigidly(task: Slide) -> SlideHistories:
         or model.load_varies
         or not (law_has_trait(law, "bonds") or law_has_trait(law, "timeless"))
     )
-    followed = follow_path(_one_point(task, load), task, is_paced)
+    followed = follow_path(_make_point_model(task, load), task, is_paced)
     frames = followed.frames
     slide = task.slide
     ratio = followed.force[frames] / load if load > 0 else np.zeros(frames.size)
@@ -53,7 +53,7 @@ def slide_rigidly(task: Slide) -> SlideHistories:
     return SlideHistories(followed.force, loads, slip, followed.ledger, frames, tau, local)
 
 
-def climbing(model, load: float, patch=None, count: int | None = None):
+def make_climbing_model(model, load: float, patch=None, count: int | None = None):
     """Return the contact model of a law with memory along the flanks of grooves.
 
     In a bench no mass is lifted.
@@ -85,13 +85,13 @@ def climbing(model, load: float, patch=None, count: int | None = None):
     return flank_climbing.with_shear_modes(contact, patch, count, model.accuracy.tolerance)
 
 
-def _one_point(task: Slide, load: float) -> ContactModel:
+def _make_point_model(task: Slide, load: float) -> ContactModel:
     """Return the contact model of a single point that carries the full load [N]."""
     model = task.model
     friction = model.friction
     engine = task.engine
     if model.grooves is not None:
-        return climbing(model, load)
+        return make_climbing_model(model, load)
     if engine.method is Method.ELEMENTS:
         element = make_law(friction, load).element(load)
         if task.options.springs is not None:
@@ -104,10 +104,12 @@ def _one_point(task: Slide, load: float) -> ContactModel:
     return bond_list_model(law, friction.static * load, choice.reach(law.order), choice.merge)
 
 
-def coarser_cells(few) -> CoarserRuns:
+def list_merged_cell_runs(reference_pass) -> CoarserRuns:
     """Return the coarser runs in which groups of four cells of a slider density are merged.
 
-    few: the Pass with which they are compared.
+    reference_pass: the Pass with which they are compared.
     """
-    runs = tuple(few._replace(springs=partial(join_cells, *merge)) for merge in CELL_MERGES)
-    return CoarserRuns(runs, merged_cell_errors, few, "cells")
+    runs = tuple(
+        reference_pass._replace(springs=partial(join_cells, *merge)) for merge in CELL_MERGES
+    )
+    return CoarserRuns(runs, merged_cell_errors, reference_pass, "cells")

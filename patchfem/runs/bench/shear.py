@@ -20,7 +20,7 @@ from ...slip.fields import bond_shear_modes, element_fields, point_fields
 from ..patch.jenkins_elements import elements
 from .follow import follow_path
 from .ledger import Slide, SlideHistories
-from .rigid import climbing
+from .rigid import make_climbing_model
 
 # Fraction of the mean pressure assumed at nodes without initial pressure of the lower piece.
 OPEN_PRESSURE_FRACTION = 1e-3
@@ -60,15 +60,15 @@ def _slide_over_grooves(task: Slide) -> SlideHistories:
     model = task.model
     patch = task.patch
     load = patch.pressure.load
-    contact = climbing(model, load, patch, model.accuracy.shear_modes)
+    contact = make_climbing_model(model, load, patch, model.accuracy.shear_modes)
     is_paced = not law_has_trait(model.friction.law, "timeless")
     followed = follow_path(contact, task, is_paced)
     followed.require_convergence()
-    tau, local = climbed_fields(patch, contact, followed.states)
+    tau, local = groove_fields(patch, contact, followed.states)
     return followed.histories(load, tau, local)
 
 
-def climbed_fields(patch, contact, states) -> tuple:
+def groove_fields(patch, contact, states) -> tuple:
     """Return traction (f, m) [Pa] with climbing and slip (f, m) [m] of points over grooves.
 
     The points have shear modes.
@@ -103,9 +103,9 @@ def _slide_bond_points(task: Slide) -> SlideHistories:
     choice = task.engine.choice
     shear = shear_modes_of_points(model, patch, task.options.modes)
     if model.side == "lower":
-        contact = lists_on_lower_piece(model, patch, choice, shear)
+        contact = make_lists_on_lower_piece(model, patch, choice, shear)
     elif choice is not None:
-        contact = sheared_lists(patch, law, shear, choice)
+        contact = make_sheared_lists(patch, law, shear, choice)
     else:
         weight = patch.pieces.interface.weight
         contact = points_model(law, weight, patch.pressure.sigma_n, shear)
@@ -161,14 +161,14 @@ def count_shear_modes(model, patch) -> int | None:
     return shear_modes_of_points(model, patch).stiffness.size
 
 
-def lists_on_lower_piece(model, patch, found, shear):
+def make_lists_on_lower_piece(model, patch, choice, shear):
     """Return the model with a bond list per node, under the pressure of the lower piece.
 
     Parameters
     ----------
     model : Model
     patch : Patch
-    found : Choice
+    choice : Choice
         Method of the sum over bonds.
     shear : ShearModes or None
         Modes on every node; None for pieces that are rigid in shear.
@@ -181,13 +181,13 @@ def lists_on_lower_piece(model, patch, found, shear):
         law.static * mean * patch.pieces.interface.weight,
         np.full(sigma.size, mean),
         shear,
-        found.reach(law.order),
-        found.merge,
+        choice.reach(law.order),
+        choice.merge,
         lower_pressure_fields(patch.x, sigma, mean),
     )
 
 
-def sheared_lists(patch, law, shear, found, force=None):
+def make_sheared_lists(patch, law, shear, choice, force=None):
     """Return the model with bond lists at the points of the shear modes of a pressed patch.
 
     Parameters
@@ -196,7 +196,7 @@ def sheared_lists(patch, law, shear, found, force=None):
     law
         Bond parameters.
     shear : ShearModes
-    found : Choice
+    choice : Choice
         Method of the sum over bonds.
     force : (k,), optional
         Normal forces [N] of the points, if few points represent all.
@@ -204,22 +204,22 @@ def sheared_lists(patch, law, shear, found, force=None):
     sigma = patch.pressure.sigma_n[shear.points] if force is None else np.ones_like(force)
     force = patch.pieces.interface.weight[shear.points] * sigma if force is None else force
     return point_lists_model(
-        law, law.static * force, sigma, shear, found.reach(law.order), found.merge
+        law, law.static * force, sigma, shear, choice.reach(law.order), choice.merge
     )
 
 
-def coarser_elements(count: int, few) -> CoarserRuns:
+def list_coarser_element_runs(count: int, reference_pass) -> CoarserRuns:
     """Return the coarser runs of a bench with parallel elements, on coarser meshes.
 
     Parameters
     ----------
     count : int
         Number of coarser meshes.
-    few : Pass
+    reference_pass : Pass
         Pass with which they are compared.
     """
-    runs = tuple(few._replace(level=level) for level in range(1, count + 1))
-    return CoarserRuns(runs, mesh_errors, few, "mesh")
+    runs = tuple(reference_pass._replace(level=level) for level in range(1, count + 1))
+    return CoarserRuns(runs, mesh_errors, reference_pass, "mesh")
 
 
 def mesh_errors(*values: dict) -> dict:

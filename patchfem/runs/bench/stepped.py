@@ -11,13 +11,13 @@ import numpy as np
 
 from ...core import Missing
 from ...friction.protocol import Step
-from .law import ends_of_rest, law_for, nodal_pressure
+from .law import find_rest_ends, make_numpy_law, nodal_pressure
 from .ledger import (
-    BLOCK,
+    N_BLOCK_SAMPLES,
     Slide,
     SlideHistories,
+    created_and_dissipated,
     elastic_slip,
-    gains_and_losses,
     local_slip,
     make_ledger,
 )
@@ -38,22 +38,22 @@ def slide_step_by_step(task: Slide) -> SlideHistories:
         If the sum over bonds would take too long.
     """
     model = task.model
-    law = law_for(model, task.patch)
+    law = make_numpy_law(model, task.patch)
     points = _pressed_points(task)
-    refuse_long_sum(model, law, task.slide.size, points.weight.size, task.slide)
+    refuse_expensive_sum(model, law, task.slide.size, points.weight.size, task.slide)
     take_step = _step_under_changing_load if model.load_varies else _step_law
-    found = _evaluate_law(
-        task, law, take_step, task.slide[:, None], points, ends_of_rest(model, task.slide)
+    histories = _evaluate_law(
+        task, law, take_step, task.slide[:, None], points, find_rest_ends(model, task.slide)
     )
     frames = task.frame_numbers
-    force = found.force[:, 0]
-    tau = found.tau[:, 0]
+    force = histories.force[:, 0]
+    tau = histories.tau[:, 0]
     sigma = np.array([points.pressure(sample) for sample in frames]).reshape(tau.shape)
     return SlideHistories(
         force,
-        found.load,
-        elastic_slip(model, task.slide, force, found.load),
-        found.ledger,
+        histories.load,
+        elastic_slip(model, task.slide, force, histories.load),
+        histories.ledger,
         frames,
         tau,
         local_slip(model, task.slide[frames], tau, sigma),
@@ -77,8 +77,8 @@ def slide_in_plane(task: Slide) -> tuple[SlideHistories, dict]:
     model = task.model
     patch = task.patch
     slide = task.slide
-    law = law_for(model)
-    refuse_long_sum(model, law, slide.size, 1, slide)
+    law = make_numpy_law(model)
+    refuse_expensive_sum(model, law, slide.size, 1, slide)
     lateral = np.interp(task.time, model.slide.corners[0], model.slide.across)
     unit_point = _Points(np.ones(1), lambda sample: np.ones(1))
     unit = _evaluate_law(task, law, _step_law, np.stack([slide, lateral], axis=1), unit_point, {})
@@ -170,7 +170,7 @@ def _evaluate_law(
                 sigma,
                 task.time[sample] - task.time[sample - 1],
             )
-            losses[sample] = gains_and_losses(weight * dissipated)
+            losses[sample] = created_and_dissipated(weight * dissipated)
             work[sample] = work[sample - 1] + increment @ np.atleast_2d(mean) @ weight
         if sample in breakaways:
             traction = law.breakaway_traction(sigma, breakaways[sample])
@@ -182,7 +182,7 @@ def _evaluate_law(
         stored[sample] = weight @ law.stored_energy(state)
         if sample in frames:
             tau.append(traction)
-        if sample % BLOCK == 0 or sample == size - 1:
+        if sample % N_BLOCK_SAMPLES == 0 or sample == size - 1:
             task.options.report(sample / (size - 1))
     return _LawHistories(
         force,
@@ -192,7 +192,7 @@ def _evaluate_law(
     )
 
 
-def refuse_long_sum(model, law, samples: int, points: int, slide) -> None:
+def refuse_expensive_sum(model, law, samples: int, points: int, slide) -> None:
     """Raise Missing if the direct sum over bonds exceeds MAX_STRIP_POINT_PRODUCTS.
 
     Bonds older than 25 bond lengths count as cut off.
@@ -230,11 +230,11 @@ def _pressed_points(task: Slide) -> _Points:
         return _Points(weight, lambda sample: sigma)
     x = task.patch.x
 
-    def moved_pressure(sample: int) -> np.ndarray:
+    def shifted_pressure(sample: int) -> np.ndarray:
         """Return the pressure of the displaced lower piece at the points of the upper piece."""
         return np.interp(x + task.slide[sample], x, sigma, left=0.0, right=0.0)
 
-    return _Points(weight, moved_pressure)
+    return _Points(weight, shifted_pressure)
 
 
 def _step_law(law, state, increment: float, before, after, duration: float) -> Step:

@@ -50,7 +50,7 @@ def collect_frames(model, numerics, patch, raw) -> dict:
 
     shots = raw.snapshots
     if model.partial_slip and model.grooves is not None:
-        tau, local = bench_shear.climbed_fields(
+        tau, local = bench_shear.groove_fields(
             patch, raw.contact, [(s["slide"], s["nodes"]) for s in shots]
         )
         return interface_frames(

@@ -110,7 +110,7 @@ def _climbing(model: Model, patch, count: int | None = None):
     f = model.friction
     load = patch.pressure.load if patch is not None else model.point.load
     if model.partial_slip or not law_has_trait(f.law, "memoryless"):
-        return rigid.climbing(model, load, patch, count)
+        return rigid.make_climbing_model(model, load, patch, count)
 
     speed = None if law_has_trait(f.law, "set-valued") else f.reference_speed
     kinetic = f.static if f.kinetic is None else f.kinetic
@@ -160,7 +160,9 @@ def contact_model(model: Model, numerics: Numerics, patch):
     if law_has_trait(f.law, "bonds"):
         return _bonds(model, numerics, patch, load)
     if law_has_trait(f.law, "averaged"):
-        return models.coulomb_model(*(f.static * load * averaged.limit_share(model, patch),) * 2)
+        return models.coulomb_model(
+            *(f.static * load * averaged.rigid_limit_ratio(model, patch),) * 2
+        )
     element = make_law(f, load).element(load)
     if not soft:
         return models.element_model(element)
@@ -185,13 +187,13 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
         modes = None
         if model.partial_slip:
             modes = shear.shear_modes_of_points(model, patch, numerics.shear_modes)
-        return shear.lists_on_lower_piece(model, patch, choice, modes)
+        return shear.make_lists_on_lower_piece(model, patch, choice, modes)
     if is_list and not model.partial_slip:
         return models.bond_list_model(law, limit, choice.reach(law.order), choice.merge)
     if model.partial_slip:
         reduced, force = _shear_modes(patch, law, numerics.shear_modes, model)
         if is_list:
-            return shear.sheared_lists(patch, law, reduced, choice, force)
+            return shear.make_sheared_lists(patch, law, reduced, choice, force)
         if force is not None:
             return models.points_model(law, force, np.ones_like(force), reduced)
         weight = patch.pieces.interface.weight

@@ -483,7 +483,7 @@ def coulomb_limits(model, patch) -> list:
         return [tuple(map(float, law.friction_limits(law.load))) for law in laws]
     static, kinetic = model.friction_limits(normal_load(model, patch))
     if law_has_trait(friction.law, "averaged"):
-        static = static * averaged.limit_share(model, patch)
+        static = static * averaged.rigid_limit_ratio(model, patch)
     if friction.kinetic is None:
         kinetic = static
     return [(float(static), float(kinetic))]

@@ -32,7 +32,7 @@ def failed_findings(result: Result) -> list:
     return [finding for check in CHECKS for finding in check(run) if finding.has_failed]
 
 
-def with_self_checks(result: Result) -> Result:
+def mark_failed_checks(result: Result) -> Result:
     """Return the result, marked as `not_converged` if any of its self-checks fails.
 
     Every failed check of CHECKS adds a sentence.

@@ -12,7 +12,7 @@ import numpy as np
 from ...core import Outcome
 from ..results.result import Result
 from ..rig import engines
-from .finding import CUBIC_QUADRATURE
+from .finding import CUBIC_QUADRATURE_TOL
 
 MIN_CYCLE_SAMPLES = 40  # Smallest number of samples per cycle of a window that the checks use.
 
@@ -32,7 +32,7 @@ class Evidence:
             if not isinstance(value, dict) or key not in value:
                 return None
             value = value[key]
-        return quantity(value)
+        return parse_scene_number(value)
 
     def value(self, name: str) -> float | None:
         """Return the value of a measure; None if the run does not have it."""
@@ -95,18 +95,20 @@ class Evidence:
         ):
             return None
         columns = {
-            key: np.array([quantity(mode[key]) for mode in structure["mode"]])
+            key: np.array([parse_scene_number(mode[key]) for mode in structure["mode"]])
             for key in ("frequency", "damping", "slide", "base", "accelerometer")
         }
         if self.scene["drive"]["kind"] == "force":
-            columns["base"] = -np.array([quantity(mode["output"]) for mode in structure["mode"]])
+            columns["base"] = -np.array(
+                [parse_scene_number(mode["output"]) for mode in structure["mode"]]
+            )
         return SceneModes(
             2 * np.pi * columns["frequency"],
             columns["damping"],
             columns["slide"],
             columns["base"],
             columns["accelerometer"],
-            quantity(structure["moving_mass"]),
+            parse_scene_number(structure["moving_mass"]),
         )
 
     @cached_property
@@ -211,10 +213,10 @@ class ForceBalance(NamedTuple):
     @property
     def threshold(self) -> float:
         """Largest difference [N] of the two force harmonics in a correct run."""
-        return self.sampling + CUBIC_QUADRATURE * self.terms
+        return self.sampling + CUBIC_QUADRATURE_TOL * self.terms
 
 
-def quantity(value) -> float | None:
+def parse_scene_number(value) -> float | None:
     """Return the number of a scene value such as 0.3 or "700.0 N"; None for other values."""
     if isinstance(value, str):
         head = value.split()[0] if value else ""

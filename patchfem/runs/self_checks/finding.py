@@ -5,17 +5,17 @@ from typing import NamedTuple
 import numpy as np
 
 # Relative round-off error; sums of some hundred terms of double precision stay below 1e-12.
-ROUND_OFF = 1e-9
+ROUND_OFF_TOL = 1e-9
 # Relative load residual; the contact solver balances the load to 1e-9 or better.
-CONTACT_RESIDUAL = 1e-6
+CONTACT_RESIDUAL_TOL = 1e-6
 # Factor on the stated error of a measure, because an error stated slightly too small is no fault.
-STATED_ERRORS = 10.0
+STATED_ERROR_FACTOR = 10.0
 # Relative difference of two evaluations of one smooth curve on a mesh or on samples.
-READING = 0.01
+EVALUATION_TOL = 0.01
 # Relative error of cubics through samples, for motions of up to a radian per step.
-CUBIC_QUADRATURE = 2e-3
-AT_MOST = "from the values of the scene at most"
-AT_LEAST = "from the values of the scene at least"
+CUBIC_QUADRATURE_TOL = 2e-3
+ROUTE_OF_UPPER_BOUND = "from the values of the scene at most"
+ROUTE_OF_LOWER_BOUND = "from the values of the scene at least"
 
 
 class Finding(NamedTuple):

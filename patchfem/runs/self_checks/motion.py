@@ -9,20 +9,20 @@ import numpy as np
 
 from ...core import Outcome
 from ..rig import engines
-from .evidence import Evidence, quantity
+from .evidence import Evidence, parse_scene_number
 from .finding import (
-    AT_LEAST,
-    AT_MOST,
-    CONTACT_RESIDUAL,
-    CUBIC_QUADRATURE,
-    READING,
-    STATED_ERRORS,
+    CONTACT_RESIDUAL_TOL,
+    CUBIC_QUADRATURE_TOL,
+    EVALUATION_TOL,
+    ROUTE_OF_LOWER_BOUND,
+    ROUTE_OF_UPPER_BOUND,
+    STATED_ERROR_FACTOR,
     Finding,
 )
 
 # Relative error of a peak between two of 40 samples per cycle of the fastest motion.
-SAMPLED_PEAK = 0.05
-LIMITED_LAWS = ("coulomb", "tanh", "elastic-plastic", "iwan", "bouc-wen", "convolution")
+SAMPLED_PEAK_TOL = 0.05
+LAWS_WITH_FRICTION_LIMIT = ("coulomb", "tanh", "elastic-plastic", "iwan", "bouc-wen", "convolution")
 # Relative error of the equivalent damping of a window whose cycles differ slightly.
 MAX_SLIP_CORRECTION = 0.05
 
@@ -50,12 +50,12 @@ def check_friction_harmonic(run: Evidence) -> Iterator[Finding]:
     if stiffness is not None and abs(balance.slide) > 0:
         expected = (balance.from_samples / balance.slide).real
         # The displacement is a divisor, so that the error of its quadrature counts in proportion.
-        slack = (balance.threshold + CUBIC_QUADRATURE * size) / abs(balance.slide)
+        slack = (balance.threshold + CUBIC_QUADRATURE_TOL * size) / abs(balance.slide)
         yield Finding(
             "equivalent_stiffness",
             stiffness,
             expected,
-            slack + STATED_ERRORS * run.error("equivalent_stiffness"),
+            slack + STATED_ERROR_FACTOR * run.error("equivalent_stiffness"),
             "N/m",
         )
 
@@ -73,36 +73,41 @@ def check_friction_limit(run: Evidence) -> Iterator[Finding]:
         or run.result.outcome
         is Outcome.GROWS  # The motion is unbounded, so that the error of the peak is not known.
         or not run.has_plain_friction
-        or run.scene["friction"]["law"] not in LIMITED_LAWS
+        or run.scene["friction"]["law"] not in LAWS_WITH_FRICTION_LIMIT
     ):
         return
     friction = run.scene["friction"]
-    static = quantity(friction["static"])
+    static = parse_scene_number(friction["static"])
     limit = static * run.load
-    slack = CONTACT_RESIDUAL * limit + run.error("friction_force_peak")
-    yield Finding("friction_force_peak", peak, min(peak, limit), slack, "N", AT_MOST)
+    slack = CONTACT_RESIDUAL_TOL * limit + run.error("friction_force_peak")
+    yield Finding("friction_force_peak", peak, min(peak, limit), slack, "N", ROUTE_OF_UPPER_BOUND)
     if run.result.patch is not None and (run.model.partial_slip or run.model.side == "lower"):
         return
     slip = run.value("slip_amplitude")
-    length = quantity(friction.get("bond_length", "none"))
-    least = None
+    length = parse_scene_number(friction.get("bond_length", "none"))
+    lower_bound = None
     if (
         friction["law"] == "coulomb"
         and slip
         and run.result.outcome is not Outcome.STUCK
         and not run.model.partial_slip
     ):
-        least = (quantity(friction.get("kinetic", static)) or 0.0) * run.load
+        lower_bound = (parse_scene_number(friction.get("kinetic", static)) or 0.0) * run.load
     elif (
         friction["law"] == "elastic-plastic"
         and run.model.rig is None
         and length is not None
         and (run.number("slide", "amplitude") or 0.0) > 4 * length
     ):
-        least = limit
-    if least is not None:
+        lower_bound = limit
+    if lower_bound is not None:
         yield Finding(
-            "friction_force_peak", peak, max(peak, least), READING * limit + slack, "N", AT_LEAST
+            "friction_force_peak",
+            peak,
+            max(peak, lower_bound),
+            EVALUATION_TOL * limit + slack,
+            "N",
+            ROUTE_OF_LOWER_BOUND,
         )
 
 
@@ -133,7 +138,7 @@ def check_loop_area(run: Evidence) -> Iterator[Finding]:
         "loop_area",
         area,
         expected,
-        missed + CUBIC_QUADRATURE * largest + STATED_ERRORS * run.error("loop_area"),
+        missed + CUBIC_QUADRATURE_TOL * largest + STATED_ERROR_FACTOR * run.error("loop_area"),
         "J",
     )
     damping = run.value("equivalent_damping")
@@ -155,7 +160,7 @@ def check_loop_area(run: Evidence) -> Iterator[Finding]:
             "equivalent_damping",
             damping,
             expected,
-            slack * abs(expected) + STATED_ERRORS * run.error("equivalent_damping"),
+            slack * abs(expected) + STATED_ERROR_FACTOR * run.error("equivalent_damping"),
         )
 
 
@@ -188,12 +193,15 @@ def check_motion_measures(run: Evidence) -> Iterator[Finding]:
             "relative_displacement_amplitude",
             amplitude,
             expected,
-            SAMPLED_PEAK * expected + STATED_ERRORS * run.error("relative_displacement_amplitude"),
+            SAMPLED_PEAK_TOL * expected
+            + STATED_ERROR_FACTOR * run.error("relative_displacement_amplitude"),
             "m",
         )
     largest = float(np.abs(window.acceleration).max())
     if peak is not None:
-        slack = SAMPLED_PEAK * largest + STATED_ERRORS * run.error("absolute_acceleration_peak")
+        slack = SAMPLED_PEAK_TOL * largest + STATED_ERROR_FACTOR * run.error(
+            "absolute_acceleration_peak"
+        )
         yield Finding(
             "absolute_acceleration_peak",
             peak,
@@ -218,7 +226,7 @@ def check_motion_measures(run: Evidence) -> Iterator[Finding]:
         "the median size of the acceleration",
         float(np.median(np.abs(window.acceleration))),
         size,
-        SAMPLED_PEAK * size + 1e-4,
+        SAMPLED_PEAK_TOL * size + 1e-4,
         "m/s2",
         "from the equation of motion of the scene",
         float(np.median(np.abs(window.acceleration - recomputed))),
@@ -235,5 +243,8 @@ def check_energy_balance(run: Evidence) -> Iterator[Finding]:
     missing = run.value("energy_balance")
     if missing is not None and run.model.rig is None:
         yield Finding(
-            "energy_balance", missing, 0.0, READING + STATED_ERRORS * run.error("energy_balance")
+            "energy_balance",
+            missing,
+            0.0,
+            EVALUATION_TOL + STATED_ERROR_FACTOR * run.error("energy_balance"),
         )

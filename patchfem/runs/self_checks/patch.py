@@ -8,7 +8,15 @@ from collections.abc import Iterator
 from ...core import Outcome
 from ..patch import values
 from .evidence import Evidence
-from .finding import AT_LEAST, AT_MOST, CONTACT_RESIDUAL, READING, ROUND_OFF, STATED_ERRORS, Finding
+from .finding import (
+    CONTACT_RESIDUAL_TOL,
+    EVALUATION_TOL,
+    ROUND_OFF_TOL,
+    ROUTE_OF_LOWER_BOUND,
+    ROUTE_OF_UPPER_BOUND,
+    STATED_ERROR_FACTOR,
+    Finding,
+)
 
 
 def check_interface_area(run: Evidence) -> Iterator[Finding]:
@@ -19,9 +27,9 @@ def check_interface_area(run: Evidence) -> Iterator[Finding]:
     """
     if run.result.patch is None:
         return
-    found = float(run.result.patch.pieces.interface.weight.sum())
-    tolerance = CONTACT_RESIDUAL if run.model.patch.mesh.file is not None else ROUND_OFF
-    yield Finding("the sum of the nodal areas", found, run.area, tolerance * run.area, "m2")
+    total_area = float(run.result.patch.pieces.interface.weight.sum())
+    tolerance = CONTACT_RESIDUAL_TOL if run.model.patch.mesh.file is not None else ROUND_OFF_TOL
+    yield Finding("the sum of the nodal areas", total_area, run.area, tolerance * run.area, "m2")
 
 
 def check_normal_load(run: Evidence) -> Iterator[Finding]:
@@ -44,7 +52,7 @@ def check_normal_load(run: Evidence) -> Iterator[Finding]:
         ("the measure normal_load", run.value("normal_load")),
     ):
         if found is not None:
-            yield Finding(quantity_name, found, run.load, CONTACT_RESIDUAL * run.load, "N")
+            yield Finding(quantity_name, found, run.load, CONTACT_RESIDUAL_TOL * run.load, "N")
 
 
 def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
@@ -69,7 +77,7 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
     ):
         return
     if any(
-        piece.length > found.pieces.length * (1 + ROUND_OFF)
+        piece.length > found.pieces.length * (1 + ROUND_OFF_TOL)
         or piece.corner_kind(found.pieces.length / 2) != "sharp"
         for piece in (found.pieces.lower, found.pieces.upper)
     ):
@@ -99,12 +107,17 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
     normal = run.value("normal_stiffness")
     shear = run.value("tangential_stiffness")
     slack = {
-        name: READING * run.value(name) + STATED_ERRORS * run.error(name)
+        name: EVALUATION_TOL * run.value(name) + STATED_ERROR_FACTOR * run.error(name)
         for name in ("normal_stiffness", "tangential_stiffness")
     }
     upper = 1 / flexibility["column"]
     yield Finding(
-        "normal_stiffness", normal, min(normal, upper), slack["normal_stiffness"], "N/m", AT_MOST
+        "normal_stiffness",
+        normal,
+        min(normal, upper),
+        slack["normal_stiffness"],
+        "N/m",
+        ROUTE_OF_UPPER_BOUND,
     )
     yield Finding(
         "tangential_stiffness",
@@ -112,7 +125,7 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
         min(shear, 1 / flexibility["shear"]),
         slack["tangential_stiffness"],
         "N/m",
-        AT_MOST,
+        ROUTE_OF_UPPER_BOUND,
     )
     if patch.active.all() and not patch.has_skin and patch.strips is None:
         yield Finding(
@@ -121,7 +134,7 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
             max(normal, 1 / flexibility["stress"]),
             slack["normal_stiffness"],
             "N/m",
-            AT_LEAST,
+            ROUTE_OF_LOWER_BOUND,
         )
 
 
@@ -142,12 +155,12 @@ def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
     mean = load / run.area
     weight = patch.pieces.interface.weight
     relative_errors = run.error("loaded_fraction") / fraction + run.error("pressure_peak") / peak
-    relative = STATED_ERRORS * relative_errors
+    relative = STATED_ERROR_FACTOR * relative_errors
     yield Finding(
         "the mean pressure, loaded_fraction × pressure_peak,",
         fraction * peak,
         mean,
-        (READING + relative) * mean,
+        (EVALUATION_TOL + relative) * mean,
         "Pa",
     )
     force = patch.pressure.sigma_n * weight
@@ -155,7 +168,8 @@ def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
         "the moment of the pressure",
         moment,
         float(force @ patch.x),
-        READING * load * run.model.patch.pieces.length / 2 + STATED_ERRORS * run.error("moment"),
+        EVALUATION_TOL * load * run.model.patch.pieces.length / 2
+        + STATED_ERROR_FACTOR * run.error("moment"),
         "N m",
     )
     cells = float(values.edge_cells(patch.x, patch.active).sum())
@@ -164,7 +178,7 @@ def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
         "contact_fraction",
         share,
         bearing,
-        READING
+        EVALUATION_TOL
         + 2 * cells / run.model.patch.pieces.length
-        + STATED_ERRORS * run.error("contact_fraction"),
+        + STATED_ERROR_FACTOR * run.error("contact_fraction"),
     )

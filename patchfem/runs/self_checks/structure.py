@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .evidence import Evidence, quantity
-from .finding import ROUND_OFF, Finding
+from .evidence import Evidence, parse_scene_number
+from .finding import ROUND_OFF_TOL, Finding
 
 
 def check_modes(run: Evidence) -> Iterator[Finding]:
@@ -32,12 +32,12 @@ def check_modes(run: Evidence) -> Iterator[Finding]:
             ("output", rig.modes.output, modes.output, ""),
         )
         for name, found, expected, unit in pairs:
-            for k, (one, other) in enumerate(zip(np.asarray(found, float), expected)):
+            for k, (mode, other) in enumerate(zip(np.asarray(found, float), expected)):
                 yield Finding(
                     f"the {name} of mode {k + 1}",
-                    float(one),
+                    float(mode),
                     float(other),
-                    ROUND_OFF * np.abs(expected).max(initial=0.0),
+                    ROUND_OFF_TOL * np.abs(expected).max(initial=0.0),
                     unit,
                 )
     elif (
@@ -45,9 +45,9 @@ def check_modes(run: Evidence) -> Iterator[Finding]:
         and "bonded" not in structure
         and structure.get("measured", "free") == "free"
     ):
-        masses = [quantity(mass) for mass in structure["masses"]]
+        masses = [parse_scene_number(mass) for mass in structure["masses"]]
         trace = sum(
-            quantity(spring["stiffness"]) / masses[place - 1]
+            parse_scene_number(spring["stiffness"]) / masses[place - 1]
             for spring in structure.get("spring", ())
             for place in spring["between"]
             if place

@@ -26,7 +26,13 @@ from ..patch.measures import with_other_strip_count
 from ..patch.press import areas, make_force_function, press_patch
 from ..patch.values import values
 from ..rig import numerics
-from .slip import CycleSlip, frames_for, slip_of_cycle, slips_uniformly, strips_slide_independently
+from .slip import (
+    CycleSlip,
+    compute_cycle_slip,
+    count_frames,
+    slips_uniformly,
+    strips_slide_independently,
+)
 
 STATE_FIELDS = tuple(WearState.__slots__)  # Fields of the wear state in a saved file.
 MOMENT_FIELDS = ("cycle", "depth", "used", "pressure", "gap", "miss")  # Arrays of a saved Moment.
@@ -100,7 +106,7 @@ class _Motion:
     def __init__(self, model, patch):
         self.model = model
         self.pair = patch.pair
-        self.frames = frames_for(model.accuracy.tolerance)
+        self.frames = count_frames(model.accuracy.tolerance)
         self.same = (
             model.grooves is None
             and model.wear.friction is None
@@ -114,7 +120,7 @@ class _Motion:
         if self.last is None or not self.same:
             worn = np.zeros_like(worn) if self.same else worn
             patch = press_patch(self.model.patch, self.pair, worn)
-            slip = slip_of_cycle(worn_model(self.model, patch, worn), patch, self.frames)
+            slip = compute_cycle_slip(worn_model(self.model, patch, worn), patch, self.frames)
             if slip.outcome is not None:
                 raise _Unbounded(slip.outcome.sentence)
             self.last = slip
@@ -157,7 +163,9 @@ def worn_model(model, patch, depth):
     return replace(model, **new) if new else model
 
 
-def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep=None) -> Evolved:
+def evolve(
+    model, patch, coarse, progress=None, initial: tuple | None = None, store=None
+) -> Evolved:
     """Compute the wear of a patch over all cycles of a model with [wear].
 
     Parameters
@@ -169,9 +177,9 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         The same on coarser meshes.
     progress : callable, optional
         Called with the completed fraction of the cycles.
-    begin : tuple, optional
+    initial : tuple, optional
         (state, moments) of an interrupted run.
-    keep : callable, optional
+    store : callable, optional
         Called with state and moments after every jump to store them.
 
     Returns
@@ -200,18 +208,18 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
     )
     stopped = ""
     try:
-        if begin is None:
+        if initial is None:
             patch = _with_earlier_wear(model, patch)
             state, moments = _start_state(model, patch, problem, motion)
         else:
-            state, moments = begin
+            state, moments = initial
             patch = press_patch(model.patch, patch.pair, frozen_array(state.depth))
     except _Unbounded as reason:
         worn = tuple(mesh and _with_earlier_wear(model, mesh) for mesh in coarse)
         stopped = f"nothing was worn: {reason}"
         seconds = perf_counter() - clock
         return Evolved(patch, worn, None, (), (), None, 0.0, seconds, stopped)
-    while state.cycle < model.wear.cycles and worn_through(model, state.depth) is None:
+    while state.cycle < model.wear.cycles and find_worn_through_coating(model, state.depth) is None:
         try:
             state = _jump(model, problem, state)
         except _Unbounded as reason:
@@ -222,8 +230,8 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
             break
         patch = press_patch(model.patch, patch.pair, frozen_array(state.depth))
         moments = (*moments, _record_moment(patch, state, motion))
-        if keep is not None:
-            keep(state, moments)
+        if store is not None:
+            store(state, moments)
         if progress is not None:
             progress(state.cycle / model.wear.cycles)
     replayed = [
@@ -259,7 +267,7 @@ class WornCoating(NamedTuple):
     thickness: float
 
 
-def worn_through(model, depth) -> WornCoating | None:
+def find_worn_through_coating(model, depth) -> WornCoating | None:
     """Return the coating that is worn through at a worn depth; None if there is none.
 
     depth: depth worn off both pieces, (m,) or (s, m) [m].
@@ -303,7 +311,7 @@ def _jump(model, problem: WearProblem, state: WearState) -> WearState:
 
     if model.patch.interface.strips is not None:
         problem.press.begin(state.force)
-    after = jump_to(next_row(model.wear, problem, state))
+    after = jump_to(next_row_cycle(model.wear, problem, state))
     low = state.cycle
     high = np.inf
     previous = 0.0
@@ -330,7 +338,7 @@ def _jump(model, problem: WearProblem, state: WearState) -> WearState:
     return after
 
 
-def next_row(wear, problem: WearProblem, state: WearState) -> float:
+def next_row_cycle(wear, problem: WearProblem, state: WearState) -> float:
     """Return the largest end cycle of a jump that passes no row of the friction table.
 
     At this cycle the current wear rate reaches the next row of the table, or the row after it if
@@ -379,7 +387,7 @@ def _with_earlier_wear(model, patch):
     start.require_same_surfaces(patch.x, patch.unloaded_gap)
     area = areas(model.patch, patch.pieces.interface)
     depth = frozen_array(model.wear.compute_earlier_depth(patch.x, area))
-    if (coating := worn_through(model, depth)) is not None:
+    if (coating := find_worn_through_coating(model, depth)) is not None:
         raise PatchfemError(
             f"{start.path}: in that run the coating of the {coating.piece} piece was worn through; choose a "
             "run in which this coating was not worn through",
@@ -422,7 +430,7 @@ def _record_moment(patch, state: WearState, motion: _Motion) -> Moment:
     )
 
 
-def _replay(patch_model, model, patch, other, moments) -> tuple:
+def _replay(patch_model, model, patch, other_patch, moments) -> tuple:
     """Compute the wear of a patch on another mesh with the jumps and slip paths of a given run.
 
     The other patch may also have another number of strips. Return its worn patch and its worn depth
@@ -437,13 +445,13 @@ def _replay(patch_model, model, patch, other, moments) -> tuple:
         Patch of the moments, and the unworn patch that is worn.
     moments : sequence of Moment
     """
-    area = areas(patch_model, other.pieces.interface)
+    area = areas(patch_model, other_patch.pieces.interface)
 
     def interpolate(path) -> np.ndarray:
         """Interpolate a slip path to the nodes and strips of the other patch."""
         if patch_model.interface.strips is None:
-            return np.interp(other.x, patch.x, path)
-        rows = np.array([np.interp(other.x, patch.x, row) for row in path])
+            return np.interp(other_patch.x, patch.x, path)
+        rows = np.array([np.interp(other_patch.x, patch.x, row) for row in path])
         width = patch_model.pieces.width
         offsets = strips.strip_offsets(width, len(area))
         row_offsets = strips.strip_offsets(width, len(rows))
@@ -453,16 +461,16 @@ def _replay(patch_model, model, patch, other, moments) -> tuple:
         (after.cycle - before.cycle, interpolate(after.used)) for before, after in pairwise(moments)
     ]
     depth = replay_jumps(
-        make_force_function(patch_model, other.pair),
+        make_force_function(patch_model, other_patch.pair),
         area,
         model.wear.coefficient,
         jumps,
-        model.wear.compute_earlier_depth(other.x, area),
+        model.wear.compute_earlier_depth(other_patch.x, area),
     )
-    return press_patch(patch_model, other.pair, frozen_array(depth)), depth
+    return press_patch(patch_model, other_patch.pair, frozen_array(depth)), depth
 
 
-def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved:
+def evolve_and_save(storage, key: str, model, patch, coarse, progress=None) -> Evolved:
     """Compute the wear of a patch and save its state after every jump.
 
     Parameters
@@ -474,10 +482,10 @@ def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved
     model, patch, coarse, progress
         See `evolve`.
     """
-    if kept is None:
+    if storage is None:
         return evolve(model, patch, coarse, progress)
-    begin = load_state(kept.path, key) if kept.resume else None
-    return evolve(model, patch, coarse, progress, begin, partial(save_state, kept.path, key))
+    begin = load_state(storage.path, key) if storage.resume else None
+    return evolve(model, patch, coarse, progress, begin, partial(save_state, storage.path, key))
 
 
 def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
@@ -501,7 +509,7 @@ def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
         os.fsync(file.fileno())
 
 
-def nothing_kept(path: Path) -> PatchfemError:
+def no_saved_state_error(path: Path) -> PatchfemError:
     """Return the error that a run folder has no saved wear state.
 
     path: file of the state.
@@ -539,7 +547,7 @@ def load_state(path: Path, key: str) -> tuple:
             for *row, values in zip(*columns, json.loads(str(arrays["values"])), strict=True)
         )
     except FileNotFoundError:
-        raise nothing_kept(path) from None
+        raise no_saved_state_error(path) from None
     except PatchfemError:
         raise
     except Exception as error:  # A damaged archive can fail in many ways.

@@ -16,7 +16,7 @@ from ..patch.measures import with_other_strip_count
 from ..patch.press import areas, press_patch
 from ..patch.values import values
 from ..results.patch_rows import TABLE, WORN_SOURCE
-from .evolve import THIN_FRACTION, mean_depth, worn_through
+from .evolve import THIN_FRACTION, find_worn_through_coating, mean_depth
 from .slip import UNBOUNDED_OUTCOMES, slip_path_of_point
 
 N_FRAMES = 24  # Number of frames of the interface during the wear.
@@ -26,7 +26,7 @@ N_EDGE_NODES = 2  # Number of nodes next to a contact edge that count as the edg
 # stiffness of the unworn piece is not valid.
 MAX_WORN_FRACTION = 0.2
 ROUND_OFF = 1e-12  # Relative error of a worn volume or depth due to round-off.
-HOLDER = {"closing": "approach", "rotation": "rotation"}
+HOLDER_MEASURES = {"closing": "approach", "rotation": "rotation"}
 
 
 def add_wear_measures(result, evolved, estimate: bool = True):
@@ -45,7 +45,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
         if result.outcome in UNBOUNDED_OUTCOMES:
             warning = f"nothing was worn: {result.outcome.sentence}"
             return replace(result, warnings=[*result.warnings, warning])
-        volume = _measure_volume_of_point(model, result, estimate=estimate)
+        volume = _measure_point_volume(model, result, estimate=estimate)
         return replace(result, measures=result.measures | volume)
     warnings = [*result.warnings, *([evolved.stopped] if evolved.stopped else [])]
     result = replace(result, seconds=result.seconds | {"wear": evolved.seconds}, warnings=warnings)
@@ -57,7 +57,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
     worn |= _measure_worn_through_cycle(model, evolved, worn["worn_depth_max"].error)
     if estimate:
         result = _widen_by_jumps(result, evolved)
-    result = _add_frames(replace(result, measures=result.measures | worn), evolved)
+    result = _add_wear_frames(replace(result, measures=result.measures | worn), evolved)
     notes = [*result.extra.get("notes", []), *_note_on_start(model)]
     if "worn_through_cycle" in worn:
         notes += _note_on_coating(model, evolved)
@@ -66,7 +66,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
     return replace(
         result,
         warnings=[*warnings, *_warn_of_depth(model, evolved), *_warn_of_table(model, evolved)],
-        extra=result.extra | {"wear": _history(evolved), "notes": notes},
+        extra=result.extra | {"wear": _list_wear_history(evolved), "notes": notes},
     )
 
 
@@ -90,7 +90,7 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
 
     error: of the largest depth [m].
     """
-    if worn_through(model, evolved.state.depth) is None:
+    if find_worn_through_coating(model, evolved.state.depth) is None:
         return {}
     before, last = evolved.moments[-2:]
     deepest = int(np.argmax(last.depth))
@@ -109,7 +109,7 @@ def _note_on_start(model) -> list:
 def _note_on_coating(model, evolved) -> list:
     """Return a note on the coating that is worn through, and in which cycle."""
     depth = evolved.state.depth
-    coating = worn_through(model, depth)
+    coating = find_worn_through_coating(model, depth)
     strip, node = divmod(int(np.argmax(depth)), evolved.patch.x.size)
     place = f"x = {format_length(float(evolved.patch.x[node]), 3)}"
     if model.patch.interface.strips is not None:
@@ -138,15 +138,15 @@ def _widen_by_jumps(result, evolved):
     patch_model = result.plan.model.patch
     coarse_depth = frozen_array(evolved.state.coarse_depth)
     coarse = values(press_patch(patch_model, evolved.patch.pair, coarse_depth))
-    fine = values(evolved.patch)
-    other = values(evolved.stripped[0]) if evolved.stripped else fine
+    fine_values = values(evolved.patch)
+    other_values = values(evolved.stripped[0]) if evolved.stripped else fine_values
     ratio = with_other_strip_count(patch_model)[1]
     measures = dict(result.measures)
-    for name, value in fine.items():
+    for name, value in fine_values.items():
         measure = measures.get(name)
         if measure is not None and measure.error is not None:
             error = error_of_change(value - coarse[name])
-            error = error + error_of_change(value - other[name], ratio)
+            error = error + error_of_change(value - other_values[name], ratio)
             measures[name] = replace(measure, error=float(measure.error + error))
     return replace(result, measures=measures)
 
@@ -207,14 +207,14 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
     """
     state = evolved.state
     area = areas(model.patch, evolved.patch.pieces.interface)
-    slip_error = evolved.frame_error + _slip_error(motion) + _change_of_slip(evolved, motion)
-    fine = _measure_depths(model.patch, evolved.patch, state.depth)
+    slip_error = evolved.frame_error + _slip_error(motion) + _slip_difference(evolved, motion)
+    fine_values = _measure_depths(model.patch, evolved.patch, state.depth)
     coarse = [
         _measure_depths(model.patch, patch, depth)
         for patch, depth in zip(evolved.coarse, evolved.depths)
     ]
     other_model, ratio = with_other_strip_count(model.patch)
-    strips = fine
+    strips = fine_values
     if evolved.stripped:
         strips = _measure_depths(other_model, *evolved.stripped)
     jump_errors = {
@@ -222,11 +222,11 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
         + state.path_error * float(area.sum()),
         "worn_depth_max": state.error,
     }
-    mesh_errors = convergence_errors(fine, *coarse) if coarse else {}
+    mesh_errors = convergence_errors(fine_values, *coarse) if coarse else {}
     before = evolved.moments[0].values
     start = model.wear.start
     measures = {}
-    for name, value in fine.items():
+    for name, value in fine_values.items():
         error = None
         start_error = 0.0 if start is None else start.measure_error(name, before[name])
         if coarse and estimate and start_error is not None:
@@ -331,7 +331,7 @@ def _measure_depths(patch_model, patch, depth) -> dict:
     }
 
 
-def _change_of_slip(evolved, motion: dict) -> float:
+def _slip_difference(evolved, motion: dict) -> float:
     """Return the relative difference of the slip in the last wear cycle from the final run.
 
     The run on the worn patch may have used smaller steps for its tolerance.
@@ -343,7 +343,7 @@ def _change_of_slip(evolved, motion: dict) -> float:
     return abs(used / last.value - 1)
 
 
-def _measure_volume_of_point(model, result, *, estimate: bool = True) -> dict:
+def _measure_point_volume(model, result, *, estimate: bool = True) -> dict:
     """Return the worn volume of a single point under [normal] by name.
 
     It is coefficient times load times slip path, over all cycles of wear.
@@ -364,7 +364,7 @@ def _measure_volume_of_point(model, result, *, estimate: bool = True) -> dict:
     return {"worn_volume": _make_measure("worn_volume", volume, error, WORN_SOURCE)}
 
 
-def _add_frames(result, evolved):
+def _add_wear_frames(result, evolved):
     """Return the Result with the fields of the wear history before those of the last cycle.
 
     The states after some of the jumps come first, then the motion. The time of a state is its cycle
@@ -390,7 +390,7 @@ def _add_frames(result, evolved):
         "time": motion["time"] + evolved.state.cycle * period,
         "worn_depth": np.repeat(depth[None], n_motion, axis=0),
     }
-    for field, name in HOLDER.items():
+    for field, name in HOLDER_MEASURES.items():
         wear[f"holder_{field}"] = np.array([state.values[name] for state in states])
         value = getattr(evolved.patch.pressure, name)
         motion[f"holder_{field}"] = np.full(n_motion, value)
@@ -402,7 +402,7 @@ def _add_frames(result, evolved):
     return replace(result, fields=fields, extra=result.extra | {"wear_shown": shown})
 
 
-def _history(evolved) -> dict:
+def _list_wear_history(evolved) -> dict:
     """Return the measures over the cycles (j,) by name that all moments have.
 
     The entries `cycle` and `EDGE_PEAK` are included.
@@ -412,11 +412,11 @@ def _history(evolved) -> dict:
     for name in moments[-1].values:
         if all(name in moment.values for moment in moments):
             history[name] = np.array([moment.values[name] for moment in moments], float)
-    history[EDGE_PEAK] = np.array([edge_peak(moment.pressure) for moment in moments])
+    history[EDGE_PEAK] = np.array([edge_pressure_excess(moment.pressure) for moment in moments])
     return history
 
 
-def edge_peak(pressure) -> float:
+def edge_pressure_excess(pressure) -> float:
     """Return the excess pressure [Pa] at a contact edge over the pressure inside.
 
     It is 0 if the largest pressure is inside, or if the contact ends with the piece. A contact edge

@@ -10,7 +10,7 @@ from ...core import PatchfemError
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from ...wear.jumps import WearProblem, start_wear, take_jump
 from ..cost import Cost
-from .evolve import next_row
+from .evolve import next_row_cycle
 
 SOLVES_PER_JUMP = 20  # Number of contact solutions per jump, with its corrections.
 # Number of contact solutions per jump and strip, fewer because each starts from the previous one.
@@ -32,7 +32,7 @@ N_SMOOTH_JUMPS = 8  # Number of jumps of a patch whose asperities touch everywhe
 MAX_COUNTED_JUMPS = 1500  # Largest number of jumps that are counted.
 
 
-def jumps_about(model) -> int:
+def estimate_jumps(model) -> int:
     """Return the number of wear jumps, prescribed or estimated for automatic jumps.
 
     The estimate was within a factor of 1.5 in 54 of 56 cases, and of 2 in all. Automatic jumps are those of a
@@ -54,7 +54,7 @@ def jumps_about(model) -> int:
     area = np.gradient(x) * pieces.width * pieces.pairs
     springs = _SpringRow(patch, x, area)
     law = model.friction
-    path = np.full(x.size, _path_about(model))
+    path = np.full(x.size, _estimate_slip_path(model))
     if wear.uses_friction_work:
         path = path * law.static
 
@@ -69,13 +69,15 @@ def jumps_about(model) -> int:
     state = start_wear(row, wear.compute_earlier_depth(x, area))
     jumps = 0
     while state.cycle < wear.cycles and jumps < MAX_COUNTED_JUMPS:
-        state = take_jump(row, state, model.accuracy.tolerance, until=next_row(wear, row, state))
+        state = take_jump(
+            row, state, model.accuracy.tolerance, until=next_row_cycle(wear, row, state)
+        )
         jumps = jumps + 1
     first_jumps = min(jumps, 6)
     return round(first_jumps + (jumps - first_jumps) * 0.6 * model.accuracy.tolerance**-0.18)
 
 
-def _path_about(model) -> float:
+def _estimate_slip_path(model) -> float:
     """Return the slip path [m] per cycle, without friction on the mass of a rig."""
     if model.rig is None:
         return (4.0 if model.slide.period else 1.0) * model.slide.amplitude
@@ -165,7 +167,7 @@ def cost(model, points: int, motion: float) -> Cost:
         CPU seconds of the march or of the bench with its coarse runs, of which a jump needs one
         run.
     """
-    jumps = jumps_about(model)
+    jumps = estimate_jumps(model)
     strips = model.patch.interface.strips
     solves = SOLVES_PER_JUMP
     if strips is not None:

@@ -46,7 +46,7 @@ class CycleSlip(NamedTuple):
     outcome: Outcome | None = None
 
 
-def frames_for(tolerance: float) -> int:
+def count_frames(tolerance: float) -> int:
     """Return the frames per cycle for which the slip path has an error of tolerance/100.
 
     A reversal between two of k frames of a sinusoid hides up to (pi/k)^2/2 of the amplitude.
@@ -68,7 +68,7 @@ def strips_slide_independently(model) -> bool:
     return model.rig is not None and model.rig.friction.strips_slide_apart
 
 
-def slip_of_cycle(model, patch, frames: int) -> CycleSlip:
+def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
     """Return the slip path of the interface nodes in a converged cycle of a model.
 
     Parameters
@@ -79,8 +79,8 @@ def slip_of_cycle(model, patch, frames: int) -> CycleSlip:
         Number of frames of the interface from which the path is computed.
     """
     if model.rig is None:
-        return _slip_of_bench(model, patch, frames)
-    return _slip_of_rig(model, patch, frames)
+        return _compute_bench_slip(model, patch, frames)
+    return _compute_rig_slip(model, patch, frames)
 
 
 class _Cycle(NamedTuple):
@@ -108,7 +108,7 @@ class Frames(NamedTuple):
     is_closed: bool
 
 
-def _slip_of_bench(model, patch, frames: int) -> CycleSlip:
+def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
     """Return the slip path of the nodes in the last cycle of a bench."""
     cycles = max(1, round(model.slide.cycles or 1))
     is_uniform = slips_uniformly(model)
@@ -132,11 +132,11 @@ def _slip_of_bench(model, patch, frames: int) -> CycleSlip:
     if model.grooves is not None:
         load = np.full(slide.size, patch.pressure.load)
         local, tau = slip_path(model, patch, slide, load, local, tau)
-    slip = slip_of_frames(model, patch, Frames(local, tau, is_closed=False))
+    slip = compute_frame_slip(model, patch, Frames(local, tau, is_closed=False))
     return slip._replace(values=run.values, outcome=outcome)
 
 
-def _slip_of_rig(model, patch, frames: int) -> CycleSlip:
+def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
     """Return the slip path of the nodes in the last cycle of a rig."""
     chosen = numerics.choose(model)
     is_uniform = slips_uniformly(model, chosen.per_point and model.grooves is None)
@@ -156,7 +156,7 @@ def _slip_of_rig(model, patch, frames: int) -> CycleSlip:
     )
     cycle = _last_rig_cycle(model, solution.window, patch.pressure.load)
     if strips_slide_independently(model) and is_uniform:
-        slip = _slip_of_strips(model, patch, solution.window)
+        slip = _compute_strip_slip(model, patch, solution.window)
     elif is_uniform:
         slip = _uniform_slip(model, patch, cycle, patch.pressure.load)
     else:
@@ -173,7 +173,7 @@ def _slip_of_rig(model, patch, frames: int) -> CycleSlip:
                 response.extra.get("normal_load", constant),
             )
             local, tau = slip_path(model, patch, frame_fields["holder_slide"], load, local, tau)
-        slip = slip_of_frames(model, patch, Frames(local, tau, is_closed=True))
+        slip = compute_frame_slip(model, patch, Frames(local, tau, is_closed=True))
     error = slip.error + _beat_error(solution.values, cycle)
     return slip._replace(error=error, values=solution.values, outcome=outcome)
 
@@ -237,7 +237,7 @@ def _is_in_last_cycle(model, window) -> np.ndarray:
     return window.time >= window.time[-1] - period * (1 + 1e-9)
 
 
-def _slip_of_strips(model, patch, window) -> CycleSlip:
+def _compute_strip_slip(model, patch, window) -> CycleSlip:
     """Return the slip path along x of every strip of a rig with yaw.
 
     An open strip has the slip of the nearest strip in contact.
@@ -257,11 +257,11 @@ def _slip_of_strips(model, patch, window) -> CycleSlip:
 
     paths = path(np.arange(len(slips)))
     error = _thinned_error(path, len(slips), paths, loads)
-    nearest = _nearest(patch.strips.offsets, loads > 0)
+    nearest = _nearest_contact_nodes(patch.strips.offsets, loads > 0)
     return CycleSlip(np.repeat(paths[nearest, None], patch.x.size, axis=1), error)
 
 
-def _thinned_error(path, count: int, fine, weight, is_closed: bool = False) -> float:
+def _thinned_error(compute_path, count: int, fine_path, weight, is_closed: bool = False) -> float:
     """Estimate the relative error of a slip path due to reversals between samples.
 
     A reversal between two samples hides f(d) of the path, d <= 1/2 of their distance. Every third
@@ -270,7 +270,7 @@ def _thinned_error(path, count: int, fine, weight, is_closed: bool = False) -> f
 
     Parameters
     ----------
-    path : callable
+    compute_path : callable
         Function from indices of samples to the slip paths (m,) [m].
     count : int
         Number of samples.
@@ -279,14 +279,14 @@ def _thinned_error(path, count: int, fine, weight, is_closed: bool = False) -> f
     is_closed : bool
         Whether the last sample is followed by the first one.
     """
-    total = float(fine @ weight)
+    total = float(fine_path @ weight)
     if total <= 0:
         return 0.0
     ends = [] if is_closed else [0, count - 1]
     changes = []
     for first in range(3):
         samples = np.unique([*ends, *range(first, count, 3)]).astype(int)
-        changes.append(abs(float((fine - path(samples)) @ weight)))
+        changes.append(abs(float((fine_path - compute_path(samples)) @ weight)))
     return THINNING_FACTOR * float(np.mean(changes)) / total
 
 
@@ -297,7 +297,7 @@ def _uniform_slip(model, patch, cycle: _Cycle, load: float) -> CycleSlip:
     weight = np.abs(cycle.force) if model.wear.uses_friction_work else cycle.load
     error = 0.0
     if model.grooves is not None:
-        weight = along_flanks(model, cycle.slide, cycle.force, cycle.load)
+        weight = wearing_force_on_flanks(model, cycle.slide, cycle.force, cycle.load)
     path = _integrate(slip, weight) / load if load > 0 else 0.0
     if model.grooves is not None and path > 0:
         error = abs(path - _integrate(slip[::2], weight[::2]) / load) / path
@@ -310,7 +310,7 @@ def _integrate(slip, weight) -> float:
     return float(np.sum(np.abs(np.diff(slip)) * (weight[1:] + weight[:-1]) / 2))
 
 
-def along_flanks(model, slide, force, load) -> np.ndarray:
+def wearing_force_on_flanks(model, slide, force, load) -> np.ndarray:
     """Return the wearing force per displacement (k,) [N] on the flanks of grooves.
 
     It is R ds/dq = V + F t of the normal force R, or with form 'energy' |f| ds/dq = |F - V t| of
@@ -364,20 +364,20 @@ def slip_path(model, patch, slide, vertical, local, tau) -> tuple:
     return path[:, None] - (slide[:, None] - local) * stretch, stress / stretch
 
 
-def slip_of_frames(model, patch, frames: Frames) -> CycleSlip:
+def compute_frame_slip(model, patch, frames: Frames) -> CycleSlip:
     """Return the slip path of every node from frames of slip and shear stress."""
     count = len(frames.slip)
 
     def path(indices) -> np.ndarray:
         """Return the slip path (m,) [m] of the nodes from selected frames."""
-        return _path(model, patch, frames, indices)
+        return _integrate_path(model, patch, frames, indices)
 
     paths = path(np.arange(count))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     return CycleSlip(paths, _thinned_error(path, count, paths, force, frames.is_closed))
 
 
-def _path(model, patch, frames: Frames, indices) -> np.ndarray:
+def _integrate_path(model, patch, frames: Frames, indices) -> np.ndarray:
     """Integrate the slip path (m,) [m] of the nodes over selected frames."""
     if frames.is_closed:
         indices = np.append(indices[-1:], indices)
@@ -388,10 +388,10 @@ def _path(model, patch, frames: Frames, indices) -> np.ndarray:
         tau = np.abs(frames.tau[indices])
         work = np.sum(steps * (tau[1:] + tau[:-1]) / 2, axis=0)
         path = np.divide(work, sigma, out=np.zeros_like(work), where=sigma > 0)
-    return path[_nearest(patch.x, sigma > 0)]
+    return path[_nearest_contact_nodes(patch.x, sigma > 0)]
 
 
-def _nearest(x, active) -> np.ndarray:
+def _nearest_contact_nodes(x, active) -> np.ndarray:
     """Return the index (m,) of the nearest node in contact for every node.
 
     A node that comes into contact during a jump has the slip of this neighbour.
