@@ -3,7 +3,7 @@
 Read `cost` first.
 """
 
-# names that other folders use, by module
+# This table lists the names that other folders use, by module.
 PUBLIC = {
     "backbone.curves": ("compute_backbone",),
     "backbone.records": (

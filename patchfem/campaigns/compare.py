@@ -1,4 +1,4 @@
-"""Measures of a scene with the surface before and with the surface after wear, side by side.
+"""Comparison of the measures of a scene with its surface before and after wear.
 
 In: two models that differ only in the gap. Out: `SurfaceRuns`, the measures of both runs with their
 errors.
@@ -15,7 +15,8 @@ from ..runs.plan import plan
 from ..runs.results.result import patch_surface
 from ..runs.run import run
 
-COMPARED_MEASURES = {  # by measure: its text in a sentence, and what a scene needs for it
+# The table gives for each measure its text in a sentence, and what a scene needs for it.
+COMPARED_MEASURES = {
     "pressure_peak": ("largest pressure", "[contact]"),
     "contact_fraction": ("fraction of the patch length that is in contact", "[contact]"),
     "normal_stiffness": ("normal stiffness K_n", "[contact]"),
@@ -32,7 +33,7 @@ COMPARED_MEASURES = {  # by measure: its text in a sentence, and what a scene ne
 
 
 class SurfaceResult(NamedTuple):
-    """Results of one run.
+    """Measures, stresses and outcome of a run with one of the two surfaces.
 
     Attributes
     ----------
@@ -58,7 +59,7 @@ class SurfaceResult(NamedTuple):
 
 
 class SurfaceRuns(NamedTuple):
-    """A scene that was run with both surfaces.
+    """Results of a scene with the surface before and with the surface after wear.
 
     Attributes
     ----------
@@ -79,7 +80,7 @@ class SurfaceRuns(NamedTuple):
     lacking: tuple
 
     def rows(self) -> list:
-        """Return the measures that at least one run has.
+        """Return the measures that at least one of the two runs has.
 
         They are tuples (name, text, measure before, measure after), where a measure may be None.
         """
@@ -92,17 +93,17 @@ class SurfaceRuns(NamedTuple):
 
 
 def _is_known(measure: Measure | None) -> bool:
-    """Return whether a measure is known."""
+    """Return whether a measure exists and has a value."""
     return measure is not None and measure.value is not None
 
 
 def run_both_surfaces(
     before: Model, after: Model, title: str, say: Callable | None = None
 ) -> SurfaceRuns:
-    """Run a model with the surface before and one with the surface after; all else is equal.
+    """Run a model with the surface before and a model with the surface after wear.
 
-    A run that is refused or does not converge is described in `failed`; the other run is still
-    given.
+    All else is equal. A run that is refused or does not converge is described in `failed`; the
+    other run is still given.
 
     Parameters
     ----------
@@ -136,7 +137,7 @@ def run_both_surfaces(
 
 
 def _run_side(model: Model, say) -> SurfaceResult:
-    """Run a model and return its results."""
+    """Run a model and return its measures, stresses and outcome."""
     result = run(plan(model), say)
     outcome = result.outcome
     surface = patch_surface(result.patch, result.fields)
@@ -151,7 +152,7 @@ def _run_side(model: Model, say) -> SurfaceResult:
 
 
 def surface_runs_data(runs: SurfaceRuns) -> dict:
-    """Return the runs as plain data in SI."""
+    """Return both surface runs as plain data in SI units."""
     measures = {}
     for name, _, before, after in runs.rows():
         measures[name] = {"before": _measure_data(before), "after": _measure_data(after)}
@@ -171,7 +172,7 @@ def surface_runs_data(runs: SurfaceRuns) -> dict:
 
 
 def _measure_data(measure: Measure | None) -> dict | None:
-    """Return value, error and unit of a measure; None for None."""
+    """Return value, error and unit of a measure; None if there is no measure."""
     if measure is None:
         return None
     return {"value": measure.value, "error": measure.error, "unit": measure.unit}

@@ -36,22 +36,24 @@ from .numerical_settings import (
     with_tolerance,
 )
 
-TOLERANCE = "tolerance"  # name of the curve over tolerances, which is accepted in addition to NUMERICAL_SETTINGS
-# Timings of a short run; the shortest one counts, because other work on the machine only adds time.
+# Name of the curve over tolerances, which is accepted in addition to NUMERICAL_SETTINGS.
+TOLERANCE = "tolerance"
+# Number of timings of a short run; the shortest one counts, because other work only adds time.
 TIMINGS = 3
-# CPU seconds above which a run is timed only once, because its timings differ by a few percent
+# CPU time [s] above which a run is timed only once, because its timings differ by a few percent.
 MIN_SECONDS_TIMED_ONCE = 0.3
-# CPU seconds that runs with proposed settings may take in total, so that `cost` ends within seconds
+# CPU time [s] that runs with proposed settings may take in total, so that `cost` ends within
+# seconds.
 MAX_TRIAL_SECONDS = 10.0
 # A warning of a run ends with its tolerance and what to do; this second part may name a setting
 # that can be tried here.
 _REMEDY_TEXT = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
 _PROPOSED_SETTING = re.compile(r"set accuracy\.(steps_per_cycle|shear_modes|harmonics) = (\d+)")
-MIN_ELAPSED_RATIO = 1.5  # elapsed time / CPU time above which both times are reported
-EQUAL_COST_RATIO = 1.1  # ratio of CPU seconds up to which two runs count as equally expensive
-TIMING_SCATTER = 2e-3  # CPU seconds by which timings of the same short run differ
-NO_EFFECT_RATIO = 0.9  # smallest / largest error above which a setting does not help
-UNCHANGED_TOL = 1e-11  # relative change of a measure below which a setting does not affect it
+MIN_ELAPSED_RATIO = 1.5  # Elapsed time over CPU time above which both times are reported.
+EQUAL_COST_RATIO = 1.1  # Ratio of CPU times up to which two runs count as equally expensive.
+TIMING_SCATTER = 2e-3  # Difference of the CPU times of repeated runs of a short scene [s].
+NO_EFFECT_RATIO = 0.9  # Smallest over largest error above which a setting does not help.
+UNCHANGED_TOL = 1e-11  # Relative change of a measure below which a setting does not affect it.
 ROUND_OFF_FRACTION = (
     1e-6  # fraction of the floor of a measure below which a change of it is round-off
 )
@@ -59,7 +61,7 @@ ROUND_OFF_FRACTION = (
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cost:
-    """One run of a cost curve.
+    """Run of a cost curve: CPU time, measures and errors for a value of a setting.
 
     Attributes
     ----------
@@ -106,11 +108,11 @@ class Cost:
     steps: int | None = None
 
     def meets_tolerance(self) -> bool:
-        """Return whether every stated error is within the tolerance that was set for the run."""
+        """Return whether every stated error is within the tolerance of the run."""
         return all(self._allows(name, error, self.tolerance) for name, error in self.errors.items())
 
     def known_error(self, name: str) -> float | None:
-        """Return the error of a measure; None if it is not known.
+        """Return the known error of a measure, stated or seen in the best run; None if unknown.
 
         It is the larger of the error that the run states and its distance to the best run.
         """
@@ -122,25 +124,25 @@ class Cost:
         return self.wall_seconds > MIN_ELAPSED_RATIO * self.seconds
 
     def is_same_run(self, other) -> bool:
-        """Return whether two settings that are numbers gave the same run bit for bit."""
+        """Return whether two numerical settings gave the same results bit for bit."""
         if None in (self.value, other.value):
             return False
         return (self.values, self.errors) == (other.values, other.errors)
 
     def is_within(self, name: str, tolerance: float) -> bool:
-        """Return whether the error of a measure is at most tolerance * |value| + floor."""
+        """Return whether the error of a measure is at most tolerance x |value| + floor."""
         error = self.known_error(name)
         return error is not None and self._allows(name, error, tolerance)
 
     def _is_changed(self, name: str, relative_change: float, floor_fraction: float) -> bool:
-        """Return whether a measure is further from the best run than a change that is allowed."""
+        """Return whether a measure deviates from the best run by more than an allowed change."""
         if name not in self.values:
             return False
         size = relative_change * abs(self.values[name])
         return self.distances.get(name, 0.0) > max(size, floor_fraction * self.floors[name])
 
     def _allows(self, name: str, error: float, tolerance: float) -> bool:
-        """Return whether an error of a measure is at most tolerance * |value| + floor."""
+        """Return whether a given error of a measure is at most tolerance x |value| + floor."""
         return error <= compute_allowed_error(tolerance, self.values[name], self.floors[name])
 
 
@@ -174,7 +176,7 @@ def tolerance_curve(model: Model, say=None) -> list:
             cost = _time_setting(setting, say)
             while cost is not None:
                 if runs and cost.is_same_run(runs[-1]):
-                    # The runs are identical, so the faster timing holds for both.
+                    # The runs are identical, so that the faster timing holds for both.
                     faster = min(runs[-1], cost, key=lambda run: run.seconds)
                     runs[-1] = _with_timing(runs[-1], faster)
                     cost = _with_timing(cost, faster)
@@ -192,12 +194,12 @@ def tolerance_curve(model: Model, say=None) -> list:
 
 
 def _with_timing(cost: Cost, other: Cost) -> Cost:
-    """Return a cost with the seconds of another run."""
+    """Return the record of a run with its CPU and elapsed times replaced."""
     return replace(cost, seconds=other.seconds, wall_seconds=other.wall_seconds)
 
 
 def _proposed_setting(setting: Setting, cost: Cost, seconds: float) -> Setting | None:
-    """Return the setting that the warnings of a run propose, or None.
+    """Return the numerical setting that the warnings of a run propose, or None.
 
     None if no warning proposes a setting that is larger than the present one, or if the run with it
     would take longer than `seconds`.
@@ -287,7 +289,7 @@ def setting_curve(model: Model, knob: str, say=None) -> list:
 
 
 def _best_run(runs: list) -> Cost:
-    """Return the run that serves as reference: the finest value, or what the tolerance chooses.
+    """Return the reference run: that of the finest value or that which the tolerance chooses.
 
     Of these two it is the run whose stated errors are the smaller ones for most measures.
     """
@@ -307,7 +309,7 @@ def _distances(cost: Cost, best: Cost) -> dict:
 
 
 def _merge_identical_runs(first: Cost, second: Cost) -> Cost:
-    """Merge two settings that gave the same run into one run with both labels.
+    """Merge two settings that gave the same results into a single run with both labels.
 
     In a sentence it is named by the shorter text, which is that of the setting without a number,
     chosen by the scene.
@@ -322,7 +324,7 @@ def _merge_identical_runs(first: Cost, second: Cost) -> Cost:
 
 
 def _time_setting(setting: Setting, say, before=(), *, can_split: bool = True) -> Cost | None:
-    """Run a setting several times and return its cost; None if it cannot be run.
+    """Run a numerical setting several times and return its cost; None if it cannot be run.
 
     It is timed TIMINGS times, or once if the run is long and nothing was compiled, or if it repeats
     a run in `before`.
@@ -364,7 +366,10 @@ def _time_setting(setting: Setting, say, before=(), *, can_split: bool = True) -
 
 
 class _FinishedRun(NamedTuple):
-    """Measures by name, warnings, and time steps per cycle (None if it has none) of a run."""
+    """Measures, warnings and steps per cycle of a finished run.
+
+    The steps are None if the run has none.
+    """
 
     measures: dict
     warnings: Sequence
@@ -372,7 +377,7 @@ class _FinishedRun(NamedTuple):
 
 
 def _make_cost(setting: Setting, timings: list, finished: _FinishedRun) -> Cost:
-    """Return the cost of a setting from its timings (CPU seconds, elapsed seconds)."""
+    """Return the cost of a setting from its timings (CPU time, elapsed time) [s]."""
     values = {}
     errors = {}
     floors = {}
@@ -402,13 +407,13 @@ def _make_cost(setting: Setting, timings: list, finished: _FinishedRun) -> Cost:
 
 
 def _measure_cpu() -> float:
-    """Return the CPU seconds of all threads of this process and of its children that have ended."""
+    """Return the CPU time [s] of this process, its threads and its finished child processes."""
     children = os.times()
     return process_time() + children.children_user + children.children_system
 
 
 def _count_compiled() -> int:
-    """Return the number of functions whose machine code is cached.
+    """Return the number of functions whose compiled code is cached.
 
     A run that increases this number has compiled a function.
     """
@@ -423,7 +428,7 @@ def _run_setting(
 ) -> _FinishedRun | None:
     """Run a setting; None if it does not converge or needs more memory than there is.
 
-    The pieces are condensed again.
+    The pieces are condensed again instead of being taken from the cache.
     """
     try:
         if setting.level:
@@ -466,9 +471,9 @@ def fastest_by_measure(runs: list, tolerance: float) -> dict:
 
 
 def _select_confirmed_runs(runs: list, names: Sequence, tolerance: float) -> list:
-    """Return the runs that have measures within a tolerance, as do all finer runs with known errors.
+    """Select the runs that meet a tolerance and are confirmed by all finer runs.
 
-    What the tolerance chooses is judged on its own.
+    The run that the tolerance chooses is judged on its own.
 
     Parameters
     ----------
@@ -479,7 +484,7 @@ def _select_confirmed_runs(runs: list, names: Sequence, tolerance: float) -> lis
     """
 
     def is_good(run: Cost) -> bool:
-        """Return whether a run has the measures within the tolerance."""
+        """Return whether a run has all named measures within the tolerance."""
         return all(run.is_within(name, tolerance) for name in names if name in run.values)
 
     confirmed = []
@@ -494,7 +499,7 @@ def _select_confirmed_runs(runs: list, names: Sequence, tolerance: float) -> lis
 
 
 def fastest_run(runs: list, tolerance: float) -> Cost | None:
-    """Return the run with the fewest CPU seconds that has all measures within a tolerance.
+    """Return the run with the least CPU time that has all measures within a tolerance.
 
     Of runs that are equally expensive it is the one that comes first, with the coarsest setting.
     None if there is no such run.
@@ -508,7 +513,10 @@ def fastest_run(runs: list, tolerance: float) -> Cost | None:
 
 
 def cost_sentence(runs: list, tolerance: float) -> str:
-    """Return which setting meets a tolerance in the least time, or which measure misses it."""
+    """Return the sentence on the fastest setting that meets a tolerance.
+
+    If none does, it names a measure that misses it.
+    """
     names = measures_with_error(runs)
     fastest = fastest_run(runs, tolerance)
     if fastest is not None:
@@ -536,7 +544,7 @@ def cost_sentence(runs: list, tolerance: float) -> str:
 
 
 def _effect_sentence(runs: list, tolerance: float) -> str:
-    """Return a clause about settings that change nothing relevant; "" if they change something."""
+    """Return the text that other settings change no result; "" if they do."""
     names = changed_measures(runs)
     if len(runs) < 2:
         return ""
@@ -550,12 +558,12 @@ def _effect_sentence(runs: list, tolerance: float) -> str:
 
 
 def _format_seconds(run: Cost) -> str:
-    """Format CPU seconds with two digits."""
+    """Format the CPU time of a run with two digits."""
     return f"{format_number(run.seconds, 2)} CPU s"
 
 
 class WorstError(NamedTuple):
-    """The measure of a run whose error is largest compared with its tolerance.
+    """Measure of a run whose error is largest relative to its tolerance.
 
     fraction: error / error that a tolerance of 1 would allow, to be compared with the tolerance;
     name: of the measure, "" if no error is known.
@@ -566,7 +574,7 @@ class WorstError(NamedTuple):
 
 
 def worst_error(run: Cost, names: Sequence, tolerance: float) -> WorstError:
-    """Find the measure whose error in a run is largest compared with a tolerance.
+    """Find the measure whose error is largest relative to a tolerance.
 
     Parameters
     ----------
@@ -589,7 +597,7 @@ def worst_error(run: Cost, names: Sequence, tolerance: float) -> WorstError:
 
 
 def worst_of_run(run: Cost) -> WorstError:
-    """Return `worst_error` of all measures of a run for the tolerance that was set for it."""
+    """Return the worst error of a run relative to the tolerance of that run."""
     return worst_error(run, list(run.values), run.tolerance)
 
 

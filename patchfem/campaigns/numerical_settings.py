@@ -11,17 +11,19 @@ from ..runs.rig import numerics
 from ..scene.rules.accuracy import has_effect
 
 NUMERICAL_SETTINGS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
-N_VALUES = 5  # number of values of a setting; each is twice as fine as the one before
-TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)  # tolerances of a mesh that is chosen automatically
-# Tolerances of a whole scene; smaller ones take long, and few scenes meet them.
+N_VALUES = 5  # Number of values of a setting; each is twice as fine as the previous one.
+# Tolerances that choose the meshes of an automatic mesh study.
+TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)
+# Tolerances of a complete scene; smaller ones take long, and few scenes meet them.
 SCENE_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)
-MAX_CELLS = 1600  # columns of the finest uniform mesh
+MAX_CELLS = 1600  # Number of columns of the finest uniform mesh.
 MAX_STEPS = 12800
-DEFAULT_MIDDLES = {"shear_modes": 8, "jumps": 8}  # middle value, if the scene does not set the key
+# Middle value of a setting if the scene does not set its key.
+DEFAULT_MIDDLES = {"shear_modes": 8, "jumps": 8}
 
 
 class Setting(NamedTuple):
-    """One value of a numerical setting.
+    """Value of a numerical setting together with its model.
 
     Attributes
     ----------
@@ -44,9 +46,9 @@ class Setting(NamedTuple):
 
 
 def applicable_settings(model: Model) -> list:
-    """Return the settings, of NUMERICAL_SETTINGS, that have an effect on a model.
+    """Return the NUMERICAL_SETTINGS that have an effect on a model.
 
-    They are its element size, time steps, shear modes, and the jumps over cycles of wear.
+    They are among the element size, time steps, shear modes, and the jumps over cycles of wear.
     """
     settings = ["element_size"] if model.patch is not None else []
     # The sum over the bonds takes the same steps as a bench.
@@ -62,7 +64,7 @@ def applicable_settings(model: Model) -> list:
 
 
 def list_settings(model: Model, knob: str) -> list:
-    """Return the values of a setting from coarse to fine, including that of the scene.
+    """Return the values of a numerical setting from coarse to fine, with that of the scene.
 
     A value that the tolerance chooses comes last if the others are numbers.
     """
@@ -74,7 +76,7 @@ def list_settings(model: Model, knob: str) -> list:
 
 
 def _split_meshes(model: Model) -> list:
-    """Return the mesh of a file, and meshes in which its edges are halved."""
+    """Return the mesh of a file and meshes with its edges halved, as settings."""
     settings = []
     for level in range(3):
         words = "contact.mesh as it is"
@@ -115,7 +117,7 @@ def with_setting(model: Model, key: str, value: float) -> Model:
 
 
 def _by_tolerance(model: Model) -> list:
-    """Return meshes that several tolerances choose; the label of the scene's mesh has no number."""
+    """Return settings for the meshes that several tolerances choose."""
     scene_tolerance = model.accuracy.tolerance
     settings = []
     for value in sorted({*TOLERANCES, scene_tolerance}, reverse=True):
@@ -128,7 +130,7 @@ def _by_tolerance(model: Model) -> list:
 
 
 def _uniform_meshes(model: Model) -> list:
-    """Return uniform meshes, and for a static patch also the mesh that its tolerance chooses."""
+    """Return settings for uniform meshes, and for the automatic mesh of a static patch."""
     length = model.patch.pieces.length
     settings = []
     middle = round(length / model.patch.uniform_element_size)
@@ -146,10 +148,10 @@ def _uniform_meshes(model: Model) -> list:
 
 
 def _integer_values(model: Model, knob: str) -> list:
-    """Return values of a setting that is a whole number, around the value of the scene.
+    """Return settings for integer values around the value of the scene.
 
-    A small value of the scene has fewer coarser values: a quarter and a half of 1 are no numbers of
-    shear modes.
+    A small value of the scene has fewer coarser values, because a quarter and a half of 1 are no
+    numbers of shear modes.
     """
     pinned = _scene_value(model, knob)
     has_steps = knob == "steps_per_cycle"
@@ -172,12 +174,12 @@ def _integer_values(model: Model, knob: str) -> list:
 
 
 def _scene_value(model: Model, knob: str) -> int | None:
-    """Return the value of a setting in the scene; None if it does not set one."""
+    """Return the value of a numerical setting in the scene; None if it does not set one."""
     return model.wear.jumps if knob == "jumps" else getattr(model.accuracy, knob)
 
 
 def _middle_value(model: Model, knob: str) -> int:
-    """Return the middle of the values of a setting."""
+    """Return the middle of the values of a numerical setting."""
     if knob != "steps_per_cycle":
         return _scene_value(model, knob) or DEFAULT_MIDDLES[knob]
     if model.kind == "bench":
@@ -186,7 +188,7 @@ def _middle_value(model: Model, knob: str) -> int:
 
 
 def _with_integer(model: Model, knob: str, value: int) -> Model:
-    """Return a model with another value of a setting that is a whole number."""
+    """Return a model with another value of an integer setting."""
     if knob == "jumps":
         return replace(model, wear=replace(model.wear, jumps=value))
     return with_setting(model, knob, value)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..model import structure
-from ..response.events import KIND_NAMES
+from ..response.events import EVENT_KIND_NAMES
 from ..response.levels import LEVEL_MEASURES
 from ..response.rows import TABLE
 from ..runs.results.result import Result, patch_surface
@@ -42,7 +42,7 @@ def result_contents(result: Result) -> netcdf.Contents:
     if "events" in extra:
         e = extra["events"]
         data = netcdf.add_events(
-            data, e.time, e.interface, e.kind, e.slide, e.count, KIND_NAMES, e.source
+            data, e.time, e.interface, e.kind, e.slide, e.count, EVENT_KIND_NAMES, e.source
         )
     if "curve" in extra:
         data = netcdf.add_curve(data, extra["curve"])

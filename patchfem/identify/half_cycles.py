@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..response.decay_curve import HalfSwings, smooth_slopes
+from ..response.decay_curve import HalfCycles, smooth_slopes
 
 MIN_SAMPLES = 5  # smallest number of samples in a half cycle
 # smallest standard deviation of the middle of a half cycle / half period, and of its size / size: a sine that is fitted
@@ -53,7 +53,7 @@ class _HalfCycle(NamedTuple):
     n_free: int
 
 
-def find_half_cycles(time, value) -> HalfSwings:
+def find_half_cycles(time, value) -> HalfCycles:
     """Fit a sine to each half cycle of a free decay.
 
     Parameters
@@ -65,7 +65,7 @@ def find_half_cycles(time, value) -> HalfSwings:
 
     Returns
     -------
-    HalfSwings
+    HalfCycles
 
     Raises
     ------
@@ -91,7 +91,7 @@ def find_half_cycles(time, value) -> HalfSwings:
     size = np.abs([half_cycle.size for half_cycle in best])
     middle_error = np.array([half_cycle.middle_error for half_cycle in best])
     size_error = np.array([half_cycle.size_error for half_cycle in best])
-    return HalfSwings(
+    return HalfCycles(
         np.array([half_cycle.middle for half_cycle in best]),
         size,
         np.maximum(noise * middle_error, SINE_FIT_ERROR * half_period),
@@ -114,7 +114,7 @@ def _raise_for_short_decay(time, middle: float, length: float) -> None:
     )
 
 
-def describe_missing_samples_at_end(time, half_cycles: HalfSwings) -> str:
+def describe_missing_samples_at_end(time, half_cycles: HalfCycles) -> str:
     """Describe a lack of samples after the last half cycle of a decay; "" if the record ends there."""
     length = half_cycles.middle[-1] - half_cycles.middle[-2]
     return _describe_missing_samples(time, float(half_cycles.middle[-1] + length), float(length))

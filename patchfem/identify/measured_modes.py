@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..response.decay_curve import compute_swing_curve
+from ..response.decay_curve import fit_decay_curve
 from ..structure import places as structure_places
 from ..structure.places import MeasuredModes
 from .decay import fit_decay
@@ -287,7 +287,7 @@ def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
     """
     time, value = _select_decay(values, begin)
     half_cycles = find_half_cycles(time, value)
-    curve = compute_swing_curve(half_cycles)
+    curve = fit_decay_curve(half_cycles)
     notes = []
     is_certain = curve.damping_error <= MAX_ERROR_RATIO * np.abs(curve.damping)
     if curve.time.size and not is_certain.all():

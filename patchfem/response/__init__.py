@@ -7,23 +7,23 @@ the events of stick and slip, and the ringing. Read `rows` first: every row of i
 functions that evaluate samples.
 """
 
-# names that other folders use, by module
+# This table lists the names that other folders use, by module.
 PUBLIC = {
     "coarser": (
         "CoarserRuns",
         "estimate_errors",
         "find_open_kinds",
-        "make_coarser_space",
+        "make_spatial_coarsening",
     ),
     "decay_curve": (
         "DecayCurve",
-        "HalfSwings",
-        "MIN_HALF_SWING",
-        "compute_swing_curve",
-        "find_turning_points",
-        "find_turning_points_outside",
-        "half_swings_between",
-        "measure_last_swing",
+        "HalfCycles",
+        "MIN_HALF_CYCLE",
+        "fit_decay_curve",
+        "locate_reversals",
+        "find_reversals_by_extrapolation",
+        "make_half_cycles",
+        "measure_last_cycle_amplitude",
         "smooth_slopes",
     ),
     "ends": ("estimate_window_error",),
@@ -45,7 +45,7 @@ PUBLIC = {
         "step_errors",
         "total_error",
     ),
-    "events": ("KIND_NAMES",),
+    "events": ("EVENT_KIND_NAMES",),
     "inside_steps": ("motion_inside_steps",),
     "levels": (
         "LEVEL_MEASURES",
@@ -75,7 +75,7 @@ PUBLIC = {
         "compute_ledger_measures",
         "compute_step_harmonic",
         "energy_balance",
-        "measure_half_swing",
+        "measure_half_range",
         "peak_sampling_errors",
         "relative_gap",
         "slip_round_off",
@@ -90,7 +90,7 @@ PUBLIC = {
         "changing_note",
         "check_piece_length",
         "classify_periodic",
-        "error_of_steady",
+        "steady_estimate_error",
         "estimate_steady",
         "is_drifting",
         "is_still_changing",
@@ -119,8 +119,8 @@ PUBLIC = {
         "MIN_REFINED_FRACTION",
         "MIN_SINUSOID",
         "SAMPLES_PER_PERIOD",
-        "held_modes",
-        "make_ring",
+        "compute_stuck_vibration",
+        "make_ringing_measures",
         "measure_ringing",
         "select_strongest",
     ),
@@ -131,7 +131,7 @@ PUBLIC = {
         "add_interface_number",
         "compute_measures",
         "error_floor",
-        "find_row",
+        "find_definition",
         "larger_term",
         "lateral_work",
         "remove_interface_number",
@@ -144,7 +144,7 @@ PUBLIC = {
         "is_all_stuck",
         "join_logs",
         "list_events",
-        "measure_rings",
+        "measure_ringing_in_sticks",
     ),
     "settling": (
         "CLASSES",
@@ -161,7 +161,7 @@ PUBLIC = {
         "motion_harmonic",
         "odd_harmonics",
         "read_instrument",
-        "wave_measures",
+        "harmonic_measures",
     ),
     "stationary": (
         "compute_spectra",

@@ -1,4 +1,4 @@
-"""Errors of a run from coarse runs of the same model: one estimate for every engine.
+"""Error estimates from coarser runs of the same model, equal for every engine.
 
 In: a ladder, i.e. the list of `CoarserRuns` of an engine (coarser in time, in space, in modes
 or in the sum over bonds), and a function that solves a variant. Each `CoarserRuns` names its
@@ -15,7 +15,7 @@ from .errors import coarser_errors, observed_orders
 
 
 class CoarserRuns(NamedTuple):
-    """Coarse runs of one kind, and the rule that turns their measures into errors.
+    """Coarser runs of one kind, and the rule that turns their measures into errors.
 
     - runs: variants (hashable arguments of `solve`), from fine to coarse.
     - rule: function (values of the reference run, *values of the coarse runs) -> error by measure
@@ -31,8 +31,8 @@ class CoarserRuns(NamedTuple):
     of: str = "own"
 
 
-def estimate_errors(solve: Callable, fine: dict, ladder, made: dict | None = None) -> tuple:
-    """Return errors by measure name, one dict per `CoarserRuns`, and the CPU time [s] they took.
+def estimate_errors(solve: Callable, fine: dict, ladder, solved_runs: dict | None = None) -> tuple:
+    """Solve coarser runs; return errors by measure name for every kind, and the CPU time [s].
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def estimate_errors(solve: Callable, fine: dict, ladder, made: dict | None = Non
     fine : dict
         Measures of the run itself by name.
     ladder : sequence of CoarserRuns
-    made : dict, optional
+    solved_runs : dict, optional
         Runs by variant that are solved already; the new ones are added.
 
     Returns
@@ -50,13 +50,13 @@ def estimate_errors(solve: Callable, fine: dict, ladder, made: dict | None = Non
     seconds : float
     """
     begin = perf_counter()
-    made = {} if made is None else made
+    solved_runs = {} if solved_runs is None else solved_runs
 
     def solve_values(variant) -> dict:
-        """Return the measures of a variant, solved on the first call."""
-        if variant not in made:
-            made[variant] = solve(variant)
-        return made[variant].values
+        """Return the measures of a variant, solving it on the first call."""
+        if variant not in solved_runs:
+            solved_runs[variant] = solve(variant)
+        return solved_runs[variant].values
 
     errors = []
     for coarser in ladder:
@@ -66,7 +66,7 @@ def estimate_errors(solve: Callable, fine: dict, ladder, made: dict | None = Non
 
 
 def find_open_kinds(kinds, errors, runs) -> dict:
-    """Return the errors by kind and measure name, and the observed `orders` of the time step.
+    """Return the errors by kind and measure name, and the observed orders in the time step.
 
     Parameters
     ----------
@@ -92,8 +92,8 @@ def find_open_kinds(kinds, errors, runs) -> dict:
     return {"parts": parts, "orders": observed_orders(*runs) if len(runs) == 3 else {}}
 
 
-def make_coarser_space(coarser, beside=None, of: str = "mesh") -> CoarserRuns:
-    """Return a `CoarserRuns` of second order with one run that has wider cells or fewer modes.
+def make_spatial_coarsening(coarser, beside=None, of: str = "mesh") -> CoarserRuns:
+    """Return a second-order error rule with a single run of wider cells or fewer modes.
 
     Parameters
     ----------

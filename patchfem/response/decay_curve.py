@@ -1,10 +1,10 @@
 """Frequency and damping ratio of a decay against its amplitude, with 95 % intervals.
 
-In: the half swings of a decay, i.e. the motion from one turning point to the next. The turning
-points of a computed motion come from the cubic between samples (`find_turning_points`), the half swings of a
-measured one from a sine fitted to each (`identify.half_cycles`). Out: a `DecayCurve`.
+In: the half cycles of a decay, i.e. the motion from one reversal to the next. The turning
+points of a computed motion come from the cubic between samples (`locate_reversals`), the half cycles of a
+measured one from a sinusoid fitted to each (`identify.half_cycles`). Out: a `DecayCurve`.
 
-Half swing k has a middle t_k and a size S_k. Over 2 m + 1 half swings, the slope of ln S_k is
+Half cycle k has a middle t_k and a size S_k. Over 2 m + 1 half cycles, the slope of ln S_k is
 the logarithmic decrement of half a cycle, pi zeta/(1 - zeta^2)^(1/2), and the slope of t_k is
 half a period. Both are exact for a viscous decay and any m, and are means over the span for any
 other decay. The error due to noise falls with m^(-3/2), that due to the curvature grows with m^2:
@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-# numbers m of half swings on both sides of a point that are tried as spans
+# Numbers of half cycles on both sides of a point that are tried as spans of a fit.
 SPAN_LENGTHS = (
     1,
     2,
@@ -35,29 +35,29 @@ SPAN_LENGTHS = (
     192,
     256,
 )
-MAX_SLOPE_DIFFERENCE = 2.0  # standard deviations by which the slopes of two spans may differ
+MAX_SLOPE_DIFFERENCE = 2.0  # Largest difference of the slopes of two spans, in standard deviations.
 INTERVAL_DEVIATIONS = (
-    2.5  # standard deviations of a 95 % interval, widened because the span is chosen by the data
+    2.5  # standard deviations of a 95 % interval, widened because the data choose the span
 )
-NOISE_HALF_WIDTH = 8  # half swings on both sides whose third differences estimate the noise
-SAMPLING_HALF_WIDTH = 4  # points on both sides over which the largest sampling error is taken
-N_NEWTON_STEPS = 3  # Newton steps to a turning point
-VALUE_ROUND_OFF = 1e-12  # round-off of a value, relative
-REST_SPEED_TOL = 1e-12  # relative to the largest speed; a slower sample is a turning point itself
-MIN_HALF_SWING = 1e-9  # relative to the largest half swing; a smaller one is round-off
-STEP_END_TOL = (
-    1e-9  # fraction of a step by which round-off may move a turning point outside the step
-)
-# relative to the range in one period; a smaller reversal is attributed to a faster mode
-MAX_WIGGLE = 0.25
-RANGE_TOL = 1e-6  # relative; a curve is evaluated this far beyond its end points
+# Number of half cycles on both sides whose third differences estimate the noise.
+NOISE_HALF_WIDTH = 8
+# Number of points on both sides over which the largest sampling error is taken.
+SAMPLING_HALF_WIDTH = 4
+N_NEWTON_STEPS = 3  # Number of Newton steps with which the time of a reversal is refined.
+VALUE_ROUND_OFF = 1e-12  # Relative round-off error of a value.
+REST_SPEED_TOL = 1e-12  # Speed over the largest speed below which a sample is itself a reversal.
+MIN_HALF_CYCLE = 1e-9  # Half cycle over the largest half cycle below which it is round-off.
+STEP_END_TOL = 1e-9  # fraction of a step by which round-off may move a reversal outside the step
+# Reversal over the range in one period; a smaller one is attributed to a faster mode.
+MAX_RIPPLE = 0.25
+RANGE_TOL = 1e-6  # Relative distance beyond its end points up to which a curve is evaluated.
 
 
-class HalfSwings(NamedTuple):
-    """Half swings of a decay, each from one turning point to the next.
+class HalfCycles(NamedTuple):
+    """Half cycles of a decaying motion, each from a reversal to the next.
 
     - middle (k,): time of the middle [s].
-    - size (k,): distance between the two turning points [m].
+    - size (k,): distance between the two reversals [m].
     - middle_noise, size_noise (k,): standard deviations of both by noise [s], [m]; 0 for a computed
       motion.
     """
@@ -69,7 +69,7 @@ class HalfSwings(NamedTuple):
 
 
 class DecayCurve(NamedTuple):
-    """Frequency and damping ratio of a decay against amplitude, largest amplitude first.
+    """Frequency and damping ratio of a decay against amplitude, sorted by falling amplitude.
 
     - time (k,): [s].
     - amplitude (k,): [m].
@@ -85,12 +85,12 @@ class DecayCurve(NamedTuple):
     damping: np.ndarray
     damping_error: np.ndarray
 
-    def at(self, pick) -> "DecayCurve":
-        """Return the points of the curve that indices, a slice or booleans select."""
-        return DecayCurve(*(part[pick] for part in self))
+    def at(self, selection) -> "DecayCurve":
+        """Return the points of the curve selected by indices, a slice or booleans."""
+        return DecayCurve(*(part[selection] for part in self))
 
     def interpolate(self, amplitudes) -> "DecayCurve":
-        """Return the curve at other amplitudes (k,) [m]; NaN outside its range.
+        """Interpolate the curve at given amplitudes (k,) [m]; NaN outside its range.
 
         Monotone cubics over the logarithm of the amplitude are used. Their difference from linear
         interpolation is added to the errors.
@@ -113,10 +113,10 @@ class DecayCurve(NamedTuple):
         )._replace(amplitude=np.asarray(amplitudes))
 
     def add_sampling_error(self, other: "DecayCurve") -> "DecayCurve":
-        """Return the curve with the sampling error added to its errors.
+        """Widen the errors of the curve by the error due to sampling the motion.
 
-        The error is the largest difference from the curve of `find_turning_points_outside` at the points
-        around.
+        The added error is the largest difference from the curve of
+        `find_reversals_by_extrapolation` at the neighbouring points.
         """
         if not self.amplitude.size:
             return self
@@ -129,57 +129,59 @@ class DecayCurve(NamedTuple):
             out[f"{name}_error"] = getattr(self, f"{name}_error") + around.max(axis=1)
         return self._replace(**out)
 
-    def add_difference(self, one: "DecayCurve", other: "DecayCurve") -> "DecayCurve":
-        """Return the curve with the difference of two other curves added to its errors.
+    def add_difference(self, first_curve: "DecayCurve", second_curve: "DecayCurve") -> "DecayCurve":
+        """Widen the errors of the curve by the difference of two other curves.
 
-        An error is infinite where one of both curves has no value.
+        An error is infinite where either of these curves has no value.
         """
 
         def wider(name: str) -> np.ndarray:
-            """Return the error of a field with the difference of both curves added."""
-            change = np.abs(getattr(one, name) - getattr(other, name))
+            """Return the error of a field, widened by the difference of both curves."""
+            change = np.abs(getattr(first_curve, name) - getattr(second_curve, name))
             return getattr(self, f"{name}_error") + np.where(np.isnan(change), np.inf, change)
 
         return self._replace(frequency_error=wider("frequency"), damping_error=wider("damping"))
 
 
-def find_turning_points(time, place, speed) -> tuple:
-    """Return the times (k,) [s] and positions (k,) [m] of the turning points of a motion.
+def locate_reversals(time, position, speed) -> tuple:
+    """Return the times (k,) [s] and positions (k,) [m] at which a motion reverses.
 
-    The cubic through the samples on both sides is used.
+    They are computed on the cubics through the samples on both sides.
 
     Parameters
     ----------
-    time, place, speed : (n,)
-        Samples of time [s], position [m] and speed [m/s] at any spacing, with every turning point
-        at a sample or alone between two of them.
+    time, position, speed : (n,)
+        Samples of time [s], position [m] and speed [m/s] at any spacing, with every reversal at a
+        sample or alone between two of them.
     """
     speed = np.where(np.abs(speed) <= REST_SPEED_TOL * np.abs(speed).max(initial=0.0), 0.0, speed)
     still = np.flatnonzero(speed == 0)
     k = np.flatnonzero(speed[:-1] * speed[1:] < 0)
     span = time[k + 1] - time[k]
-    places = (place[k], place[k + 1])
+    positions = (position[k], position[k + 1])
     speeds = speed[k] * span, speed[k + 1] * span
-    share = _find_turning_fraction(places, speeds)
-    times = np.concatenate([time[still], time[k] + share * span])
-    found = np.concatenate([place[still], _evaluate_cubic(places, speeds, share)])
-    order = np.lexsort((found, times))
-    # the samples before and after a jump of the force at a turning point have the same time
-    apart = VALUE_ROUND_OFF * float(np.ptp(time))
-    order = order[np.diff(times[order], prepend=-np.inf) > apart]
-    return times[order], found[order]
+    fraction = _find_reversal_fraction(positions, speeds)
+    times = np.concatenate([time[still], time[k] + fraction * span])
+    reversal_positions = np.concatenate(
+        [position[still], _evaluate_cubic(positions, speeds, fraction)]
+    )
+    order = np.lexsort((reversal_positions, times))
+    # The samples before and after a jump of the force at a reversal have the same time.
+    min_interval = VALUE_ROUND_OFF * float(np.ptp(time))
+    order = order[np.diff(times[order], prepend=-np.inf) > min_interval]
+    return times[order], reversal_positions[order]
 
 
-def measure_last_swing(time, place, speed, period: float) -> float | None:
-    """Return half the peak-to-peak value [m] of the last whole cycle of a motion.
+def measure_last_cycle_amplitude(time, position, speed, period: float) -> float | None:
+    """Return half the peak-to-peak value [m] of the last complete cycle of a motion.
 
-    The cycle reaches from a turning point to the next but one. A smaller reversal than MAX_WIGGLE of
-    the range in the last period is that of a faster mode and is ignored.
+    The cycle reaches from a reversal to the next but one. A reversal smaller than MAX_RIPPLE times
+    the range in the last period belongs to a faster mode and is ignored.
 
     Parameters
     ----------
-    time, place, speed : (n,)
-        Samples, as in `find_turning_points`.
+    time, position, speed : (n,)
+        Samples, as in `locate_reversals`.
     period : float
         Period [s].
 
@@ -187,155 +189,175 @@ def measure_last_swing(time, place, speed, period: float) -> float | None:
     -------
     float or None
         Half the range in the last period if the motion is at rest there; None if it has fewer than
-        three turning points.
+        three reversals.
     """
-    late = float(np.ptp(place[time >= time[-1] - period * (1 + STEP_END_TOL)]))
-    if late <= MIN_HALF_SWING * np.ptp(place):
-        return late / 2
-    # turning points from the end of the motion; direction; farthest position since the last turning
-    # point
-    found = []
-    way = 0
-    far = float(place[-1])
-    for at in find_turning_points(time, place, speed)[1][::-1].tolist():
-        if way == 0:
-            way = int(np.sign(at - far)) if abs(at - far) > MAX_WIGGLE * late else 0
-            far = at if way else far
-        elif way * (at - far) > 0:
-            far = at
-        elif way * (far - at) > MAX_WIGGLE * late:
-            found.append(far)
-            far = at
-            way = -way
-        if len(found) == 3:
-            return max(abs(found[0] - found[1]), abs(found[1] - found[2])) / 2
+    last_range = float(np.ptp(position[time >= time[-1] - period * (1 + STEP_END_TOL)]))
+    if last_range <= MIN_HALF_CYCLE * np.ptp(position):
+        return last_range / 2
+    # Going back from the end of the motion, the loop collects reversals and tracks the direction
+    # and the farthest position since the last one.
+    reversal_positions = []
+    direction = 0
+    farthest = float(position[-1])
+    for reversal in locate_reversals(time, position, speed)[1][::-1].tolist():
+        if direction == 0:
+            direction = (
+                int(np.sign(reversal - farthest))
+                if abs(reversal - farthest) > MAX_RIPPLE * last_range
+                else 0
+            )
+            farthest = reversal if direction else farthest
+        elif direction * (reversal - farthest) > 0:
+            farthest = reversal
+        elif direction * (farthest - reversal) > MAX_RIPPLE * last_range:
+            reversal_positions.append(farthest)
+            farthest = reversal
+            direction = -direction
+        if len(reversal_positions) == 3:
+            return (
+                max(
+                    abs(reversal_positions[0] - reversal_positions[1]),
+                    abs(reversal_positions[1] - reversal_positions[2]),
+                )
+                / 2
+            )
     return None
 
 
-def find_turning_points_outside(time, place, speed) -> tuple:
-    """Return the turning points as `find_turning_points` does, from the cubics of the neighbouring steps.
+def find_reversals_by_extrapolation(time, position, speed) -> tuple:
+    """Find reversals as `locate_reversals`, but extrapolate the cubics of adjacent steps.
 
-    The times between two samples are the means of the zeros of the speed on the continued cubics of
-    the steps before and after. If the force of a law reverses with the speed within less than a
-    step, it does so at the turning point: each of these cubics contains the force on its own side,
+    The times between two samples are the means of the zeros of the speed on the extrapolated cubics
+    of the steps before and after. If the force of a law reverses with the speed within less than a
+    step, it does so at the reversal: each of these cubics contains the force on its own side,
     whereas the cubic between the two samples is distorted by the jump.
 
     Parameters
     ----------
-    time, place, speed : (n,)
-        Samples, as in `find_turning_points`.
+    time, position, speed : (n,)
+        Samples, as in `locate_reversals`.
     """
-    times, places = find_turning_points(time, place, speed)
+    times, positions = locate_reversals(time, position, speed)
     k = np.flatnonzero(speed[1:-2] * speed[2:-1] < 0) + 1
-    share = speed[k] / (speed[k] - speed[k + 1])
+    fraction = speed[k] / (speed[k] - speed[k + 1])
 
-    def find_zero(step, near):
-        """Find the time [s] of zero speed on the continued cubic of a step by Newton's method.
+    def find_zero(step, guess):
+        """Find the time [s] of zero speed on the extrapolated cubic of a step by Newton's method.
 
         near: initial guess as a fraction of the step, outside 0 to 1.
         """
         span = time[step + 1] - time[step]
-        a = place[step]
-        b = place[step + 1]
+        a = position[step]
+        b = position[step + 1]
         c = speed[step] * span
         d = speed[step + 1] * span
         two = 2 * (3 * (b - a) - 2 * c - d)
         three = 3 * (2 * (a - b) + c + d)
         for _ in range(N_NEWTON_STEPS):
-            near = near - (c + near * (two + near * three)) / (two + 2 * near * three)
-        return time[step] + near * span
+            guess = guess - (c + guess * (two + guess * three)) / (two + 2 * guess * three)
+        return time[step] + guess * span
 
-    at = (find_zero(k - 1, 1 + share) + find_zero(k + 1, share - 1)) / 2
-    # round-off may move a turning point to the sample before it
-    between = (at >= time[k]) & (at <= time[k + 1])
-    times[np.searchsorted(times, time[k])[between]] = at[between]
-    return times, places
+    reversal_times = (find_zero(k - 1, 1 + fraction) + find_zero(k + 1, fraction - 1)) / 2
+    # Round-off may move a reversal to the sample before it.
+    is_inside = (reversal_times >= time[k]) & (reversal_times <= time[k + 1])
+    times[np.searchsorted(times, time[k])[is_inside]] = reversal_times[is_inside]
+    return times, positions
 
 
-def half_swings_between(times, places, size=None) -> HalfSwings:
-    """Return the half swings between the turning points of a computed motion.
+def make_half_cycles(times, positions, size=None) -> HalfCycles:
+    """Return the half cycles between the reversals of a computed decaying motion.
 
-    They end before the first one that is not smaller than its predecessor or that is round-off of
-    the largest.
+    They end before the first half cycle that is not smaller than its predecessor or that is round-
+    off of the largest.
 
     Parameters
     ----------
-    times, places : (k,)
-        Turning points: times [s] and positions [m].
+    times, positions : (k,)
+        Reversals: times [s] and positions [m].
     size : (k - 1,), optional
-        Sizes of the half swings at another point of the structure [m]; None: distances of `places`.
+        Sizes of the half cycles at another point of the structure [m]; None: distances of
+        `positions`.
     """
-    own = np.abs(np.diff(places))
+    distances = np.abs(np.diff(positions))
     ends = np.flatnonzero(
-        (np.diff(own, prepend=np.inf) >= 0) | (own <= MIN_HALF_SWING * own.max(initial=0.0))
+        (np.diff(distances, prepend=np.inf) >= 0)
+        | (distances <= MIN_HALF_CYCLE * distances.max(initial=0.0))
     )
-    count = int(ends[0]) if ends.size else own.size
-    still = np.zeros(count)
-    return HalfSwings(
-        (times[1:] + times[:-1])[:count] / 2, (own if size is None else size)[:count], still, still
+    count = int(ends[0]) if ends.size else distances.size
+    no_noise = np.zeros(count)
+    return HalfCycles(
+        (times[1:] + times[:-1])[:count] / 2,
+        (distances if size is None else size)[:count],
+        no_noise,
+        no_noise,
     )
 
 
-def compute_swing_curve(swings: HalfSwings) -> DecayCurve:
-    """Return frequency and damping ratio against amplitude from the half swings of a decay.
+def fit_decay_curve(half_cycles: HalfCycles) -> DecayCurve:
+    """Compute frequency and damping ratio against amplitude from half cycles of a decay.
 
-    A computed decay has a point at each inner half swing, a measured one at half swings whose spans
-    overlap by half. Fewer than three half swings give no point.
+    A computed decay has a point at each inner half cycle, a measured one at half cycles whose spans
+    overlap by half. Fewer than three half cycles give no point.
     """
-    if swings.size.size < 3:
+    if half_cycles.size.size < 3:
         return DecayCurve(*np.empty((6, 0)))
-    log = np.log(swings.size)
-    fall = fit_slopes(log, _limit_noise(swings.size_noise / swings.size, log))
-    noise = _limit_noise(swings.middle_noise, swings.middle)
-    half = fit_slopes(swings.middle, noise)
-    at = np.arange(half.span.size)
+    log = np.log(half_cycles.size)
+    fall = fit_slopes(log, _limit_noise(half_cycles.size_noise / half_cycles.size, log))
+    noise = _limit_noise(half_cycles.middle_noise, half_cycles.middle)
+    half = fit_slopes(half_cycles.middle, noise)
+    selected = np.arange(half.span.size)
     if noise.any():
-        at = _overlap_spans(np.minimum(half.span, fall.span))
-    half = half.at(at)
-    fall = fall.at(at)
-    tilt = np.hypot(np.pi, fall.slope)
-    found = DecayCurve(
-        time=swings.middle[1 + at],
-        amplitude=np.exp(_smooth_values(log, 1 + at, fall.span)) / 2,
+        selected = _overlap_spans(np.minimum(half.span, fall.span))
+    half = half.at(selected)
+    fall = fall.at(selected)
+    decay_per_radian = np.hypot(np.pi, fall.slope)
+    curve = DecayCurve(
+        time=half_cycles.middle[1 + selected],
+        amplitude=np.exp(_smooth_values(log, 1 + selected, fall.span)) / 2,
         frequency=0.5 / half.slope,
         frequency_error=0.5 * half.error / half.slope**2,
-        damping=-fall.slope / tilt,
-        damping_error=fall.error * np.pi**2 / tilt**3,
+        damping=-fall.slope / decay_per_radian,
+        damping_error=fall.error * np.pi**2 / decay_per_radian**3,
     )
-    return _add_sampling_error(found) if found.time.size > 1 else found
+    return _add_sampling_error(curve) if curve.time.size > 1 else curve
 
 
 def _overlap_spans(span) -> np.ndarray:
-    """Choose inner half swings so that the spans (n,) around them overlap by half."""
+    """Select inner half cycles such that the spans (n,) around them overlap by half."""
     out = [0]
     while (place := out[-1] + max(1, int(span[out[-1]]))) < span.size:
         out.append(place)
     return np.array(out)
 
 
-def _smooth_values(values, places, span) -> np.ndarray:
-    """Evaluate at each index the least-squares parabola over the span around it."""
-    out = np.empty(places.size)
+def _smooth_values(values, indices, span) -> np.ndarray:
+    """Evaluate least-squares parabolas over spans of values at their midpoints."""
+    out = np.empty(indices.size)
     for m in np.unique(span):
-        here = span == m
-        out[here] = sliding_window_view(values, 2 * m + 1)[places[here] - m] @ _parabola_weights(m)
+        has_span = span == m
+        out[has_span] = sliding_window_view(values, 2 * m + 1)[
+            indices[has_span] - m
+        ] @ _parabola_weights(m)
     return out
 
 
 class Slopes(NamedTuple):
-    """Slopes (k,) per half swing, the half-widths of their intervals, and their spans m."""
+    """Slopes of a quantity per half cycle, with confidence half-widths and fit spans.
+
+    All are (k,); a span is its number of half cycles on either side.
+    """
 
     slope: np.ndarray
     error: np.ndarray
     span: np.ndarray
 
-    def at(self, pick) -> "Slopes":
-        """Return the slopes that indices, a slice or booleans select."""
-        return Slopes(*(part[pick] for part in self))
+    def at(self, selection) -> "Slopes":
+        """Return the slopes selected by indices, a slice or booleans."""
+        return Slopes(*(part[selection] for part in self))
 
 
 def fit_slopes(values, noise) -> Slopes:
-    """Fit the slope at each inner point over the longest span that agrees with all shorter ones.
+    """Fit the slope at each inner point over the longest span consistent with shorter ones.
 
     Spans grow until the slope differs from that of a shorter span by more than the noise of both
     allows (Lepski, 1991). The error is the sum of two parts: the noise, and the bias of a mean. The
@@ -345,7 +367,7 @@ def fit_slopes(values, noise) -> Slopes:
     Parameters
     ----------
     values : (n,) array
-        Values at the half swings.
+        Values at successive half cycles.
     noise : (n,) array
         Their standard deviations; 0 for a computed motion.
 
@@ -358,7 +380,8 @@ def fit_slopes(values, noise) -> Slopes:
     slope = np.empty(count)
     spread = np.zeros(count)
     bias = np.full(count, np.nan)
-    shorter_change = np.full(count, np.nan)  # change over the next shorter span, minus its noise
+    # This is the change over the next shorter span, minus its noise.
+    shorter_change = np.full(count, np.nan)
     span = np.zeros(count, int)
     grows = np.ones(count, bool)
     tried: list = []
@@ -401,11 +424,11 @@ def fit_slopes(values, noise) -> Slopes:
 
 
 def _add_sampling_error(curve: DecayCurve) -> DecayCurve:
-    """Add the errors that follow from amplitudes that are too large by the fraction delta^2/8.
+    """Widen the errors of a decay curve by the effect of amplitudes overestimated by delta^2/8.
 
-    Half of a half swing is cosh(delta/2) times the amplitude at its middle, where delta is the
-    decrement of half a cycle. The errors are the changes of the curve over this fraction of the
-    amplitude.
+    Half of a half cycle is cosh(delta/2) times the amplitude at its middle, where delta is the
+    logarithmic decrement over half a cycle. The errors are the changes of the curve over this
+    fraction of the amplitude.
     """
     delta = np.pi * curve.damping / np.sqrt(np.maximum(1 - curve.damping**2, VALUE_ROUND_OFF))
     decrement = np.abs(np.gradient(np.log(curve.amplitude)))
@@ -419,13 +442,13 @@ def _add_sampling_error(curve: DecayCurve) -> DecayCurve:
 
 
 def smooth_slopes(values, noise) -> np.ndarray:
-    """Return the slopes (n,) of values (n,) per half swing; both ends repeat their neighbour."""
+    """Return the fitted slopes (n,) of values per half cycle; both ends repeat their neighbour."""
     slope = fit_slopes(values, noise).slope
     return np.concatenate([slope[:1], slope, slope[-1:]])
 
 
 def _limit_noise(noise, values) -> np.ndarray:
-    """Return standard deviations (n,) that are not below those estimated from third differences.
+    """Limit standard deviations (n,) from below by an estimate from third differences.
 
     Third differences of a parabola vanish, those of white noise have 20 times its variance. Values
     without noise keep 0.
@@ -441,7 +464,7 @@ def _limit_noise(noise, values) -> np.ndarray:
 
 
 def _parabola_weights(m: int) -> np.ndarray:
-    """Return the weights (2 m + 1,) for the midpoint value of a least-squares parabola."""
+    """Return the weights (2 m + 1,) of the midpoint value of a least-squares parabola."""
     x = np.arange(-m, m + 1)
     if m <= 1:
         return (x == 0) * 1.0
@@ -449,37 +472,39 @@ def _parabola_weights(m: int) -> np.ndarray:
     return (np.sum(x2**2) - np.sum(x2) * x2) / (x.size * np.sum(x2**2) - np.sum(x2) ** 2)
 
 
-def _interpolate_monotone(x, own, values) -> np.ndarray:
-    """Interpolate values (n,) at increasing positions own (n,) to x (k,) by monotone cubics.
+def _interpolate_monotone(x, knots, values) -> np.ndarray:
+    """Interpolate values (n,) at increasing knots (n,) to positions x (k,) by monotone cubics.
 
-    Fritsch and Butland (1984); x is clipped to the range of `own`.
+    Fritsch and Butland (1984); x is clipped to the range of the knots.
     """
     from scipy.interpolate import PchipInterpolator
 
-    x = np.clip(x, own[0], own[-1])
-    return PchipInterpolator(own, values)(x) if own.size > 1 else np.interp(x, own, values)
+    x = np.clip(x, knots[0], knots[-1])
+    return PchipInterpolator(knots, values)(x) if knots.size > 1 else np.interp(x, knots, values)
 
 
-def _evaluate_cubic(place, speed, share):
-    """Return positions (k,) at the fractions `share` (k,) of steps, on cubics.
+def _evaluate_cubic(position, speed, fraction):
+    """Evaluate Hermite cubics of steps at given fractions (k,) of the steps.
 
-    place, speed: positions and speeds at both ends of the steps; the speeds are multiplied by the
-    durations of the steps.
+    position, speed: values at both ends of the steps; the speeds are multiplied by the durations of
+    the steps.
     """
-    (a, b), (c, d), s = place, speed, share
+    (a, b), (c, d), s = position, speed, fraction
     return a + s * (c + s * (3 * (b - a) - 2 * c - d + s * (2 * (a - b) + c + d)))
 
 
-def _find_turning_fraction(place, speed) -> np.ndarray:
-    """Return the fraction (k,) of the step at which the cubics have a turning point.
+def _find_reversal_fraction(position, speed) -> np.ndarray:
+    """Return the fraction (k,) of each step at which the position on a cubic reverses.
 
     The speeds at both ends have opposite signs.
     """
-    (a, b), (c, d) = place, speed
+    (a, b), (c, d) = position, speed
     two = 2 * (3 * (b - a) - 2 * c - d)
     three = 3 * (2 * (a - b) + c + d)
     both = -(two + np.copysign(np.sqrt(np.maximum(two**2 - 4 * three * c, 0.0)), two)) / 2
     with np.errstate(divide="ignore", invalid="ignore"):
-        near = c / both
-        far = both / three
-    return np.clip(np.where(np.abs(near - 0.5) <= 0.5 + STEP_END_TOL, near, far), 0.0, 1.0)
+        first_root = c / both
+        second_root = both / three
+    return np.clip(
+        np.where(np.abs(first_root - 0.5) <= 0.5 + STEP_END_TOL, first_root, second_root), 0.0, 1.0
+    )

@@ -1,4 +1,4 @@
-"""Errors of a run that ends at a sample next to the requested end.
+"""Errors of a run that ends at a sample next to the requested end time.
 
 In: the samples of the last cycles, and by how many steps their end misses the requested end.
 Out: errors by measure name. A recorded drive or a sweep ends at a given time, a march at a
@@ -8,11 +8,11 @@ whole step. All coarse runs end at the same sample, so that they do not show thi
 import numpy as np
 
 from ..core import Response
-from .run_events import slips_and_slides
+from .run_events import slips_and_displacements
 
 
 def estimate_window_error(window: Response, period: float, offset: float) -> dict:
-    """Return the change of each measure, by name, if the window is shifted by `offset` steps.
+    """Return the change of each measure by name for a window shifted by `offset` steps.
 
     An extreme value changes only if it lies at an end of the window.
 
@@ -29,7 +29,7 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
         return {}
     offset = abs(offset)
     span = window.time[-1] - window.time[0]
-    cycles, (slips, slides) = span / period, slips_and_slides(window)
+    cycles, (slips, slides) = span / period, slips_and_displacements(window)
     forces = window.extra.get("forces", window.force[:, None])
     parts = (forces[1:] + forces[:-1]) / 2 * np.diff(slides, axis=0)
     if "lateral_slides" in window.extra:
@@ -57,7 +57,7 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
 
 
 def _change_of_end_maximum(values) -> float:
-    """Return the change of the largest value (k,) over one step if it lies at an end; else 0."""
+    """Return the change of a maximum over one step if it lies at an end of the samples, else 0."""
     largest = int(np.argmax(values))
     if largest == 0:
         return abs(float(values[0] - values[1]))
@@ -67,7 +67,7 @@ def _change_of_end_maximum(values) -> float:
 
 
 def _change_of_drift(slide, cycles: float) -> float:
-    """Return the change of the drift per cycle [m] if the window moves by one step.
+    """Return the change of the drift per cycle [m] for a window shifted by one step.
 
     As in `loops.drift`, below 1.5 cycles the drift is the motion between the ends of the window,
     else the difference between the means of two cycles.

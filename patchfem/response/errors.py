@@ -1,4 +1,4 @@
-"""Errors of measures from coarser runs of the same scene: the grid convergence index for every engine.
+"""Errors of measures from coarser runs of the same scene, by the grid convergence index.
 
 A run that is `ratio` times as coarse in one way (steps, elements, cells of a density, harmonics,
 modes, tolerance of a step) changes a measure by ratio**p - 1 times its error, where p is the order
@@ -15,22 +15,24 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import Measure
-from .rows import error_floor, find_row
+from .rows import error_floor, find_definition
 
-# Roache's factor for two runs; it covers runs that are too coarse to show the order
+# Roache's safety factor for two runs; it covers runs that are too coarse to show the order.
 SAFETY_FACTOR = 3.0
-MIN_ORDER = 1.0  # smallest order that an estimate assumes
-MAX_ORDER = 2.0  # largest order that an estimate assumes, that of the methods
-MAX_CHANGE_RATIO = 16.0  # ratio of two changes, of order 4; above it the last is small by chance
-# lowest observed order at which an error counts as decreasing with the step
+MIN_ORDER = 1.0  # Lowest order of convergence that an estimate assumes.
+MAX_ORDER = 2.0  # Highest order of convergence that an estimate assumes, that of the methods.
+# Largest ratio of two successive changes, at order 4; above it the last change is accidentally
+# small.
+MAX_CHANGE_RATIO = 16.0
+# Lowest observed order at which an error counts as decreasing with the step.
 MIN_OBSERVED_ORDER = 0.5
-SUM_ROUND_OFF = 1e-12  # relative round-off of a long sum
-MEAN_ROUND_OFF = 1e-13  # round-off of a mean over the motion, relative to the amplitude
-ERROR_MEASURES = ("energy_balance", "work_check")  # measures that are errors themselves
+SUM_ROUND_OFF = 1e-12  # Relative round-off error of a long sum.
+MEAN_ROUND_OFF = 1e-13  # Round-off error of a mean over the motion, relative to the amplitude.
+ERROR_MEASURES = ("energy_balance", "work_check")  # These measures are errors themselves.
 
 
 def signed_change(fine: dict, coarse: dict) -> dict:
-    """Return fine - coarse by name of the measures of both runs; that of a phase lies in +-pi/2."""
+    """Return the fine-minus-coarse difference of each measure; phase differences lie in +-pi/2."""
     out = {name: fine[name] - coarse[name] for name in fine.keys() & coarse.keys()}
     if "slip_start_phase" in out:
         out["slip_start_phase"] = (out["slip_start_phase"] + np.pi / 2) % np.pi - np.pi / 2
@@ -38,12 +40,12 @@ def signed_change(fine: dict, coarse: dict) -> dict:
 
 
 def absolute_change(fine: dict, coarse: dict) -> dict:
-    """Return |fine - coarse| by name of the measures of both runs; a phase is taken modulo pi."""
+    """Return the absolute difference of each measure in two runs; phases are taken modulo pi."""
     return {name: abs(gap) for name, gap in signed_change(fine, coarse).items()}
 
 
 def error_of_change(difference, ratio: float = 2.0, order: float = MIN_ORDER):
-    """Return the error of a value that a run `ratio` times as coarse changes by `difference`.
+    """Return the error of a value from its change in a run `ratio` times as coarse.
 
     Parameters
     ----------
@@ -61,7 +63,7 @@ def error_of_change(difference, ratio: float = 2.0, order: float = MIN_ORDER):
 
 
 def convergence_error(last, before=None):
-    """Return the error of a value from its changes when the step or cell was halved.
+    """Return the error of a value from its changes at successive halvings of step or cell.
 
     Parameters
     ----------
@@ -82,7 +84,7 @@ def convergence_error(last, before=None):
 
 
 def convergence_errors(*values: dict) -> dict:
-    """Return the error of each measure from its values in runs of halved steps or cells.
+    """Return the error of each measure from its values at successive halvings of step or cell.
 
     If the interval of a further run contains the value, this run does not widen the error, and
     narrows it by no more than the highest order allows.
@@ -106,14 +108,14 @@ def _ladder_error(changes: list) -> float:
     error = convergence_error(*changes[-2:])
     for last, before in reversed(list(pairwise(changes[:-1]))):
         next_error = convergence_error(last, before)
-        if abs(last) <= error:  # the interval of the coarser run contains the value
+        if abs(last) <= error:  # The error interval of the coarser run contains the value.
             next_error = min(next_error, error)
         error = max(next_error, error / 2**MAX_ORDER)
     return error
 
 
 def step_errors(*values: dict, steps: int) -> dict:
-    """Return the error of the time step by measure name from runs at halved steps.
+    """Return the time-step error of each measure from runs at halved numbers of steps.
 
     A measure that counts samples has at least their resolution.
 
@@ -126,15 +128,15 @@ def step_errors(*values: dict, steps: int) -> dict:
     """
     out = convergence_errors(*values)
     for name in out:
-        out[name] += find_row(name).sample_error / steps
+        out[name] += find_definition(name).sample_error / steps
     load = values[0].get("normal_load_least", 0.0)
     if values[0].get("open_fraction") == 0 and load > out.get("normal_load_least", np.inf):
-        out["open_fraction"] = 0.0  # the load stays above 0 between the samples as well
+        out["open_fraction"] = 0.0  # The load stays above 0 between the samples as well.
     return out
 
 
 def coarser_errors(fine: dict, *coarse: dict, ratio: float = 2.0, order: float = MIN_ORDER) -> dict:
-    """Return the error of each measure from runs that are all `ratio` times as coarse.
+    """Return the error of each measure from runs with steps or cells `ratio` times as long.
 
     Parameters
     ----------
@@ -155,9 +157,10 @@ def coarser_errors(fine: dict, *coarse: dict, ratio: float = 2.0, order: float =
 
 
 def finer_errors(values: dict, finer: dict) -> dict:
-    """Return the error of each measure from a run with more harmonics, modes or strips of bonds.
+    """Return the error of each measure from a run with more harmonics, modes or bond strips.
 
-    The finer run has twice as many. The truncation error of the series of a friction force with
+    The finer run has twice as many of them. The truncation error of the series of a friction force
+    with
     corners is of second order.
 
     Parameters
@@ -169,7 +172,7 @@ def finer_errors(values: dict, finer: dict) -> dict:
 
 
 def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
-    """Return the error of each measure from runs in which four cells of a density are merged.
+    """Return the error of each measure from runs with merged cells of a slider density.
 
     The force of a density in cells is exact at the ends of a cell and has its largest error, of
     second order in the width, in the middle. A measure that depends on the instants at which the
@@ -185,11 +188,13 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
     """
     errors = coarser_errors(fine, *coarse, ratio=4.0, order=2.0)
     at_instants = coarser_errors(fine, *coarse, ratio=4.0, order=1.0)
-    return errors | {name: at_instants[name] for name in errors if find_row(name).sample_error}
+    return errors | {
+        name: at_instants[name] for name in errors if find_definition(name).sample_error
+    }
 
 
 class FrictionScale(NamedTuple):
-    """Sizes in a run to which a relative error of the friction force refers.
+    """Friction scales of a run to which a relative force error is referred.
 
     - static: coefficient of friction [1].
     - limit: friction limit [N].
@@ -205,7 +210,7 @@ class FrictionScale(NamedTuple):
 
 
 def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict:
-    """Return errors by name that a relative error of the friction force causes in the measures.
+    """Return the errors of the measures caused by a relative error of the friction force.
 
     Forces and slip change by this fraction of their own scale, work by this fraction of the
     exchanged work, the stored energy by this fraction of the energy of a bond at the limit, and
@@ -239,7 +244,7 @@ def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict
 
 
 def observed_orders(fine: dict, half: dict, quarter: dict) -> dict:
-    """Return the observed order [1] at which each measure changes with the time step, at most 2.
+    """Return the observed convergence order [1] of each measure in the time step, at most 2.
 
     Parameters
     ----------
@@ -267,9 +272,10 @@ def observed_orders(fine: dict, half: dict, quarter: dict) -> dict:
 def add_errors(
     values: dict, *errors: dict, min_relative_error: float = 0.0, size: float = np.inf
 ) -> dict:
-    """Return measures by name with the sum of the given errors, plus `min_relative_error` of the value.
+    """Combine values and errors into measures, adding a relative error to each.
 
-    The error of a measure that a coarse run does not have is its absolute value.
+    The summed errors of a measure are its parts plus `min_relative_error` of the value. The error
+    of a measure that a coarse run does not have is its absolute value.
 
     Parameters
     ----------
@@ -288,13 +294,13 @@ def add_errors(
         parts = [errors_by_name.get(name, abs(value)) for errors_by_name in errors]
         error = total_error(name, value, parts, min_relative_error, amplitude)
         out[name] = Measure(
-            float(value), find_row(name).unit, float(error), float(error_floor(name, size))
+            float(value), find_definition(name).unit, float(error), float(error_floor(name, size))
         )
     return out
 
 
 def total_error(name: str, value, parts, min_relative_error: float, size):
-    """Return the error of a measure of one run, or (n,) of many, from its parts.
+    """Return the total error of a measure of one run, or (n,) of many, as sum of its parts.
 
     Parameters
     ----------
@@ -309,10 +315,10 @@ def total_error(name: str, value, parts, min_relative_error: float, size):
         Amplitude of the output [m].
     """
     error = sum(parts) + np.abs(value) * min_relative_error
-    if name == "slip_start_phase":  # the error of a phase modulo pi is at most pi/2
+    if name == "slip_start_phase":  # The error of a phase modulo pi is at most pi/2.
         return np.minimum(error, np.pi / 2)
-    if name in ERROR_MEASURES:  # the value itself is an error
+    if name in ERROR_MEASURES:  # The value itself is an error.
         return np.maximum(error, np.abs(value))
-    if name == "drift_per_cycle":  # a difference of means, which has their round-off
+    if name == "drift_per_cycle":  # The value is a difference of means, which has their round-off.
         return error + max(MEAN_ROUND_OFF, min_relative_error) * np.abs(size)
     return error

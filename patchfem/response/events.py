@@ -1,4 +1,4 @@
-"""Table of the events of a run, detected in samples, and the stick intervals between events.
+"""Table of stick-slip events of a run, detected in samples, and the stick intervals between.
 
 In: samples of slip and slide, or rows of a log. Out: `Events`, and intervals of stick. Samples
 are those of a march or of a comparison method; the log of the exact engine is read in
@@ -11,14 +11,14 @@ import numpy as np
 
 from ..core import STICK_SPEED_RATIO
 
-# kinds of events, as indices of KIND_NAMES
+# Kinds of events, as indices of EVENT_KIND_NAMES.
 STOP = 0
 RELEASE_UP = 1
 RELEASE_DOWN = 2
 REVERSAL_UP = 3
 REVERSAL_DOWN = 4
-BORDER = 5
-KIND_NAMES = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")
+SEGMENT_BORDER = 5
+EVENT_KIND_NAMES = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")
 MAX_EVENTS = 100_000
 
 
@@ -29,7 +29,7 @@ class Events:
     - time (k,): [s].
     - interface (k,): number of the interface from 1; 0 for the border between two segments of the
       drive.
-    - kind (k,): index of KIND_NAMES; "up" means towards positive slip.
+    - kind (k,): index of EVENT_KIND_NAMES; "up" means towards positive slip.
     - slide (k,): relative displacement [m].
     - count: number of all events of the run.
     - source: sentence on how the events were found.
@@ -44,7 +44,7 @@ class Events:
 
 
 def sort_events(rows, count: int | None = None, source: str = "") -> Events:
-    """Return the Events of rows (time [s], interface, kind, slide [m]) in any order.
+    """Sort event rows (time [s], interface, kind, displacement [m]) into an Events table.
 
     Parameters
     ----------
@@ -69,8 +69,10 @@ def sort_events(rows, count: int | None = None, source: str = "") -> Events:
     )
 
 
-def detect_events(time, slips, slides, period: float, held: float = 0.0, borders=()) -> Events:
-    """Return the events in samples: stops, releases, reversals, and borders of drive segments.
+def detect_events(
+    time, slips, slides, period: float, max_stick_slip: float = 0.0, borders=()
+) -> Events:
+    """Detect the events in samples: stops, releases, reversals, and borders of drive segments.
 
     A stop or a release is where the slip speed passes 1e-2 of its peak in the cycle, a reversal
     where it changes sign without a stop between two samples.
@@ -83,15 +85,15 @@ def detect_events(time, slips, slides, period: float, held: float = 0.0, borders
         Slip and relative displacement of each interface [m].
     period : float
         Period of the drive [s].
-    held : float
+    max_stick_slip : float
         Slip in a cycle [m] below which the interface sticks in it.
     borders : sequence of float
         Times [s] at which a segment of the drive ends and the next one starts.
     """
-    rows = [(at, 0, BORDER, np.nan) for at in borders if time[0] < at < time[-1]]
+    rows = [(at, 0, SEGMENT_BORDER, np.nan) for at in borders if time[0] < at < time[-1]]
     for number in range(slips.shape[1]):
         rows += _detect_interface_events(
-            time, slips[:, number], slides[:, number], period, held, number + 1
+            time, slips[:, number], slides[:, number], period, max_stick_slip, number + 1
         )
     return sort_events(
         rows,
@@ -100,8 +102,8 @@ def detect_events(time, slips, slides, period: float, held: float = 0.0, borders
     )
 
 
-def compute_slip_states(time, slip, period: float, held: float = 0.0) -> tuple:
-    """Return the relative slip speed (k - 1,) [1] and the state (k - 1,) between the samples.
+def compute_slip_states(time, slip, period: float, max_stick_slip: float = 0.0) -> tuple:
+    """Return relative slip speed (k - 1,) [1] and stick-slip state (k - 1,) between samples.
 
     Parameters
     ----------
@@ -111,7 +113,7 @@ def compute_slip_states(time, slip, period: float, held: float = 0.0) -> tuple:
         Slip [m].
     period : float
         Period of the drive [s].
-    held : float
+    max_stick_slip : float
         Slip in a cycle [m] below which the interface sticks in it.
 
     Returns
@@ -122,21 +124,23 @@ def compute_slip_states(time, slip, period: float, held: float = 0.0) -> tuple:
     """
     step = np.diff(time)
     rate = np.divide(np.diff(slip), step, out=np.zeros(step.size), where=step > 0)
-    # 1e-6 of a cycle allows for round-off of the times
+    # 1e-6 of a cycle allows for round-off of the times.
     cycle = np.floor((time[:-1] - time[0]) / period + 1e-6).astype(int)
     peak, low, high = (np.full(cycle.max(initial=0) + 1, start) for start in (0.0, np.inf, -np.inf))
     np.maximum.at(peak, cycle, np.abs(rate))
     for side in (slip[:-1], slip[1:]):
         np.minimum.at(low, cycle, side)
         np.maximum.at(high, cycle, side)
-    peak[high - low <= held] = np.inf
+    peak[high - low <= max_stick_slip] = np.inf
     share = rate / np.where(peak > 0, peak, np.inf)[cycle]
     return share, np.where(np.abs(share) >= STICK_SPEED_RATIO, np.sign(share), 0).astype(int)
 
 
-def _detect_interface_events(time, slip, slide, period: float, held: float, number: int) -> list:
-    """Return the event rows of one interface from its samples; `number` is its number from 1."""
-    share, state = compute_slip_states(time, slip, period, held)
+def _detect_interface_events(
+    time, slip, slide, period: float, max_stick_slip: float, number: int
+) -> list:
+    """Return the event rows of a single interface, detected in its samples."""
+    share, state = compute_slip_states(time, slip, period, max_stick_slip)
     k = np.flatnonzero(state[1:] != state[:-1])
     at = (time[1:] + time[:-1]) / 2
     before = state[k]
@@ -178,7 +182,7 @@ def find_sticks(events: Events, begin: float, end: float, moves) -> list:
         mine = events.kind[events.interface == number + 1]
         if mine.size:
             sliding[number] = mine[0] not in (RELEASE_UP, RELEASE_DOWN)
-    # of the events before `begin`, only the last one of each interface decides its state
+    # Of the events before `begin`, only the last one of each interface decides its state.
     first = int(np.searchsorted(events.time, begin))
     for number in range(count):
         mine = events.kind[:first][events.interface[:first] == number + 1]
@@ -189,7 +193,7 @@ def find_sticks(events: Events, begin: float, end: float, moves) -> list:
     rows = zip(
         *(column[first:].tolist() for column in (events.time, events.interface, events.kind))
     )
-    for when, number, kind in [*rows, (np.inf, 0, BORDER)]:
+    for when, number, kind in [*rows, (np.inf, 0, SEGMENT_BORDER)]:
         a = max(last, begin)
         b = min(when, end)
         if b > a and not sliding[0]:

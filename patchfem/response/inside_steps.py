@@ -1,10 +1,10 @@
-"""Motion of an interface inside the steps of a march, for a force that changes in a step.
+"""Motion of an interface within time steps, for a friction force that changes in a step.
 
 In: samples at the ends of steps, and the LuGre law. Out: the window with samples inside the
 steps. The force of the LuGre law exceeds its kinetic limit while the slide reverses. If the
 slide is many times the length over which the stretch relaxes, this takes less than a step and
 is not visible at the ends of the steps. Here the law is integrated along the cubic through
-slides and rates: every step is divided into N_STEP_PARTS parts, and a reversal of the slide is the end
+slides and rates: every step is divided into N_SUBSTEPS parts, and a reversal of the slide is the end
 of a part.
 """
 
@@ -15,14 +15,14 @@ import numpy as np
 
 from ..core import Response
 from ..friction.laws.lugre import LuGre
-from .measures import find_turning_steps
+from .measures import find_reversal_steps
 
-# Parts of a step: with 16, the peaks of 60 rigs change by less than they change with the step.
-N_STEP_PARTS = 16
+# Number of substeps per step; with 16, the error in peaks of 60 rigs is below the time-step error.
+N_SUBSTEPS = 16
 
 
 class Steps(NamedTuple):
-    """Ends of the parts of every step: times [s], slides [m] and speeds [m/s], (k, N_STEP_PARTS) each."""
+    """Ends of all substeps: times [s], displacements [m] and speeds [m/s], (k, N_SUBSTEPS) each."""
 
     time: np.ndarray
     slide: np.ndarray
@@ -30,7 +30,7 @@ class Steps(NamedTuple):
 
 
 def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
-    """Return the window with the ends of all parts of its steps as samples of the interface.
+    """Return the window with the ends of all substeps as samples of its interface.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
     Returns
     -------
     Response
-        time, slide, slide_rate, force and slip have (k - 1) N_STEP_PARTS + 1 samples; all other fields are
+        time, slide, slide_rate, force and slip have (k - 1) N_SUBSTEPS + 1 samples; all other fields are
         those of the window.
     """
     parts = divide_steps(window.time, window.slide, window.slide_rate)
@@ -58,8 +58,8 @@ def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
     kept = np.exp(-np.abs(increment) / length)
     stretch = evaluate_recursion(
         window.slide[0] - window.slip[0],
-        kept.reshape(-1, N_STEP_PARTS),
-        ((1 - kept) * np.sign(increment) * length).reshape(-1, N_STEP_PARTS),
+        kept.reshape(-1, N_SUBSTEPS),
+        ((1 - kept) * np.sign(increment) * length).reshape(-1, N_SUBSTEPS),
     )
     rate = speed - law.stiffness * np.abs(speed) * stretch / law.limit(speed)
     force = load * (law.stiffness * stretch + law.micro_damping * rate + law.viscous * speed)
@@ -69,11 +69,11 @@ def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
 
 
 def divide_steps(time, slide, speed) -> Steps:
-    """Divide the steps between samples into parts, on the cubics through slides and speeds.
+    """Divide the steps between samples into substeps, on cubics of the displacement.
 
-    If the speed changes sign in a step, half of its parts lie before the reversal. A reversal that
-    is closer to a sample than a part stays inside one of the parts there: shorter parts would have
-    slides of the size of round-off.
+    If the speed changes sign in a step, half of its substeps lie before the reversal. A reversal
+    that is closer to a sample than a substep stays inside one of the substeps there, because
+    shorter substeps would have displacements of the size of round-off.
 
     Parameters
     ----------
@@ -85,10 +85,10 @@ def divide_steps(time, slide, speed) -> Steps:
     Steps
     """
     step = np.diff(time)
-    share = np.tile(np.arange(1, N_STEP_PARTS + 1) / N_STEP_PARTS, (step.size, 1))
-    turns, at = find_turning_steps(time, slide, speed)
-    middle = np.clip(at, 1 / N_STEP_PARTS, 1 - 1 / N_STEP_PARTS)[:, None]
-    half = np.arange(1, N_STEP_PARTS // 2 + 1) / (N_STEP_PARTS // 2)
+    share = np.tile(np.arange(1, N_SUBSTEPS + 1) / N_SUBSTEPS, (step.size, 1))
+    turns, at = find_reversal_steps(time, slide, speed)
+    middle = np.clip(at, 1 / N_SUBSTEPS, 1 - 1 / N_SUBSTEPS)[:, None]
+    half = np.arange(1, N_SUBSTEPS // 2 + 1) / (N_SUBSTEPS // 2)
     share[turns] = np.column_stack([middle * half, middle + (1 - middle) * half])
     begin = speed[:-1] * step
     end = speed[1:] * step
@@ -107,21 +107,21 @@ def divide_steps(time, slide, speed) -> Steps:
     return inside
 
 
-def evaluate_recursion(start: float, kept, gained) -> np.ndarray:
-    """Return the values (k p + 1,) of the recursion x -> kept x + gained from part to part.
+def evaluate_recursion(start: float, factor, increment) -> np.ndarray:
+    """Iterate the recursion x -> factor x + increment over the substeps; (k p + 1,) values.
 
     Parameters
     ----------
     start : float
         First value.
-    kept, gained : (k, p)
-        Factor and increment of each part.
+    factor, increment : (k, p)
+        Factor and increment of each substep.
     """
-    factor = np.cumprod(kept, axis=1)
-    term = gained.copy()
-    for part in range(1, kept.shape[1]):
-        term[:, part] += kept[:, part] * term[:, part - 1]
-    begin = [start]
-    for whole, added in zip(factor[:-1, -1].tolist(), term[:-1, -1].tolist()):
-        begin.append(whole * begin[-1] + added)
-    return np.append(start, factor * np.array(begin)[:, None] + term)
+    product = np.cumprod(factor, axis=1)
+    term = increment.copy()
+    for part in range(1, factor.shape[1]):
+        term[:, part] += factor[:, part] * term[:, part - 1]
+    starts = [start]
+    for total_factor, total_increment in zip(product[:-1, -1].tolist(), term[:-1, -1].tolist()):
+        starts.append(total_factor * starts[-1] + total_increment)
+    return np.append(start, product * np.array(starts)[:, None] + term)

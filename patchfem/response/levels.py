@@ -27,17 +27,16 @@ LEVEL_MEASURES = (
     "secant_stiffness",
     "equivalent_damping",
 )
-AMPLITUDE = LEVEL_MEASURES[0]
-# third over first harmonic of the acceleration [1], above which the distortion is visible in the
-# curve
+AMPLITUDE_MEASURE = LEVEL_MEASURES[0]
+# Ratio of third to first acceleration harmonic [1] above which distortion is visible in the curve.
 MIN_DISTORTION = 0.03
-# smallest factor of a jump between neighbouring levels, divided by the factor of the drive [1]
+# Smallest factor of a jump between neighbouring levels, relative to the factor of the drive [1].
 MIN_JUMP_FACTOR = 1.5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Level:
-    """State of a run at the end of one level of the drive.
+    """State of a run at the end of a level of the drive.
 
     - drive: acceleration [m s-2]; for a force drive the force over the modal mass, or the force [N]
       if `unit` says so.
@@ -56,7 +55,7 @@ class Level:
 
 
 def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level], bool]:
-    """Return a function that decides whether a level lies above the onset.
+    """Return a function that decides whether a drive level lies above the onset of slip.
 
     A motion that grows without bound lies above every onset.
 
@@ -70,13 +69,13 @@ def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level],
     """
     beyond = {
         "slip": lambda level: not level.stuck,
-        "gauge": lambda level: level.values[AMPLITUDE] > length,
+        "gauge": lambda level: level.values[AMPLITUDE_MEASURE] > length,
     }.get(kind, lambda level: level.values.get("acceleration_distortion", 0.0) > MIN_DISTORTION)
     return lambda level: level.outcome == Outcome.GROWS or beyond(level)
 
 
 def make_no_onset_reason(kind: str, length: float | None = None) -> str:
-    """Return the reason why a sequence of levels has no onset; parameters as in `make_onset_test`."""
+    """Return the reason why a sequence of drive levels has no onset."""
     far = f"has an amplitude of more than {format_length(length)} at the output" if length else ""
     what = {"slip": "slips", "gauge": far}.get(
         kind,
@@ -85,15 +84,15 @@ def make_no_onset_reason(kind: str, length: float | None = None) -> str:
     return f"no level of the increasing sequence {what}"
 
 
-def bracket_onset(levels, past: Callable[[Level], bool]) -> tuple | None:
-    """Return the indices of the last level below the onset and of the first one above it.
+def bracket_onset(levels, is_above_onset: Callable[[Level], bool]) -> tuple | None:
+    """Return the indices of the last level below the onset and of the first level above it.
 
     Only the levels before the first decrease count.
 
     Parameters
     ----------
     levels : sequence of Level
-    past : callable
+    is_above_onset : callable
         Decides whether a level lies above the onset (see `make_onset_test`).
 
     Returns
@@ -103,15 +102,15 @@ def bracket_onset(levels, past: Callable[[Level], bool]) -> tuple | None:
         the onset.
     """
     for k, level in enumerate(levels):
-        if past(level):
+        if is_above_onset(level):
             return k - 1, k
         if k + 1 < len(levels) and levels[k + 1].drive < level.drive:
             return None
     return None
 
 
-def largest_jump(levels, name: str = AMPLITUDE) -> tuple | None:
-    """Return the largest relative change of a measure between neighbouring levels.
+def largest_jump(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
+    """Return the largest relative jump of a measure between neighbouring drive levels.
 
     The factor of the measure is divided by the factor of the drive.
 
@@ -136,7 +135,7 @@ def largest_jump(levels, name: str = AMPLITUDE) -> tuple | None:
     return max(found)[1:] if found and max(found)[0] >= np.log(MIN_JUMP_FACTOR) else None
 
 
-def largest_hysteresis(levels, name: str = AMPLITUDE) -> tuple | None:
+def largest_hysteresis(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
     """Return the largest difference of a measure between increasing and decreasing levels.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Friction loop of the last cycles: range of the slide, stiffness, damping and drift.
+"""Friction loop of the last cycles: displacement range, stiffness, damping and drift.
 
 In: samples of slide, its rate and force, at any spacing; those of an exact run contain both
 sides of every event. Out: reversals, secant stiffness, the measures of the loop, and the drift
@@ -14,17 +14,17 @@ import numpy as np
 from ..effects import law_has_trait
 from .measures import COORDINATE_ROUND_OFF
 
-EVENT_TIME_TOL = 1e-9  # fraction of a period; samples that are closer are the two sides of an event
-REST_RATE_TOL = 1e-9  # relative to the largest rate; a slower slide is at rest
-# relative to the largest step of the slide; a larger step ends a rest, round-off does not
+EVENT_TIME_TOL = 1e-9  # Fraction of a period below which two samples are the two sides of an event.
+REST_RATE_TOL = 1e-9  # Rate over the largest rate below which the interface is at rest.
+# Step over the largest displacement step above which a rest ends, because round-off is smaller.
 MIN_REST_END_STEP = 1e-3
 
 
 class Reversal(NamedTuple):
-    """Largest or smallest slide of a cycle [m], and the force there [N].
+    """Extreme relative displacement of a cycle [m], and the friction force there [N].
 
-    force is None if the slide rests at this value over an end of the window, so that one side of a
-    jump is not known.
+    force is None if the displacement rests at this value over an end of the window, so that one
+    side of a jump is not known.
     """
 
     slide: float
@@ -32,7 +32,7 @@ class Reversal(NamedTuple):
 
 
 def cycle_spans(time, period: float) -> list:
-    """Return the whole cycles [(start, end)] [s] of times (k,), oldest first.
+    """Return the complete cycles [(start, end)] [s] of times (k,), oldest first.
 
     They are measured from the end, so that a partial cycle at the start is left out.
     """
@@ -43,7 +43,7 @@ def cycle_spans(time, period: float) -> list:
 
 
 def reversal_evaluation(model) -> str:
-    """Return how the force at a reversal of the slide of a Model is evaluated, for `find_reversals`."""
+    """Return the rule that evaluates the friction force at a reversal, for `find_reversals`."""
     law = model.friction.law
     soft = model.partial_slip or (
         model.rig is not None and model.rig.friction.interfaces[0].partial_slip
@@ -56,7 +56,7 @@ def reversal_evaluation(model) -> str:
 
 
 def find_reversals(time, slide, rate, force, period: float, by: str = "rate") -> list:
-    """Return the (smallest, largest) `Reversal` of the slide in every whole cycle, oldest first.
+    """Return the (smallest, largest) `Reversal` of the displacement in every complete cycle.
 
     Parameters
     ----------
@@ -90,8 +90,8 @@ def find_reversals(time, slide, rate, force, period: float, by: str = "rate") ->
     return out
 
 
-def _find_largest(time, y, v, near: float) -> tuple:
-    """Find the maximum of the cubics through samples `y` with rates `v`.
+def _find_largest(time, y, v, time_tolerance: float) -> tuple:
+    """Find the maximum of the cubics through samples of a quantity and its rate.
 
     Returns the index of the sample before it, its value, and the fraction of the step to the next
     sample.
@@ -99,8 +99,9 @@ def _find_largest(time, y, v, near: float) -> tuple:
     top = int(np.argmax(y))
     best = (top, float(y[top]), 0.0)
     step = np.diff(time)
-    for k in (top - 1, top):  # the cubics on both sides of the largest sample
-        if not 0 <= k < step.size or step[k] <= near or v[k] <= 0 or v[k + 1] >= 0:
+    # The maximum may lie on the cubic on either side of the largest sample.
+    for k in (top - 1, top):
+        if not 0 <= k < step.size or step[k] <= time_tolerance or v[k] <= 0 or v[k + 1] >= 0:
             continue
         a = y[k]
         p = v[k] * step[k]
@@ -116,65 +117,73 @@ def _find_largest(time, y, v, near: float) -> tuple:
     return best
 
 
-def _find_rate_zero(v, at: int, *, first: bool) -> tuple:
-    """Find where the rate v (k,) decreases through 0 next to a sample.
+def _find_rate_zero(v, sample: int, *, first: bool) -> tuple:
+    """Find where a sampled rate (k,) decreases through 0 next to a given sample.
 
     The step before the sample `at` is used if `first`, else the step after it.
 
     Returns the index of a sample and the fraction of the step to the next one; (None, 0) if there
     is no such point.
     """
-    k = at - 1 if first else at
-    if abs(v[at]) <= REST_RATE_TOL * np.abs(v).max(initial=0.0):
-        return at, 0.0
+    k = sample - 1 if first else sample
+    if abs(v[sample]) <= REST_RATE_TOL * np.abs(v).max(initial=0.0):
+        return sample, 0.0
     if 0 <= k < v.size - 1 and v[k] > 0 >= v[k + 1]:
         return k, float(v[k] / (v[k] - v[k + 1]))
     return None, 0.0
 
 
-def _force_at_reversal(slide, force, at: int, share: float, value: float, by: str) -> float | None:
-    """Return the force [N] at the largest slide `value`; None if it is not known.
+def _force_at_reversal(
+    slide, force, sample: int, fraction: float, value: float, by: str
+) -> float | None:
+    """Return the friction force [N] at the largest displacement; None if it is not known.
 
     The largest slide lies at the fraction `share` of the step after sample `at`; `by` as in
     `find_reversals`.
     """
     if by == "rate":
-        return float(force[at] + share * (force[min(at + 1, len(force) - 1)] - force[at]))
-    top = at + int(share > 0 and slide[at + 1] > slide[at])
+        return float(
+            force[sample] + fraction * (force[min(sample + 1, len(force) - 1)] - force[sample])
+        )
+    top = sample + int(fraction > 0 and slide[sample + 1] > slide[sample])
     if by == "jumps":
-        return _force_beside_rest(slide, force, top, value)
-    rise = slide[top] - slide[at - 1] if share > 0 and at > 0 else 0.0
+        return _force_around_rest(slide, force, top, value)
+    rise = slide[top] - slide[sample - 1] if fraction > 0 and sample > 0 else 0.0
     if rise <= 0:
         return float(force[top])
-    return float(force[top] + (force[top] - force[at - 1]) * (value - slide[top]) / rise)
+    return float(force[top] + (force[top] - force[sample - 1]) * (value - slide[top]) / rise)
 
 
-def _force_beside_rest(slide, force, at: int, value: float) -> float | None:
-    """Return the mean force [N] before and after a rest at the slide `value`, or None."""
+def _force_around_rest(slide, force, sample: int, value: float) -> float | None:
+    """Return the mean of the friction force [N] before and after a rest; None if it is unknown."""
     step = np.abs(np.diff(slide))
     moves = step > MIN_REST_END_STEP * step.max(initial=0.0)
     moves &= np.maximum(
         np.abs(slide[1:] - value), np.abs(slide[:-1] - value)
     ) > COORDINATE_ROUND_OFF * np.abs(slide).max(initial=0.0)
-    before = np.flatnonzero(moves[:at])
-    after = np.flatnonzero(moves[at:])
+    before = np.flatnonzero(moves[:sample])
+    after = np.flatnonzero(moves[sample:])
     if not before.size or not after.size:
         return None
-    return float(force[before[-1]] + force[at + after[0] + 1]) / 2
+    return float(force[before[-1]] + force[sample + after[0] + 1]) / 2
 
 
-def mean_half_range(turns) -> float:
-    """Return half the range of the slide [m], averaged over the cycles; 0 without a cycle."""
-    return float(np.mean([high.slide - low.slide for low, high in turns])) / 2 if turns else 0.0
+def mean_half_range(reversals) -> float:
+    """Return half the displacement range [m] averaged over the cycles; 0 without a cycle."""
+    return (
+        float(np.mean([high.slide - low.slide for low, high in reversals])) / 2
+        if reversals
+        else 0.0
+    )
 
 
-def secant_stiffness(turns) -> float | None:
+def secant_stiffness(reversals) -> float | None:
     """Return the secant stiffness (F(q_max) - F(q_min))/2A [N/m], averaged over the cycles.
 
-    None if the slide changes in no cycle, or if no cycle has both forces.
+    It is None if the displacement changes in no cycle, or if no cycle has both forces.
     """
     stiffnesses = []
-    for low, high in turns:
+    for low, high in reversals:
         if high.slide > low.slide and None not in (low.force, high.force):
             stiffnesses.append((high.force - low.force) / (high.slide - low.slide))
     return float(np.mean(stiffnesses)) if stiffnesses else None
@@ -208,7 +217,7 @@ def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffn
 
 
 def interface_loops(amplitude, q, f, work, stiffness) -> dict:
-    """Return the values of `interface_loop` as numbers, or (n,) of many loops; NaN for no value.
+    """Return the loop measures of one loop, or (n,) of many; NaN where there is no value.
 
     The parameters are those of `interface_loop`, numbers or (n,).
     """
@@ -249,7 +258,7 @@ def drift(time, slide, rate, period: float) -> float:
 
 
 def time_mean(time, value, rate, begin: float, end: float) -> float:
-    """Return the mean of the cubics through samples and their rates over a time span.
+    """Return the time mean of a quantity from cubics through its samples and rates.
 
     Each step contributes h (y0 + y1)/2 + h^2 (v0 - v1)/12, of fourth order at any spacing.
 
@@ -271,6 +280,7 @@ def time_mean(time, value, rate, begin: float, end: float) -> float:
     middle = t[0]
     y = y - y[0]
     area = float(np.sum(step * (y[1:] + y[:-1]) / 2 + step**2 * (v[:-1] - v[1:]) / 12))
-    # the gaps between the ends of the span and the nearest samples, at the value of these samples
+    # The gaps between the ends of the span and the nearest samples have the values of these
+    # samples.
     area += float(y[-1]) * (end - t[-1]) + float(y[0]) * (middle - begin)
     return float(value[part][0]) + area / (end - begin)

@@ -11,35 +11,39 @@ from ..dynamics import integrated
 from ..friction import path_work
 
 SLIP_FRACTION = (
-    0.5  # irreversible fraction of the change of the slide above which an interface slips [1]
+    0.5  # irreversible fraction of the displacement change above which an interface slips [1]
 )
-COORDINATE_ROUND_OFF = 1e-13  # round-off, relative to the largest coordinate
-MIN_ENERGY_GAP = 1e-18  # smallest gap of an energy balance that counts [J]
-# relative to the energy that passes through a run; less friction work than this is round-off
-ROUND_OFF_WORK = 1e-10
-MIN_SLIDE_RANGE = 1e-15  # range of a slide [m] below which nothing moves
+COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest modal coordinate.
+MIN_ENERGY_GAP = 1e-18  # Smallest gap of an energy balance that counts [J].
+# Friction work over the energy that passes through a run below which it is round-off.
+WORK_ROUND_OFF = 1e-10
+MIN_SLIDE_RANGE = 1e-15  # Range of the relative displacement [m] below which nothing moves.
 MAX_SMOOTH_RATIO = (
-    4.0  # largest ratio of second differences at neighbouring samples of one smooth curve
+    4.0  # largest ratio of second differences at neighbouring samples of a smooth curve
 )
 
 
-def energy_balance(book: dict):
-    """Return the relative gap of the energy balance [1] of a run, or (n,) of many.
+def energy_balance(energies: dict):
+    """Return the relative gap of the energy balance [1] of one run, or (n,) of many.
 
     |work in - stored - dissipated| / (integral |power in| + peak stored). A gap of MIN_ENERGY_GAP is the
     round-off of a system at rest; without energy the result is 0.
 
     Parameters
     ----------
-    book : dict
+    energies : dict
         Energies by name [J].
     """
-    miss = np.abs(book["work_in"] - book["stored"] - book["friction"] - book["viscous"])
-    return ratio_or_zero(miss * (miss > MIN_ENERGY_GAP), book["power"] + book["peak_stored"])
+    miss = np.abs(
+        energies["work_in"] - energies["stored"] - energies["friction"] - energies["viscous"]
+    )
+    return ratio_or_zero(
+        miss * (miss > MIN_ENERGY_GAP), energies["power"] + energies["peak_stored"]
+    )
 
 
 def relative_gap(sampled, balanced, passed, energy=0.0):
-    """Compare the friction work from samples with that of the energy balance.
+    """Return the relative difference of the friction work by samples and by energy balance.
 
     Parameters
     ----------
@@ -48,7 +52,7 @@ def relative_gap(sampled, balanced, passed, energy=0.0):
     passed : float or (n,) array
         Sum of the absolute values of the friction work of all steps [J].
     energy : float or (n,) array, optional
-        Energy that passes through the whole run [J]; `ROUND_OFF_WORK` of it is added to `passed`,
+        Energy that passes through the whole run [J]; `WORK_ROUND_OFF` of it is added to `passed`,
         so that a stuck interface shows no round-off.
 
     Returns
@@ -58,14 +62,14 @@ def relative_gap(sampled, balanced, passed, energy=0.0):
     """
     difference = np.abs(sampled - balanced)
     return ratio_or_zero(
-        difference * (difference > MIN_ENERGY_GAP), passed + ROUND_OFF_WORK * energy
+        difference * (difference > MIN_ENERGY_GAP), passed + WORK_ROUND_OFF * energy
     )
 
 
-def ratio_or_zero(part, whole):
-    """Return part / whole, or 0 if the whole is not positive; numbers or (n,) arrays."""
-    is_positive = np.asarray(whole) > 0
-    return (part / np.where(is_positive, whole, 1.0) * is_positive)[()]
+def ratio_or_zero(part, total):
+    """Return part/total, or 0 where the total is not positive; numbers or (n,) arrays."""
+    is_positive = np.asarray(total) > 0
+    return (part / np.where(is_positive, total, 1.0) * is_positive)[()]
 
 
 def compute_harmonic(time, weight, values, omega) -> complex:
@@ -86,7 +90,7 @@ def compute_harmonic(time, weight, values, omega) -> complex:
 
 
 def compute_step_harmonic(time, means, omega) -> complex:
-    """Return the first Fourier coefficient of a force from its mean in each step.
+    """Return the first Fourier coefficient of a force from its mean value in each step.
 
     It is exact for a force that is constant in each step, even if it jumps at a sample.
 
@@ -104,7 +108,7 @@ def compute_step_harmonic(time, means, omega) -> complex:
 
 
 def lateral_history(window: Response, name: str, number: int = 0):
-    """Return a history (k,) of an interface in the second direction of its plane.
+    """Return a history (k,) of an interface perpendicular to its main sliding direction.
 
     Parameters
     ----------
@@ -124,15 +128,15 @@ def lateral_history(window: Response, name: str, number: int = 0):
 
 
 def largest_distance(x, y=None) -> float:
-    """Return the largest distance [m] between two points x (k,), or (x, y) of a path in a plane."""
+    """Return the largest distance [m] between two points of a path on a line or in a plane."""
     if y is None:
         return float(x.max() - x.min())
     best = 0.0
     angle = 0.0
     turns = np.pi * np.arange(180) / 180
     way = 0
-    # first the width in each of 180 directions, then in that of the widest pair until it grows no
-    # more
+    # The search starts with the width in each of 180 directions and continues in that of the widest
+    # pair until it grows no more.
     while way < 200:
         turn = turns[way] if way < turns.size else angle
         along = x * np.cos(turn) + y * np.sin(turn)
@@ -148,15 +152,15 @@ def largest_distance(x, y=None) -> float:
     return best
 
 
-def distances_moved(x, y=None) -> np.ndarray:
-    """Return the distances (k - 1,) [m] between successive points; parameters as in `largest_distance`."""
+def path_increments(x, y=None) -> np.ndarray:
+    """Return the distances (k - 1,) [m] between successive points of a path."""
     return np.abs(np.diff(x)) if y is None else np.hypot(np.diff(x), np.diff(y))
 
 
 def compute_slip_measures(
     window: Response, drive, steps_per_cycle: int, second=(None, None)
 ) -> dict:
-    """Return slip amplitude [m], stick fraction [1] and phase of the start of slip [rad].
+    """Return slip amplitude [m], stick fraction [1] and phase at the start of slip [rad].
 
     The interface sticks while less than SLIP_FRACTION of the change of its slide is irreversible, or while
     it does not slide at all; the instant at which this fraction passes SLIP_FRACTION is interpolated
@@ -175,11 +179,11 @@ def compute_slip_measures(
     """
     across, beside = second
     if largest_distance(window.slide, across) <= MIN_SLIDE_RANGE:
-        # the slip of a law without a stiffness follows its traction, even if the slide is constant
+        # The slip of a law without a stiffness follows its traction, even at constant displacement.
         return {"slip_amplitude": 0.0, "stick_fraction": 1.0}
     slip = window.slip
     out = {"slip_amplitude": largest_distance(slip, beside) / 2}
-    # a single sample, or no slip above round-off
+    # There is a single sample, or no slip above round-off.
     if slip.size < 2 or 2 * out["slip_amplitude"] <= slip_round_off(window):
         return out | {"stick_fraction": 1.0}
     cycles = max(1, (slip.size - 1) // steps_per_cycle)
@@ -187,15 +191,15 @@ def compute_slip_measures(
         slice(-cycles * steps_per_cycle - 1, None) if slip.size > steps_per_cycle else slice(None)
     )
     across, beside = (None if one is None else one[kept] for one in second)
-    slid = distances_moved(slip[kept], beside)
-    slide = distances_moved(window.slide[kept], across)
+    slid = path_increments(slip[kept], beside)
+    slide = path_increments(window.slide[kept], across)
     time = window.time[kept]
     still = slide <= COORDINATE_ROUND_OFF * np.abs(window.slide).max(initial=0.0)
     above = np.where(still, 0.0, slid / np.where(still, 1.0, slide)) - SLIP_FRACTION
     before = above[:-1]
     after = above[1:]
     rise = np.abs(after - before)
-    # fraction of the time between two midpoints in which the linear interpolant is below 0
+    # This is the fraction of the time between two midpoints in which the interpolant is below 0.
     low = np.minimum(before, after)
     high = np.maximum(before, after)
     below = np.where(high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0)))
@@ -211,14 +215,14 @@ def compute_slip_measures(
 
 
 def slip_round_off(window: Response) -> float:
-    """Return the round-off of the slip [m]: 1e-13 of the largest modal coordinate."""
+    """Return the round-off error of the slip [m], 1e-13 of the largest modal coordinate."""
     return COORDINATE_ROUND_OFF * float(np.abs(window.modal).max(initial=0.0))
 
 
 def slip_start_measure(phases) -> dict:
-    """Return slip_start_phase [rad] by name from the phases (k,) [rad] of starts of slip.
+    """Return slip_start_phase [rad] by name, averaged over phases of slip starts.
 
-    Empty if the starts have no phase in common.
+    The dict is empty if the starts have no phase in common.
     """
     found = integrated.mean_slip_phase(
         len(phases), np.cos(2 * phases).sum(), np.sin(2 * phases).sum()
@@ -259,7 +263,7 @@ def work_difference(work, pairs, jumps: bool = False) -> float:
 
 
 def compute_acceleration_peak(window: Response) -> float:
-    """Return the largest |absolute acceleration| [m s-2] at the accelerometer in a window.
+    """Return the peak absolute acceleration [m s-2] at the accelerometer in a window.
 
     The samples are equally spaced. The vertex of the parabola through the largest inner sample and
     its neighbours is used if the curve is smooth there.
@@ -271,12 +275,12 @@ def compute_acceleration_peak(window: Response) -> float:
     left, mid, right = size[top - 1 : top + 2]
     bend = left - 2 * mid + right
     gain = -((right - left) ** 2) / (8 * bend) if bend < 0 else 0.0
-    # a larger gain is a jump, not a smooth peak
+    # A larger increase is a jump, not a smooth peak.
     return float(mid + (gain if gain < 0.01 * mid else 0.0))
 
 
 def _is_smooth(size, top: int) -> bool:
-    """Return whether samples (k,) are smooth at the largest one.
+    """Return whether samples (k,) are smooth at their largest value.
 
     The second difference there is at most MAX_SMOOTH_RATIO times that at the samples on both sides. Next to a
     jump, one of these has the opposite sign.
@@ -286,7 +290,7 @@ def _is_smooth(size, top: int) -> bool:
 
 
 def peak_sampling_errors(window: Response, climbs: bool = False) -> dict:
-    """Return by how much peaks may exceed their samples, by name, as an additional error.
+    """Return a bound on the peaks missed between samples, by measure name.
 
     - Acceleration: if it jumps at its largest sample, its change over a step on the smooth side.
     - Normal load that changes: an eighth of its second difference at its smallest and largest
@@ -321,12 +325,12 @@ def peak_sampling_errors(window: Response, climbs: bool = False) -> dict:
     return out
 
 
-def find_turning_steps(time, place, rate) -> tuple:
-    """Return the steps in which the rate changes sign, and the fractions of the step there.
+def find_reversal_steps(time, position, rate) -> tuple:
+    """Return the steps in which a rate changes sign, and the fraction of the step there.
 
     Parameters
     ----------
-    time, place, rate : (k,)
+    time, position, rate : (k,)
         Samples of time [s], position [m] and rate [m/s]; the cubic through both is used.
 
     Returns
@@ -338,36 +342,36 @@ def find_turning_steps(time, place, rate) -> tuple:
     k = np.flatnonzero(rate[:-1] * rate[1:] < 0)
     p = rate[k] * step[k]
     q = rate[k + 1] * step[k]
-    rise = place[k + 1] - place[k]
+    rise = position[k + 1] - position[k]
     two = 3 * rise - 2 * p - q
     three = p + q - 2 * rise
-    # p + 2 two s + 3 three s^2 = 0; this form of the root avoids cancellation if the cubic is
-    # nearly a parabola
+    # The cubic has zero slope where p + 2 two s + 3 three s^2 = 0; this form of the root avoids
+    # cancellation if the cubic is nearly a parabola.
     root = np.sqrt(np.maximum(two**2 - 3 * three * p, 0.0))
     return k, np.clip(-p / (two - np.sign(p) * root), 0.0, 1.0)
 
 
-def measure_half_swing(time, place, rate) -> float:
-    """Return half the peak-to-peak value [m] of the cubics through samples and their rates.
+def measure_half_range(time, position, rate) -> float:
+    """Return half the peak-to-peak value [m] of cubics through samples and their rates.
 
     Parameters
     ----------
-    time, place, rate : (k,)
+    time, position, rate : (k,)
         Samples of time [s], position [m] and rate [m/s].
     """
     h = np.diff(time)
-    k, s = find_turning_steps(time, place, rate)
+    k, s = find_reversal_steps(time, position, rate)
     p = rate[k] * h[k]
     q = rate[k + 1] * h[k]
-    rise = place[k + 1] - place[k]
+    rise = position[k + 1] - position[k]
     two = 3 * rise - 2 * p - q
     three = p + q - 2 * rise
-    every = np.concatenate([place, place[k] + s * (p + s * (two + s * three))])
+    every = np.concatenate([position, position[k] + s * (p + s * (two + s * three))])
     return float(every.max() - every.min()) / 2
 
 
 def window_amplitudes(extremes, window: int) -> np.ndarray:
-    """Return half the peak-to-peak value [m] of the output per window, oldest first.
+    """Return half the peak-to-peak output [m] of each window, oldest first.
 
     Parameters
     ----------
@@ -384,7 +388,7 @@ def window_amplitudes(extremes, window: int) -> np.ndarray:
 
 
 def window_end_values(extremes, phasors, window: int) -> tuple:
-    """Return amplitudes [m] and phasors [m] of the last cycle of each window, oldest first.
+    """Return amplitude [m] and phasor [m] of the last cycle of each window, oldest first.
 
     Parameters
     ----------

@@ -25,23 +25,22 @@ from .settling import (
     window_amplitude_means,
 )
 
-# fraction of the tolerance; if the amplitude will still change by more, the page states the steady
-# estimate
+# Fraction of the tolerance; if the amplitude will still change by more, the page states the steady
+# estimate.
 ESTIMATE_TOL = 0.02
 UNSETTLED = "the interface sticks, but the amplitude has not settled"
 OPEN_LOOP = "the friction loop of the last cycle does not close"
-# factor on the cycles that the decay needs, because the amplitude of the last windows may beat
+# Safety factor on the cycles that the decay needs, because the last amplitudes may beat.
 CYCLES_SAFETY_FACTOR = 1.5
-MAX_PROPOSED_CYCLES = 1e6  # largest number of cycles that a message proposes
-# relative to the displacement a/omega^2 of the drive; a smaller change of the amplitude is
-# round-off
+MAX_PROPOSED_CYCLES = 1e6  # Largest number of cycles that a message proposes.
+# Change of the amplitude over the displacement a/omega^2 of the drive below which it is round-off.
 AMPLITUDE_ROUND_OFF = 1e-12
 
 
 def judge_outcome(
     raw, measures: dict, tolerance: float, drive, level_cycles: float = 0.0, slowest: float = 0.0
 ) -> tuple:
-    """Return the outcome of a run, and its measures with the steady estimate if there is one.
+    """Classify the motion of a run, and extend its measures by a steady estimate.
 
     - Periodic drive, and the last level of a drive in levels: the amplitudes of successive windows
       decide (`classify_periodic`), and the free motion that remains in them (`remaining_free_motion`). A motion that is
@@ -125,7 +124,7 @@ def judge_outcome(
     if not np.isnan(steady) and (
         outcome is Outcome.TRANSIENT or is_still_changing(steady, error, base.value, tolerance)
     ):
-        total = error_of_steady(steady, error, base.value, base.error or 0.0)
+        total = steady_estimate_error(steady, error, base.value, base.error or 0.0)
         measures = measures | {
             "relative_displacement_amplitude_steady": Measure(
                 float(steady), "m", float(total), base.floor
@@ -164,7 +163,7 @@ def _midpoint_drift(extremes, window: int) -> float:
 
 
 def _reject_drifting(
-    outcome: Outcome, measures: dict, tolerance: float, middle: float = np.inf
+    outcome: Outcome, measures: dict, tolerance: float, window_drift: float = np.inf
 ) -> Outcome:
     """Return TRANSIENT instead of STEADY if the midpoint of the motion drifts.
 
@@ -176,7 +175,7 @@ def _reject_drifting(
     if outcome is not Outcome.STEADY or drift is None or drift.value is None:
         return outcome
     moves = is_drifting(
-        min(abs(drift.value), abs(middle)),
+        min(abs(drift.value), abs(window_drift)),
         drift.error or 0.0,
         amplitude.value,
         tolerance,
@@ -186,7 +185,7 @@ def _reject_drifting(
 
 
 def remove_errors(measures: dict) -> dict:
-    """Return the measures of a growing motion without errors: later values are different."""
+    """Return the measures of a growing motion without errors, because later values differ."""
     return {name: replace(one, error=None) for name, one in measures.items()}
 
 
@@ -234,8 +233,8 @@ def classify_periodic(
         mean, mean_error = beat_mean_amplitudes(extremes, window)
         value = np.where(is_unknown, mean, value)
         error = np.where(is_unknown, mean_error, error)
-        # without a visible tail, the steady amplitude is the mean over the cycles of the last
-        # window
+        # Without a visible transient, the steady amplitude is the mean over the cycles of the last
+        # window.
         is_unknown = np.isnan(value) & (classes == STEADY_CLASS)
         value = np.where(is_unknown, window_amplitude_means(extremes, window)[1][:, -1], value)
         error = np.where(is_unknown, free_motion + np.abs(last - value), error)
@@ -258,18 +257,18 @@ def is_still_changing(steady, error, amplitude, tolerance) -> np.ndarray:
     return np.abs(steady - amplitude) + error > ESTIMATE_TOL * tolerance * np.abs(amplitude)
 
 
-def error_of_steady(steady, error, amplitude, own):
+def steady_estimate_error(steady, error, amplitude, amplitude_error):
     """Return the error of a steady estimate [m], including the numerical error of the amplitude.
 
     Parameters
     ----------
     steady, error : float or (n,)
         Steady estimate and its error by extrapolation [m].
-    amplitude, own : float or (n,)
+    amplitude, amplitude_error : float or (n,)
         Amplitude of the last cycles and its error [m], which is scaled by the ratio of both
         amplitudes.
     """
-    return error + own * steady / np.maximum(np.abs(amplitude), 1e-300)
+    return error + amplitude_error * steady / np.maximum(np.abs(amplitude), 1e-300)
 
 
 def is_still_loading(window, period: float, tolerance: float) -> bool:
@@ -297,7 +296,7 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
         size = np.abs(forces)
         rises = np.all(np.diff(size, axis=0) >= -1e-9 * largest_force, axis=0)
         return bool(np.any(rises & (size[-1] - size[0] > tolerance * largest_force)))
-    # without this factor, round-off at the end of a cycle would leave out a step
+    # Without this factor, round-off at the end of a cycle would leave out a step.
     near = period * (1 + 1e-9)
     first = time <= time[0] + near
     last = time >= time[-1] - near
@@ -307,8 +306,10 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
     return bool(np.any(means[1] - means[0] > tolerance * largest_force))
 
 
-def check_piece_length(outcome: Outcome | None, reach: float, length: float) -> Outcome | None:
-    """Return the outcome, or LEAVES_CONTACT if the slide exceeded the length of the piece.
+def check_piece_length(
+    outcome: Outcome | None, max_displacement: float, length: float
+) -> Outcome | None:
+    """Return LEAVES_CONTACT if the displacement exceeded the piece length, else the outcome.
 
     From that instant on nothing overlaps, so this outcome replaces any later one: steady, growing,
     or at the stop of the flexure, which would have ended the run earlier if it were nearer. A
@@ -318,12 +319,12 @@ def check_piece_length(outcome: Outcome | None, reach: float, length: float) -> 
     Parameters
     ----------
     outcome : Outcome or None
-    reach : float
+    max_displacement : float
         Largest |slide| of the run [m].
     length : float
         Length of the piece [m].
     """
-    if reach > length and outcome is not Outcome.NOT_CONVERGED:
+    if max_displacement > length and outcome is not Outcome.NOT_CONVERGED:
         return Outcome.LEAVES_CONTACT
     return outcome
 
@@ -358,7 +359,7 @@ def warn_if_ringing(raw, measures: dict, limits: tuple, drive, cycles: float) ->
 
 
 def remaining_ringing(extremes, window: int, decay):
-    """Return how much of the amplitude of stuck motions is free vibration [m], (...).
+    """Return the free vibration [m] that the amplitude of stuck motions still contains, (...).
 
     It is `remaining_free_motion`, but not less than the change of the last window.
 
@@ -379,7 +380,7 @@ def remaining_ringing(extremes, window: int, decay):
 
 
 def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: float) -> list:
-    """Return the warning of `warn_if_ringing`, as a list, for a known amount of free vibration.
+    """Return the warning on a given amount of free vibration of a stuck motion, as a list.
 
     Parameters
     ----------
@@ -429,7 +430,7 @@ def estimate_steady(drive, amplitudes, phasors) -> tuple:
     """Return the steady amplitude and its error [m] under a periodic drive, else (None, None).
 
     A released or struck rig comes to rest, so its amplitudes are not extrapolated. Under a drive
-    that is not a sine the motion may have no first harmonic, so the amplitudes are extrapolated
+    that is not sinusoidal the motion may have no first harmonic, so the amplitudes are extrapolated
     instead of the phasors.
 
     Parameters

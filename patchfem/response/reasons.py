@@ -15,7 +15,7 @@ from .measures import lateral_history
 from .rows import TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
-# fraction of the slide that other modes carry [1]; above it the damping ratio is not that of mode 1
+# Displacement fraction of other modes [1] above which the damping ratio is not that of mode 1.
 MAX_OTHER_MODES_FRACTION = 0.05
 IN_PLANE = "the interface slides in a plane, but this measure is defined only for one direction"
 CYCLE_MEASURES = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
@@ -42,8 +42,10 @@ UNCLOSED = (
 )
 
 
-def find_missing(values, window, drive, rubs: bool, beside: float = 0.0) -> dict:
-    """Return the measures that lack a value in a coupled run, by name, each with the reason.
+def find_missing(
+    values, window, drive, has_loaded_interface: bool, other_modes_fraction: float = 0.0
+) -> dict:
+    """Return the measures without a value in a coupled run, by name, each with the reason.
 
     Parameters
     ----------
@@ -52,27 +54,29 @@ def find_missing(values, window, drive, rubs: bool, beside: float = 0.0) -> dict
     window : Response
         Last cycles.
     drive
-    rubs : bool
+    has_loaded_interface : bool
         Whether an interface carries a load.
-    beside : float
+    other_modes_fraction : float
         Fraction of the slide that modes other than the first carry [1].
     """
     lacking = {}
-    for name in CYCLE_MEASURES if rubs else ACCELERATIONS:
-        lacking[name] = _why_no_cycle_value(name, values, window, drive, beside)
+    for name in CYCLE_MEASURES if has_loaded_interface else ACCELERATIONS:
+        lacking[name] = _reason_for_missing_cycle_value(
+            name, values, window, drive, other_modes_fraction
+        )
     if hasattr(drive, "band"):
         lacking |= dict.fromkeys(
             ("response_frequency", "response_damping"),
             "the frequency response (H1) has no peak within the frequency band of the drive",
         )
-    if rubs:
-        lacking["slip_start_phase"] = _why_no_phase(values, drive)
+    if has_loaded_interface:
+        lacking["slip_start_phase"] = _reason_for_missing_phase(values, drive)
     names = [name for name in lacking if name not in values]
     return {name: _make_missing_measure(name, lacking[name]) for name in names}
 
 
 def find_missing_secant(values) -> dict:
-    """Replace the value of the secant stiffness by a reason if the friction force is not unique.
+    """Replace the secant stiffness by a reason if the friction force is not unique.
 
     The force of rigid friction takes many values if the interface sticks at the largest slide.
     values: Measure by name. The result is a dict by name; {} if the value remains.
@@ -87,7 +91,7 @@ def find_missing_secant(values) -> dict:
 
 
 def find_missing_steady(values, outcome: Outcome, drive) -> dict:
-    """Return the steady amplitude with a reason in place of a value, if a transient hides it.
+    """Replace the steady amplitude by a reason if a transient hides it.
 
     Parameters
     ----------
@@ -108,13 +112,13 @@ def find_missing_steady(values, outcome: Outcome, drive) -> dict:
 
 
 def _make_missing_measure(name: str, reason: str) -> Measure:
-    """Return a measure without a value."""
+    """Return a measure that has a reason instead of a value."""
     row = TABLE[name]
     return Measure(None, row.unit, None, row.floor, reason=reason)
 
 
 def find_missing_drift(values, drive) -> dict:
-    """Replace the value of the drift by a reason if the drive is not periodic.
+    """Replace the drift by a reason if the drive is not periodic.
 
     Means over time spans other than a period differ without any drift. values: Measure by name.
     The result is a dict by name; {} if the value remains.
@@ -127,7 +131,7 @@ def find_missing_drift(values, drive) -> dict:
 
 
 def find_missing_unbounded(values) -> dict:
-    """Replace the values of all measures except the load by a reason: no bounded motion exists."""
+    """Replace all measures except the load by the reason that no bounded motion exists."""
     out = {}
     for name, measure in values.items():
         out[name] = replace(measure, error=None)
@@ -137,12 +141,13 @@ def find_missing_unbounded(values) -> dict:
 
 
 def find_missing_loops(values, window, drive) -> dict:
-    """Replace the areas of loops that do not close by a reason; {} if all loops close.
+    """Replace the areas of friction loops that do not close by a reason.
 
-    The work per cycle is reported as a loss. If nothing forces the motion to repeat, as after a
-    release, the interface also returns or stores energy: if this exceeds the dissipation, the work
-    is not a loss. The energies of several interfaces are known only in sum: a loop does not close
-    if its interface returns more than it takes while none creates energy.
+    The result is {} if all loops close. The work per cycle is reported as a loss. If nothing forces
+    the motion to repeat, as after a release, the interface also returns or stores energy: if this
+    exceeds the dissipation, the work is not a loss. The energies of several interfaces are known
+    only in sum: a loop does not close if its interface returns more than it takes while none
+    creates energy.
 
     Parameters
     ----------
@@ -173,7 +178,7 @@ def find_missing_loops(values, window, drive) -> dict:
     }
 
 
-def _why_no_phase(values, drive) -> str:
+def _reason_for_missing_phase(values, drive) -> str:
     """Return the reason why the phase at the start of slip has no value."""
     if not is_sinusoidal(drive):
         return "the drive is not a sine at the end of the run, so the start of slip has no phase"
@@ -185,8 +190,10 @@ def _why_no_phase(values, drive) -> str:
     return "the interface never sticks in the last cycles, so slip never starts after stick"
 
 
-def _why_no_cycle_value(name: str, values, window, drive, beside: float) -> str:
-    """Return the reason why a measure of the cycles under a sine has no value."""
+def _reason_for_missing_cycle_value(
+    name: str, values, window, drive, other_modes_fraction: float
+) -> str:
+    """Return the reason why a cycle measure has no value under sinusoidal drive."""
     if not is_sinusoidal(drive):
         return "this measure exists only for a drive that is a sine at the end of the run"
     if not has_full_cycle(window.time[-1] - window.time[0], drive):
@@ -200,9 +207,9 @@ def _why_no_cycle_value(name: str, values, window, drive, beside: float) -> str:
     if "equivalent_stiffness" not in values:
         return f"{ALWAYS_STICKS}, so the slide does not change and the loop has no width"
     if name == "equivalent_damping":
-        if beside <= MAX_OTHER_MODES_FRACTION:
+        if other_modes_fraction <= MAX_OTHER_MODES_FRACTION:
             return "mode 1 is a rigid-body mode, or does not move the interface"
-        percent = format_number(100 * beside, 2)
+        percent = format_number(100 * other_modes_fraction, 2)
         return (
             f"this measure is that of mode 1, but another mode contributes {percent} % of the slide"
         )

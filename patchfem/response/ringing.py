@@ -1,10 +1,10 @@
-"""Free vibration of a rig while an interface sticks: a decaying sinusoid and forced motion.
+"""Free vibration of a rig while an interface sticks, fitted as decaying sinusoids.
 
 In: a signal during the stick intervals of a window. Out: `ring_frequency`, `ring_damping` and their
 errors. The model is a sum of decaying sinusoids, the forced sine and a constant. Frequency and
 decay enter nonlinearly, all else linearly (variable projection, Golub and Pereyra, 1973). Up to
-three sinusoids are fitted together, and the one with the most energy is kept. Without a sine,
-`held_modes` computes the sinusoids from the eigenvalues of the rig.
+three sinusoids are fitted together, and the one with the most energy is kept. Without a sinusoid,
+`compute_stuck_vibration` computes the sinusoids from the eigenvalues of the rig.
 """
 
 from dataclasses import dataclass
@@ -15,31 +15,33 @@ import numpy as np
 
 from .. import compiled
 
-# periods of the ringing in a stick interval; with fewer, frequency and decay are not independent
+# Smallest number of ringing periods in a stick interval; with fewer, frequency and decay correlate.
 MIN_PERIODS = 1.5
 MIN_SAMPLES = 16
-MAX_SAMPLES = 600  # samples of a fit; more take longer and change nothing
-MAX_STICKS = 20  # stick intervals that are fitted, the longest ones
-MAX_SINUSOIDS = 3  # decaying sinusoids of a fit
-SAMPLES_PER_PERIOD = 24  # samples per period of the ringing that are sufficient
-MIN_SINUSOID = 1e-6  # relative to the largest value of the signal; a smaller sinusoid is no ringing
-MAX_RESIDUAL = 0.1  # largest root mean square of the residual over that of the ringing [1]
-MAX_DAMPING_RATIO = 0.5  # largest damping ratio that counts as ringing [1]
-# residual of a fit relative to the signal without the forced sine; below it no other start is tried
+MAX_SAMPLES = 600  # Largest number of samples of a fit; more take longer and change nothing.
+MAX_STICKS = 20  # Largest number of stick intervals that are fitted; the longest ones are used.
+MAX_SINUSOIDS = 3  # Largest number of decaying sinusoids of a fit.
+SAMPLES_PER_PERIOD = 24  # Number of samples per ringing period that are sufficient for a fit.
+# Sinusoid over the largest value of the signal below which there is no ringing.
+MIN_SINUSOID = 1e-6
+MAX_RESIDUAL = 0.1  # Largest root mean square of the residual over that of the ringing [1].
+MAX_DAMPING_RATIO = 0.5  # Largest damping ratio that counts as ringing [1].
+# Residual of a fit over the signal without the forced sinusoid below which no other start is tried.
 EXACT_RESIDUAL = 1e-9
-ROUNDING = float(np.finfo(float).eps)
-# CPU seconds of an evaluation of a fit in Python, per sample and squared number of columns
+FLOAT_EPSILON = float(np.finfo(float).eps)
+# CPU time [s] of a fit evaluation in Python per sample and squared number of columns.
 SECONDS_PER_TERM = 8e-7
-EVALUATIONS_PER_FIT = 2.0  # evaluations of a fit, for the estimate of its cost
+EVALUATIONS_PER_FIT = 2.0  # Number of evaluations of a fit, for the estimate of its cost.
 KERNELS_MODULE = "response.ringing_kernels"
-MAX_STEPS = 60  # largest number of steps of a fit
-# fraction of MIN_PERIODS; a fit below it with a residual below EXACT_RESIDUAL is refused, so it is not refined
+MAX_STEPS = 60  # Largest number of iteration steps of a fit.
+# Fraction of MIN_PERIODS; a shorter fit with a residual below EXACT_RESIDUAL is refused, so it is
+# not refined.
 MIN_REFINED_FRACTION = 0.9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Ring:
-    """Decaying sinusoid.
+class Ringing:
+    """Decaying sinusoid of a free vibration during stick.
 
     - frequency: frequency of the damped motion [Hz].
     - damping: damping ratio [1].
@@ -53,8 +55,8 @@ class Ring:
     errors: tuple
 
 
-def fit_ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | None:
-    """Return the ringing in a signal during one stick interval; None if there is none.
+def fit_ringing(time, value, omega: float = 0.0, size: float | None = None) -> Ringing | None:
+    """Fit the free vibration in a signal during a stick interval; None if there is none.
 
     A line at a harmonic of the drive that does not decay is forced motion and no ringing.
 
@@ -73,15 +75,22 @@ def fit_ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring
     size = max(size or 0.0, float(np.abs(value).max(initial=0.0)))
     if time.size < MIN_SAMPLES or size == 0:
         return None
-    columns = _forced_columns(time, omega)
+    columns = _make_forced_columns(time, omega)
     rest = value - columns @ np.linalg.lstsq(columns, value, rcond=1e-12)[0]
     if np.abs(rest).max() <= MIN_SINUSOID * size:
         return None
-    # the first part of a long stick interval is used, because the ringing decays
+    # The first part of a long stick interval is used, because the ringing decays.
     if time.size > MAX_SAMPLES:
-        # a stride keeps no more samples per period than the ringing needs
+        # A stride keeps no more samples per period than the ringing needs.
         stride = max(
-            1, int(2 * np.pi / _largest_line(time, rest) / (time[1] - time[0]) / SAMPLES_PER_PERIOD)
+            1,
+            int(
+                2
+                * np.pi
+                / _find_largest_line(time, rest)
+                / (time[1] - time[0])
+                / SAMPLES_PER_PERIOD
+            ),
         )
         time, value, columns, rest = (
             part[::stride][:MAX_SAMPLES].copy() for part in (time, value, columns, rest)
@@ -115,7 +124,7 @@ def fit_ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring
     if time.size >= 2 * MIN_SAMPLES:
         few = _refine_poles(time[::2].copy(), value[::2].copy(), columns[::2], poles).poles
     apart = np.abs(few - poles)[2 * k : 2 * k + 2] + 2 * sigma[2 * k : 2 * k + 2]
-    return Ring(
+    return Ringing(
         float(own / (2 * np.pi)),
         damping,
         amplitude,
@@ -123,18 +132,20 @@ def fit_ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring
     )
 
 
-def make_ring(amplitude: float, own: float, damping: float, size: float) -> dict:
+def make_ringing_measures(
+    amplitude: float, omega: float, damping: float, largest_acceleration: float
+) -> dict:
     """Return ring_frequency [Hz] and ring_damping [1] of a sinusoid known in closed form.
 
     Parameters
     ----------
     amplitude : float
         Its largest acceleration [m s-2]; 0 if nothing rings.
-    own : float
+    omega : float
         Angular frequency [rad/s].
     damping : float
         Damping ratio [1].
-    size : float
+    largest_acceleration : float
         Largest acceleration of the whole signal [m s-2].
 
     Returns
@@ -142,13 +153,13 @@ def make_ring(amplitude: float, own: float, damping: float, size: float) -> dict
     dict
         {} if the amplitude is below MIN_SINUSOID of the size.
     """
-    if not amplitude > MIN_SINUSOID * size:
+    if not amplitude > MIN_SINUSOID * largest_acceleration:
         return {}
-    return {"ring_frequency": float(own / (2 * np.pi)), "ring_damping": float(damping)}
+    return {"ring_frequency": float(omega / (2 * np.pi)), "ring_damping": float(damping)}
 
 
-class HeldMode(NamedTuple):
-    """Free vibration of one mode while every interface sticks.
+class VibratingMode(NamedTuple):
+    """Free vibration of a mode while every interface sticks.
 
     - begin, end: start and end of the stick interval [s].
     - frequency: frequency of the damped motion [Hz].
@@ -164,10 +175,10 @@ class HeldMode(NamedTuple):
     acceleration: float
 
 
-def held_modes(modes, stiffness, motion) -> list:
-    """Return the free vibration of each mode while every interface sticks, as HeldModes.
+def compute_stuck_vibration(modes, stiffness, motion) -> list:
+    """Return the free vibration of each mode while every interface sticks.
 
-    The motion must not contain a response to a sine.
+    The motion must not contain a response to a sinusoidal drive.
 
     Each stuck interface is a spring, and the modes are eigenvectors of the rig with these springs.
     Two states that are h apart differ by c (exp(lambda h) - 1) in every mode, whatever the
@@ -191,10 +202,10 @@ def held_modes(modes, stiffness, motion) -> list:
     turned = np.expm1(values * (motion.time[1] - motion.time[0]))
     told = (values.imag > 0) & (np.abs(turned) > MIN_SINUSOID)
     sizes = np.linalg.solve(shapes, (state[1] - state[0]).astype(complex))[told] / turned[told]
-    # a pair of conjugate eigenvalues gives one real sinusoid
+    # A pair of conjugate eigenvalues gives one real sinusoid.
     out = 2 * np.abs(modes.output @ shapes[:n, told] * sizes)
     return [
-        HeldMode(
+        VibratingMode(
             float(motion.time[0]),
             float(motion.time[-1]),
             one.imag / (2 * np.pi),
@@ -206,26 +217,26 @@ def held_modes(modes, stiffness, motion) -> list:
     ]
 
 
-def select_strongest(held: list, kind: str) -> HeldMode:
-    """Return the HeldMode with the largest energy over the stick interval.
+def select_strongest(modes: list, kind: str) -> VibratingMode:
+    """Return the mode with the largest vibration energy over the stick interval.
 
     Energy is the time integral of the square of its "displacement" or "acceleration", as `kind`
     says.
     """
 
-    def energy(one: HeldMode) -> float:
-        """Return the mean square of the decaying sinusoid over the stick interval.
+    def energy(mode: VibratingMode) -> float:
+        """Return the mean square of a decaying sinusoid over the stick interval.
 
         Its amplitude is the field of this `kind`.
         """
-        fall = 4 * np.pi * one.damping * one.frequency * (one.end - one.begin)
-        return getattr(one, kind) ** 2 * (-np.expm1(-fall) / fall if fall else 1.0)
+        fall = 4 * np.pi * mode.damping * mode.frequency * (mode.end - mode.begin)
+        return getattr(mode, kind) ** 2 * (-np.expm1(-fall) / fall if fall else 1.0)
 
-    return max(held, key=energy)
+    return max(modes, key=energy)
 
 
 def measure_ringing(time, value, sticks, omega: float = 0.0) -> tuple:
-    """Return frequency and damping ratio of the ringing in a signal: medians over stick intervals.
+    """Return frequency and damping of the ringing in a signal as medians over stick intervals.
 
     Parameters
     ----------
@@ -249,7 +260,7 @@ def measure_ringing(time, value, sticks, omega: float = 0.0) -> tuple:
         part = slice(
             np.searchsorted(time, begin, side="left"), np.searchsorted(time, end, side="right")
         )
-        one = fit_ring(time[part], value[part], omega, size)
+        one = fit_ringing(time[part], value[part], omega, size)
         if one is not None:
             found.append(one)
     if not found:
@@ -266,7 +277,7 @@ def measure_ringing(time, value, sticks, omega: float = 0.0) -> tuple:
 
 
 def _resample(time, value) -> tuple:
-    """Return the samples at equal steps, with times from 0.
+    """Select equally spaced samples of a signal, with times from 0.
 
     Other samples, such as the second one on an event, are left out.
     """
@@ -283,8 +294,8 @@ def _resample(time, value) -> tuple:
     return time - time[0], value
 
 
-def _forced_columns(time, omega: float) -> np.ndarray:
-    """Return the columns (k, 1 or 3) of a constant and the forced sine."""
+def _make_forced_columns(time, omega: float) -> np.ndarray:
+    """Return the fit columns (k, 1 or 3) of a constant and the forced sinusoid."""
     parts = [np.ones(time.size)]
     if omega > 0:
         parts += [np.cos(omega * time), np.sin(omega * time)]
@@ -292,7 +303,7 @@ def _forced_columns(time, omega: float) -> np.ndarray:
 
 
 class _Fit(NamedTuple):
-    """Sinusoids fitted to a signal.
+    """Fit of decaying sinusoids to a signal.
 
     - poles (2 r,): angular frequency [rad/s] and decay rate [1/s] of each.
     - sigma (2 r,): standard errors of the poles.
@@ -305,9 +316,10 @@ class _Fit(NamedTuple):
 
 
 def _fit_poles(time, value, forced, poles, *ends) -> tuple:
-    """Fit the poles (2 r,) to a signal, or evaluate the residual at them if there are no `ends`.
+    """Fit the poles (2 r,) of decaying sinusoids to a signal, or evaluate their residual.
 
-    The poles are overwritten by the best ones.
+    The poles are overwritten by the best ones. Without `ends`, the residual is evaluated at the
+    given poles.
 
     Returns the number of evaluations, the sum of squares of the best residual, and the workspace of
     `ringing_kernels.fit_sinusoids`, which is valid until the next call.
@@ -323,69 +335,69 @@ def _fit_poles(time, value, forced, poles, *ends) -> tuple:
 
 
 @lru_cache(maxsize=16)
-def _fit_workspace(count: int, many: int, samples: int) -> tuple:
-    """Return the workspace of a fit of `many` poles; cached, because making it takes time."""
+def _fit_workspace(count: int, n_sinusoids: int, samples: int) -> tuple:
+    """Return the cached workspace of a fit with a given number of poles."""
     return (
         np.empty((3, count, samples)),
         np.empty((count + 2, count)),
-        np.empty((many, samples)),
-        np.zeros((many, many + 1)),
-        np.empty((many + 2, many)),
+        np.empty((n_sinusoids, samples)),
+        np.zeros((n_sinusoids, n_sinusoids + 1)),
+        np.empty((n_sinusoids + 2, n_sinusoids)),
     )
 
 
 def _subtract_sinusoids(time, value, forced, poles) -> tuple:
-    """Return the residual (k,) and a list of the sinusoids (k,) of the poles."""
+    """Return the residual (k,) and the fitted sinusoids (k,) of given poles."""
     n, (columns, few, *_) = forced.shape[1], _fit_poles(time, value, forced, poles)[2]
     return columns[2, 0].copy(), [
         few[-1, at : at + 2] @ columns[0, at : at + 2] for at in range(n, n + poles.size, 2)
     ]
 
 
-def _fit_all_sinusoids(time, value, forced, rest) -> _Fit | None:
-    """Return the fit with as many sinusoids as the signal contains.
+def _fit_all_sinusoids(time, value, forced, signal) -> _Fit | None:
+    """Fit as many decaying sinusoids as the signal contains.
 
-    One sinusoid is added after the other while each one at least halves the residual.
+    Sinusoids are added one after the other while each of them at least halves the residual.
     """
-    scale = last = np.sqrt(np.mean(rest**2))
+    scale = last = np.sqrt(np.mean(signal**2))
     best = None
     for _ in range(MAX_SINUSOIDS):
         poles = best.poles if best is not None else np.empty(0)
         tries = []
-        for start in _initial_guesses(time, value, forced, poles, rest):
+        for start in _initial_guesses(time, value, forced, poles, signal):
             tries.append(
                 _refine_poles(time, value, forced, np.append(poles, start), EXACT_RESIDUAL * scale)
             )
             if tries[-1].rms < EXACT_RESIDUAL * scale:
                 break
         new = min(tries, key=lambda one: one.rms)
-        # a smaller reduction of the residual is noise
+        # A smaller reduction of the residual is noise.
         if not np.isfinite(new.rms) or new.rms > last / 2:
             break
         best = new
         last = new.rms
         if last < 1e-6 * scale or time.size < 8 * (len(best.poles) + 2):
             break
-        rest = _subtract_sinusoids(time, value, forced, best.poles)[0]
+        signal = _subtract_sinusoids(time, value, forced, best.poles)[0]
     return best
 
 
-def _largest_line(time, rest) -> float:
-    """Return the angular frequency [rad/s] of the highest line in the spectrum of `rest` (k,)."""
+def _find_largest_line(time, residual) -> float:
+    """Return the angular frequency [rad/s] of the highest spectral line of a residual (k,)."""
     window = np.hanning(time.size + 2)[1:-1]
     size = 4 * time.size
-    lines = np.abs(np.fft.rfft(rest * window, size))
+    lines = np.abs(np.fft.rfft(residual * window, size))
     lines[:2] = 0.0
     return 2 * np.pi * int(np.argmax(lines)) / (size * (time[1] - time[0]))
 
 
-def _initial_guesses(time, value, forced, poles, rest) -> list:
-    """Return two initial guesses of the next sinusoid, with different decay.
+def _initial_guesses(time, value, forced, poles, residual) -> list:
+    """Return two initial guesses of the next sinusoid, with different decay rates.
 
     The frequency is the best one, by projection, around the highest line of the residual.
     """
     span = time[-1]
-    top = _largest_line(time, rest)
+    top = _find_largest_line(time, residual)
     near = [own for own in top + np.linspace(-1.2, 1.2, 7) * 2 * np.pi / span if own > np.pi / span]
     sizes = [
         _fit_poles(time, value, forced, np.append(poles, (own, 0.5 / span)))[1] for own in near
@@ -394,8 +406,8 @@ def _initial_guesses(time, value, forced, poles, rest) -> list:
     return [np.array([own, decay / span]) for decay in (0.1, 2.0)]
 
 
-def _refine_poles(time, value, forced, poles, whole: float = 0.0) -> _Fit:
-    """Return the fit that starts from `poles`, by Levenberg-Marquardt on the projected residual.
+def _refine_poles(time, value, forced, poles, max_slow_rms: float = 0.0) -> _Fit:
+    """Fit decaying sinusoids from given poles by Levenberg-Marquardt on the projected residual.
 
     It ends when the residual is round-off of the signal, when a step reduces the sum of squares by
     less than its round-off, or when the rms of the residual is below `whole` with sinusoids that
@@ -411,8 +423,8 @@ def _refine_poles(time, value, forced, poles, whole: float = 0.0) -> _Fit:
         value,
         forced,
         poles,
-        (4 * ROUNDING) ** 2 * (value @ value),
-        time.size * whole**2,
+        (4 * FLOAT_EPSILON) ** 2 * (value @ value),
+        time.size * max_slow_rms**2,
         short,
     )
     rms = float(np.sqrt(size / time.size))

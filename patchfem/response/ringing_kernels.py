@@ -13,18 +13,18 @@ from ..compiled.jit import njit
 from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 EPS = 2.0**-52
-# norm of a column after projection over its norm; below it the column depends on the others
+# Norm of a column after projection over its norm; below it the column depends on the others.
 MIN_INDEPENDENT_NORM = 1e-12
-INITIAL_DAMPING = 1e-3  # tenth of the Levenberg-Marquardt damping with which a fit starts
-MAX_DAMPING = 1e9  # Levenberg-Marquardt damping above which a fit ends
-# step over the scale of the poles that ends a fit, if the step lowered the residual
+INITIAL_DAMPING = 1e-3  # Initial Levenberg-Marquardt damping of a fit, divided by ten.
+MAX_DAMPING = 1e9  # Levenberg-Marquardt damping above which a fit ends.
+# Step over the scale of the poles that ends a fit, if the step lowered the residual.
 SUCCESS_STEP_TOL = 1e-13
-FAILURE_STEP_TOL = 1e-15  # the same, if the step did not lower the residual
+FAILURE_STEP_TOL = 1e-15  # Same ratio for a step that did not lower the residual.
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def fill_sinusoids(time, poles, columns, first):
-    """Fill rows of columns with decaying sinusoids, a cosine and a sine for each pole.
+    """Fill rows of an array with decaying sinusoids, a cosine and a sine for each pole.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def fill_sinusoids(time, poles, columns, first):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def dot(a, b):
-    """Return the scalar product of `a` (k,) and `b` (k,)."""
+    """Return the scalar product of two arrays (k,)."""
     out = 0.0
     for j in range(a.size):
         out += a[j] * b[j]
@@ -76,7 +76,7 @@ def subtract_multiple(a, share, b):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def factor_qr(columns, count, basis, corner):
-    """Compute the QR factorization of the columns by Gram-Schmidt, twice for each column.
+    """Compute the QR factorization of columns by Gram-Schmidt, repeated for each column.
 
     Fills the rows of `basis` and the upper triangle `corner` (count, count) with column j = sum
     corner[i, j] basis[i]. A dependent column has zeros as its basis vector.
@@ -111,7 +111,7 @@ def factor_qr(columns, count, basis, corner):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def project(value, count, basis, inside, left):
-    """Project a signal (k,) onto a basis of `count` rows.
+    """Project a signal (k,) onto orthonormal basis rows.
 
     Fills `left` (k,) with the residual and `inside` (count,) with the coefficients.
 
@@ -133,7 +133,7 @@ def project(value, count, basis, inside, left):
     for i in range(count):
         inside[i] = dot(basis[i], left)
         subtract_multiple(left, inside[i], basis[i])
-    for i in range(count):  # the second pass removes the round-off of the first
+    for i in range(count):  # The second pass removes the round-off of the first.
         share = dot(basis[i], left)
         inside[i] += share
         subtract_multiple(left, share, basis[i])
@@ -141,7 +141,7 @@ def project(value, count, basis, inside, left):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_upper_triangle(count, corner, inside, numbers):
-    """Solve for the coefficients of the columns by back substitution.
+    """Solve for the coefficients of fit columns by back substitution.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def solve_upper_triangle(count, corner, inside, numbers):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def compute_residual(time, value, poles, columns, few):
-    """Compute the residual of the sinusoids of poles for a signal (k,) at times (k,) [s].
+    """Compute the residual of fitting decaying sinusoids with given poles to a signal.
 
     Fills the workspace and returns the sum of squares of the residual.
 
@@ -188,7 +188,7 @@ def compute_residual(time, value, poles, columns, few):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def compute_jacobian(time, poles, scale, columns, few, slopes, normal):
-    """Compute the Jacobian of the residual with respect to poles over scale (Kaufman, 1975).
+    """Compute the Jacobian of the fit residual with respect to scaled poles (Kaufman, 1975).
 
     Fills `slopes` (2 r, k) with the Jacobian, and `normal` (2 r, 2 r + 1) with the normal matrix
     and, in the last column, the gradient.
@@ -230,7 +230,7 @@ def compute_jacobian(time, poles, scale, columns, few, slopes, normal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(normal, damping, step, lower):
-    """Fill an array with the Levenberg-Marquardt step, and return its product with the gradient.
+    """Compute the Levenberg-Marquardt step in place, and return its product with the gradient.
 
     The step is -(N + damping diag N)^-1 g, by Cholesky factorization; a dependent direction is left
     out.
@@ -277,7 +277,7 @@ def solve_step(normal, damping, step, lower):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def fit_sinusoids(time, value, poles, scale, ends, room):
-    """Fit sinusoids to a signal (k,) at times (k,) [s] by the Levenberg-Marquardt method.
+    """Fit decaying sinusoids to a signal (k,) by the Levenberg-Marquardt method.
 
     Parameters
     ----------
@@ -336,7 +336,7 @@ def fit_sinusoids(time, value, poles, scale, ends, room):
         else:
             damping *= 10
         gain = -solve_step(normal, damping, step, lower)
-        # round-off would decide whether a step with less gain is taken
+        # Otherwise round-off would decide whether a step with less gain is taken.
         if looked > ends[3] or gain <= EPS * size:
             break
         largest = 0.0

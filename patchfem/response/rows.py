@@ -33,15 +33,15 @@ from .measures import (
     relative_gap,
     slip_start_measure,
 )
-from .spectrum import MIN_HARMONIC, odd_harmonics, wave_measures
+from .spectrum import MIN_HARMONIC, harmonic_measures, odd_harmonics
 
-# for an engine that computes measures from samples only
+# For engines that compute measures from samples only.
 NO_INTEGRATED_MEASURES = IntegratedMeasures()
 
 
 @dataclass(frozen=True, eq=False)
 class LastCycles:
-    """Last cycles of a run, with values that its engine computes more accurately than samples.
+    """Last cycles of a run, with values that its engine integrates more accurately than samples.
 
     - window: histories.
     - drive: drive of the run.
@@ -50,7 +50,7 @@ class LastCycles:
     - load: normal load [N]; None without friction.
     - stiffness: K of the first mode as seen by the contact [N/m]; 0 if no damping ratio refers to
       it.
-    - sine: whether the drive is a sine at the end of the run.
+    - sine: whether the drive is sinusoidal at the end of the run.
     - integrated: measures that the engine integrated itself.
     - loop: first harmonics of slide [m] and force [N] and work per cycle [J], if they do not come
       from `integrated`; None if the window contains no whole cycle.
@@ -93,17 +93,17 @@ class LastCycles:
 
     @cached_property
     def samples(self) -> Response:
-        """Window with the samples of the interface inside the steps, if the engine has them."""
+        """Window with interface samples inside the time steps, if the engine has them."""
         return self.window if self.inside is None else self.inside(self.window, self.number)
 
     @cached_property
     def has_full_cycle(self) -> bool:
-        """Whether the window contains whole cycles of the drive."""
+        """Whether the window contains complete cycles of the drive."""
         return drive_sizes.has_full_cycle(self.span, self.drive)
 
     @cached_property
     def slip(self) -> dict:
-        """slip_amplitude [m], stick_fraction [1] and slip_start_phase [rad] by name, where defined."""
+        """Slip amplitude [m], stick fraction [1] and phase of the slip start [rad] by name."""
         if self.load is None:
             return {}
         first = self.integrated.loops[0] if self.integrated.loops else None
@@ -126,7 +126,7 @@ class LastCycles:
 
     @cached_property
     def turns(self) -> list:
-        """Smallest and largest `Reversal` of the slide in every whole cycle of the window."""
+        """Smallest and largest `Reversal` of the displacement in every complete cycle."""
         if self.integrated.reversals:
             return [tuple(Reversal(*one) for one in pair) for pair in self.integrated.reversals]
         w = self.samples
@@ -134,7 +134,10 @@ class LastCycles:
 
     @cached_property
     def harmonics(self) -> tuple | None:
-        """First harmonics of slide and force, and work per cycle [J]; None without a whole cycle."""
+        """First harmonics of displacement and force, and work per cycle [J].
+
+        It is None without a complete cycle.
+        """
         if self.loop is not None or not self.integrated.loops or not self.has_full_cycle:
             return self.loop
         first = self.integrated.loops[0]
@@ -146,10 +149,10 @@ class LastCycles:
 
     @cached_property
     def cycle(self) -> dict:
-        """Measures of the friction loop by name; {} without friction or without a whole cycle.
+        """Measures of the friction loop by name; {} without friction or complete cycle.
 
-        loop_area [J]; under a sine also equivalent_stiffness and secant_stiffness [N/m] and
-        equivalent_damping [1].
+        loop_area [J]; under sinusoidal drive also equivalent_stiffness and secant_stiffness [N/m]
+        and equivalent_damping [1].
         """
         if self.harmonics is None or self.load is None:
             return {}
@@ -165,7 +168,7 @@ class LastCycles:
 
     @cached_property
     def waves(self) -> dict:
-        """Harmonics of the acceleration by name, for whole cycles of a drive that ends as a sine.
+        """Harmonics of the acceleration by name; {} if the drive does not end as a sinusoid.
 
         absolute_acceleration_fundamental [m s-2] and, if there is an acceleration,
         acceleration_distortion [1].
@@ -173,8 +176,8 @@ class LastCycles:
         if not (self.sine and self.has_full_cycle):
             return {}
         if self.integrated.acceleration_harmonics is None:
-            return wave_measures(*odd_harmonics(self.window, self.drive))
-        return wave_measures(
+            return harmonic_measures(*odd_harmonics(self.window, self.drive))
+        return harmonic_measures(
             *self.integrated.acceleration_harmonics, drive_sizes.find_max_acceleration(self.drive)
         )
 
@@ -184,11 +187,11 @@ class LastCycles:
         return {} if self.ledger is None else compute_ledger_measures(self.ledger)
 
     @cached_property
-    def random_measures(self) -> dict:
-        """Measures of a stationary random drive by name (`stationary.random_measures`); {} under others."""
+    def random_response_measures(self) -> dict:
+        """Measures of a stationary random drive by name; {} under other drives."""
         if not hasattr(self.drive, "band"):
             return {}
-        found = stationary.random_measures(self.window, self.drive)
+        found = stationary.random_response_measures(self.window, self.drive)
         if self.load is None:
             names = [name for name in found if name.startswith("friction_power")]
             for name in names:
@@ -197,7 +200,7 @@ class LastCycles:
 
     @property
     def work_check(self) -> float | None:
-        """Relative difference [1] of the two values of the friction work; None without a second one."""
+        """Relative difference [1] of two computations of the friction work; None without the second."""
         if self.load is None or self.integrated.friction_works is None:
             return None
         return relative_gap(
@@ -241,7 +244,7 @@ class LastCycles:
         return out
 
     def lateral(self, name: str):
-        """Return a history of the interface in its second direction (see `measures.lateral_history`)."""
+        """Return a history of the interface perpendicular to its main sliding direction."""
         return lateral_history(self.window, name, self.number)
 
     def evaluate_load(self, value: Callable) -> float | None:
@@ -254,7 +257,7 @@ class LastCycles:
 
 
 def lateral_work(window, number: int) -> float:
-    """Return the friction work [J] that an interface does across the drive during a window.
+    """Return the friction work [J] of an interface perpendicular to the drive in a window.
 
     The trapezoidal rule is used; the work is 0 if the interface slides along a line.
     """
@@ -263,42 +266,45 @@ def lateral_work(window, number: int) -> float:
 
 
 def resultant_peak(force, across) -> float:
-    """Return the largest magnitude [N] of a force (k,), or of its resultant with a lateral one."""
+    """Return the largest magnitude [N] of a force (k,) or of its resultant with a lateral force."""
     return float((np.abs(force) if across is None else np.hypot(force, across)).max())
 
 
 def compute_drift(s: LastCycles) -> float:
-    """Return the drift of the slide of an interface per cycle [m].
+    """Return the drift of the relative displacement of an interface per cycle [m].
 
     If the interface slides in a plane, it is the magnitude of the drift vector.
     """
     w = s.window
     across = s.lateral("slides")
-    own = drift(w.time, w.slide, w.slide_rate, s.drive.period)
+    drift_along = drift(w.time, w.slide, w.slide_rate, s.drive.period)
     if across is None:
-        return own
+        return drift_along
     return float(
         np.hypot(
-            own, drift(w.time, across, w.extra["lateral_slide_rates"][:, s.number], s.drive.period)
+            drift_along,
+            drift(w.time, across, w.extra["lateral_slide_rates"][:, s.number], s.drive.period),
         )
     )
 
 
 def first_harmonic(values: dict):
-    """Return the magnitude of the ratio of the harmonics of friction force and slide [N/m].
+    """Return the ratio [N/m] of the first harmonics of friction force and displacement.
 
     The part in phase is the equivalent stiffness; the other part is W/(pi A^2), often many times as
     large. values: measures of one run, or (n,) of many.
     """
-    part = np.abs(values["equivalent_stiffness"])
-    reach = np.asarray(values.get("slip_amplitude", 0.0), float)
+    in_phase = np.abs(values["equivalent_stiffness"])
+    slip_amplitude = np.asarray(values.get("slip_amplitude", 0.0), float)
     with np.errstate(all="ignore"):
-        other = np.where(reach > 0, values.get("loop_area", 0.0) / (np.pi * reach**2), 0.0)
-    return np.hypot(part, np.nan_to_num(other))
+        quadrature = np.where(
+            slip_amplitude > 0, values.get("loop_area", 0.0) / (np.pi * slip_amplitude**2), 0.0
+        )
+    return np.hypot(in_phase, np.nan_to_num(quadrature))
 
 
 def _drift_scale(values: dict):
-    """Return the amplitude [m] that a drift is compared with.
+    """Return the amplitude [m] with which the drift of an interface is compared.
 
     It is the amplitude of the slip; without slip, that of the motion. values: as in
     `first_harmonic`.
@@ -308,11 +314,11 @@ def _drift_scale(values: dict):
 
 
 def _random_rows(name: str, unit: str, floor: float, words: str, group: str = "motion") -> tuple:
-    """Return the definitions of a measure under a random drive and of its scatter."""
+    """Return the definitions of a measure under random drive and of its scatter."""
     scatter = f"{name}_scatter"
     return (
         MeasureDefinition(
-            name, unit, floor, words, lambda s: s.random_measures.get(name), group=group
+            name, unit, floor, words, lambda s: s.random_response_measures.get(name), group=group
         ),
         MeasureDefinition(
             scatter,
@@ -320,17 +326,17 @@ def _random_rows(name: str, unit: str, floor: float, words: str, group: str = "m
             floor,
             f"half-width of the 95 % interval of {name}: the scatter between "
             "random drives of the same length with different seeds",
-            lambda s: s.random_measures.get(scatter),
+            lambda s: s.random_response_measures.get(scatter),
             group=group,
             larger_term=(name, lambda values: np.abs(values.get(name, 0.0))),
         ),
     )
 
 
-# Measures that only single runs compute. If there are any, a sweep runs each case of a rig by
-# itself, because its batches compute only the shipped measures.
+# This table has measures that only single runs compute. If there are any, a sweep runs each case of
+# a rig by itself, because its batches compute only the shipped measures.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
-CUBIC_ORDER = 4.0  # order of a value on cubics between the samples
+CUBIC_CONVERGENCE_ORDER = 4.0  # Convergence order of a value on cubics between samples.
 ROWS = (
     MeasureDefinition(
         "relative_displacement_amplitude",
@@ -405,7 +411,7 @@ ROWS = (
         "the length of this vector; null if the drive is not periodic at the end of the run",
         lambda s: compute_drift(s) if s.integrated.drift is None else s.integrated.drift,
         larger_term=("slip amplitude (without slip: amplitude of the motion)", _drift_scale),
-        order=CUBIC_ORDER,
+        order=CUBIC_CONVERGENCE_ORDER,
     ),
     MeasureDefinition(
         "slip_amplitude",
@@ -479,7 +485,7 @@ ROWS = (
         "before and after the jump is used; null if rigid friction sticks there, where the force takes many values",
         lambda s: s.cycle.get("secant_stiffness"),
         group="friction",
-        order=CUBIC_ORDER,
+        order=CUBIC_CONVERGENCE_ORDER,
     ),
     MeasureDefinition(
         "equivalent_damping",
@@ -490,7 +496,7 @@ ROWS = (
         "cycle)/(value of the key `slide` of this mode); null if other modes contribute more than 5 % of the slide",
         lambda s: s.cycle.get("equivalent_damping"),
         group="friction",
-        order=CUBIC_ORDER,
+        order=CUBIC_CONVERGENCE_ORDER,
     ),
     MeasureDefinition(
         "friction_work",
@@ -664,7 +670,7 @@ ROWS = (
 )
 NEEDS_RUN = tuple(row for row in ROWS if row.needs_run)
 TABLE = {row.name: row for row in ROWS}
-# measures that every interface has
+# These measures exist for every interface.
 INTERFACE_MEASURES = (
     "slip_amplitude",
     "stick_fraction",
@@ -677,35 +683,35 @@ DISPLACEMENT_MEASURES = (
     "slip_amplitude",
     "drift_per_cycle",
 )
-# largest floor of a displacement relative to the displacement of the drive
+# Largest floor of a displacement error relative to the displacement of the drive.
 MAX_DISPLACEMENT_FLOOR = 1e-5
 
 
-def compute_measures(seen: LastCycles) -> dict:
+def compute_measures(last_cycles: LastCycles) -> dict:
     """Compute the measures of a run from its last cycles, by name, in SI units.
 
     Measures without a value are left out. The INTERFACE_MEASURES are repeated for every further
     interface, with its number after the name. A value of the engine replaces the one computed from
     samples.
     """
-    out = {row.name: _compute_value(row, seen) for row in ROWS}
-    for number, interface in enumerate(seen.further_interfaces(), 1):
+    out = {row.name: _compute_value(row, last_cycles) for row in ROWS}
+    for number, interface in enumerate(last_cycles.further_interfaces(), 1):
         for name in INTERFACE_MEASURES:
             out[add_interface_number(name, number)] = TABLE[name].function(interface)
-    return {name: value for name, value in (out | seen.known).items() if value is not None}
+    return {name: value for name, value in (out | last_cycles.known).items() if value is not None}
 
 
-def _compute_value(row: MeasureDefinition, seen: LastCycles) -> float | None:
-    """Return the value of a measure definition; None if the run has no value or lacks histories."""
-    if row.name in seen.known:
-        return seen.known[row.name]
-    if row.function is None or (row.needs_run and seen.run is None):
+def _compute_value(row: MeasureDefinition, last_cycles: LastCycles) -> float | None:
+    """Compute the value of a measure; None if the run has no value or lacks histories."""
+    if row.name in last_cycles.known:
+        return last_cycles.known[row.name]
+    if row.function is None or (row.needs_run and last_cycles.run is None):
         return None
-    return row.function(seen)
+    return row.function(last_cycles)
 
 
 def stick_fraction(stuck, span):
-    """Return the time in stick [s] over a time span [s]; numbers or (n,).
+    """Return the fraction of a time span [s] that a stick time [s] covers; numbers or (n,).
 
     A fraction that differs from 1 only by the round-off of the sum of its parts is set to 1.
     """
@@ -719,7 +725,7 @@ def remove_interface_number(name: str) -> str:
 
 
 def add_interface_number(name: str, number: int) -> str:
-    """Return the name of a measure of the interface of this index; the first has no suffix."""
+    """Append the interface number to the name of a measure; the first interface has no suffix."""
     return f"{name}_{number + 1}" if number else name
 
 
@@ -734,7 +740,7 @@ def error_floor(name: str, size=np.inf):
     size : float or (n,)
         Displacement that the drive alone causes [m]; 0 or inf if no drive moves anything.
     """
-    floor = find_row(name).floor
+    floor = find_definition(name).floor
     if remove_interface_number(name) not in DISPLACEMENT_MEASURES:
         return floor
     return np.where(
@@ -756,7 +762,7 @@ def larger_term(name: str, values: dict):
     float or (n,)
         0 if the measure is not a difference.
     """
-    row = find_row(name)
+    row = find_definition(name)
     number = name[len(remove_interface_number(name)) :]
     if row.larger_term is None:
         return 0.0
@@ -767,18 +773,20 @@ def larger_term(name: str, values: dict):
     return row.larger_term[1](own_values)
 
 
-def set_final_floors(found: dict, tolerance: float) -> dict:
-    """Return measures with their final floors: tolerance times the larger term for differences."""
-    values = {name: measure.value for name, measure in found.items() if measure.value is not None}
-    out = dict(found)
+def set_final_floors(measures: dict, tolerance: float) -> dict:
+    """Return measures with final floors; that of a difference is tolerance x its larger term."""
+    values = {
+        name: measure.value for name, measure in measures.items() if measure.value is not None
+    }
+    out = dict(measures)
     for name in values:
         if remove_interface_number(name) in TABLE:
             floor = tolerance * float(larger_term(name, values))
-            if floor > found[name].floor:
-                out[name] = replace(found[name], floor=floor)
+            if floor > measures[name].floor:
+                out[name] = replace(measures[name], floor=floor)
     return out
 
 
-def find_row(name: str) -> MeasureDefinition:
+def find_definition(name: str) -> MeasureDefinition:
     """Return the definition of a measure of any interface; KeyError for an unknown name."""
     return TABLE[remove_interface_number(name)]

@@ -11,10 +11,10 @@ import numpy as np
 from ..dynamics.events import event_list as listed
 from . import ringing
 from .events import (
-    BORDER,
     MAX_EVENTS,
     RELEASE_UP,
     REVERSAL_UP,
+    SEGMENT_BORDER,
     STOP,
     Events,
     compute_slip_states,
@@ -22,26 +22,28 @@ from .events import (
     find_sticks,
     sort_events,
 )
-from .measures import distances_moved, lateral_history, slip_round_off
+from .measures import lateral_history, path_increments, slip_round_off
 
-KIND_OF_LOG = {
+KIND_BY_LOG_NUMBER = {
     0: STOP,
     1: RELEASE_UP,
     -1: RELEASE_UP + 1,
     2: REVERSAL_UP,
     -2: REVERSAL_UP + 1,
-    9: BORDER,
+    9: SEGMENT_BORDER,
 }
-LOG_OFFSET = -min(KIND_OF_LOG)
-KIND_TABLE = np.full(
-    LOG_OFFSET + max(KIND_OF_LOG) + 1, np.nan
-)  # kind of an event by its number in a log
-KIND_TABLE[np.array(list(KIND_OF_LOG)) + LOG_OFFSET] = list(KIND_OF_LOG.values())
+LOG_OFFSET = -min(KIND_BY_LOG_NUMBER)
+KIND_BY_SHIFTED_LOG_NUMBER = np.full(
+    LOG_OFFSET + max(KIND_BY_LOG_NUMBER) + 1, np.nan
+)  # This array gives the kind of an event by its number in a log.
+KIND_BY_SHIFTED_LOG_NUMBER[np.array(list(KIND_BY_LOG_NUMBER)) + LOG_OFFSET] = list(
+    KIND_BY_LOG_NUMBER.values()
+)
 EXACT_SOURCE = "the times of stick and slip are those of the exact solution"
 
 
-def slips_and_slides(response) -> tuple:
-    """Return slip and slide (k, i) [m] of every interface at the samples of a Response.
+def slips_and_displacements(response) -> tuple:
+    """Return slip and displacement (k, i) [m] of every interface at the samples of a Response.
 
     For an interface that slides in a plane, the slip is the path length, which only grows, and the
     slide is that in the first direction.
@@ -51,23 +53,23 @@ def slips_and_slides(response) -> tuple:
         slips = extra["slips"].copy()
         for k in range(slips.shape[1]):
             if (second := lateral_history(response, "slips", k)) is not None:
-                slips[1:, k] = slips[0, k] + np.cumsum(distances_moved(slips[:, k], second))
+                slips[1:, k] = slips[0, k] + np.cumsum(path_increments(slips[:, k], second))
         return slips, extra["slides"]
     if "slides" in extra:
         return extra.get("slips", extra["slides"]), extra["slides"]
     return response.slip[:, None], response.slide[:, None]
 
 
-def segment_borders(drive) -> list:
-    """Return the times [s] at which a drive changes from one of its segments to the next."""
+def find_segment_borders(drive) -> list:
+    """Return the times [s] at which a drive changes from a segment to the next."""
     return [segment.start for segment in drive.segments[1:]]
 
 
-def events_of_log(log) -> Events:
-    """Return the Events of an EventLog of the exact engine."""
+def convert_event_log(log) -> Events:
+    """Convert an EventLog of the exact engine to an Events table."""
     part = slice(-MAX_EVENTS, None)
-    kind = KIND_TABLE[log.kind[part] + LOG_OFFSET]
-    slide = np.where(kind == BORDER, np.nan, log.slide[part])
+    kind = KIND_BY_SHIFTED_LOG_NUMBER[log.kind[part] + LOG_OFFSET]
+    slide = np.where(kind == SEGMENT_BORDER, np.nan, log.slide[part])
     return sort_events(
         np.stack([log.time[part], log.interface[part] + 1.0, kind, slide], axis=1),
         log.count,
@@ -75,32 +77,32 @@ def events_of_log(log) -> Events:
     )
 
 
-def list_events(window, drive, log=None, held: float = 0.0) -> Events:
-    """Return the Events of a run: those of its log, else those detected in the last cycles.
+def list_events(window, drive, log=None, max_stick_slip: float = 0.0) -> Events:
+    """Return the events of a run from its log, or else detected in the last cycles.
 
     Parameters
     ----------
     window : Response
     drive
     log : EventLog, optional
-    held : float
+    max_stick_slip : float
         Slip in a cycle [m] below which the interface sticks in it.
     """
     if log is not None:
-        return events_of_log(log)
-    slips, slides = slips_and_slides(window)
+        return convert_event_log(log)
+    slips, slides = slips_and_displacements(window)
     return detect_events(
         window.time,
         slips,
         slides,
         drive.period,
-        max(held, slip_round_off(window)),
-        segment_borders(drive),
+        max(max_stick_slip, slip_round_off(window)),
+        find_segment_borders(drive),
     )
 
 
-def find_slipping(window, drive, log=None, held: float = 0.0) -> list:
-    """Return whether each interface slips at some time in the window, as a list of bool (i).
+def list_slipping_interfaces(window, drive, log=None, max_stick_slip: float = 0.0) -> list:
+    """Return for each interface whether it slips in the window, as a list of bool (i).
 
     Parameters
     ----------
@@ -108,21 +110,23 @@ def find_slipping(window, drive, log=None, held: float = 0.0) -> list:
     drive
     log : array, optional
         Events that the engine recorded, as in `list_events`.
-    held : float
+    max_stick_slip : float
         Change of slip up to which an interface sticks [m].
     """
-    held = max(held, slip_round_off(window))
+    max_stick_slip = max(max_stick_slip, slip_round_off(window))
     out = []
-    for slip in slips_and_slides(window)[0].T:
+    for slip in slips_and_displacements(window)[0].T:
         if log is None:
-            is_slipping = compute_slip_states(window.time, slip, drive.period, held)[1].any()
+            is_slipping = compute_slip_states(window.time, slip, drive.period, max_stick_slip)[
+                1
+            ].any()
         else:
             is_slipping = np.ptp(slip) > 0
         out.append(bool(is_slipping))
     return out
 
 
-def find_stick_intervals(window, drive, log=None, held: float = 0.0) -> list:
+def find_stick_intervals(window, drive, log=None, max_stick_slip: float = 0.0) -> list:
     """Return the stick intervals [(start, end)] [s] of a window.
 
     Parameters
@@ -131,21 +135,22 @@ def find_stick_intervals(window, drive, log=None, held: float = 0.0) -> list:
     drive
     log : array, optional
         Events that the engine recorded, as in `list_events`.
-    held : float
+    max_stick_slip : float
         Change of slip up to which an interface sticks [m].
     """
     return find_sticks(
-        list_events(window, drive, log, held),
+        list_events(window, drive, log, max_stick_slip),
         window.time[0],
         window.time[-1],
-        find_slipping(window, drive, log, held),
+        list_slipping_interfaces(window, drive, log, max_stick_slip),
     )
 
 
 def select_last_cycle(spans, end: float, period: float) -> list:
-    """Return the stick intervals that begin in the last cycle but one, and end before `end`.
+    """Select the stick intervals that represent the last cycle of a periodic motion.
 
-    These are all stick intervals of a periodic motion; none if the interface always sticks.
+    They begin in the last cycle but one and end before `end`. The list is empty if the interface
+    always sticks.
 
     Parameters
     ----------
@@ -159,10 +164,10 @@ def select_last_cycle(spans, end: float, period: float) -> list:
     return [(a, b) for a, b in spans if end - 2 * period <= a < end - period and b < end]
 
 
-def measure_rings(
-    window, modes, drive, log=None, held: float = 0.0, repeats: bool = False
+def measure_ringing_in_sticks(
+    window, modes, drive, log=None, max_stick_slip: float = 0.0, repeats: bool = False
 ) -> tuple:
-    """Return ring_frequency [Hz] and ring_damping [1] during stick by name, and their errors.
+    """Return frequency [Hz] and damping ratio [1] of the ringing during stick, and their errors.
 
     They are computed from the acceleration at the output. The result is ({}, {}) if nothing rings,
     if the drive has no frequency (sweep, recorded signal), or if the samples do not resolve the
@@ -174,7 +179,7 @@ def measure_rings(
     modes
     drive
     log : EventLog, optional
-    held : float
+    max_stick_slip : float
         Slip in a cycle [m] below which the interface sticks in it.
     repeats : bool
         Whether the motion is periodic, so that the stick intervals of one cycle represent all. A
@@ -185,7 +190,7 @@ def measure_rings(
     if modes.omega.max() * float(np.median(np.diff(window.time))) > np.pi:
         return {}, {}
     last = drive.segments[-1]
-    spans = find_stick_intervals(window, drive, log, held)
+    spans = find_stick_intervals(window, drive, log, max_stick_slip)
     if repeats:
         spans = select_last_cycle(spans, window.time[-1], drive.period)
     if not spans:
@@ -195,26 +200,28 @@ def measure_rings(
     )
 
 
-def add_uncertainty(measures: dict, own: dict | None) -> dict:
-    """Add the errors `own`, which the run itself states by name, to the errors of measures."""
+def add_uncertainty(measures: dict, stated_errors: dict | None) -> dict:
+    """Add errors that the run itself states, by name, to the errors of measures."""
     return {
-        name: replace(m, error=m.error + (own or {}).get(name, 0.0)) if m.error is not None else m
+        name: replace(m, error=m.error + (stated_errors or {}).get(name, 0.0))
+        if m.error is not None
+        else m
         for name, m in measures.items()
     }
 
 
-def is_all_stuck(window, held: float) -> bool:
-    """Return whether no interface or strip slips in the window by more than `held` [m].
+def is_all_stuck(window, max_stick_slip: float) -> bool:
+    """Return whether no interface or strip of a window slips by more than a given slip [m].
 
     The limit applies to half the range of the slip and is not below its round-off.
     """
-    slips = slips_and_slides(window)[0]
+    slips = slips_and_displacements(window)[0]
     slips = np.column_stack([*([] if "lateral_slips" in window.extra else [window.slip]), slips])
-    return bool(np.ptp(slips, axis=0).max() / 2 <= max(held, slip_round_off(window)))
+    return bool(np.ptp(slips, axis=0).max() / 2 <= max(max_stick_slip, slip_round_off(window)))
 
 
 def join_logs(logs, shifts) -> object:
-    """Return one EventLog of runs in sequence, with a border between them.
+    """Join the EventLogs of successive runs to a single one, with a border between them.
 
     shifts: times [s] by which the runs start later than the first one.
     """

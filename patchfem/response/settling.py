@@ -10,19 +10,19 @@ import numpy as np
 from ..core import Outcome
 
 CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
-STEADY_CLASS = 1  # index of Outcome.STEADY in CLASSES
-GROWS_CLASS = 2  # index of Outcome.GROWS in CLASSES
-MIN_WINDOWS = 3  # smallest number of windows from which free motion is estimated
-SLIP_SPEED_TOL = 1e-3  # relative to the largest speed in a run; above it an interface slips
-# sine of the angle between differences of phasors; below it they lie along one line
+STEADY_CLASS = 1  # Index of Outcome.STEADY in CLASSES.
+GROWS_CLASS = 2  # Index of Outcome.GROWS in CLASSES.
+MIN_WINDOWS = 3  # Smallest number of windows from which free motion is estimated.
+SLIP_SPEED_TOL = 1e-3  # Speed over the largest speed in a run above which an interface slips.
+# Sine of the angle between phasor differences below which they lie along one line.
 COLLINEAR_SINE = 0.02
-# fraction that the slowest mode must lose over a third of the run, before a beat that remains
-# counts as periodic
+# Fraction that the slowest mode must lose over a third of the run before a remaining beat counts as
+# periodic.
 PERIODIC_TOL = 0.1
 
 
 def classify(amplitudes, tolerance: float, floor: float = 0.0) -> Outcome:
-    """Return the class of a motion by the amplitudes of successive windows (`classify_motions`).
+    """Classify a motion as steady, growing or transient by the amplitudes of its windows.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def classify_motions(a, tolerance: float, floor=0.0) -> np.ndarray:
     rest = np.abs(geometric_remainders(a[:, -3:]))
     ends = np.isfinite(rest)
     rises = _increases_steadily(a)
-    endless = rises & (change > 0.05 * scale)  # 0.05 of the limit: slower growth is steady
+    endless = rises & (change > 0.05 * scale)  # Growth below 0.05 of the limit counts as steady.
     out[rises & ~ends] = GROWS_CLASS
     out[(change <= scale) & np.where(ends, rest <= scale, ~endless)] = STEADY_CLASS
     return out
@@ -86,7 +86,7 @@ def geometric_remainder(three) -> complex | None:
 
 
 def geometric_remainders(three):
-    """Return the remaining sum of geometric series through three values (Aitken extrapolation).
+    """Return the remaining sums of geometric series through three values (Aitken's method).
 
     It is what the series still adds to the last of three equally spaced values (..., 3), and NaN if
     the changes do not shrink. A beat is a series of complex values with a complex ratio.
@@ -99,7 +99,7 @@ def geometric_remainders(three):
 
 
 def extrapolate_steady_amplitude(amplitudes, phasors) -> tuple:
-    """Return the steady amplitude of a motion [m] and its error [m]; see `extrapolate_steady_amplitudes`.
+    """Extrapolate the steady amplitude of a motion [m] and estimate its error [m].
 
     (None, None) if no bounded limit can be estimated.
     """
@@ -168,7 +168,7 @@ def extrapolate_steady_amplitudes(a, p) -> tuple:
 
 
 def plane_map_remainders(p) -> np.ndarray:
-    """Return the remaining sums (n,) of differences that one linear map of the plane generates.
+    """Return the remaining sums (n,) of differences that a linear map of the plane generates.
 
     By the Cayley-Hamilton theorem d3 = t d2 - q d1, with the trace t and the determinant q of the
     map; the sum of all further differences is ((t - q) d3 - q d2)/(1 - t + q). NaN if all
@@ -181,18 +181,18 @@ def plane_map_remainders(p) -> np.ndarray:
     area = np.where(known, area, 1.0)
     t = (d1.conj() * d3).imag / area
     q = (d2.conj() * d3).imag / area
-    # both eigenvalues of the map lie inside the unit circle
+    # Both eigenvalues of the map lie inside the unit circle.
     known &= (np.abs(q) < 1) & (np.abs(t) < 1 + q)
     return np.where(known, ((t - q) * d3 - q * d2) / np.where(known, 1 - t + q, 1.0), np.nan)
 
 
-def _unpack_single(found: tuple) -> tuple:
-    """Return value and error (1,) of one motion as floats; None for NaN."""
-    return tuple(None if np.isnan(one[0]) else float(one[0]) for one in found)
+def _unpack_single(estimate: tuple) -> tuple:
+    """Return value and error (1,) of a single motion as floats; None for NaN."""
+    return tuple(None if np.isnan(one[0]) else float(one[0]) for one in estimate)
 
 
 def window_amplitude_means(extremes, window: int) -> tuple:
-    """Return half the peak-to-peak value of windows, and the mean of that of their cycles [m].
+    """Return the amplitude of each window [m], and the mean of the amplitudes of its cycles [m].
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def window_amplitude_means(extremes, window: int) -> tuple:
 
 
 def remaining_free_motion(extremes, window: int, decay=0.0):
-    """Return how much of the amplitude of the last window [m] is free motion that will decay.
+    """Return the decaying free motion [m] that the amplitude of the last window contains.
 
     A free motion at a frequency near that of the drive beats. If the beat is short, the cycles of
     one window differ: the excess of the amplitude of the window over the mean of its cycles
@@ -289,7 +289,7 @@ def beat_mean_amplitudes(extremes, window: int) -> tuple:
 
 
 def slip_period(time, rate) -> float:
-    """Return the longest time [s] between the starts of successive slips, of the last three.
+    """Return the longest time [s] between the starts of the last three slips.
 
     It is 0 if there are fewer than two slips, or if the last one is more than 1.5 times this long
     ago, because the interface then sticks. The interface slips while its rate exceeds SLIP_SPEED_TOL of the
@@ -304,7 +304,7 @@ def slip_period(time, rate) -> float:
     way = np.sign(rate) * (np.abs(rate) > SLIP_SPEED_TOL * np.abs(rate).max(initial=0.0))
     time = np.asarray(time, float)
     begins = np.flatnonzero((way[1:] != 0) & (way[1:] != way[:-1]))
-    # the slip after a stick interval starts at the last sample of this interval
+    # The slip after a stick interval starts at the last sample of this interval.
     starts = time[begins + (way[begins] != 0)]
     longest = float(np.diff(starts[-4:]).max(initial=0.0))
     return longest if starts.size and time[-1] - starts[-1] <= 1.5 * longest else 0.0

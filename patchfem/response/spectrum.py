@@ -1,26 +1,26 @@
-"""Harmonics of the motion of the last cycles, distortion, and the readings of instruments.
+"""Harmonics of the motion of the last cycles, distortion, and instrument readings.
 
-In: a window of a run under a drive that ends as a sine. Out: Fourier coefficients of motion,
+In: a window of a run under a drive that ends as a sinusoid. Out: Fourier coefficients of motion,
 acceleration and friction; the distortion of the acceleration; and its reading by an instrument,
 which acts on the computed motion and never on the model.
 """
 
 import numpy as np
 
-ACCELERATION_ROUND_OFF = 1e-12  # round-off relative to the largest acceleration of the drive
-MIN_HARMONIC = 1e-4  # smallest first harmonic [m s-2]; below it the output is at rest
+ACCELERATION_ROUND_OFF = 1e-12  # Round-off error relative to the largest acceleration of the drive.
+MIN_HARMONIC = 1e-4  # Smallest first harmonic [m s-2]; below it the output is at rest.
 READINGS = ("peak", "fundamental", "rms", "lowpass")
-N_FILTER_HARMONICS = 64  # number of harmonics that pass through the low-pass filter
-N_FILTER_SAMPLES = 1024  # number of samples of a cycle after the filter
+N_FILTER_HARMONICS = 64  # Number of harmonics that pass through the low-pass filter.
+N_FILTER_SAMPLES = 1024  # Number of samples of a cycle after the filter.
 _GAUSS_RULE = np.polynomial.legendre.leggauss(4)
-GAUSS_POINTS = (1 + _GAUSS_RULE[0]) / 2  # Gauss points of a step of length 1
-GAUSS_WEIGHTS = _GAUSS_RULE[1] / 2  # their weights
+GAUSS_POINTS = (1 + _GAUSS_RULE[0]) / 2  # Positions of the Gauss points in a step of length 1.
+GAUSS_WEIGHTS = _GAUSS_RULE[1] / 2  # Weights of the Gauss points in a step of length 1.
 
 
 def harmonic_weights(time, omega: float) -> list:
-    """Return the factors by which `motion_harmonic` weights the motion at the Gauss points.
+    """Return the Fourier weights of a motion at the Gauss points of its steps.
 
-    They take most of its time, so that several motions share them.
+    `motion_harmonic` spends most of its time on them, so that several motions share them.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def harmonic_weights(time, omega: float) -> list:
     """
     step = np.diff(time)
     waves = np.exp(-1j * omega * time[:-1])
-    # at equal steps, one wave times a constant phase serves all four points
+    # At equal steps, one wave times a constant phase serves all four points.
     even = step.size and np.ptp(step) <= 1e-15 * abs(time[-1])
     turns = [np.exp(-1j * omega * s * (step.mean() if even else step)) for s in GAUSS_POINTS]
     return [(weight * step, waves * turn) for turn, weight in zip(turns, GAUSS_WEIGHTS)]
@@ -91,7 +91,7 @@ def acceleration_harmonic(time, value, rate, omega: float) -> complex:
 
 
 def _integrate_by_parts(time, value, rate, omega: float, first: complex) -> complex:
-    """Return `acceleration_harmonic` for a known Fourier coefficient `first` of the motion."""
+    """Return the harmonic of the acceleration from the known harmonic of the displacement."""
     span = time[-1] - time[0]
     wave = np.exp(-1j * omega * time[[0, -1]])
     border = (rate[-1] + 1j * omega * value[-1]) * wave[1] - (
@@ -103,51 +103,55 @@ def _integrate_by_parts(time, value, rate, omega: float, first: complex) -> comp
 def odd_harmonics(window, drive) -> tuple:
     """Return the magnitudes of harmonics 1 and 3 of the acceleration at the output [m s-2].
 
-    window: Response over whole cycles of a drive that ends as a sine.
+    window: Response over complete cycles of a drive that ends as a sinusoid.
     """
     last = [part for part in drive.segments if part.start < window.time[-1]][-1]
     first, third = (
         acceleration_harmonic(window.time, window.output, window.output_rate, n * last.omega)
         for n in (1, 3)
     )
-    # the Fourier coefficient of the base, a sin(omega (t - start) + phase), is -i a exp(i (phase -
-    # omega start))
+    # The Fourier coefficient of the base, a sin(omega (t - start) + phase), is -i a exp(i (phase -
+    # omega start)).
     if drive.moving:
         first += -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start))
     return float(abs(first)), float(abs(third))
 
 
-def wave_measures(first: float, third: float, size: float = 0.0) -> dict:
-    """Return absolute_acceleration_fundamental [m s-2] and acceleration_distortion [1] by name.
+def harmonic_measures(
+    first_harmonic: float, third_harmonic: float, drive_acceleration: float = 0.0
+) -> dict:
+    """Return the acceleration fundamental [m s-2] and distortion [1] by measure name.
 
     Parameters
     ----------
-    first, third : float
+    first_harmonic, third_harmonic : float
         Magnitudes of the first and the third harmonic [m s-2].
-    size : float
+    drive_acceleration : float
         Acceleration of the drive [m s-2]; the distortion is None if `distortion_ratio` has no value.
     """
-    ratio = distortion_ratio(first, third, size)
+    ratio = distortion_ratio(first_harmonic, third_harmonic, drive_acceleration)
     return {
-        "absolute_acceleration_fundamental": float(first),
+        "absolute_acceleration_fundamental": float(first_harmonic),
         "acceleration_distortion": None if np.isnan(ratio) else float(ratio),
     }
 
 
-def distortion_ratio(first, third, size):
+def distortion_ratio(first_harmonic, third_harmonic, drive_acceleration):
     """Return the ratio of third to first harmonic of an acceleration (3.4); NaN for 0/0.
 
     It is NaN if the first harmonic is below its floor or the round-off of the drive.
 
     Parameters
     ----------
-    first, third : float or (n,)
+    first_harmonic, third_harmonic : float or (n,)
         Magnitudes of the harmonics [m s-2].
-    size : float or (n,)
+    drive_acceleration : float or (n,)
         Acceleration of the drive [m s-2].
     """
-    there = np.asarray(first) > np.maximum(ACCELERATION_ROUND_OFF * np.asarray(size), MIN_HARMONIC)
-    return np.where(there, third / np.where(there, first, 1.0), np.nan)[()]
+    there = np.asarray(first_harmonic) > np.maximum(
+        ACCELERATION_ROUND_OFF * np.asarray(drive_acceleration), MIN_HARMONIC
+    )
+    return np.where(there, third_harmonic / np.where(there, first_harmonic, 1.0), np.nan)[()]
 
 
 def friction_harmonic(window, modes, drive) -> complex:
@@ -160,7 +164,7 @@ def friction_harmonic(window, modes, drive) -> complex:
     Parameters
     ----------
     window : Response
-        Whole cycles of a drive that ends as a sine, with no other forces than drive and friction.
+        Whole cycles of a drive that ends as a sinusoid, with no other forces than drive and friction.
     modes
         Modal basis with one interface.
     drive
@@ -231,9 +235,9 @@ def read_instrument(
 
 
 def _acceleration_harmonic_n(window, drive, n: int) -> complex:
-    """Return the complex harmonic n [m s-2] of the absolute acceleration, from the motion.
+    """Return the complex n-th harmonic [m s-2] of the absolute acceleration, from the motion.
 
-    By integration by parts, so that a jump of the acceleration causes no error.
+    Integration by parts is used, so that a jump of the acceleration causes no error.
     """
     place, rate = (
         window.extra.get(name, own)

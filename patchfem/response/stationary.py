@@ -1,4 +1,4 @@
-"""Measures of a stationary random drive: root mean squares, spectra and frequency response.
+"""Measures under a stationary random drive: root mean squares, spectra, frequency response.
 
 In: the window of a run and its drive. Out: measures by name, each with its scatter between
 records (half-width of the 95 % interval by Student's t).
@@ -20,18 +20,18 @@ from scipy.special import stdtrit
 
 from .welch import CrossDensities, Segments, average_segments, transform_segments
 
-SEGMENTS_PER_RECORD = 16  # length of the record over that of a segment
-# number of parts of the record from which the scatter is estimated; groups of segments, each left
-# out once
+SEGMENTS_PER_RECORD = 16  # Length of the record over that of a segment.
+# Number of parts of the record from which the scatter is estimated; they are groups of segments,
+# each left out once.
 N_GROUPS = 10
-FIT_BAND = 6.0, 8.0  # half-width of the band of a fit, in half-power widths and in spectral lines
-# length of a record in decay times of the mode; in a shorter one the parts are correlated
+FIT_BAND = 6.0, 8.0  # Half-width of the band of a fit, in half-power widths and in spectral lines.
+# Smallest length of a record in decay times of the mode; the parts of a shorter one are correlated.
 MIN_DECAY_TIMES = 50.0
-MIN_SEGMENT_SAMPLES = 64  # smallest number of samples of a segment
+MIN_SEGMENT_SAMPLES = 64  # Smallest number of samples of a segment.
 
 
 class Record(NamedTuple):
-    """Equally spaced samples of a record.
+    """Equally spaced samples of drive and output under a random drive.
 
     - step: time step [s].
     - drive (k,): acceleration of the drive [m s-2].
@@ -65,7 +65,7 @@ class Spectra(NamedTuple):
 
 
 def make_record(window, drive) -> Record:
-    """Return the Record of a window at the sampling rate of its drive.
+    """Sample the drive and output of a window at the sampling rate of its drive.
 
     The displacement comes from cubics through positions and rates.
     """
@@ -77,7 +77,7 @@ def make_record(window, drive) -> Record:
     return Record(step, drive.values(grid), place, np.interp(grid, time, window.acceleration[kept]))
 
 
-def random_measures(window, drive) -> dict:
+def random_response_measures(window, drive) -> dict:
     """Return the measures under a stationary random drive by name, except those without value."""
     record = make_record(window, drive)
     out = {}
@@ -97,19 +97,19 @@ def random_measures(window, drive) -> dict:
     return {name: float(value) for name, value in out.items() if np.isfinite(value)}
 
 
-def warn_if_short(found: dict, window) -> list:
+def warn_if_short(measures: dict, window) -> list:
     """Return a warning, as a list, if a record is short compared with the decay of its mode.
 
     Parameters
     ----------
-    found : dict
+    measures : dict
         Measure by name.
     window : Response
     """
     names = "response_frequency", "response_damping"
-    if any(name not in found or not found[name].value for name in names):
+    if any(name not in measures or not measures[name].value for name in names):
         return []
-    at, zeta = (found[name].value for name in names)
+    at, zeta = (measures[name].value for name in names)
     span = float(window.time[-1] - window.time[0])
     decay = 1 / (2 * np.pi * at * zeta)
     if span >= MIN_DECAY_TIMES * decay:
@@ -123,7 +123,7 @@ def warn_if_short(found: dict, window) -> list:
 def compute_rms(time, values) -> float:
     """Return the root mean square about the mean of samples (k,) at times (k,) [s].
 
-    By the trapezoidal rule.
+    The trapezoidal rule is used.
     """
     span = time[-1] - time[0]
     mean = np.trapezoid(values, time) / span
@@ -131,7 +131,7 @@ def compute_rms(time, values) -> float:
 
 
 def rms_scatter(values) -> float:
-    """Return the half-width of the interval of `compute_rms` of equally spaced samples (k,).
+    """Return the confidence half-width of the root mean square of equally spaced samples.
 
     It comes from the mean squares of N_GROUPS parts. The interval is one of the logarithm of the mean
     square, because few oscillations have a skewed distribution; its upper half counts.
@@ -148,7 +148,7 @@ def rms_scatter(values) -> float:
 
 
 def mean_power(time, work) -> tuple:
-    """Return the mean power [W] and the half-width of its interval [W] from cumulative work.
+    """Return the mean power [W] and its confidence half-width [W] from cumulative work.
 
     The half-width comes from the means over N_GROUPS parts of equal length.
 
@@ -165,13 +165,12 @@ def mean_power(time, work) -> tuple:
 
 
 def is_steady(window, drive) -> bool:
-    """Return whether the rms of both halves of a window agree within their scatter."""
+    """Return whether the root mean squares of both halves of a window agree within scatter."""
     place = make_record(window, drive).place
     half = place.size // 2
     first = place[:half]
     last = place[half:]
-    # the half-widths are 2 standard errors, so a difference of up to 4 of its standard errors
-    # passes
+    # The half-widths are 2 standard errors, so a difference of up to 4 standard errors is accepted.
     return bool(
         abs(first.std() - last.std()) <= 2 * np.hypot(rms_scatter(first), rms_scatter(last))
     )
@@ -187,7 +186,7 @@ def transform_record(record: Record) -> Segments:
 
 
 def compute_spectra(window, drive) -> Spectra:
-    """Return the Spectra of a window, up to twice the highest frequency of the drive."""
+    """Compute the spectra of a window, up to twice the highest frequency of the drive."""
     frequency, (push, place, acceleration) = transform_record(make_record(window, drive))
     low, high = drive.band
     shown = (frequency > 0) & (frequency <= 2 * high)
@@ -201,7 +200,7 @@ def compute_spectra(window, drive) -> Spectra:
 
 
 def fit_peak(record: Record, band: tuple) -> tuple | None:
-    """Return frequency [Hz] and damping ratio of the largest peak of H1, and their half-widths.
+    """Fit frequency [Hz] and damping ratio of the largest peak of H1, with half-widths.
 
     Parameters
     ----------
@@ -235,7 +234,7 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
     right = high[high > top].min(initial=f.size - 1)
     width = float(f[right] - f[left])
     theta = np.log([2 * np.pi * f[top], max(0.3 * width, 0.05 * line) / (2 * f[top])])
-    for _ in range(3):  # the band of the fit follows the width of the peak
+    for _ in range(3):  # The band of the fit follows the width of the peak.
         at = np.exp(theta[0]) / (2 * np.pi)
         half = np.exp(theta.sum()) / (2 * np.pi)
         near = np.abs(f - at) <= max(FIT_BAND[0] * half, FIT_BAND[1] * line)
@@ -258,7 +257,7 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
 
 
 def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
-    """Return ln of (omega [rad/s], damping ratio) of the mode whose `expected_response` fits H1.
+    """Fit ln of (omega [rad/s], damping ratio) of the mode that reproduces H1.
 
     A complex constant is fitted as well, for the other modes.
 
@@ -308,7 +307,8 @@ def expected_response(f, omega: float, zeta: float, span: float) -> np.ndarray:
     out = 0.0
     for pole, sign in ((-zeta * omega + 1j * own, 1), (-zeta * omega - 1j * own, -1)):
         q = pole - 2j * np.pi * f
-        late = np.exp(q * span) - 1  # exp(turn span) = 1, so this is the same at q +- turn
+        # Since exp(turn span) = 1, the result is the same at q +- turn.
+        late = np.exp(q * span) - 1
         ramp = sum(
             share * (late / s - span) / (s * span)
             for share, s in ((2 / 3, q), (1 / 6, q + turn), (1 / 6, q - turn))

@@ -10,7 +10,7 @@ import numpy as np
 
 
 class Segments(NamedTuple):
-    """Transforms of the segments of records.
+    """Fourier transforms of the segments of sampled records.
 
     - frequency (q,): [Hz].
     - transforms (r, m, q): of r records over m segments, scaled so that 2 |X|^2 is a one-sided
@@ -35,7 +35,7 @@ class CrossDensities(NamedTuple):
 
 
 def transform_segments(step: float, records, size: int, *, has_window: bool = True) -> Segments:
-    """Transform segments of records that overlap by half.
+    """Compute Fourier transforms of record segments that overlap by half.
 
     Parameters
     ----------
@@ -57,14 +57,14 @@ def transform_segments(step: float, records, size: int, *, has_window: bool = Tr
     segments = records[:, starts[:, None] + np.arange(size)]
     taper = np.ones(size)
     if has_window:
-        taper = np.sin(np.pi * np.arange(size) / size) ** 2  # Hann's window, periodic
+        taper = np.sin(np.pi * np.arange(size) / size) ** 2  # This is Hann's window, periodic.
         segments = (segments - segments.mean(axis=2, keepdims=True)) * taper
     transforms = np.fft.rfft(segments) * np.sqrt(step / np.sum(taper**2))
     return Segments(np.fft.rfftfreq(size, step), transforms)
 
 
 def average_segments(driven, response) -> CrossDensities:
-    """Return the spectral densities of an input and an output from transforms (m, q)."""
+    """Average transforms (m, q) of input and output segments to spectral densities."""
     return CrossDensities(
         input=2 * np.mean(np.abs(driven) ** 2, axis=0),
         output=2 * np.mean(np.abs(response) ** 2, axis=0),

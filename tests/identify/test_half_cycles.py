@@ -6,7 +6,7 @@ import pytest
 from patchfem.core import PatchfemError
 from patchfem.identify import compute_decay_curve
 from patchfem.identify.half_cycles import find_half_cycles
-from patchfem.response import compute_swing_curve
+from patchfem.response import fit_decay_curve
 
 
 def viscous(rng):
@@ -42,7 +42,7 @@ def covered(kind, seeds) -> np.ndarray:
     for seed in seeds:
         rng = np.random.default_rng(seed)
         t, y, frequency, ratio = kind(rng)
-        found = compute_swing_curve(
+        found = fit_decay_curve(
             find_half_cycles(t, y + 10 ** rng.uniform(-4, -1.5) * rng.normal(size=t.size))
         )
         out += zip(

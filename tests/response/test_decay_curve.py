@@ -9,10 +9,10 @@ from scipy.optimize import brentq
 import patchfem as pf
 from patchfem.campaigns import compute_backbone
 from patchfem.response import (
-    compute_swing_curve,
-    find_turning_points,
-    find_turning_points_outside,
-    half_swings_between,
+    find_reversals_by_extrapolation,
+    fit_decay_curve,
+    locate_reversals,
+    make_half_cycles,
 )
 from patchfem.runs import mesh_errors_of_decay
 
@@ -23,8 +23,8 @@ RELEASED = DRIVE[: DRIVE.index("kind")] + 'kind = "free"\ndisplacement = "2 mm"\
 def test_exact_a_viscous_decay_has_one_frequency_and_one_ratio(zeta):
     k = np.arange(30)
     own = 700.0 * np.sqrt(1 - zeta**2)
-    found = compute_swing_curve(
-        half_swings_between(np.pi * k / own, (-1.0) ** k * np.exp(-zeta * 700.0 * np.pi * k / own))
+    found = fit_decay_curve(
+        make_half_cycles(np.pi * k / own, (-1.0) ** k * np.exp(-zeta * 700.0 * np.pi * k / own))
     )
     assert found.damping == pytest.approx(zeta, rel=1e-9)
     assert found.frequency == pytest.approx(own / (2 * np.pi), rel=1e-12)
@@ -62,15 +62,13 @@ def test_order_turns_lie_between_samples_to_the_fourth():
     """The cubic of places and speeds at both ends misses the place of a turn by the fourth power of the step."""
     off = []
     for samples in (407, 1627):
-        found = compute_swing_curve(
-            half_swings_between(*find_turning_points(*viscous(0.01, 300.0, samples)))
-        )
+        found = fit_decay_curve(make_half_cycles(*locate_reversals(*viscous(0.01, 300.0, samples))))
         off.append(np.abs(found.damping - 0.01).max())
     assert off[0] < 1e-4 and 50 < off[0] / off[1] < 500
 
 
 def test_exact_at_its_points_a_curve_is_itself_and_outside_there_is_none():
-    found = compute_swing_curve(half_swings_between(np.pi * np.arange(9), (-0.9) ** np.arange(9.0)))
+    found = fit_decay_curve(make_half_cycles(np.pi * np.arange(9), (-0.9) ** np.arange(9.0)))
     there = found.interpolate(found.amplitude[2:5])
     assert there.damping == pytest.approx(found.damping[2:5], rel=1e-12)
     assert np.isnan(found.interpolate([2.0, 1e-3]).frequency).all()
@@ -79,7 +77,7 @@ def test_exact_at_its_points_a_curve_is_itself_and_outside_there_is_none():
     )
     assert wider.damping_error == pytest.approx(there.damping_error + np.array([1.0, np.inf, 0.0]))
     assert np.isnan(
-        compute_swing_curve(half_swings_between(np.arange(3.0), np.array([1.0, -0.5, 0.2])))
+        fit_decay_curve(make_half_cycles(np.arange(3.0), np.array([1.0, -0.5, 0.2])))
         .interpolate([0.3])
         .damping
     ).all()
@@ -108,9 +106,7 @@ def test_always_intervals_hold_a_loss_that_bends_with_the_amplitude():
                 atol=1e-12,
             ).y[0]
         )
-        found = compute_swing_curve(half_swings_between(np.pi * k, (-1.0) ** k * a)).at(
-            slice(1, -1)
-        )
+        found = fit_decay_curve(make_half_cycles(np.pi * k, (-1.0) ** k * a)).at(slice(1, -1))
         true = fall(found.amplitude)
         held.append(np.abs(found.damping - true / np.hypot(np.pi, true)) <= found.damping_error)
     assert np.concatenate(held).mean() > 0.95
@@ -118,17 +114,14 @@ def test_always_intervals_hold_a_loss_that_bends_with_the_amplitude():
 
 def test_too_few_swings_or_one_that_grows_end_it():
     assert (
-        compute_swing_curve(
-            half_swings_between(np.arange(3.0), np.array([1.0, -0.5, 0.2]))
-        ).time.size
-        == 0
+        fit_decay_curve(make_half_cycles(np.arange(3.0), np.array([1.0, -0.5, 0.2]))).time.size == 0
     )
-    assert half_swings_between(np.arange(5.0), np.array([1.0, -0.5, 0.2, -0.9, 0.1])).size.size == 2
+    assert make_half_cycles(np.arange(5.0), np.array([1.0, -0.5, 0.2, -0.9, 0.1])).size.size == 2
     assert (
-        half_swings_between(np.arange(6.0), np.array([1.0, -0.5, 0.25, -0.1, 0.02, 0.02])).size.size
+        make_half_cycles(np.arange(6.0), np.array([1.0, -0.5, 0.25, -0.1, 0.02, 0.02])).size.size
         == 4
     )
-    assert find_turning_points(np.arange(3.0), np.arange(3.0), np.ones(3))[0].size == 0
+    assert locate_reversals(np.arange(3.0), np.arange(3.0), np.ones(3))[0].size == 0
 
 
 def test_exact_a_release_under_coulomb_friction():
@@ -367,7 +360,7 @@ def test_exact_a_reversal_at_which_the_force_jumps_is_extrapolated_from_both_sid
         place[part] = -sign * rate * off**2 / 2
         speed[part] = -sign * rate * off
     near, exact = (
-        one(time, place, speed)[0] for one in (find_turning_points, find_turning_points_outside)
+        one(time, place, speed)[0] for one in (locate_reversals, find_reversals_by_extrapolation)
     )
     inner = np.array([int(np.argmin(np.abs(near - crest))) for crest in crests])
     assert np.abs(near[inner] - crests).min() > 2e-4

@@ -6,7 +6,7 @@ import pytest
 from patchfem.core import Response
 from patchfem.response import estimate_window_error
 from patchfem.response.loops import drift
-from patchfem.response.run_events import slips_and_slides
+from patchfem.response.run_events import slips_and_displacements
 
 PERIOD, STEPS = 1.0, 4000
 
@@ -29,7 +29,7 @@ def read(w, cycles):
         "absolute_acceleration_peak": w.acceleration.max(),
         "friction_force_peak": np.abs(w.force).max(),
         "relative_displacement_amplitude": np.ptp(w.output) / 2,
-        "slip_amplitude": np.ptp(slips_and_slides(w)[0]) / 2,
+        "slip_amplitude": np.ptp(slips_and_displacements(w)[0]) / 2,
         "friction_work": float(np.trapezoid(w.force * w.slide_rate, w.time)),
     }
 

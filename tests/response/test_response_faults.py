@@ -6,7 +6,7 @@ import pytest
 from patchfem.core import Outcome, Response
 from patchfem.friction import LuGre
 from patchfem.response import compute_step_harmonic, motion_inside_steps, settling
-from patchfem.response.inside_steps import N_STEP_PARTS, divide_steps
+from patchfem.response.inside_steps import N_SUBSTEPS, divide_steps
 
 
 @pytest.mark.parametrize(
@@ -27,7 +27,7 @@ def test_exact_a_cubic_motion_is_followed_inside_its_steps():
     motion = np.polynomial.Polynomial([0.2, 1.5, 0.7, 0.3])
     time = np.array([0.0, 0.4, 1.1, 1.3])
     steps = divide_steps(time, motion(time), motion.deriv()(time))
-    assert steps.time.shape == (3, N_STEP_PARTS)
+    assert steps.time.shape == (3, N_SUBSTEPS)
     np.testing.assert_allclose(steps.slide, motion(steps.time), rtol=1e-14)
     np.testing.assert_allclose(steps.speed, motion.deriv()(steps.time), rtol=1e-13)
 
@@ -45,7 +45,7 @@ def test_exact_force_of_lugre_inside_a_step_at_constant_speed():
         slip=none,
     )  # fmt: skip
     inside = motion_inside_steps(window, law, load)
-    assert inside.time.size == 2 * N_STEP_PARTS + 1
+    assert inside.time.size == 2 * N_SUBSTEPS + 1
     limit = 0.4 + 0.2 * np.exp(-0.25)
     fraction = np.exp(-speed * inside.time * law.stiffness / limit)
     np.testing.assert_allclose(inside.slide - inside.slip, limit / 2e5 * (1 - fraction), rtol=1e-9)

@@ -9,7 +9,7 @@ from scene_texts import KILOGRAM
 from patchfem import load
 from patchfem.compiled.no_jit import load_uncompiled
 from patchfem.response import measure_ringing
-from patchfem.response.ringing import fit_ring
+from patchfem.response.ringing import fit_ringing
 from patchfem.runs.run import run
 
 RELEASE = (
@@ -79,7 +79,7 @@ def test_exact_the_basis_of_nearly_equal_sinusoids_is_orthonormal():
 
 def test_exact_a_ring_beside_a_forced_sine():
     t = np.linspace(0, 0.6, 241)
-    found = fit_ring(t + 5.0, signal(t, 3.0, 2 * np.pi * 9, 0.02), 3.0)
+    found = fit_ringing(t + 5.0, signal(t, 3.0, 2 * np.pi * 9, 0.02), 3.0)
     assert found.frequency == pytest.approx(9, rel=1e-9) and found.damping == pytest.approx(
         0.02, rel=1e-7
     )
@@ -94,7 +94,7 @@ def test_always_a_ring_of_more_than_one_and_a_half_periods_is_found(
 ):
     t = np.linspace(0, 1.0, 301)
     own = 2 * np.pi * periods
-    found = fit_ring(t, signal(t, omega, own, zeta, size, phase), omega)
+    found = fit_ringing(t, signal(t, omega, own, zeta, size, phase), omega)
     assert found.frequency == pytest.approx(periods, rel=1e-6) and found.damping == pytest.approx(
         zeta, abs=1e-6
     )
@@ -103,7 +103,7 @@ def test_always_a_ring_of_more_than_one_and_a_half_periods_is_found(
 def test_exact_the_stronger_of_two_rings():
     t = np.linspace(0, 1.0, 501)
     both = signal(t, 3.0, 2 * np.pi * 12, 0.02) + signal(t, 3.0, 2 * np.pi * 31, 0.01, 0.3)
-    assert fit_ring(t, both, 3.0).frequency == pytest.approx(12, rel=1e-6)
+    assert fit_ringing(t, both, 3.0).frequency == pytest.approx(12, rel=1e-6)
 
 
 def test_exact_the_error_holds_under_noise():
@@ -113,7 +113,7 @@ def test_exact_the_error_holds_under_noise():
     held = 0
     wide = []
     for _ in range(40):
-        found = fit_ring(
+        found = fit_ringing(
             t, signal(t, 3.0, 2 * np.pi * 7, 0.01) + 0.01 * source.normal(size=t.size), 3.0
         )
         held += abs(found.frequency - 7) <= found.errors[0]
@@ -134,7 +134,7 @@ def test_exact_the_error_holds_under_noise():
 def test_exact_nothing_rings(own, zeta, size):
     """A forced sine alone, too few periods, a decay that hardly swings, a last digit, too few samples."""
     t = np.linspace(0, 1.0, 301)
-    assert fit_ring(t, signal(t, 2 * np.pi * 3, own, zeta, size), 2 * np.pi * 3) is None
+    assert fit_ringing(t, signal(t, 2 * np.pi * 3, own, zeta, size), 2 * np.pi * 3) is None
 
 
 def test_exact_the_median_over_sticks_outvotes_a_stray_one():

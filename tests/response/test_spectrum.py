@@ -63,12 +63,12 @@ def test_exact_distortion_with_and_without_a_moving_base(moving):
     assert first == pytest.approx(5 if moving else 3, rel=1e-7) and third == pytest.approx(
         0.5, rel=1e-7
     )
-    found = spectrum.wave_measures(first, third)
+    found = spectrum.harmonic_measures(first, third)
     assert found == {
         "absolute_acceleration_fundamental": first,
         "acceleration_distortion": third / first,
     }
-    assert spectrum.wave_measures(1e-16, 1e-17, 1.0)["acceleration_distortion"] is None
+    assert spectrum.harmonic_measures(1e-16, 1e-17, 1.0)["acceleration_distortion"] is None
 
 
 SCENE = """\

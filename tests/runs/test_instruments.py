@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem import SceneError, run
-from patchfem.response import measure_half_swing, read_instrument
+from patchfem.response import measure_half_range, read_instrument
 from patchfem.scene import loads
 
 MODES = """
@@ -131,4 +131,4 @@ def test_exact_half_a_swing_of_cubics():
     v = 3 * t**2 - 8 * t + 2
     peak = (lambda x: x**3 - 4 * x**2 + 2 * x)((8 - np.sqrt(40)) / 6)
     valley = (lambda x: x**3 - 4 * x**2 + 2 * x)((8 + np.sqrt(40)) / 6)
-    assert measure_half_swing(t, y, v) == pytest.approx((peak - valley) / 2, rel=1e-14)
+    assert measure_half_range(t, y, v) == pytest.approx((peak - valley) / 2, rel=1e-14)

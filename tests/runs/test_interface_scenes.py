@@ -8,7 +8,7 @@ import xarray as xr
 from command_line import cli
 from march_paths import share_one_loop
 
-from patchfem.response import KIND_NAMES
+from patchfem.response import EVENT_KIND_NAMES
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -138,7 +138,7 @@ def test_exact_figure_16_of_the_report(written):
         and np.abs(slide.values[late.values]).max() > 0.5
     )
     assert np.abs(data.friction_force).max() <= 3 * (1 + 1e-12)
-    stops = data.event_kind.values == KIND_NAMES.index("stop")
+    stops = data.event_kind.values == EVENT_KIND_NAMES.index("stop")
     assert data.event_time.values[0] == pytest.approx(8.079711463905416, abs=1e-11)
     assert data.event_time.values[stops][:3] == pytest.approx(
         [10.00410372419476, 12.96534318337974, 15.73725378200728], abs=1e-11

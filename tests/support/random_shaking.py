@@ -54,7 +54,7 @@ def shaken(frequency: float, damping: float, duration: float, seed: int) -> tupl
 
 def held(frequency: float, damping: float, duration: float, seed: int) -> list:
     """Of each of NAMES (value, half-width) over its truth."""
-    found = stationary.random_measures(*shaken(frequency, damping, duration, seed))
+    found = stationary.random_response_measures(*shaken(frequency, damping, duration, seed))
     truth = (
         *shaken_rms(2 * np.pi * frequency, damping, LEVEL, band_of(frequency)),
         frequency,

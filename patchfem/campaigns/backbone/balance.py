@@ -1,4 +1,4 @@
-"""Curve of a mode by the periodic motion that a negative damping keeps up (Krack 2015).
+"""Backbone of a mode from periodic motions sustained by negative damping (Krack 2015).
 
 The motion is found by harmonic balance; under rigid friction it is exact from reversal to reversal.
 """
@@ -19,17 +19,18 @@ from ...response.errors import error_of_change
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
 from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 
-# Numbers of harmonics that are tried in turn, each with four times the samples of the one before.
+# Numbers of harmonics that are tried in turn, each with four times the samples of the previous one.
 HARMONICS = (9, 19, 39)
-MAX_SAMPLES = 65536  # Samples per cycle: more take too long, and 39 harmonics need fewer.
-N_SAMPLES = 4096  # Samples of a cycle from which the largest motion is read.
-MAX_STEPS = 8  # Maximum number of secant steps to the motion that has the requested amplitude at the output.
-# Smallest slope of the logarithms of both amplitudes with which a secant step is taken.
+# Largest number of samples per cycle: more take too long, and 39 harmonics need fewer.
+MAX_SAMPLES = 65536
+N_SAMPLES = 4096  # Number of samples of a cycle from which the largest displacement is read.
+MAX_STEPS = 8  # Largest number of secant steps to the motion of the requested output amplitude.
+# Smallest slope of log output over log modal amplitude with which a secant step is taken.
 MIN_SLOPE = 0.1
 
 
 class FreeMotion(NamedTuple):
-    """Free motion at one amplitude, found by harmonic balance.
+    """Free motion of a mode at a given amplitude, computed by harmonic balance.
 
     free: a `harmonic.backbone.FreeMotion`; unknowns: (N,); reach: amplitude at the output / amplitude of
     the coordinate.
@@ -41,7 +42,7 @@ class FreeMotion(NamedTuple):
 
 
 def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
-    """Return the curve by harmonic balance, or exactly under rigid friction."""
+    """Compute the backbone of a mode by harmonic balance, or exactly under rigid friction."""
     joint.require_steady_loops("balance")
     if joint.is_rigid:
         return _compute_rigid_curve(joint, amplitudes)
@@ -73,7 +74,7 @@ def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
 def _read_motions(
     group: LawGroup, joint: Joint, amplitudes, harmonics: int, count=None
 ) -> np.ndarray:
-    """Return frequency [Hz], damping ratio and loss [J] (3, k) of the free motions.
+    """Return frequency [Hz], damping ratio and energy loss [J] (3, k) of free motions.
 
     They are NaN if no motion is found, and for all amplitudes after the first `count`.
 
@@ -99,7 +100,7 @@ def _read_motions(
 
 
 def find_free_motions(group: LawGroup, joint: Joint, amplitudes, harmonics: int) -> list:
-    """Find the free motions at amplitudes (k,) [m] of the output.
+    """Find the free motions at amplitudes (k,) [m] of the output by harmonic balance.
 
     The search starts from the motion at the amplitude before. If there is none, for example after a
     fold of the curve, it starts from the sticking mode, for the first motion also via a small
@@ -133,7 +134,7 @@ def find_free_motions(group: LawGroup, joint: Joint, amplitudes, harmonics: int)
 
 
 class _FreeMotionSearch:
-    """Equations of the free motion, and the sticking mode from which a search starts.
+    """Solver of the free motions of a mode, with the stuck mode as its fallback start.
 
     Parameters
     ----------
@@ -162,7 +163,7 @@ class _FreeMotionSearch:
         self.small = MIN_AMPLITUDE_FACTOR * float(joint.slip_amplitude) / self.reach
 
     def continue_motion(self, near: FreeMotion | None, amplitude: float) -> FreeMotion | None:
-        """Return the motion at an amplitude [m], starting from another motion; None if it fails."""
+        """Solve for the motion at an amplitude [m] from a neighbouring motion; None if it fails."""
         if near is None:
             return None
         here = amplitude / near.reach
@@ -173,7 +174,7 @@ class _FreeMotionSearch:
             return None
 
     def start_motion(self, amplitude: float, *, is_first: bool) -> FreeMotion | None:
-        """Return the motion at an amplitude [m], starting from the sticking mode; None if it fails.
+        """Solve for the motion at an amplitude [m] from the stuck mode; None if it fails.
 
         is_first: whether a search via a small amplitude is tried as well.
         """
@@ -191,7 +192,7 @@ class _FreeMotionSearch:
 def _reach_amplitude(
     equations: FreeBalance, joint: Joint, x, here: float, amplitude: float
 ) -> FreeMotion:
-    """Find the motion that has an amplitude [m] at the output, by secant steps.
+    """Find the free motion of a given output amplitude [m] by secant steps.
 
     The steps end at ROUND_OFF_ERROR, or at AMPLITUDE_TOL if they lead no further.
 
@@ -245,7 +246,7 @@ def _reach_amplitude(
 
 
 def _solve_from_stuck(equations: FreeBalance, first, small: float, here: float) -> np.ndarray:
-    """Solve at an amplitude `here` [m], starting from the sticking mode.
+    """Solve for the free motion at a coordinate amplitude [m] from the stuck mode.
 
     If this fails, solve first at the amplitude `small` [m] and continue from there.
     """
@@ -258,13 +259,13 @@ def _solve_from_stuck(equations: FreeBalance, first, small: float, here: float) 
 
 
 def half_range(harmonics) -> float:
-    """Return (maximum - minimum)/2 of a motion with harmonics (H + 1,)."""
+    """Return half the peak-to-peak value of a motion with harmonics (H + 1,)."""
     motion = evaluate_series(harmonics, N_SAMPLES)
     return (find_peak(motion) + find_peak(-motion)) / 2
 
 
 def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:
-    """Return the curve under rigid friction.
+    """Compute the backbone of a mode under rigid friction in closed form.
 
     It begins at the amplitude above which the motion does not stop within a cycle.
     """
@@ -298,8 +299,8 @@ def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:
     if modes.omega.size == 1:
         loss = 4 * kinetic * amplitude * abs(row[joint.mode] / modes.output[joint.mode])
     relative_error = np.array([cycle.error / cycle.amplitude for cycle in cycles])
-    # The damping of the structure does not depend on the amplitude, so only that of friction takes
-    # its error.
+    # The damping of the structure does not depend on the amplitude, so that only the frictional
+    # damping takes its error.
     structure_rate = modes.damping_matrix[joint.mode, joint.mode]
     friction_damping = damping - structure_rate / (4 * np.pi * frequency)
     frequency_error = (relative_error + ROUND_OFF_ERROR) * frequency

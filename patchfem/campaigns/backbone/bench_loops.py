@@ -1,4 +1,4 @@
-"""Steady friction loops of the contact of a rig on a bench, driven by a sine."""
+"""Steady friction loops of the contact of a rig under a sinusoidal displacement."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -9,13 +9,14 @@ from ...runs.bench import bench
 from ...runs.bench.engine import steps_per_cycle
 from ...runs.rig import decays
 
-FIRST_CYCLES = 3.0  # Cycles of the first loop; the last of them is read.
-MAX_CYCLES = 192.0  # Most laws are steady after a few cycles; growing bonds take tens.
+FIRST_CYCLES = 3.0  # Number of cycles of the first loop, of which the last one is evaluated.
+# Largest number of cycles: most laws are steady after a few, growing bonds after tens.
+MAX_CYCLES = 192.0
 LOOP_MEASURES = ("secant_stiffness", "loop_area")
 
 
 class BenchLoop(NamedTuple):
-    """A run on a bench, with its model and number of steps."""
+    """Run of a contact under a sinusoidal displacement, with its model and step number."""
 
     run: object
     model: Model
@@ -23,7 +24,9 @@ class BenchLoop(NamedTuple):
 
 
 class SettledLoop(NamedTuple):
-    """A steady run on a bench, with its model and number of steps.
+    """Steady run of a contact under a sinusoidal displacement.
+
+    It has its model and its number of steps.
 
     change: change of each of LOOP_MEASURES by the later half of the cycles.
     """
@@ -35,7 +38,7 @@ class SettledLoop(NamedTuple):
 
 
 def run_loop(model: Model, patch, slide: float, frequency: float, cycles: float) -> BenchLoop:
-    """Compute the friction loop of the contact under a sinusoidal displacement.
+    """Compute the friction loop of a contact under a sinusoidal displacement.
 
     Parameters
     ----------
@@ -44,9 +47,9 @@ def run_loop(model: Model, patch, slide: float, frequency: float, cycles: float)
     patch : Patch or None
         Pressed patch.
     slide : float
-        Amplitude of the sine [m].
+        Amplitude of the sinusoidal displacement [m].
     frequency : float
-        Frequency of the sine [Hz].
+        Frequency of the displacement [Hz].
     cycles : float
 
     Returns
@@ -60,7 +63,7 @@ def run_loop(model: Model, patch, slide: float, frequency: float, cycles: float)
 
 
 def settle_loop(model: Model, patch, slide: float, frequency: float) -> SettledLoop:
-    """Double the cycles until the loop changes within the tolerance, up to MAX_CYCLES.
+    """Double the number of cycles until the friction loop is steady within the tolerance.
 
     Parameters
     ----------
@@ -69,9 +72,9 @@ def settle_loop(model: Model, patch, slide: float, frequency: float) -> SettledL
     patch : Patch or None
         Pressed patch.
     slide : float
-        Amplitude of the sine [m].
+        Amplitude of the sinusoidal displacement [m].
     frequency : float
-        Frequency of the sine [Hz].
+        Frequency of the displacement [Hz].
 
     Returns
     -------

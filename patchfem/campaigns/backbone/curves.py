@@ -1,4 +1,4 @@
-"""Backbone of a mode: curves by all methods, loss exponents and amplitude of flutter."""
+"""Backbone of a mode: curves by all methods, loss exponents and flutter amplitude."""
 
 from dataclasses import replace
 
@@ -28,9 +28,9 @@ from .records import (
     ModeFrequencies,
 )
 
-# Amplitude / amplitude at which the whole contact begins to slip; above this ratio a point counts as gross slip.
+# Smallest amplitude of gross slip over the amplitude at which the complete contact begins to slip.
 GROSS_SLIP_BEGIN = 3.0
-FLUTTER_TOL = 1e-8  # Relative error of the amplitude of flutter, below the digits that are printed.
+FLUTTER_TOL = 1e-8  # Relative error of the flutter amplitude, below the digits that are printed.
 
 
 def compute_backbone(
@@ -42,7 +42,7 @@ def compute_backbone(
     *,
     errors: bool = True,
 ) -> Backbone:
-    """Compute frequency and damping of a mode of a rig against amplitude.
+    """Compute frequency and damping of a rig mode against amplitude.
 
     Parameters
     ----------
@@ -51,9 +51,9 @@ def compute_backbone(
     mode : str
         Name of the mode; "" for the first.
     amplitudes : (k,) array, optional
-        Increasing, at the output [m]. By default from a hundredth of the amplitude at which all of
-        the contact slips to 15 times this amplitude, or to the amplitude at which the mode moves as
-        if it were free.
+        Increasing, at the output [m]. By default from a hundredth of the amplitude at which the
+        complete contact slips to 15 times this amplitude, or to the amplitude at which the mode
+        moves as if it were free.
     methods : sequence of str
         From METHODS.
     progress : callable, optional
@@ -102,7 +102,7 @@ def compute_backbone(
 
 
 def compute_curve(joint: Joint, amplitudes, method: str, progress=None) -> Curve:
-    """Compute the curve of a mode by one method.
+    """Compute the frequency and damping curve of a mode by a given method.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def compute_curve(joint: Joint, amplitudes, method: str, progress=None) -> Curve
 
 
 def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
-    """Add the error of modes that a reduced structure lacks.
+    """Widen the errors of a curve by the effect of modes that a reduced structure lacks.
 
     richer: the curve of the structure with more modes.
     """
@@ -153,7 +153,7 @@ def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
 
 
 def _make_backbone(joint: Joint, amplitudes, curves: dict, missing: dict) -> Backbone:
-    """Return the backbone of the curves at the requested amplitudes (k,) [m]."""
+    """Assemble the backbone from its curves at the requested amplitudes (k,) [m]."""
     exponents = LossExponents()
     first = curves.get("quasi-static", curves.get("balance"))
     sentences = [*notes.note_linear_rig(joint), *notes.note_gaps(amplitudes, curves)]
@@ -183,7 +183,7 @@ def _make_backbone(joint: Joint, amplitudes, curves: dict, missing: dict) -> Bac
 
 
 def _main_mode_name(joint: Joint) -> str:
-    """Return the name of the mode that moves most in the coordinate."""
+    """Return the name of the structural mode that dominates the coordinate."""
     modes = joint.modes
     if not joint.model.rig.structure.lists_modes:
         return f"{joint.mode + 1}"
@@ -192,7 +192,7 @@ def _main_mode_name(joint: Joint) -> str:
 
 
 def _mode_frequencies(joint: Joint) -> ModeFrequencies:
-    """Return the frequencies [Hz] without the contact and with a contact that sticks.
+    """Return the frequencies [Hz] of a mode without its contact and with a sticking contact.
 
     The first includes a bonded spring, with its stiffness at rest if it is nonlinear. The second
     uses the stiffness that a run of the patch prints, extrapolated over its meshes, if the pieces
@@ -209,7 +209,7 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
     if stuck is None:
         return ModeFrequencies(free, None)
     measure = stuck_patch_stiffness(model, joint.patch, joint.coarser)
-    # Modes that were measured with the joint have the stiffness of the joint in them.
+    # Modes that were measured with the joint include the stiffness of the joint.
     has_joint = len(modes.interfaces) > 1 or model.rig.structure.joint_stiffness is not None
     if measure is None or has_joint:
         return ModeFrequencies(free, stuck / (2 * np.pi))
@@ -219,14 +219,14 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
 
 
 def _stuck_frequency(joint: Joint, stiffness: float) -> float:
-    """Return the frequency [Hz] with a contact of a stiffness [N/m] that sticks."""
+    """Return the frequency [Hz] of a mode with a sticking contact of a stiffness [N/m]."""
     modes = joint.modes
     omega, _ = modes.compute_stuck_mode(modes.interfaces, np.array([stiffness]), joint.mode)
     return omega / (2 * np.pi)
 
 
 def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
-    """Return the slopes of ln(loss) over ln(amplitude) in micro-slip and in gross slip.
+    """Fit the exponents of energy loss over amplitude in micro-slip and in gross slip.
 
     In micro-slip it is the slope from the first to the last point, in gross slip that of the last
     two points. A loss counts if it exceeds MIN_LOSS_RATIO times its error and the round-off of the
@@ -248,7 +248,10 @@ def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
 
 
 def _loss_slope(curve: Curve, points) -> float | None:
-    """Return the slope from the first to the last of some points; None for fewer than two."""
+    """Return the log-log slope of the loss between the ends of a point range.
+
+    It is None for fewer than two points.
+    """
     if points.size < 2:
         return None
     ends = points[[0, -1]]
@@ -258,7 +261,7 @@ def _loss_slope(curve: Curve, points) -> float | None:
 
 
 def _theoretical_exponent(joint: Joint) -> float | None:
-    """Return the theoretical exponent of the loss in micro-slip; None if no theory applies.
+    """Return the theoretical loss exponent in micro-slip; None if no theory applies.
 
     It is chi + 3 for sliders (Segalman 2005), and 3 for bonds and for pieces whose pressure falls
     to 0 at the edges of the contact (Cattaneo, Mindlin).
@@ -275,9 +278,9 @@ def _theoretical_exponent(joint: Joint) -> float | None:
 def _flutter_amplitude(joint: Joint, method: str, curve: Curve) -> float | None:
     """Find the largest amplitude [m] at which the damping changes from positive to negative.
 
-    The curve gives the two amplitudes that enclose the root. Brent's method on damping × amplitude,
-    which is a straight line under Coulomb friction, computes further points of the same curve. None
-    if there is no such root.
+    The curve gives the two amplitudes that enclose the root. Brent's method on damping x amplitude,
+    which is a straight line under Coulomb friction, computes further points of the same curve. It
+    is None if there is no such root.
     """
     falls = np.flatnonzero((curve.damping[:-1] > 0) & (curve.damping[1:] <= 0))
     if not falls.size:
@@ -288,7 +291,7 @@ def _flutter_amplitude(joint: Joint, method: str, curve: Curve) -> float | None:
     known = {low: loss_low, high: loss_high}
 
     def net_loss(log_amplitude: float) -> float:
-        """Return damping x amplitude at the logarithm of an amplitude."""
+        """Return the product of damping ratio and amplitude [m], given the log of the amplitude."""
         if log_amplitude not in known:
             amplitude = np.array([np.exp(log_amplitude)])
             point = compute_curve(joint._replace(has_errors=False), amplitude, method)

@@ -1,4 +1,4 @@
-"""Curve of a mode by a release from the largest amplitude, read from reversal to reversal."""
+"""Backbone of a mode from a decay after release at the largest amplitude."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core import NotConverged
 from ...formatting import format_length
-from ...response.decay_curve import find_turning_points_outside
+from ...response.decay_curve import find_reversals_by_extrapolation
 from ...runs.rig import decays, solve
 from ...runs.rig.engines import ENGINES, SMOOTH
 from .decay_reading import measure_other_modes, read_decay
@@ -16,14 +16,14 @@ from .records import ROUND_OFF_ERROR, Curve, make_curve
 from .release import Release, release_from_largest_decaying, run_release
 
 MAX_DOUBLINGS = 3  # Largest number of times that the time steps are halved.
-# Motion of other modes / amplitude, above which the decay is not one of this mode.
+# Motion of other modes over amplitude above which the decay is not that of a single mode.
 MAX_OTHER_MODES = 0.1
 
 
 class DecayReading(NamedTuple):
-    """Frequency [Hz] and damping ratio (2, k) read from a release, and their errors (2, k).
+    """Frequency [Hz] and damping ratio (2, k) identified from a decay, with errors (2, k).
 
-    reading_error: of the reading from reversal to reversal; run_error: from coarser runs.
+    reading_error: of the evaluation from reversal to reversal; run_error: from coarser runs.
     """
 
     value: np.ndarray
@@ -31,12 +31,12 @@ class DecayReading(NamedTuple):
     run_error: np.ndarray
 
     def known_amplitudes(self) -> np.ndarray:
-        """Return the amplitudes (k,) bool at which values and errors are known."""
+        """Return a mask (k,) of the amplitudes at which values and errors are known."""
         return np.isfinite(self.value + self.run_error).all(axis=0)
 
 
 def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
-    """Return the curve of a release from the largest amplitude, as far as it decays.
+    """Compute the backbone of a mode from its decay after release at the largest amplitude.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
 
 
 def _coarser_in_space(joint: Joint, release: Release) -> list:
-    """Return the runs of a release on coarser meshes or with fewer elements."""
+    """List the runs of a release on coarser meshes or with fewer elements."""
     engine = ENGINES[release.numerics.engine]
     return engine.coarser_in_space(
         release.model, release.numerics, joint.patch, joint.coarse, release.solution
@@ -95,7 +95,7 @@ def _coarser_in_space(joint: Joint, release: Release) -> list:
 
 
 def _note_mixed(amplitudes) -> list:
-    """Return a sentence about amplitudes (k,) [m] at which other modes move too much."""
+    """Return a note on amplitudes (k,) [m] of a decay at which other modes move too much."""
     count = amplitudes.size
     if not count:
         return []
@@ -109,7 +109,7 @@ def _note_mixed(amplitudes) -> list:
 
 
 def _note_growing(amplitudes) -> list:
-    """Return a note about the amplitudes (k,) [m] from which a released motion grows."""
+    """Return a note on the amplitudes (k,) [m] from which a released motion grows."""
     if not amplitudes.size:
         return []
     return [
@@ -119,7 +119,7 @@ def _note_growing(amplitudes) -> list:
 
 
 def _note_unknown_modes(joint: Joint, known, other_modes) -> list:
-    """Return a sentence about amplitudes at which the motion of other modes is not known."""
+    """Return a note on amplitudes at which the motion of other modes is not known."""
     unknown = known & np.isnan(other_modes)
     if joint.modes.omega.size == 1 or not unknown.any():
         return []
@@ -133,14 +133,17 @@ def _note_unknown_modes(joint: Joint, known, other_modes) -> list:
 
 
 class RefinedRelease(NamedTuple):
-    """A release and its reading, with time steps that meet the tolerance or the smallest ones."""
+    """Release of a mode and its decay curve, with time steps that meet the tolerance.
+
+    If no steps meet it, they are the smallest ones.
+    """
 
     release: Release
     reading: DecayReading
 
 
 def _refine_release(joint: Joint, release: Release, amplitudes) -> RefinedRelease:
-    """Halve the time steps until the errors from coarser runs meet the tolerance."""
+    """Halve the time steps of a release until its estimated errors meet the tolerance."""
     model, choice, _ = release
     engine = ENGINES[choice.engine]
     tolerance = joint.model.accuracy.tolerance
@@ -161,7 +164,7 @@ def _refine_release(joint: Joint, release: Release, amplitudes) -> RefinedReleas
 
 
 class _ReleaseVariants:
-    """Frequency [Hz] and damping (2, k) of coarser runs of a release, each computed once.
+    """Cache of frequency [Hz] and damping (2, k) of coarser runs of a release.
 
     Parameters
     ----------
@@ -178,7 +181,7 @@ class _ReleaseVariants:
         self.computed: dict = {}
 
     def curve(self, settings) -> np.ndarray:
-        """Return the values of a coarser run; NaN if it does not decay to an amplitude."""
+        """Return frequency and damping of a coarser run; NaN at amplitudes it does not reach."""
         if settings not in self.computed:
             patch = self.joint.coarse if settings.coarse_patch else self.joint.patch
             solution = solve.solve(self.release.model, replace(settings, whole=True), patch)
@@ -187,18 +190,18 @@ class _ReleaseVariants:
         return self.computed[settings]
 
     def change(self, coarsening, value) -> np.ndarray:
-        """Return the change (2, k) of the values by one kind of coarsening."""
+        """Return the change (2, k) of frequency and damping by a given kind of coarsening."""
         base = value if coarsening.beside is None else self.curve(coarsening.beside)
         runs = coarsening.runs if coarsening.of == "cells" else coarsening.runs[:1]
         return np.max([np.abs(self.curve(run) - base) for run in runs], axis=0)
 
 
 def _read_with_errors(joint: Joint, release: Release, amplitudes) -> DecayReading:
-    """Read a release at amplitudes (k,) [m], with errors from coarser runs."""
+    """Identify frequency and damping at amplitudes (k,) [m] from a release, with errors."""
     model, choice, solution = release
     decay = read_decay(joint, solution.response)
     if choice.engine == SMOOTH.name:
-        other = read_decay(joint, solution.response, find_turning_points_outside)
+        other = read_decay(joint, solution.response, find_reversals_by_extrapolation)
         decay = decay.add_sampling_error(other)
     decay = decay.interpolate(amplitudes)
     value = np.array([decay.frequency, decay.damping])

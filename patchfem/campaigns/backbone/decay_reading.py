@@ -1,4 +1,4 @@
-"""Frequency, damping and purity of a decaying motion, read from reversal to reversal."""
+"""Frequency, damping and modal purity of a decaying motion, from reversal to reversal."""
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -9,26 +9,26 @@ from ...dynamics.harmonic.forces import LawGroup
 from ...dynamics.harmonic.laws import evaluate_series
 from ...response.decay_curve import (
     DecayCurve,
-    compute_swing_curve,
-    find_turning_points,
-    half_swings_between,
+    fit_decay_curve,
+    locate_reversals,
+    make_half_cycles,
 )
 from .balance import HARMONICS, find_free_motions
 from .joint import Joint
 
-N_SAMPLES = 4096  # Samples of a cycle of a free motion.
-# Half swings before and after, over which the maximum effect of other modes is taken.
+N_SAMPLES = 4096  # Number of samples of a cycle of a free motion.
+# Number of half cycles on either side over which the largest effect of other modes is taken.
 N_BEAT_SWINGS = 8
-EQUAL_SWINGS_TOL = 1e-7  # Relative difference of two half swings, up to which nothing slips.
-STUCK_FRACTION = 0.999  # Stiffness / stiffness without slip, above which a contact sticks.
+EQUAL_SWINGS_TOL = 1e-7  # Relative difference of two half cycles below which nothing slips.
+STUCK_FRACTION = 0.999  # Stiffness over the stiffness without slip above which a contact sticks.
 
 
-def read_decay(joint: Joint, motion: Response, find_turns=find_turning_points) -> DecayCurve:
-    """Read a decaying motion from reversal to reversal.
+def read_decay(joint: Joint, motion: Response, find_turns=locate_reversals) -> DecayCurve:
+    """Identify frequency and damping of a decaying motion from reversal to reversal.
 
-    With several modes, the reversals are those of the motion along the shape of the sticking mode, in
-    which other modes move least. Where consecutive swings last equally long, nothing slips: the motion
-    along this shape is then the mode's own, whatever else moves the output.
+    With several modes, the reversals are those of the motion along the shape of the stuck mode, in
+    which other modes move least. Where consecutive half cycles last equally long, nothing slips:
+    the motion along this shape is then that of the mode alone, whatever else moves the output.
 
     Parameters
     ----------
@@ -44,19 +44,19 @@ def read_decay(joint: Joint, motion: Response, find_turns=find_turning_points) -
     shape = joint.shape
     if shape.size == 1:
         turns = find_turns(motion.time, motion.output, motion.output_rate)
-        return compute_swing_curve(half_swings_between(*turns))
+        return fit_decay_curve(make_half_cycles(*turns))
     times, components = find_turns(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
     if times.size < 3:
-        return compute_swing_curve(half_swings_between(times, components))
+        return fit_decay_curve(make_half_cycles(times, components))
     output = CubicHermiteSpline(motion.time, motion.output, motion.output_rate)(times)
     sizes = np.abs(np.diff(output))
     lengths = np.diff(times)
     are_equal = np.abs(np.diff(lengths)) <= EQUAL_SWINGS_TOL * lengths[1:]
     sticks = np.append(True, are_equal) & np.append(are_equal, True)
-    at_output = compute_swing_curve(half_swings_between(times, components, sizes))
+    at_output = fit_decay_curve(make_half_cycles(times, components, sizes))
     mode_sizes = joint.reach / (shape @ shape) * np.abs(np.diff(components))
     sizes = np.where(sticks, mode_sizes, sizes)
-    curve = compute_swing_curve(half_swings_between(times, components, sizes))
+    curve = fit_decay_curve(make_half_cycles(times, components, sizes))
     change = _mode_coupling(joint) * np.abs(curve.damping - at_output.damping)
     if change.size:
         padded = np.pad(change, N_BEAT_SWINGS)
@@ -68,7 +68,7 @@ def read_decay(joint: Joint, motion: Response, find_turns=find_turning_points) -
 
 
 def measure_other_modes(joint: Joint, motion: Response, amplitudes) -> np.ndarray:
-    """Return the motion of other modes / amplitude (k,) in a decay, at amplitudes (k,) [m].
+    """Return the ratio (k,) of the motion of other modes to the amplitude of a decay.
 
     It is the distance of the modal coordinates, and of their rates / omega, from those of the free
     motion by harmonic balance at the same amplitude, at a reversal; both are divided by their
@@ -101,7 +101,7 @@ def measure_other_modes(joint: Joint, motion: Response, amplitudes) -> np.ndarra
         return out
     max_stuck = _max_stuck_displacements(group, free_motions)
     decay = read_decay(joint, motion)
-    times, _ = find_turning_points(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
+    times, _ = locate_reversals(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
     for column, free in zip(columns, free_motions):
         if free is None:
             continue
@@ -123,7 +123,7 @@ def measure_other_modes(joint: Joint, motion: Response, amplitudes) -> np.ndarra
 
 
 def _max_stuck_displacements(group: LawGroup, free_motions: list) -> np.ndarray:
-    """Return the largest displacement (i,) of each interface at which a free motion does not slip."""
+    """Return the largest displacement (i,) of each interface at which free motion does not slip."""
     largest = np.zeros(len(group.rows))
     for free in free_motions:
         if free is not None:
@@ -133,9 +133,12 @@ def _max_stuck_displacements(group: LawGroup, free_motions: list) -> np.ndarray:
 
 
 def _distance_to_free_motion(free, shape, modal, scaled_rate) -> float:
-    """Return the distance of modal coordinates (n,) and rates / omega (n,) from a free motion.
+    """Return the distance of a modal state from a free motion, relative to the mode shape.
 
-    Both are divided by their component along the shape (n,) of the sticking mode.
+    The state consists of coordinates (n,) and rates / omega (n,).
+
+    Coordinates and free motion are divided by their component along the shape (n,) of the stuck
+    mode.
     """
     order = np.arange(free.modal.shape[0])[:, None]
     free_modal = np.apply_along_axis(evaluate_series, 0, free.modal, N_SAMPLES)
@@ -151,7 +154,7 @@ def _distance_to_free_motion(free, shape, modal, scaled_rate) -> float:
 
 
 def _is_stuck(group: LawGroup, free) -> np.ndarray:
-    """Return whether each interface (i,) of a free motion has its stiffness without slip."""
+    """Return whether each interface (i,) has its stick stiffness in a free motion."""
     force = free.forces[:, 1]
     slide = free.slides[:, 1]
     stiffness = STUCK_FRACTION * group.stiffness()
@@ -159,7 +162,7 @@ def _is_stuck(group: LawGroup, free) -> np.ndarray:
 
 
 def _mode_coupling(joint: Joint) -> float:
-    """Return the coupling of other modes along the shape of the sticking mode, at most 1.
+    """Return the coupling of other modes along the shape of the stuck mode, at most 1.
 
     It is the effect of other modes along this shape / their effect at the output. Dampers couple
     the modes.

@@ -1,4 +1,4 @@
-"""Mode with its contact: its shape in sticking contact and the scales of its amplitudes."""
+"""Mode of a rig with its contact: shape of the stuck mode and scales of its amplitudes."""
 
 from collections.abc import Callable
 from functools import partial
@@ -19,19 +19,21 @@ from ...runs.rig.plan import stuck_stiffness
 from .bench_loops import settle_loop
 
 AMPLITUDES_PER_DECADE = 8  # Number of default amplitudes per decade.
-MIN_AMPLITUDE_FACTOR = 1e-2  # Smallest amplitude / amplitude at which the whole contact slips.
-MAX_AMPLITUDE_FACTOR = 15.0  # Largest amplitude / amplitude at which the whole contact slips.
-# Smallest amplitude under rigid friction / the static deflection by friction.
+# Smallest default amplitude over the amplitude at which the complete contact slips.
+MIN_AMPLITUDE_FACTOR = 1e-2
+# Largest default amplitude over the amplitude at which the complete contact slips.
+MAX_AMPLITUDE_FACTOR = 15.0
+# Smallest default amplitude under rigid friction over the static deflection by friction.
 MIN_RIGID_FACTOR = 2.0
-# Largest amplitude / amplitude at which a softening spring no longer returns the block.
+# Largest amplitude over that at which a softening spring no longer returns the block.
 SOFTENING_END = 0.7
-# Largest amplitude / amplitude at which a hardening spring is as stiff as the mode.
+# Largest amplitude over that at which a hardening spring is as stiff as the mode.
 HARDENING_END = 3.0
-# Release of a decay / largest amplitude, because the first swings still depend on the release.
+# Release amplitude over largest amplitude, because the first half cycles depend on the release.
 RELEASE_FACTOR = 1.15
 # First [m] and last [m] amplitude and their number for a linear rig.
 LINEAR_AMPLITUDES = (1e-6, 1e-3, 4)
-# Fraction of the amplitude at which all of the contact slips; at this one nothing slips.
+# Fraction of the amplitude at which the complete contact slips; at it nothing slips.
 STUCK_FRACTION = 1e-5
 ALL_METHODS_CURE = "; use --method quasi-static"
 NO_CLOSED_FORM = (
@@ -41,7 +43,7 @@ NO_CLOSED_FORM = (
 
 
 class StuckMode(NamedTuple):
-    """Mode with the contact stuck.
+    """Structural mode with its contact stuck.
 
     omega: circular frequency [rad/s], None if nothing is elastic; shape: (n,).
     """
@@ -51,7 +53,7 @@ class StuckMode(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """A mode of a rig with its contact.
+    """Mode of a rig together with its contact.
 
     Attributes
     ----------
@@ -79,12 +81,12 @@ class Joint(NamedTuple):
 
     @property
     def modes(self):
-        """The ModalBasis of the rig."""
+        """Modal basis of the rig."""
         return self.model.rig.modes
 
     @property
     def coarse(self):
-        """The patch on the first coarser mesh, or None."""
+        """Contact patch on the first coarser mesh, or None."""
         return self.coarser[0]
 
     @property
@@ -99,7 +101,7 @@ class Joint(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """Motion at the output per unit of `shape`."""
+        """Output displacement per unit of the stuck mode shape."""
         return abs(float(self.modes.output @ self.shape))
 
     @property
@@ -111,12 +113,12 @@ class Joint(NamedTuple):
 
     @property
     def face_slide(self) -> float:
-        """Relative displacement of that interface per unit of `shape`."""
+        """Relative displacement of the dominant interface per unit of the stuck mode shape."""
         return float(self.modes.interfaces[self.face] @ self.shape)
 
     @property
     def friction_limit(self) -> float:
-        """Largest friction force of that interface [N]; 0 without friction."""
+        """Friction limit of the dominant interface [N]; 0 without friction."""
         model = self.model
         if len(model.rig.friction.interfaces) > 1 and self.patch is None:
             interface = model.rig.friction.interfaces[self.face]
@@ -153,12 +155,12 @@ class Joint(NamedTuple):
 
     @property
     def deflection(self) -> float:
-        """Relative displacement [m] by which the largest friction deflects the free mode."""
+        """Relative displacement [m] of the free mode under the friction limit as a static force."""
         return self.friction_limit * self.face_slide**2 / self.spring
 
     @property
     def slip_displacement(self) -> float:
-        """Relative displacement [m] at which all of the contact slips.
+        """Relative displacement [m] at which the complete contact slips.
 
         For rigid friction it is the static deflection by friction. For springs alone it is the
         displacement at which a cubic spring doubles the stiffness of the mode, or the one of an
@@ -173,16 +175,16 @@ class Joint(NamedTuple):
         return self.friction_limit / stiffness if stiffness else self.deflection
 
     def output_amplitude(self, slide):
-        """Return the amplitude at the output [m] at which the interface moves by `slide` [m]."""
+        """Return the amplitude at the output [m] for a relative displacement amplitude [m]."""
         return self.reach / (abs(self.face_slide) or 1.0) * slide
 
     @property
     def slip_amplitude(self) -> float:
-        """Amplitude at the output [m] at which all of the contact slips."""
+        """Amplitude at the output [m] at which the complete contact slips."""
         return self.output_amplitude(self.slip_displacement)
 
     def default_amplitudes(self) -> np.ndarray:
-        """Return amplitudes (k,) [m] from a sticking contact to a mode that moves as if free."""
+        """Return amplitudes (k,) [m] from a stuck contact to a mode that moves as if free."""
         rig = self.model.rig
         if self.is_linear:
             return np.geomspace(*LINEAR_AMPLITUDES) * min(
@@ -195,7 +197,7 @@ class Joint(NamedTuple):
         return np.geomspace(low, high, count)
 
     def _default_slides(self) -> tuple:
-        """Return the smallest and largest displacement [m] of the default amplitudes."""
+        """Return the smallest and largest relative displacement [m] of the default amplitudes."""
         stiffness = float(self.stiffness[self.face])
         deflection = self.deflection if self.friction_limit else 0.0
         if 0 < stiffness < np.inf or not deflection:
@@ -204,7 +206,7 @@ class Joint(NamedTuple):
         return MIN_RIGID_FACTOR * deflection, MAX_AMPLITUDE_FACTOR**2 * deflection
 
     def _max_amplitude(self) -> float:
-        """Return the largest default amplitude [m] by the stop and by a cubic spring."""
+        """Return the largest default amplitude [m] that the stop and a cubic spring allow."""
         rig = self.model.rig
         modes = self.modes
         travel = rig.springs.travel / RELEASE_FACTOR
@@ -216,9 +218,9 @@ class Joint(NamedTuple):
         return min(travel, doubling * end)
 
     def steady_laws(self) -> LawGroup:
-        """Return the steady loops of all laws.
+        """Return the steady friction loops of all interface laws.
 
-        PatchfemError if a law has no steady loop in closed form.
+        Raises PatchfemError if a law has no steady loop in closed form.
         """
         try:
             return decays.laws_on(self.model, self.patch)
@@ -229,7 +231,7 @@ class Joint(NamedTuple):
             raise PatchfemError(NO_CLOSED_FORM + cure) from None
 
     def require_steady_loops(self, method: str) -> None:
-        """Raise PatchfemError if the steady loops of the contact do not determine the free motion."""
+        """Raise PatchfemError if steady loops of the contact do not determine its free motion."""
         model = self.model
         reason = ""
         if model.grooves is not None:
@@ -244,7 +246,10 @@ class Joint(NamedTuple):
             raise PatchfemError(f"{method} cannot be computed {reason}")
 
     def space_errors(self, read: Callable) -> np.ndarray | float:
-        """Return the errors of read(LawGroup) due to the mesh and to the discrete sliders of a law."""
+        """Return the errors of a quantity due to the mesh and to the discrete sliders of a law.
+
+        `compute` maps a LawGroup to the quantity.
+        """
         model = self.model
         laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
         has_cells = any(law_has_trait(law, "cells") for law in laws)
@@ -266,7 +271,7 @@ class Joint(NamedTuple):
 
 
 def build_joint(model: Model, name: str) -> Joint:
-    """Press the patch of a rig and hold the contact of one of its modes.
+    """Solve the contact of a rig and return it with one of its modes.
 
     Parameters
     ----------

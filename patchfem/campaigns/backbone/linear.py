@@ -1,4 +1,4 @@
-"""Curves of a mode in a linear rig: frequency and damping are the same at all amplitudes."""
+"""Backbone of a mode in a linear rig, with equal frequency and damping at all amplitudes."""
 
 import numpy as np
 
@@ -6,12 +6,12 @@ from ...core import NotConverged
 from .joint import Joint
 from .records import ROUND_OFF_ERROR, Curve, make_curve
 
-# Fixed-point steps to the negative damping that maintains the motion; they converge fast.
+# Number of fixed-point steps to the negative damping that sustains the motion; they converge fast.
 N_STEPS = 8
 
 
 def compute_level_curve(joint: Joint, amplitudes, method: str) -> Curve:
-    """Return the constant curve of a linear rig.
+    """Return the constant frequency and damping curve of a mode in a linear rig.
 
     By decay, frequency and damping ratio are those of the damped mode. For the other methods, a
     negative damping g of every coordinate maintains the motion: the frequency is that of this
@@ -43,7 +43,7 @@ def compute_level_curve(joint: Joint, amplitudes, method: str) -> Curve:
 def _find_root(joint: Joint, negative_damping: float) -> complex:
     """Return the eigenvalue of z'' + (D - g) z' + Omega^2 z = 0 that belongs to the mode.
 
-    It is the one whose eigenvector has the largest component of the mode.
+    Its eigenvector has the largest component of the mode.
 
     negative_damping: g [1/s].
     """

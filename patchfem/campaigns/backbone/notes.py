@@ -1,4 +1,4 @@
-"""Sentences about the curves of a backbone: gaps, and differences of the methods."""
+"""Notes on the curves of a backbone: gaps, and differences between the methods."""
 
 import numpy as np
 
@@ -8,12 +8,13 @@ from ...runs.patch import faces
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
 from .records import Curve
 
-# Amplitude / amplitude at which the whole contact begins to slip; below this ratio it is in micro-slip.
+# Largest amplitude of micro-slip over the amplitude at which the complete contact begins to slip.
 MICRO_SLIP_END = 0.3
-MIN_LOSS_RATIO = 4.0  # Loss / error of the loss, above which a loss counts for an exponent.
-MAX_LISTED = 6  # Amplitudes that a sentence lists one by one.
-REPORT_OTHER_MODES = 1e-3  # Motion of other modes / amplitude, above which a sentence states it.
-MIN_RATIO = 2.0  # Ratio of two values, above which a sentence gives the ratio and not a percentage.
+# Smallest ratio of a loss to its error with which the loss counts for an exponent.
+MIN_LOSS_RATIO = 4.0
+MAX_LISTED = 6  # Largest number of amplitudes that a sentence lists individually.
+REPORT_OTHER_MODES = 1e-3  # Motion of other modes over amplitude above which a sentence states it.
+MIN_RATIO = 2.0  # Ratio of two values above which a sentence gives the ratio and not a percentage.
 MISSING_ERRORS = (
     "the errors of the curves do not account for the mesh, because no coarser mesh was computed: "
 )
@@ -33,7 +34,7 @@ REASONS_OF_DIFFERENCES = {
 
 
 def note_linear_rig(joint: Joint) -> list:
-    """Return a sentence about a rig that has friction in the scene although no friction acts."""
+    """Return a note on a rig whose scene has friction although no friction acts."""
     has_friction = joint.model.friction is not None or joint.model.rig.friction.interfaces
     if joint.is_linear and has_friction:
         return ["no friction acts, so frequency and damping are the same at all amplitudes"]
@@ -41,12 +42,12 @@ def note_linear_rig(joint: Joint) -> list:
 
 
 def note_wear(model: Model) -> list:
-    """Return a sentence about a scene with wear."""
+    """Return a note that the backbone of a scene with wear neglects the wear."""
     return [] if model.wear is None else ["these curves are for unworn pieces: [wear] is ignored"]
 
 
 def note_missing_mesh(joint: Joint) -> list:
-    """Return a sentence about a contact with partial slip that has no coarser mesh."""
+    """Return a note on a contact with partial slip that has no coarser mesh."""
     model = joint.model
     if joint.is_linear:
         return []
@@ -60,7 +61,7 @@ def note_missing_mesh(joint: Joint) -> list:
 
 
 def note_micro_slip(joint: Joint, amplitudes) -> list:
-    """Return a sentence about amplitudes (k,) [m] that do not determine the exponent of micro-slip."""
+    """Return a note on amplitudes (k,) [m] that do not determine the micro-slip exponent."""
     edge = MICRO_SLIP_END * joint.slip_amplitude
     if amplitudes[0] > edge:
         begin = format_length(MIN_AMPLITUDE_FACTOR / MICRO_SLIP_END * edge, 2)
@@ -78,7 +79,7 @@ def note_micro_slip(joint: Joint, amplitudes) -> list:
 
 
 def note_gaps(amplitudes, curves: dict) -> list:
-    """Return sentences about the requested amplitudes (k,) [m] at which a curve has no value."""
+    """Return notes on the requested amplitudes (k,) [m] at which a curve has no value."""
     out = []
     for method, curve in curves.items():
         missing = amplitudes[~np.isin(amplitudes, curve.amplitude)]
@@ -98,7 +99,9 @@ def note_gaps(amplitudes, curves: dict) -> list:
 
 
 def note_secant_stiffness(joint: Joint, amplitudes, curves: dict) -> list:
-    """Return a note about the secant stiffness of a static curve in slip, without one by balance.
+    """Return a note on the secant stiffness of a quasi-static curve in slip.
+
+    It is given if no curve by harmonic balance exists.
 
     Parameters
     ----------
@@ -122,7 +125,7 @@ def note_secant_stiffness(joint: Joint, amplitudes, curves: dict) -> list:
 
 
 def note_differences(curves: dict) -> list:
-    """Return sentences about curves that differ from the balance by more than both errors."""
+    """Return notes on curves that differ from harmonic balance by more than both errors."""
     if "balance" not in curves:
         return []
     balance = curves["balance"]
@@ -143,7 +146,7 @@ def note_differences(curves: dict) -> list:
 def _note_largest_difference(
     method: str, name: str, curve: Curve, balance: Curve, reason: str
 ) -> list:
-    """Return a sentence about the largest difference of two curves at the same amplitudes.
+    """Return a note on the largest difference of two curves at the same amplitudes.
 
     Parameters
     ----------
@@ -152,7 +155,7 @@ def _note_largest_difference(
     name : {"frequency", "damping"}
     curve, balance : Curve
     reason : str
-        Reason of the difference, with a place for the fraction that a cycle loses.
+        Reason of the difference, with a placeholder for the fraction that a cycle loses.
     """
     value = getattr(curve, name)
     balance_value = getattr(balance, name)

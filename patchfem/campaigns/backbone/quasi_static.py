@@ -1,4 +1,4 @@
-"""Curve of a mode by a static force that has the shape of the mode with the contact stuck."""
+"""Backbone of a mode from a static force with the shape of the stuck mode."""
 
 import numpy as np
 
@@ -12,15 +12,16 @@ from .bench_loops import LOOP_MEASURES, settle_loop
 from .joint import Joint
 from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 
-N_SAMPLES = 4096  # Samples of a cycle of a loop; half as many give the error.
-MAX_STEPS = 60  # Maximum number of corrections of the displacement until the amplitude is the requested one.
-MIN_FLOOR = 1e-10  # Smallest relative error of a loop on a bench.
+N_SAMPLES = 4096  # Number of samples of a friction loop per cycle; half as many give the error.
+# Largest number of corrections of the displacement until the amplitude is the requested one.
+MAX_STEPS = 60
+MIN_FLOOR = 1e-10  # Smallest relative error of a friction loop on a bench.
 
 
 def compute_static_curve(joint: Joint, amplitudes) -> Curve:
-    """Return the curve by a static force.
+    """Compute the backbone of a mode from loops under a static modal force.
 
-    Laws whose loops have no closed form are run on a bench.
+    Loops of laws without a closed form are computed on a bench.
     """
     joint.require_steady_loops("static curve")
     if joint.is_rigid:
@@ -39,7 +40,7 @@ def compute_static_curve(joint: Joint, amplitudes) -> Curve:
         return _by_bench_loops(joint, amplitudes)
 
     def read(group, samples: int) -> np.ndarray:
-        """Return amplitude, frequency, damping and loss (4, k) by the loops of a LawGroup."""
+        """Return amplitude, frequency, damping and loss (4, k) from the loops of a LawGroup."""
         return decays.static_rows(joint.modes, group, joint.mode, amplitudes, samples)
 
     best = read(laws, N_SAMPLES)
@@ -51,9 +52,9 @@ def compute_static_curve(joint: Joint, amplitudes) -> Curve:
 
 
 def _rising_part(best, error) -> Curve:
-    """Return the part of the curve on which the force increases.
+    """Select the part of a quasi-static curve on which the force increases.
 
-    After this part no equilibrium is stable.
+    Beyond this part no equilibrium is stable.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def _rising_part(best, error) -> Curve:
 
 
 def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
-    """Return the curve of one interface whose law has its loop in closed form, else None."""
+    """Compute the curve of a single interface in closed form; None if its law has none."""
     model = joint.model
     modes = joint.modes
     is_soft = (
@@ -90,7 +91,7 @@ def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
         is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
         if is_wanted.all():
             break
-        # The shape at the output differs from that of the sticking mode.
+        # The shape at the output differs from that of the stuck mode.
         slides = slides * amplitudes / best[0]
     is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
     best = np.where(is_wanted, best, np.nan)
@@ -100,7 +101,10 @@ def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
 
 
 def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
-    """Return amplitude, frequency, damping and loss (4, k) by loops at displacements (k,) [m]."""
+    """Return amplitude, frequency, damping and loss (4, k) from given loops.
+
+    The loops have displacement amplitudes (k,) [m].
+    """
     modes = joint.modes
     statics = quasi_static.find_static_motions_from_loops(
         modes, modes.interfaces[0], joint.stuck_mode, slides, loops
@@ -109,7 +113,7 @@ def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
 
 
 def _by_bench_loops(joint: Joint, amplitudes) -> Curve:
-    """Return the curve by loops of the contact on a bench at the frequency of the mode."""
+    """Compute the curve from bench loops of the contact at the frequency of the mode."""
     slides = np.abs(joint.modes.interfaces[0] @ joint.shape) * amplitudes / joint.reach
     patches = [joint.patch]
     if joint.coarse is not None:

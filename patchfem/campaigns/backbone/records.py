@@ -1,17 +1,17 @@
-"""Records of a backbone: the curves of a mode, its frequencies and exponents of the loss."""
+"""Records of a backbone: curves of a mode, its frequencies and its loss exponents."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 METHODS = ("balance", "decay", "quasi-static")
-ROUND_OFF_ERROR = 1e-9  # Relative error of a value due to round-off.
+ROUND_OFF_ERROR = 1e-9  # Relative round-off error of a computed value.
 AMPLITUDE_TOL = 1e-7  # Relative difference below which two amplitudes are equal.
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error", "loss")
 
 
 class Curve(NamedTuple):
-    """Frequency and damping of a mode against amplitude, by one method.
+    """Frequency and damping of a mode against amplitude, computed by a given method.
 
     Attributes
     ----------
@@ -39,20 +39,22 @@ class Curve(NamedTuple):
     other_modes: np.ndarray | None = None
 
     def at(self, points) -> "Curve":
-        """Return the curve at some of its points, selected by bools (k,) or by a slice."""
+        """Return the points of the curve selected by bools (k,) or by a slice."""
         columns = {name: getattr(self, name)[points] for name in COLUMNS}
         if self.other_modes is not None:
             columns["other_modes"] = self.other_modes[points]
         return self._replace(**columns)
 
     def interpolate(self, amplitudes) -> dict:
-        """Return frequency and damping at other amplitudes (k,) [m] by name."""
+        """Interpolate frequency and damping at given amplitudes (k,) [m], by name."""
         names = ("frequency", "damping")
         return {name: np.interp(amplitudes, self.amplitude, getattr(self, name)) for name in names}
 
 
 def make_curve(amplitude, values, errors, **columns) -> Curve:
-    """Return a curve with an unknown loss, if it is not the last row of the values.
+    """Make a curve from values and errors; the energy loss is optional.
+
+    It is the last row of the values if it is known, else NaN.
 
     Parameters
     ----------
@@ -71,7 +73,7 @@ def make_curve(amplitude, values, errors, **columns) -> Curve:
 
 
 class ModeFrequencies(NamedTuple):
-    """Frequencies [Hz] of a mode without its contact and with a contact that sticks.
+    """Frequencies [Hz] of a mode without its contact and with a sticking contact.
 
     stuck: None if the contact does not move in the mode; stuck_error: None if it is not known.
     """
@@ -82,7 +84,9 @@ class ModeFrequencies(NamedTuple):
 
 
 class LossExponents(NamedTuple):
-    """Exponents of the loss of the contact as a power of the amplitude; None if not determined.
+    """Exponents of the energy loss of a contact as a power of the amplitude.
+
+    An exponent is None if it is not determined.
 
     micro: in micro-slip; gross: in gross slip; micro_theory: theoretical value in micro-slip.
     """
@@ -93,7 +97,7 @@ class LossExponents(NamedTuple):
 
 
 class Backbone(NamedTuple):
-    """Curves of a mode.
+    """Backbone of a mode: its curves by all methods, frequencies and loss exponents.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Release of a mode from an amplitude, in which no other mode is excited, and the run of its decay."""
+"""Release of a single mode at a given amplitude, and the run of its decay."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from ...effects import NO_WAVEFORM
 from ...formatting import format_length
 from ...model.model import Model
 from ...model.rig import DriveLevels
-from ...response.decay_curve import find_turning_points
+from ...response.decay_curve import locate_reversals
 from ...runs.rig import decays, numerics, solve
 from ...runs.rig.engines import PIECES
 from ...structure import drives
@@ -19,24 +19,27 @@ from .balance import HARMONICS, find_free_motions
 from .decay_reading import read_decay
 from .joint import MIN_AMPLITUDE_FACTOR, RELEASE_FACTOR, Joint
 
-# Cycles of the first decay; longer ones follow until the amplitude is small enough.
+# Number of cycles of the first decay; longer ones follow until the amplitude is small enough.
 FIRST_CYCLES = 50
-MAX_CYCLES_ONE_MODE = 12800  # Cycles of the longest decay of one mode; a longer one takes minutes.
-MAX_CYCLES = 3200  # The same for several modes, for which each cycle takes longer.
-MAX_CYCLES_TURNS = 102400  # For one mode with elastic elements, of which only reversals are stored.
-# Amplitudes at which the free motion of a release is computed, up to that of the release.
+# Largest number of cycles of the decay of one mode; a longer one takes minutes.
+MAX_CYCLES_ONE_MODE = 12800
+MAX_CYCLES = 3200  # Largest number of cycles with several modes, for which each cycle takes longer.
+# Largest number of cycles of one mode with elastic elements, of which only reversals are stored.
+MAX_CYCLES_TURNS = 102400
+# Number of amplitudes at which the free motion of a release is computed, up to that of the release.
 N_START_STEPS = 12
-MAX_RAISED = 3  # Maximum number of repeated releases, each from a higher amplitude.
+MAX_RAISED = 3  # Largest number of repeated releases, each from a higher amplitude.
 MAX_RAISE_FACTOR = 8.0  # Largest ratio of the amplitudes of two successive releases.
-# End of a decay / smallest amplitude, by which coarser runs reach this amplitude as well.
+# Final amplitude of the decay over the smallest requested one, such that coarser runs reach it too.
 END_FACTOR = 0.8
-N_FREE_SWINGS = 3.0  # Periods of the free mode within which the first swings of a decay appear.
-ANNOUNCED_SECONDS = 20.0  # CPU seconds of a decay, above which it is announced.
-COARSER_RUNS_FACTOR = 2.0  # CPU seconds of a decay with its coarser runs / without them.
+# Number of periods of the free mode within which the first half cycles of a decay appear.
+N_FREE_SWINGS = 3.0
+ANNOUNCED_SECONDS = 20.0  # CPU time [s] of a decay above which it is announced.
+COARSER_RUNS_FACTOR = 2.0  # CPU time of a decay with its coarser runs over that without them.
 
 
 class Release(NamedTuple):
-    """Run of a release: its model, its numerical settings and its Solution."""
+    """Run of a released mode: its model, numerical settings and Solution."""
 
     model: Model
     numerics: object
@@ -44,18 +47,21 @@ class Release(NamedTuple):
 
 
 class DecayingRelease(NamedTuple):
-    """A release that does not grow, and the number of amplitudes up to the one of the release."""
+    """Release whose motion does not grow, with the number of amplitudes up to its own."""
 
     n_amplitudes: int
     release: Release
 
 
 class _GrowingRelease(NotConverged):
-    """Raised if a released motion grows: negative damping supplies more energy than is dissipated."""
+    """Exception for a released motion that grows.
+
+    Negative damping then supplies more energy than is dissipated.
+    """
 
 
 def run_release(joint: Joint, model: Model, choice) -> Release:
-    """Run the model of a release.
+    """Compute the motion of a model of a released mode.
 
     Parameters
     ----------
@@ -73,7 +79,7 @@ def run_release(joint: Joint, model: Model, choice) -> Release:
 
 
 def release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> DecayingRelease:
-    """Release the mode from the largest amplitude from which its motion does not grow.
+    """Release the mode at the largest amplitude from which its motion does not grow.
 
     Parameters
     ----------
@@ -105,18 +111,19 @@ def release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> De
 
 
 def _is_growing(joint: Joint, motion: Response) -> bool:
-    """Return whether the swings of a motion grow along the shape of the sticking mode."""
+    """Return whether the oscillation grows along the shape of the stuck mode."""
     shape = joint.shape
-    _, turns = find_turning_points(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
+    _, turns = locate_reversals(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
     swings = np.abs(np.diff(turns))
     return find_decay_rate(joint.modes) < 0 and swings.size > 2 and swings[-1] > swings[0]
 
 
 def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
-    """Release the mode and compute as many cycles as the decay to the smallest amplitude takes.
+    """Release the mode and compute its decay down to the smallest requested amplitude.
 
     The release begins at an amplitude at which the first reading is above the largest amplitude.
-    Each longer run is announced with a time that follows from the time per cycle of the run before.
+    Each longer run is announced with a time that follows from the time per cycle of the previous
+    run.
     """
     travel = joint.model.rig.springs.travel
     begin = min(RELEASE_FACTOR * float(amplitudes[-1]), travel)
@@ -142,7 +149,8 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
         if not decay.time.size:
             if cycles >= max_cycles or end >= free_swings:
                 return release
-            # The cycles are those of the sticking mode; a swing in slip can last hundreds of them.
+            # The cycles are those of the stuck mode; a half cycle in slip can last hundreds of
+            # them.
             cycles = min(8 * cycles, max_cycles)
             continue
         high = decay.amplitude[0]
@@ -160,14 +168,14 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
 
 
 def _max_cycles(joint: Joint, engine: str) -> int:
-    """Return the largest number of cycles of a release."""
+    """Return the largest number of cycles that a release may take."""
     if joint.modes.omega.size > 1:
         return MAX_CYCLES
     return MAX_CYCLES_TURNS if engine == PIECES.name else MAX_CYCLES_ONE_MODE
 
 
 def _choose_numerics(joint: Joint, begin: float, cycles: int) -> tuple:
-    """Return the model of a release from an amplitude `begin` [m], and its numerical settings."""
+    """Return the model of a release at a given amplitude [m], and its numerical settings."""
     model = release_model(joint, begin)
     drive = replace(model.rig.drive, cycles=float(cycles))
     model = replace(model, rig=replace(model.rig, drive=drive))
@@ -179,7 +187,7 @@ def _choose_numerics(joint: Joint, begin: float, cycles: int) -> tuple:
 
 
 def _raise_release(joint: Joint, begin: float, high: float, largest: float) -> float:
-    """Return a higher amplitude [m] for a release whose first reading is below `largest`.
+    """Return a higher release amplitude [m] after a first reading below `largest`.
 
     Parameters
     ----------
@@ -191,7 +199,7 @@ def _raise_release(joint: Joint, begin: float, high: float, largest: float) -> f
     largest : float
         Amplitude [m] that the first reading must exceed.
     """
-    # Friction reduces the amplitude by two static deflections per half swing.
+    # Friction reduces the amplitude by two static deflections per half cycle.
     deflection = joint.output_amplitude(joint.deflection) if joint.friction_limit else 0.0
     limit = max(MAX_RAISE_FACTOR * begin, RELEASE_FACTOR * (begin + 2 * deflection))
     raised = begin * RELEASE_FACTOR * largest / high
@@ -199,7 +207,7 @@ def _raise_release(joint: Joint, begin: float, high: float, largest: float) -> f
 
 
 def release_model(joint: Joint, amplitude: float) -> Model:
-    """Return the model of a mode that is released at an amplitude [m] of the output."""
+    """Return the model of a mode that is released at an output amplitude [m]."""
     model = decays.with_automatic_method(joint.model)
     period = 2 * np.pi / (joint.omega)
     rig = model.rig.with_signal(
@@ -215,11 +223,11 @@ def release_model(joint: Joint, amplitude: float) -> Model:
 
 
 def _start_release(joint: Joint, amplitude: float) -> InitialState:
-    """Return the initial state of a release at an amplitude [m] of the output.
+    """Return the initial state of a mode released at an output amplitude [m].
 
     It is the free motion by harmonic balance, in which no other mode is excited. If this is not
     known, it is the shape of the mode: with the contact stuck, or without the contact at amplitudes
-    at which all of it slips.
+    at which the complete contact slips.
     """
     modes = joint.modes
     at_rest = np.zeros(modes.omega.size)

@@ -1,4 +1,4 @@
-"""Fits of one scene: values of its keys that explain a measurement.
+"""Fits of a scene: values of its keys that explain a measurement.
 
 In: a scene, ranges of its free keys, and a measurement: a friction loop (`loop`), a curve of frequency
 and damping against amplitude (`curve`), a worn depth (`wear`), or the loops of the scene's own patch

@@ -1,4 +1,4 @@
-"""Fit of a rig to frequency and damping against amplitude, from a decay or any backbone.
+"""Fit of a rig to measured frequency and damping against amplitude.
 
 The curve of the model is that of a periodic motion at the measured amplitudes, by harmonic balance.
 The search uses the curve of one static force, which takes a hundredth of the time, corrected so
@@ -36,17 +36,20 @@ UNITS = {
     "damping": {"": 1.0, "1": 1.0},
 }
 HEADER = "decay_amplitude [m],decay_frequency [Hz],decay_damping [1]"
-DEFAULT_FREQUENCY_ERROR = 1e-3  # Relative error of a frequency in a row without its error.
-DEFAULT_DAMPING_ERROR = 5e-2  # Relative error of a damping ratio in a row without its error.
+# Relative error that is assumed for a frequency if its row states none.
+DEFAULT_FREQUENCY_ERROR = 1e-3
+# Relative error that is assumed for a damping ratio if its row states none.
+DEFAULT_DAMPING_ERROR = 5e-2
 # Smallest relative standard deviation of a value, because an error of 0 has no weight.
 MIN_SPREAD = 1e-6
 METHODS = ("balance", "quasi-static")  # The first method is the reference, the last one is fast.
-DEFAULT_STARTS = 6  # Starts of a search by the fast method.
-# Values that are tried in addition to those of the scene until both methods have a curve.
+DEFAULT_STARTS = 6  # Number of starts of a search by the fast method.
+# Largest number of values tried besides those of the scene until both methods have a curve.
 MAX_TRIALS = 8
-PROGRESS_SECONDS = 10.0  # Time from one line of progress to the next.
-MAX_LISTED = 6  # Amplitudes that a sentence lists one by one.
-N_CACHED_CURVES = 8  # Curves that are kept, because a step of the search needs the last ones again.
+PROGRESS_SECONDS = 10.0  # Time between two lines of progress [s].
+MAX_LISTED = 6  # Largest number of amplitudes that a sentence lists individually.
+# Number of cached curves, because a step of the search needs the last ones again.
+N_CACHED_CURVES = 8
 NO_MODE_ERROR = "the intervals do not contain the error of the modes left out of the structure"
 
 
@@ -74,7 +77,7 @@ class MeasuredCurve(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedCurve:
-    """A fit to a curve.
+    """Fit of a rig to a measured curve of frequency and damping.
 
     Attributes
     ----------
@@ -85,7 +88,7 @@ class FittedCurve:
     model : (2, k) array
         Fitted frequency [Hz] and damping ratio.
     method : {"balance", "quasi-static"}
-        How the model's curve was computed.
+        How the curve of the model was computed.
     notes : tuple of str
         Sentences about what is compared, and about the error of the modes that a reduced structure lacks.
     """
@@ -108,7 +111,10 @@ def is_curve(path) -> bool:
 
 
 def read_curve(path) -> MeasuredCurve:
-    """Read a table that `import --decay` or `backbone` wrote; PatchfemError names mistakes."""
+    """Read a measured curve that `import --decay` or `backbone` wrote.
+
+    Raises PatchfemError that names all mistakes.
+    """
     table = _read_table(path)
     if len(set(table.labels.get("method", ("",)))) > 1:
         raise PatchfemError(
@@ -138,7 +144,7 @@ def read_curve(path) -> MeasuredCurve:
 
 
 def _read_table(path):
-    """Read the columns of a curve, with or without the prefix "decay_"."""
+    """Read the columns of a curve file, with or without the prefix "decay_"."""
     units = {}
     for prefix in ("decay_", ""):
         for name, unit in UNITS.items():
@@ -149,7 +155,7 @@ def _read_table(path):
 
 
 class CurveModel:
-    """Frequency [Hz] and damping ratio (2, k) of a rig at measured amplitudes, by free values.
+    """Frequency [Hz] and damping (2, k) of a rig at measured amplitudes, by free parameters.
 
     Methods raise PatchfemError for values without a curve.
 
@@ -177,15 +183,15 @@ class CurveModel:
         self._cached_curve = lru_cache(N_CACHED_CURVES)(self._compute)
 
     def compute(self, method: str, values) -> np.ndarray:
-        """Return the curve by a method, NaN at amplitudes at which the mode does not oscillate."""
+        """Compute the curve by a method; NaN at amplitudes at which the mode does not oscillate."""
         return self._cached_curve(tuple(map(float, values)), method)
 
     def model(self, values):
-        """Build the rig with these values, with the modes that it has without the joint."""
+        """Build the rig for given free parameters, with the modes that it has without the joint."""
         return model_without_joint(self.base, format_assignments(self.ranges, values))
 
     def compute_model_curve(self, model, method: str) -> np.ndarray:
-        """Compute the curve of any model at the measured amplitudes."""
+        """Compute frequency and damping of any model at the measured amplitudes."""
         return _compute_curve(model, self.distinct, method)[:, self.rows]
 
     def _compute(self, values: tuple, method: str) -> np.ndarray:
@@ -197,7 +203,7 @@ class CurveModel:
         return self.compute_model_curve(self.model(values), method)
 
     def choose_methods(self, trials: list) -> None:
-        """Keep the METHODS that have a curve at the first values at which most of them have one."""
+        """Select the METHODS that have a curve for the first trial values at which most have one."""
         reasons: list = []
         best: list = []
         for values in trials:
@@ -220,11 +226,11 @@ class CurveModel:
         self.methods = best
 
     def reference(self, values) -> np.ndarray:
-        """Return the curve by the reference method, NaN if the mode does not oscillate."""
+        """Compute the curve by the reference method; NaN where the mode does not oscillate."""
         return self.compute(self.methods[0], values)
 
     def quick(self, values) -> np.ndarray:
-        """Return the curve by the fast method; PatchfemError if the mode does not oscillate."""
+        """Compute the curve by the fast method; PatchfemError if the mode does not oscillate."""
         curve = self.compute(self.methods[-1], values)
         missing = self.amplitude[np.isnan(curve[0])]
         if missing.size:
@@ -235,10 +241,10 @@ class CurveModel:
         return curve
 
     def complete_reference(self, values) -> np.ndarray:
-        """Return the curve by the reference method, without gaps.
+        """Compute the curve by the reference method, with gaps filled by the fast method.
 
-        In rows in which only this method has no value, the fast method's value is multiplied by the
-        ratio of both methods in the row that is nearest in amplitude.
+        In rows in which only the reference method has no value, the value of the fast method is
+        multiplied by the ratio of both methods in the row that is nearest in amplitude.
         """
         curve = self.reference(values)
         quick = self.compute(self.methods[-1], values)
@@ -250,7 +256,7 @@ class CurveModel:
 def fit_curve(
     scene: Scene, to: Path, free: Sequence, say=None, starts: int = DEFAULT_STARTS
 ) -> FittedCurve:
-    """Fit keys of a rig to a curve of frequency and damping against amplitude.
+    """Fit keys of a rig to a measured curve of frequency and damping against amplitude.
 
     Each row is weighted by its error. Values at which the mode does not oscillate are failed
     evaluations. For a reduced structure the intervals contain the error of the missing modes.
@@ -319,7 +325,7 @@ def fit_curve(
 
 
 def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tuple:
-    """Return the corrected fast model, or None, and its best values."""
+    """Fit the surrogate model; return it, or None, and its best-fit parameters."""
     try:
         return models.search(start, starts)
     except NotConverged:
@@ -333,7 +339,7 @@ def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tupl
 
 
 def _describe_substitutes(amplitudes) -> str:
-    """Return the warning about amplitudes (k,) [m] at which the balance has no result."""
+    """Return the warning on amplitudes (k,) [m] at which harmonic balance has no result."""
     return (
         f"harmonic balance found no oscillation at the amplitudes {_list_amplitudes(amplitudes)}; there, "
         "the values of the static curve are used, multiplied by the ratio of the two methods at "
@@ -342,7 +348,7 @@ def _describe_substitutes(amplitudes) -> str:
 
 
 def _compare_methods(path, method: str, measured: MeasuredCurve) -> tuple:
-    """Return a note if the measured curve is of another kind than that of the model."""
+    """Return a note if the measured curve and that of the model are of different kinds."""
     label = (*_read_table(path).labels.get("method", ()), "decay")[0]
     if label == method:
         return ()
@@ -359,7 +365,7 @@ def _compare_methods(path, method: str, measured: MeasuredCurve) -> tuple:
 
 
 class WidenedFit(NamedTuple):
-    """A fit whose intervals contain the error of missing modes, and notes about it."""
+    """Fit with intervals that include the error of missing modes, and notes on it."""
 
     fit: Fit
     notes: tuple
@@ -373,7 +379,7 @@ def _include_missing_modes(
     measured: MeasuredCurve,
     model: Callable,
 ) -> WidenedFit:
-    """Widen the intervals by the effect of modes that a reduced structure lacks.
+    """Widen the intervals of a fit by the effect of modes that a reduced structure lacks.
 
     Parameters
     ----------
@@ -420,12 +426,12 @@ def _include_missing_modes(
 
 
 def _format_fraction(change: float, value: float) -> str:
-    """Format a change as a percentage of a value, or as it is if the value is 0."""
+    """Format a change as a percentage of a value, or as a number if the value is 0."""
     return f"{100 * change / abs(value):.2g} %" if value else f"{change:.2g}"
 
 
 def _nearest_rows(amplitudes, others) -> np.ndarray:
-    """Find the amplitudes (k,) [m] that are nearest to others (m,) [m] by their ratio."""
+    """Return the indices (m,) of the amplitudes (k,) that are nearest in ratio to others (m,)."""
     return np.abs(np.log(np.asarray(others)[:, None] / amplitudes)).argmin(axis=1)
 
 

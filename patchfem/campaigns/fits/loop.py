@@ -1,4 +1,4 @@
-"""Fit of a scene with a prescribed slide to a measured friction loop.
+"""Fit of a scene with a prescribed displacement to a measured friction loop.
 
 The model starts without stress in the first row of the record and follows the measured displacement,
 which is linear between two rows. Where the force depends on the time steps, they are halved until they
@@ -23,13 +23,15 @@ from .loop_model import BenchModel
 from .loop_path import DEFAULT_OPTIONS, LoopOptions, read_offsets
 from .problem import FittedKeys, FreeKeys, parse_ranges
 
-MAX_PIECES = 64  # Time steps between two rows, above which the steps are not halved any more.
-# Fraction of the tolerance; a smaller change of the force has no effect on a fit.
+# Number of time steps between two rows above which the steps are not halved any more.
+MAX_PIECES = 64
+# Change of the force over the tolerance below which it has no effect on a fit.
 STEP_FRACTION = 0.1
-MIN_INDEPENDENT = 0.6  # Independent rows / rows, below which a warning states the correlation.
-# Residual / peak force, below which the residual is dominated by rounding, not by correlation.
+MIN_INDEPENDENT = 0.6  # Fraction of independent rows below which a warning states the correlation.
+# Residual over peak force below which rounding, not correlation, dominates the residual.
 MIN_RMS = 1e-6
-MAX_FIRST_FORCE = 0.2  # Force in the first row / peak, above which the record cannot begin at rest.
+# Force in the first row over the peak above which the record cannot begin at rest.
+MAX_FIRST_FORCE = 0.2
 LOAD_UNITS = {
     "time": UNIT_FACTORS["time"],
     "displacement": UNIT_FACTORS["length"],
@@ -40,7 +42,7 @@ LOAD_UNITS = {
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedLoop:
-    """A fit to a friction loop.
+    """Fit of a scene to a measured friction loop.
 
     Attributes
     ----------
@@ -90,7 +92,7 @@ def fit_loop(
     say: Callable | None = None,
     options: LoopOptions = DEFAULT_OPTIONS,
 ) -> FittedLoop:
-    """Fit keys of a scene with a prescribed slide to the friction loop in a file.
+    """Fit keys of a scene with a prescribed displacement to the friction loop in a file.
 
     Parameters
     ----------
@@ -142,7 +144,7 @@ def fit_loop(
     scale = float(np.abs(loop.reading[~held_out]).max())
 
     def residual(values) -> np.ndarray:
-        """Return the residual / largest force (r,) in the fitted rows."""
+        """Return the residual over the largest force (r,) in the fitted rows."""
         return (bench(values) - loop.reading)[~held_out] / scale
 
     offset_ranges = [offset.range for offset in offsets]
@@ -170,14 +172,14 @@ def fit_loop(
 
 
 class RefinedFit(NamedTuple):
-    """A fit, and the largest change of its model if the time steps are halved."""
+    """Fit with the largest change of its model when the time steps are halved."""
 
     fit: Fit
     step_error: float
 
 
 def _solve_with_refined_steps(problem: Problem, bench: BenchModel, say) -> RefinedFit:
-    """Solve with time steps that are halved until the change of the force is negligible."""
+    """Fit with time steps that are halved until the change of the force is negligible."""
     if bench.exact:
         return RefinedFit(problem.solve(interval_kind="series"), 0.0)
     fit = problem.solve(interval_kind="")
@@ -200,7 +202,7 @@ def _solve_with_refined_steps(problem: Problem, bench: BenchModel, say) -> Refin
 
 
 def _add_counts(fit: Fit, before: Fit) -> Fit:
-    """Add the evaluations and failures of an earlier fit."""
+    """Add the numbers of evaluations and failures of an earlier fit to a fit."""
     counts = SearchCounts(
         fit.counts.evaluations + before.counts.evaluations,
         fit.counts.failures + before.counts.failures,

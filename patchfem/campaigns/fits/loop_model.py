@@ -19,14 +19,15 @@ from ...scene.scene import Scene, SceneError
 from .loop_path import count_whole_cycles, extend_start
 from .problem import format_assignments, press_patch
 
-# Number of free keys of [contact] whose bounds and middles choose the shared meshes: 3**3 models.
+# Largest number of free [contact] keys whose bounds and middles choose the shared meshes: 3**3
+# models.
 MAX_MESH_KEYS = 3
-REST_SPEED_FRACTION = 1e-3  # Speed / largest measured speed, below which bonds are at rest.
-AMPLITUDE_TOL = 0.02  # Relative difference of two amplitudes, above which a note names them.
+REST_SPEED_FRACTION = 1e-3  # Speed over the largest measured speed below which bonds are at rest.
+AMPLITUDE_TOL = 0.02  # Relative difference of two amplitudes above which a note names them.
 
 
 class BenchModel:
-    """Force or friction ratio (k,) at the rows of a measured loop, as a function of free values.
+    """Model force or friction ratio (k,) at the rows of a measured loop, by free parameters.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ class BenchModel:
     offsets : sequence of Offset
         Their values follow those of the keys.
     warm : bool
-        Whether the whole cycles of the record are driven once beforehand.
+        Whether the complete cycles of the record are driven once beforehand.
     say : Callable, optional
         Takes a line of progress.
     """
@@ -71,13 +72,13 @@ class BenchModel:
         self.n_computed = 0
         self.patch = None
         self.moves_contact = any(bound.key.startswith("contact.") for bound in ranges)
-        # They are shared by all values, and chosen when a patch is first pressed.
+        # The meshes are shared by all values, and chosen when a patch is first pressed.
         self.meshes = None
 
     def _rest_speed_sets(self) -> list:
-        """Return a rest speed for growing bonds from the measured motion.
+        """Return the assignment of a rest speed for growing bonds from the measured motion.
 
-        [] if the scene sets it, or if the bonds do not grow.
+        It is [] if the scene sets the rest speed, or if the bonds do not grow.
         """
         law = self.scene.friction
         grows = law_has_trait(law.law, "bonds") and law.rest_growth is not None
@@ -101,7 +102,7 @@ class BenchModel:
         return not (bonds and contact.compliance_key) and find_shape_side(contact) != "lower"
 
     def __call__(self, values) -> np.ndarray:
-        """Return the reading (k,) at the rows; PatchfemError for values that make no scene."""
+        """Compute the reading (k,) at the rows; PatchfemError for values that make no scene."""
         count = len(self.ranges)
         offsets = dict(zip(self.offsets, values[count:]))
         model = self._model(self.build_scene(values[:count]))
@@ -111,7 +112,7 @@ class BenchModel:
         return reading + offsets.get("force", 0.0)
 
     def _model(self, scene: Scene) -> Model:
-        """Build the model of a scene, and keep the first error."""
+        """Build the model of a scene, and store the first error."""
         try:
             with locate_errors(scene):
                 return build(scene)
@@ -121,7 +122,7 @@ class BenchModel:
             raise
 
     def _reading(self, model: Model, offset: float) -> np.ndarray:
-        """Return the force or friction ratio (k,) of a model, whose first row is offset [m]."""
+        """Compute the force or friction ratio (k,) of a model whose first row is offset [m]."""
         patch = self._patch(model)
         path = extend_start(self.time, self.loop.displacement, self.warm, offset)
         corner = np.arange(path.time.size) * self.pieces
@@ -144,7 +145,7 @@ class BenchModel:
         return reading / run.load[0] if self.loop.quantity == "friction_ratio" else reading
 
     def build_scene(self, values) -> Scene:
-        """Return the scene with values of the free keys."""
+        """Return the scene with given values of its free keys."""
         try:
             return self.base.override([*self.sets, *format_assignments(self.ranges, values)])
         except SceneError as error:
@@ -162,7 +163,7 @@ class BenchModel:
         return self.patch
 
     def _shared_meshes(self):
-        """Return the meshes for the bounds and the middle of each range of a key of [contact]."""
+        """Return meshes shared by the bounds and the middle of each range of a [contact] key."""
         if self.meshes is not None:
             return self.meshes
         middle = [(bound.low + bound.high) / 2 for bound in self.ranges]
@@ -185,10 +186,10 @@ class BenchModel:
         return self.meshes
 
     def _row_times(self) -> np.ndarray:
-        """Return the times of the rows [s].
+        """Return the times of the measured rows [s].
 
-        They are measured, or computed from the speed of the slide, or equally spaced if time has no
-        effect.
+        They are measured, or computed from the speed of the motion, or equally spaced if time has
+        no effect.
         """
         loop = self.loop
         scene = self.scene

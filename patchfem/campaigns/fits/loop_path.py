@@ -1,4 +1,4 @@
-"""Displacement along which a fit to a loop drives its model: a lead-in and the record."""
+"""Displacement path that drives the model of a loop fit: a lead-in and the record."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from ...inputs.loops import Loop
 from ...scene.ranges import Range
 
 OFFSETS = ("force", "displacement")
-POSITION_TOL = 1e-6  # Fraction of the range of the record; positions closer than this are equal.
+POSITION_TOL = 1e-6  # Fraction of the range of the record below which two positions are equal.
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Offset:
-    """A constant that is fitted besides the keys of the scene.
+    """Constant that is fitted in addition to the keys of the scene.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Offset:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LoopOptions:
-    """Names of OFFSETS that are fitted, and whether the record is driven once beforehand."""
+    """Names of fitted OFFSETS, and whether the record is driven once beforehand."""
 
     offsets: tuple = ()
     warm: bool = False
@@ -43,7 +43,7 @@ DEFAULT_OPTIONS = LoopOptions()
 
 
 def read_offsets(names: Sequence, loop: Loop) -> list:
-    """Return the Offset of each name; PatchfemError for a name that is not in OFFSETS."""
+    """Return the offsets of a fit by name; PatchfemError for a name not in OFFSETS."""
     requested = []
     for text in names:
         requested += [name.strip() for name in text.split(",")]
@@ -63,9 +63,10 @@ def read_offsets(names: Sequence, loop: Loop) -> list:
 
 
 def count_whole_cycles(loop: Loop) -> int:
-    """Count the rows until the record last passes its first displacement in the first direction.
+    """Count the rows of the complete cycles at the start of a recorded loop.
 
-    The first row counts. PatchfemError for a record that does not return there.
+    These rows end where the record last passes its first displacement in the first direction. The
+    first row counts. PatchfemError for a record that does not return there.
     """
     displacement = loop.displacement
     direction = np.sign(displacement[np.flatnonzero(displacement)[0]])
@@ -81,7 +82,7 @@ def count_whole_cycles(loop: Loop) -> int:
 
 
 class DrivenPath(NamedTuple):
-    """Path that drives the model.
+    """Displacement path that drives the model of a loop fit.
 
     time: (n,) [s]; displacement: (n,) [m]; n_before: number of points before the record.
     """
@@ -99,7 +100,7 @@ def extend_start(time, recorded, n_warm: int, offset: float) -> DrivenPath:
     time, recorded : (r,) array
         Times [s] and displacements [m] of the record; the first displacement is 0.
     n_warm : int
-        Leading rows that form whole cycles and are driven once before the record; 0 for none.
+        Leading rows that form complete cycles and are driven once before the record; 0 for none.
     offset : float
         Displacement of the first row [m]; it is reached at the mean speed of the record.
 

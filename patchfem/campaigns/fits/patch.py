@@ -23,21 +23,22 @@ from ...runs.patch import jenkins_elements, ladder
 from ...scene.scene import Scene
 from .patch_laws import FITTED_LAWS, MIN_LOSS, Curves, LawProblem
 
-AMPLITUDES_PER_DECADE = 8  # This density resolves every regime of a law.
+# Number of amplitudes per decade; this density resolves every regime of a law.
+AMPLITUDES_PER_DECADE = 8
 MIN_AMPLITUDES = 12  # Smallest number of amplitudes, also of a short range.
-MIN_AMPLITUDE_FACTOR = 1e-2  # Smallest amplitude / (slip force / stiffness); below, nothing slips.
-MAX_AMPLITUDE_FACTOR = 2.0  # Largest amplitude / the amplitude at which every element slips.
-MAX_FIRST_FACTOR = 0.2  # A range begins at most at this multiple of slip force / stiffness.
-# While fewer than 1 of this many elements slips, the loss is dominated by the mesh.
+MIN_AMPLITUDE_FACTOR = 1e-2  # Smallest amplitude over slip force/stiffness; below it nothing slips.
+MAX_AMPLITUDE_FACTOR = 2.0  # Largest amplitude over the amplitude at which every element slips.
+MAX_FIRST_FACTOR = 0.2  # Largest start of an amplitude range over slip force/stiffness.
+# Inverse of the fraction of slipping elements below which the mesh dominates the loss.
 MESH_ELEMENTS = 16
-# Change of the loss by a coarser mesh (rms), above which the mesh is refined.
+# Root-mean-square change of the loss by a coarser mesh above which the mesh is refined.
 MAX_LOSS_CHANGE = 0.1
-REFINE_FACTOR = 10.0  # Tolerance of the mesh / tolerance of its refinement.
-MIN_TOLERANCE = 9e-5  # Tolerance below which a mesh is not refined, as it takes too long.
+REFINE_FACTOR = 10.0  # Tolerance of the mesh over the tolerance of its refinement.
+MIN_TOLERANCE = 9e-5  # Tolerance below which a mesh is not refined, because that takes too long.
 
 
 class Elements(NamedTuple):
-    """Stiffness (t,) [N/m] and yield displacement (t,) [m] of elastic-plastic elements."""
+    """Elastic-plastic elements: stiffness (t,) [N/m] and yield displacement (t,) [m]."""
 
     stiffness: np.ndarray
     yield_displacement: np.ndarray
@@ -53,12 +54,12 @@ class Elements(NamedTuple):
         return float(self.stiffness.sum())
 
     def compute_curves(self, slides) -> Curves:
-        """Return the curves at amplitudes (k,) [m] of the slide."""
+        """Compute force and loss of the elements at displacement amplitudes (k,) [m]."""
         return Curves(*masing_loop(self.stiffness, self.yield_displacement, slides))
 
 
 class PatchLoops(NamedTuple):
-    """Loops of a patch.
+    """Friction loops of a patch at several displacement amplitudes.
 
     Attributes
     ----------
@@ -70,7 +71,7 @@ class PatchLoops(NamedTuple):
     stiffness_error : float or None
         Its error [N/m]; None if it is not known.
     slides : (k,) array
-        Amplitudes of the slide [m].
+        Displacement amplitudes [m].
     curves : Curves
     mesh_change : (2, k) array or None
         Relative change of the curves by a coarser mesh; None if there is none.
@@ -90,7 +91,7 @@ class PatchLoops(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedPatch:
-    """Fitted laws, by name, that can replace the patch of a scene.
+    """Fitted point laws, by name, that can replace the patch of a scene.
 
     best: the law with the smallest sum of squares.
     """
@@ -104,14 +105,13 @@ class FittedPatch:
 
 
 def fit_patch(scene: Scene, slides=None) -> FittedPatch:
-    """Fit FITTED_LAWS to the friction loops of a scene's patch.
+    """Fit point friction laws (FITTED_LAWS) to the friction loops of a patch.
 
     Parameters
     ----------
     scene : Scene
-    slides : (k,) array, optional
-        Increasing amplitudes of the slide [m]; by default from the onset of slip to twice the
-        amplitude at which the whole patch slips.
+    Increasing displacement amplitudes [m]; by default from the onset of slip to twice the amplitude
+    at which the complete patch slips.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
 
 
 class _MeshedLoops(NamedTuple):
-    """Loops of a patch on a mesh, and their change by a coarser one.
+    """Friction loops of a patch on a mesh, and their change by a coarser mesh.
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ class _MeshedLoops(NamedTuple):
         Patches on coarser meshes, or None.
     elements : Elements
     slides : (k,) array
-        Amplitudes of the slide [m].
+        Displacement amplitudes [m].
     curves : Curves
     mesh_change : (2, k) array or None
         Relative change of the curves by a coarser mesh; None if there is none.
@@ -181,14 +181,14 @@ class _MeshedLoops(NamedTuple):
 
     @property
     def loss_change(self) -> float:
-        """Change of the loss by a coarser mesh, as root mean square; 0 without such a mesh."""
+        """Root-mean-square change of the loss by a coarser mesh; 0 without such a mesh."""
         return (
             0.0 if self.mesh_change is None else float(np.sqrt(np.mean(self.mesh_change[1] ** 2)))
         )
 
 
 def _solve_with_refined_mesh(model: Model, slides) -> _MeshedLoops:
-    """Press the patch on finer meshes until a coarser one hardly changes the loss."""
+    """Solve the patch on finer meshes until a coarser mesh hardly changes the loss."""
     tolerance = model.accuracy.tolerance
     while True:
         patch, *coarser = ladder.solve_all(model.patch, tolerance)
@@ -210,7 +210,7 @@ def _solve_with_refined_mesh(model: Model, slides) -> _MeshedLoops:
 
 
 def _default_slides(elements: Elements) -> np.ndarray:
-    """Return amplitudes (k,) [m] from the onset of slip to slip of the whole patch."""
+    """Return amplitudes (k,) [m] from the onset of slip to slip of the complete patch."""
     stuck_limit = elements.slip_force / elements.total_stiffness
     high = MAX_AMPLITUDE_FACTOR * float(elements.yield_displacement.max())
     trials = np.geomspace(MIN_AMPLITUDE_FACTOR * stuck_limit, high, 1024)
@@ -224,7 +224,7 @@ def _default_slides(elements: Elements) -> np.ndarray:
 
 
 def _warn_of_mesh(model: Model, meshed: _MeshedLoops) -> tuple:
-    """Return a warning if a coarser mesh changes the loss too much."""
+    """Return a warning if a coarser mesh changes the loss of a patch too much."""
     if meshed.loss_change <= MAX_LOSS_CHANGE:
         return ()
     if model.patch.mesh.is_automatic:
@@ -244,7 +244,7 @@ def _warn_of_mesh(model: Model, meshed: _MeshedLoops) -> tuple:
 
 
 def _patch_elements(model: Model, patch) -> Elements:
-    """Return the elements of a pressed patch."""
+    """Return the elastic-plastic elements of a pressed patch."""
     friction = model.friction
     load = patch.pressure.load
     element = make_law(friction, load).element(load)
@@ -299,9 +299,9 @@ def _check_model(model: Model) -> None:
 
 
 def read_slides(lengths) -> np.ndarray | None:
-    """Check the requested amplitudes (k,) [m]; PatchfemError if there are fewer than three.
+    """Check requested amplitudes (k,) [m]; PatchfemError if there are fewer than three.
 
-    None if none are given.
+    It returns None if no amplitudes are given.
     """
     if lengths is None:
         return None

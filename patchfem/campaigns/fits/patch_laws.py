@@ -1,4 +1,4 @@
-"""Friction laws of a single point, fitted to friction loops.
+"""Friction laws of a single point, fitted to given friction loops.
 
 Each law has the slip force of the loops. Its other values minimise the squares of the relative
 differences in force at the reversals and, with a fifth of the weight, in loss per cycle.
@@ -12,14 +12,16 @@ import numpy as np
 from ...friction.record import steady_loop
 from ...identify.least_squares import Fit, Problem
 
-MIN_LOSS = 1e-3  # Loss / (4 x force x slide), above which the patch counts as slipping.
-# Weights of the differences in force and in loss; the relative error of the loss is larger by 5.
+MIN_LOSS = 1e-3  # Loss/(4 x force x displacement) above which the patch counts as slipping.
+# Weights of the differences in force and in loss; the relative error of the loss is 5 times as
+# large.
 WEIGHTS = np.array([[1.0], [0.2]])
-STIFFNESS_RANGE = 20.0  # A law's stiffness is searched for from 1/20 to 20 times that of the patch.
+# Factor below and above the stiffness of the patch up to which that of a law is searched for.
+STIFFNESS_RANGE = 20.0
 
 
 class LawKeys(NamedTuple):
-    """Values of a law that are fitted in addition to its stiffness.
+    """Parameters of a law that are fitted in addition to its stiffness.
 
     The stiffness is fitted as a multiple of that of the patch.
 
@@ -40,17 +42,17 @@ class LawKeys(NamedTuple):
 
 
 def _iwan_keys(stiffness: float, slip_force: float, chi: float, fraction: float) -> dict:
-    """Return the keys of law "iwan"."""
+    """Return the scene keys of law "iwan" for fitted values."""
     return {"stiffness": stiffness, "chi": chi, "beta": fraction / (1 - fraction)}
 
 
 def _bouc_wen_keys(stiffness: float, slip_force: float, exponent: float, shape: float) -> dict:
-    """Return the keys of law "bouc-wen"."""
+    """Return the scene keys of law "bouc-wen" for fitted values."""
     return {"stiffness": stiffness, "exponent": exponent, "shape": shape}
 
 
 def _elastic_plastic_keys(stiffness: float, slip_force: float) -> dict:
-    """Return the keys of law "elastic-plastic"."""
+    """Return the scene keys of law "elastic-plastic" for fitted values."""
     return {"bond_length": slip_force / stiffness}
 
 
@@ -62,19 +64,19 @@ FITTED_LAWS = {
 
 
 class Curves(NamedTuple):
-    """Force at the reversals [N] and loss per cycle [J], (k,) each."""
+    """Friction force at the reversals [N] and energy loss per cycle [J], (k,) each."""
 
     force: np.ndarray
     loss: np.ndarray
 
     def relative_deviations(self, target: "Curves", slides) -> np.ndarray:
-        """Return the relative differences (2, k) from other curves at slides (k,) [m]."""
+        """Return the relative differences (2, k) from target curves at amplitudes (k,) [m]."""
         scale = np.maximum(target.loss, MIN_LOSS * 4 * slides * target.force)
         return np.array([self.force / target.force - 1, (self.loss - target.loss) / scale])
 
 
 class FittedLaw(NamedTuple):
-    """Friction law of a point that replaces the patch.
+    """Friction law of a point that replaces a patch, with its deviations.
 
     Attributes
     ----------
@@ -93,7 +95,7 @@ class FittedLaw(NamedTuple):
 
 
 class LawProblem(NamedTuple):
-    """Fit of one law to the loops of a joint.
+    """Least-squares fit of a friction law to the loops of a joint.
 
     Attributes
     ----------
@@ -104,7 +106,7 @@ class LawProblem(NamedTuple):
     load : float
         Normal load [N]; the slip force is static x load.
     slides : (k,) array
-        Amplitudes of the slide [m].
+        Displacement amplitudes [m].
     target : Curves
         Curves of the joint at these amplitudes.
     stiffness : float
@@ -119,21 +121,21 @@ class LawProblem(NamedTuple):
     stiffness: float
 
     def keys(self, values) -> dict:
-        """Return the keys of [friction] at values (n,) of the fit."""
+        """Return the [friction] keys for given fit parameters (n,)."""
         slip_force = self.static * self.load
         return FITTED_LAWS[self.law].keys(values[0] * self.stiffness, slip_force, *values[1:])
 
     def curves(self, values) -> Curves:
-        """Return the curves of the law at values (n,) of the fit."""
+        """Compute force and loss of the law for given fit parameters (n,)."""
         friction = _FrictionKeys(self.law, self.static, self.keys(values))
         return Curves(*steady_loop(friction, self.load, self.slides))
 
     def deviations(self, values) -> np.ndarray:
-        """Return the relative differences (2, k) from the curves of the joint."""
+        """Return the relative differences (2, k) of the law from the loops of the joint."""
         return self.curves(values).relative_deviations(self.target, self.slides)
 
     def solve(self) -> FittedLaw:
-        """Fit the law."""
+        """Fit the parameters of the friction law."""
         other = FITTED_LAWS[self.law]
         middle = [(low + high) / 2 for low, high in zip(other.low, other.high)]
         problem = Problem(
@@ -150,7 +152,7 @@ class LawProblem(NamedTuple):
 
 
 class _FrictionKeys:
-    """Stand-in for a table [friction] with values within the bounds of the fit.
+    """Stand-in for a [friction] table with values within the bounds of the fit.
 
     Its values need no check.
     """

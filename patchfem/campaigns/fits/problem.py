@@ -1,4 +1,4 @@
-"""Free keys of a scene as the values of a least-squares problem, and the keys that a fit found.
+"""Least-squares problem over free keys of a scene, and the record of the fitted keys.
 
 A fit to a loop, a curve or rows makes an `identify.least_squares.Problem` of its free keys, solves it,
 and concludes with the fitted keys and all warnings.
@@ -21,13 +21,13 @@ from ...scene.overrides import BaseScene
 from ...scene.ranges import Range, read_ranges
 from ...scene.scene import Scene, SceneError, loads
 
-# high / low of a range above which its middle is the geometric mean, as in `identify.space`
+# Ratio high/low of a range above which its middle is the geometric mean, as in `identify.space`.
 LOG_RATIO = 10.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedKeys:
-    """Values of free keys of a scene.
+    """Fitted values of the free keys of a scene, with intervals and warnings.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class FittedKeys:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FreeKeys:
-    """Free keys of a scene, which are the values of a least-squares problem.
+    """Free keys of a scene as the unknowns of a least-squares problem.
 
     Attributes
     ----------
@@ -87,11 +87,11 @@ class FreeKeys:
 
     @property
     def bounds(self) -> list:
-        """The Range of every value."""
+        """Ranges of all unknowns, keys first."""
         return [*self.ranges, *self.offsets]
 
     def make_problem(self, residual: Callable) -> Problem:
-        """Return the problem of a residual as a function of the values.
+        """Return the least-squares problem for a residual function of the unknowns.
 
         It starts from the values of the scene, else from the middle of each range.
         """
@@ -103,7 +103,7 @@ class FreeKeys:
         )
 
     def conclude(self, fit: Fit, begin: float, doubts: Sequence = ()) -> FittedKeys:
-        """Return the fitted keys with all warnings.
+        """Return the fitted keys with intervals and all warnings.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ def format_assignments(ranges: Iterable, values: Iterable) -> list:
 
 
 def parse_ranges(texts: Iterable) -> list:
-    """Parse the Range of each free key from "table.key=low..high" strings.
+    """Parse the ranges of free keys from "table.key=low..high" strings.
 
     Raises SceneError with all mistakes.
     """
@@ -136,7 +136,7 @@ def parse_ranges(texts: Iterable) -> list:
 
 
 def model_without_joint(base: BaseScene, sets: Iterable) -> Model:
-    """Build a rig whose modes are those without the joint.
+    """Build a rig model whose modes are those without the joint.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def model_without_joint(base: BaseScene, sets: Iterable) -> Model:
 
 
 def press_patch(model: Model):
-    """Press the patch of a model without error estimates; PatchfemError if nothing touches."""
+    """Solve the contact of a model without error estimates; PatchfemError without contact."""
     patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]
     if patch.pressure.outcome is Outcome.NO_CONTACT:
         raise PatchfemError(patch.pressure.outcome.sentence, "")
@@ -180,7 +180,7 @@ def _initial_value(scene: Scene, bound: Range) -> float:
 
 
 def _find_item(items: tuple, word: str):
-    """Return a table of an array by its name or its number from 0; None if there is none."""
+    """Return the table of an array by its name or its number from 0; None if not found."""
     named = [item for item in items if getattr(item, "name", None) == word]
     if named:
         return named[0]

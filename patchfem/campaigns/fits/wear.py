@@ -24,17 +24,18 @@ from ...scene.keys.quantities import parse_quantity
 from ...scene.ranges import Range
 from .problem import parse_ranges
 
-# Names as in compare.json; the more accurate one comes first.
+# Names of the worn depths as in compare.json; the more accurate one comes first.
 QUANTITIES = ("worn_depth_mean", "worn_depth_max")
 MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two or three of them.
-MAX_FILE_BYTES = 1 << 20  # Largest file that is read; a file that compare writes is far smaller.
-DEPTH_TOL = 0.1  # Fraction of the scene's tolerance to which the depth is met.
+# Size of the largest file that is read [bytes]; a file that compare writes is far smaller.
+MAX_FILE_BYTES = 1 << 20
+DEPTH_TOL = 0.1  # Fraction of the tolerance of the scene to which the depth is met.
 KEY = "wear.coefficient"
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredDepth:
-    """A measured depth with its interval.
+    """Measured worn depth with its interval.
 
     name: one of QUANTITIES; value, low, high: [m]; source: "--to" or a file.
     """
@@ -48,7 +49,7 @@ class MeasuredDepth:
 
 @dataclass(frozen=True, slots=True)
 class FittedCoefficient:
-    """A fitted wear coefficient.
+    """Fitted wear coefficient with its interval.
 
     Attributes
     ----------
@@ -73,13 +74,13 @@ class FittedCoefficient:
 
 
 class WearCurve(NamedTuple):
-    """A depth (j,) [m] over the fraction of the cycles (j,)."""
+    """Worn depth (j,) [m] over the completed fraction of the cycles (j,)."""
 
     fraction: np.ndarray
     depth: np.ndarray
 
     def inverse(self) -> Callable:
-        """Return the fraction of the cycles as a function of the depth."""
+        """Return a function that gives the fraction of the cycles at a worn depth."""
         grows = np.concatenate([[True], np.diff(self.depth) > 0])
         depth = self.depth[grows]
         fraction = self.fraction[grows]
@@ -145,7 +146,10 @@ def _read_file(path: Path) -> MeasuredDepth:
 
 
 def _measure_interval(measure) -> list | None:
-    """Return value, low and high of a measure of compare; None if one of them is no number."""
+    """Return value, low and high of a measure in a compare file.
+
+    It is None if one of them is not a number.
+    """
     if not isinstance(measure, dict):
         return None
     parts = [measure.get(key) for key in ("value", "low", "high")]
@@ -155,7 +159,7 @@ def _measure_interval(measure) -> list | None:
 
 
 def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
-    """Find the wear coefficient with which the computed depth equals a measured one.
+    """Find the wear coefficient for which the computed depth equals a measured one.
 
     Parameters
     ----------
@@ -193,7 +197,7 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
     patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]
 
     def compute(coefficient: float) -> WearCurve:
-        """Return the depth over the cycles for a coefficient [m2/N]."""
+        """Compute the depth over the cycles for a wear coefficient [m2/N]."""
         return _compute_curve(model, patch, coefficient, target.name, progress)
 
     curve = compute(bounds.high)
@@ -243,7 +247,7 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
 
 
 def _read_bounds(free) -> Range:
-    """Read the range of the coefficient; PatchfemError for any other free key."""
+    """Parse the range of the wear coefficient; PatchfemError for other free keys."""
     ranges = parse_ranges(free)
     if [bound.key for bound in ranges] != [KEY]:
         raise PatchfemError(
@@ -254,7 +258,10 @@ def _read_bounds(free) -> Range:
 
 
 def _compute_curve(model: Model, patch, coefficient: float, name: str, progress) -> WearCurve:
-    """Run the wear of a model with a coefficient [m2/N]; patch: that of the unworn pieces."""
+    """Compute the worn depth over the cycles for a wear coefficient [m2/N].
+
+    patch: solved contact of the unworn pieces.
+    """
     model = replace(model, wear=replace(model.wear, coefficient=coefficient))
     worn = evolve.evolve(model, patch, (None, None), progress)
     if worn.stopped:

@@ -10,17 +10,19 @@ from ...core import PatchfemError, frozen_array
 from ...inputs.measured import read_table
 from ...scene.keys.quantities import parse_quantity
 
-# Smallest displacement [m] in a ratio: one digit of the printed displacements, 0.01 mil.
+# Smallest displacement [m] in a ratio: the last printed digit of the displacements, 0.01 mil.
 MIN_DISPLACEMENT = 0.01 * 25.4e-6
-# Largest absolute logarithm; a motion that grows without bound or is zero gets this value.
+# Largest absolute log ratio; a motion that grows without bound or is zero gets this value.
 MAX_LOG = log(1e3)
-EQUAL_TOL = 1e-9  # relative difference below which two inputs are the same condition
+EQUAL_TOL = 1e-9  # Relative difference below which two inputs are the same condition.
 KINDS = {"frequency": "frequency", "input": "acceleration"}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Readings:
-    """The n readings of a table, row by row; the acceleration of a row comes first.
+    """Measured readings of a table of responses, row by row.
+
+    The acceleration of a row comes before its displacement.
 
     Attributes
     ----------
@@ -52,7 +54,7 @@ class Readings:
 
     @property
     def runs(self) -> list:
-        """A name per row, made of its frequency and whether it is a repeat."""
+        """Names of the rows, made of their frequency and whether they are repeats."""
         return [f"{row.frequency:.6g} Hz" + " repeat" * ("R" in row.flag) for row in self.rows]
 
     @property
@@ -61,7 +63,7 @@ class Readings:
         return sorted(set(range(len(self.rows))) - set(self.row.tolist()))
 
     def column(self, name: str) -> list:
-        """Return the values (n,) of a column at the readings.
+        """Return the values (n,) of a table column for all readings.
 
         PatchfemError for a column other than "frequency", "input", "flag" and "run".
         """
@@ -76,7 +78,7 @@ class Readings:
         return [getattr(self.rows[k], name) for k in self.row]
 
     def select(self, selector: str) -> np.ndarray:
-        """Return which readings (n,) a selector such as "column=value" selects.
+        """Return a mask (n,) of the readings that a selector such as "column=value" selects.
 
         The text is like "frequency=135 Hz,150 Hz" or "run=143 Hz repeat". PatchfemError for a value
         without its unit, and for a value that no row has.
@@ -100,9 +102,12 @@ class Readings:
         return selected
 
     def group_readings(self, name: str, among) -> dict:
-        """Return the readings (n,) bool of every distinct value of a column, by the value as text.
+        """Group selected readings by the distinct values of a column.
 
-        Only the readings `among` (n,) bool count; the values are in the order of the rows.
+        The result maps the value as text to a mask (n,).
+
+        Only the readings in the mask `selected` (n,) count; the values are in the order of the
+        rows.
         """
         column = self.column(name)
         groups = {}
@@ -113,7 +118,7 @@ class Readings:
         return groups
 
     def logs(self, acceleration, displacement) -> np.ndarray:
-        """Return ln(computed/measured) (n,) of all readings.
+        """Return the log ratios ln(computed/measured) (n,) of all readings.
 
         It is NaN if nothing was computed, and MAX_LOG if a motion is not finite.
 
@@ -132,7 +137,7 @@ class Readings:
 
 
 def _equals(name: str, value, text: str) -> bool:
-    """Return whether a value of a column equals that of a selector."""
+    """Return whether a value of a table column equals that of a selector."""
     if name not in KINDS:
         return text in value if name == "flag" else text == value
     try:
@@ -143,7 +148,7 @@ def _equals(name: str, value, text: str) -> bool:
 
 
 def _format_cell(name: str, value) -> str:
-    """Format a value of a column."""
+    """Format a value of a table column with its unit."""
     unit = {"frequency": " Hz", "input": " m/s^2"}.get(name)
     return f"{value:.6g}{unit}" if unit else str(value) or "(none)"
 
@@ -204,7 +209,9 @@ def _distinct_conditions(inputs) -> np.ndarray:
 
 
 def scores(cells: Readings, logs, among) -> dict | None:
-    """Return the root mean square of logarithms of readings; None if there are no readings.
+    """Return the root mean square of the log ratios of selected readings, by kind.
+
+    It is None if no reading is selected.
 
     Parameters
     ----------

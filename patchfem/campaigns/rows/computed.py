@@ -1,4 +1,4 @@
-"""Readings of the instruments of a rig at the measured conditions, by the free values."""
+"""Computed instrument readings of a rig at measured conditions, by free parameters."""
 
 import numpy as np
 
@@ -10,10 +10,10 @@ from .condition_models import GAIN_KEYS, ConditionModels
 
 
 class ModelReadings:
-    """Readings of the models of a ConditionModels, as a function of values (n,) and conditions.
+    """Function that computes instrument readings of a rig for given free parameters.
 
-    A motion starts from the motion of the values before, so that a descent is fast. After `forget`
-    it starts from rest, so that the result does not depend on earlier evaluations.
+    It starts a motion from that of the previous parameters, so that a descent is fast. After
+    `forget` it starts from rest, so that the result does not depend on earlier evaluations.
 
     A call returns the acceleration reading [m s-2] and the displacement amplitude [m], (c,) each:
     NaN at conditions that were not requested, and infinite if no bounded motion is found.
@@ -37,7 +37,7 @@ class ModelReadings:
         self.free_gains = [keys.index(key) if key in keys else None for key in GAIN_KEYS]
 
     def forget(self) -> None:
-        """Let the next motions start from rest."""
+        """Start the next motions from rest."""
         self.last_motions = {}
         self.last_readings = (None, {})
 
@@ -57,7 +57,7 @@ class ModelReadings:
         return out
 
     def _run(self, values, conditions) -> dict:
-        """Return, by condition, the acceleration reading without its gain and the displacement."""
+        """Return acceleration reading without gain and displacement, by condition."""
         model = self.models.model(values)
         readings = {}
         with locate_errors(model.source):
@@ -81,13 +81,13 @@ class ModelReadings:
         return readings
 
     def _read_accelerometer(self, motion, drive) -> float:
-        """Return the reading of the accelerometer [m s-2] without its gain."""
+        """Return the accelerometer reading of a motion [m s-2] without its gain."""
         if self.reading[0] == "fundamental" and motion.fundamental is not None:
             return abs(motion.fundamental)
         return read_instrument(motion.window, drive, motion.acceleration, *self.reading)
 
     def _get_patch(self, model):
-        """Return the pressed patch of a model; None for a [normal] contact.
+        """Return the solved contact patch of a model; None for a [normal] contact.
 
         It is pressed only once if no free key changes it.
         """

@@ -1,4 +1,4 @@
-"""Models of a scene of a rig at each measured condition, for any values of the free keys."""
+"""Models of a rig at each measured condition, for given values of the free keys."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ GAIN_KEYS = ("measured.acceleration_gain", "measured.displacement_gain")
 
 
 class FitRequest:
-    """Problem of a fit: the scene of a rig, the ranges of its free keys, and a file of rows."""
+    """Request for a fit: scene of a rig, ranges of its free keys, and a file of rows."""
 
     def __init__(self, scene: Scene, ranges, measured):
         self.scene = scene
@@ -32,7 +32,7 @@ class FitRequest:
 
 
 class ConditionModels:
-    """Models of a rig under sinusoidal base motion, at measured conditions and for values of free keys.
+    """Models of a rig under sinusoidal base motion at measured conditions.
 
     If the scene names no method, its steady motions are computed, provided that the method
     'harmonic' accepts it (`notes` says so): a row was read after the rig had settled.
@@ -72,7 +72,7 @@ class ConditionModels:
             self.rigs.append(build(self.base.override(condition_sets(*condition))).rig)
 
     def _refuse(self, measured) -> None:
-        """Raise PatchfemError for a scene or a key that cannot be fitted to rows."""
+        """Raise PatchfemError for a scene or a key that cannot be fitted to measured rows."""
         scene = self.scene
         drive = scene.drive
         location = f"{scene.path}: fit --to {measured.name}: "
@@ -114,18 +114,18 @@ class ConditionModels:
         )
 
     def model(self, values) -> Model:
-        """Return the model with values (n,) of the free keys, at the drive of the scene."""
+        """Return the model for values (n,) of the free keys, with the drive of the scene."""
         sets = [self.ranges[k].format_assignment(values[k]) for k in self.inner]
         return model_without_joint(self.base, sets)
 
     def at(self, model: Model, condition: int) -> Model:
-        """Return the model with the drive of a condition."""
+        """Return the model with the drive of a measured condition."""
         drive = self.rigs[condition].drive
         rig = model.rig.with_signal(drive.signal, frequency=drive.frequency, cycles=drive.cycles)
         return replace(model, rig=rig)
 
     def sine(self, condition: int) -> SineDrive:
-        """Return the drive of a condition."""
+        """Return the sinusoidal drive of a measured condition."""
         return self.rigs[condition].drive.signal
 
     @property
@@ -135,7 +135,10 @@ class ConditionModels:
 
 
 def condition_sets(frequency: float, level: float) -> list:
-    """Return the --set strings of a condition: frequency [Hz], input [m s-2]."""
+    """Return the --set strings of a measured condition.
+
+    frequency [Hz], level: input [m s-2].
+    """
     return [
         f"drive.frequency={float(frequency)!r} Hz",
         f"drive.acceleration={float(level)!r} m/s^2",

@@ -24,7 +24,7 @@ from .condition_models import ConditionModels, FitRequest
 from .null_models import NULL_MODELS, fit_null_model
 from .search import BestFit, SearchSettings, make_residual, search_random_starts
 
-SAME_SCORE = 1.01  # Ratio of two scores, below which two searches found the same fit.
+SAME_SCORE = 1.01  # Ratio of two scores below which two searches found the same fit.
 UNSTABLE_MEANINGS = {
     "bound": "count in the fit as lower bounds",
     "out": "are left out of the fit",
@@ -34,7 +34,7 @@ UNSTABLE_MEANINGS = {
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fold:
-    """The fit without the readings of one value of the column that is left out.
+    """Cross-validation fit without the readings of a single value of a column.
 
     name: the value; readings: (n,) bool, those left out; search: the fit of all others.
     """
@@ -46,7 +46,7 @@ class Fold:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Placebo:
-    """A repeated fit with a key at a value that the fit did not choose.
+    """Refit with a parameter fixed at a value that differs from the best fit.
 
     text: the "key=value" string; search: the fit; logs: (n,) ln(computed/measured).
     """
@@ -57,7 +57,7 @@ class Placebo:
 
 
 class NullPrediction(NamedTuple):
-    """Prediction by a model without mechanics.
+    """Prediction of the readings by a model without mechanics.
 
     logs: (n,) ln(computed/measured); left_out_logs: (n,) the same by fits that did not see the
     reading; numbers: fitted values by kind of reading.
@@ -70,7 +70,7 @@ class NullPrediction(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedRows:
-    """A rig fitted to rows.
+    """Rig fitted to rows of measured responses.
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ class FittedRows:
 
 @dataclass(frozen=True, slots=True)
 class RowsOptions:
-    """Options of a fit: readings to hold or leave out, placebos, and settings of the search.
+    """Options of a fit: readings to hold or leave out, placebos, and search settings.
 
     hold: rows held out, "column=value,value"; leave_out: the column of which each value is left out in
     turn; placebos: "key=value,value" strings; search: the SearchSettings.
@@ -250,7 +250,7 @@ def fit_rows(
 def _require_enough_readings(
     cells: Readings, training, n_values: int, settings: SearchSettings
 ) -> None:
-    """Raise PatchfemError if a fit has no more readings than values."""
+    """Raise PatchfemError if a fit has no more readings than free parameters."""
     used = training & ~cells.unstable if settings.unstable == "out" else training
     if used.sum() <= n_values:
         raise PatchfemError(
@@ -266,7 +266,7 @@ def _predict_from_rest(computed: ModelReadings, values, conditions) -> np.ndarra
 
 
 class _RowsFitter(NamedTuple):
-    """Fits of the free keys to some readings of a table.
+    """Fitter of the free keys to selected readings of a table.
 
     report: called with 1 after each start, or None.
     """
@@ -277,7 +277,7 @@ class _RowsFitter(NamedTuple):
     report: Callable | None
 
     def fit(self, readings: ModelReadings, training, name: str, interval_kind: str = "") -> BestFit:
-        """Fit the free keys to the training readings (n,) bool.
+        """Fit the free keys to the readings selected by the mask `training` (n,).
 
         Parameters
         ----------
@@ -297,7 +297,7 @@ class _RowsFitter(NamedTuple):
 
 
 class _StartCounter:
-    """Counter of finished starts, which reports their fraction of `total`."""
+    """Counter of finished search starts that reports their fraction of the total."""
 
     def __init__(self, progress: Callable, total: int):
         self.progress = progress
@@ -305,13 +305,13 @@ class _StartCounter:
         self.finished = 0
 
     def __call__(self, count: int) -> None:
-        """Add finished starts."""
+        """Add finished starts to the count and report the fraction."""
         self.finished += count
         self.progress(self.finished / self.total)
 
 
 def _split_placebo(text: str, ranges) -> list:
-    """Return the key=value strings of a placebo.
+    """Return the key=value strings of a placebo fit.
 
     PatchfemError for a key that the fit or the rows would set to another value.
     """
@@ -334,7 +334,7 @@ def _split_placebo(text: str, ranges) -> list:
 
 
 def _predict_null(cells: Readings, name: str, fitted, groups: dict) -> NullPrediction:
-    """Return the prediction by a null model, also of the readings that are left out."""
+    """Predict all readings by a null model, including the readings that are left out."""
     logs, numbers = fit_null_model(cells, name, fitted)
     left_out_logs = np.full(fitted.size, np.nan)
     for group in groups.values():
@@ -343,7 +343,7 @@ def _predict_null(cells: Readings, name: str, fitted, groups: dict) -> NullPredi
 
 
 def _doubt_warnings(cells: Readings, search: BestFit, logs, settings: SearchSettings) -> list:
-    """Return warnings about the rows and about the search."""
+    """Return warnings on the measured rows and on the search."""
     warnings = []
     if cells.empty:
         numbers = ", ".join(str(k + 1) for k in cells.empty)

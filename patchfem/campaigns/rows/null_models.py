@@ -1,4 +1,4 @@
-"""Models without mechanics that a fitted rig has to beat.
+"""Models without mechanics that a fitted rig has to outperform.
 
 They are y = C a^p f^q for each kind of reading; a is the input and f the frequency. The logarithm
 of y is linear in the free values, so each model is an exact linear least-squares solution. Readings
@@ -13,7 +13,7 @@ NULL_MODELS = ("constant", "power_input", "power_input_frequency")
 
 
 def fit_null_model(cells: Readings, name: str, training) -> tuple:
-    """Fit a null model to some readings and predict all of them.
+    """Fit a model without mechanics to selected readings and predict all readings.
 
     The models are y = C a ("constant"), y = C a^p ("power_input") and y = C a^p f^q
     ("power_input_frequency"). If the training readings do not determine an exponent, such as q at a

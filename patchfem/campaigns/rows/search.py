@@ -1,4 +1,4 @@
-"""Search for the values of a rig that fit some readings best, from random starts.
+"""Search for the best-fit parameters of a rig from random starts.
 
 A search uses nothing but the training readings.
 """
@@ -27,7 +27,7 @@ UNSTABLE = ("bound", "out", "read")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BestFit:
-    """The best fit of several starts.
+    """Best fit of a search from several starts.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class BestFit:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SearchSettings:
-    """Settings of the search for the best values.
+    """Settings of the search for the best-fit parameters.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class SearchSettings:
 
 
 def make_residual(cells: Readings, computed: ModelReadings, training, unstable: str) -> Callable:
-    """Return the residual ln(computed/measured) of some readings, as a function of the values.
+    """Return the function that gives the log ratios of selected readings, by free parameters.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def make_residual(cells: Readings, computed: ModelReadings, training, unstable: 
     bound = cells.unstable[used] if unstable == "bound" else np.zeros(int(used.sum()), bool)
 
     def residual(values):
-        """Return the residual at values (n,) of the free keys."""
+        """Return the residual for given free parameters (n,)."""
         logs = cells.logs(*computed(values, conditions))[used]
         return np.where(bound, np.minimum(logs, 0.0), logs)
 
@@ -133,7 +133,7 @@ def search_random_starts(
     name: str = "",
     report: Callable | None = None,
 ) -> BestFit:
-    """Solve a problem whose residual is expensive, from random starts.
+    """Solve a least-squares problem with an expensive residual from random starts.
 
     Each start begins with motions from rest, so that its result depends only on its starting values
     and on the training readings. The descent with the smallest sum of squares is continued until it

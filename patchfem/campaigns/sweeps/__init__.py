@@ -1,4 +1,4 @@
-"""Sweeps: many cases of one scene, which differ in the values of a few keys.
+"""Sweeps: many cases of a scene that differ in the values of a few keys.
 
 In: `SweepScene`, the scene as text, and `Cases`, the values of its keys. Out: `CaseResults` of
 `runs.batch`, chunk by chunk in any order. The modules of `executors/` compute chunks in this

@@ -29,7 +29,7 @@ from ...scene.scene import Scene, SceneError, loads, read_sweep_axes
 
 @dataclass(frozen=True, slots=True)
 class SweepScene:
-    """Scene of a sweep in its written form.
+    """Scene of a sweep as text, with the settings that all cases share.
 
     Attributes
     ----------
@@ -48,16 +48,16 @@ class SweepScene:
     of: str = ""
 
     def scene(self, sets: Sequence[str]) -> Scene:
-        """Return the scene with `table.key=value` strings; SceneError names every mistake."""
+        """Return the scene with given `table.key=value` strings; SceneError lists every mistake."""
         base = _get_base(self).scene
         return base.override(sets) if base is not None else self._read(sets)
 
     def _read(self, sets: Sequence[str]) -> Scene:
-        """Parse the scene with `table.key=value` strings."""
+        """Parse the scene with given `table.key=value` strings."""
         return replace(require_files(loads(self.text, self.path, (*self.sets, *sets))), sweep=())
 
     def model(self, sets: Sequence[str], values: Sequence[float | str] = ()) -> Model:
-        """Build the model of a case.
+        """Build the model of a single case of the sweep.
 
         Parameters
         ----------
@@ -113,9 +113,9 @@ class SweepScene:
         return SimilarModels(*models[keys], values, sets, cases)
 
     def _like(self, sets: Sequence[str], values: Sequence) -> Model | None:
-        """Return the model of a case, derived from the first valid one with the same keys.
+        """Derive the model of a case from the first valid model with the same keys.
 
-        None if the rules of a scene must check it.
+        It returns None if the rules of a scene must check the case.
         """
         if not values or not all(isinstance(value, float) for value in values):
             return None
@@ -134,14 +134,14 @@ class SweepScene:
         return []
 
     def axes(self) -> tuple[list, list[str]]:
-        """Return the axes of the table [sweep] and its mistakes; both are empty without this table."""
+        """Return the axes of the table [sweep] and its mistakes; both are empty without it."""
         try:
             return read_sweep_axes(self.text, self.path)
         except SceneError as error:
             return [], error.mistakes
 
     def numbered_key(self, key: str) -> str:
-        """Return a key in which the name of a mode is replaced by its number."""
+        """Replace the name of a mode in a key by its number."""
         pieces = key.split(".")
         modes = tomllib.loads(self.text).get("structure", {})
         modes = modes.get("mode") if isinstance(modes, dict) else None
@@ -151,7 +151,7 @@ class SweepScene:
         return ".".join(pieces)
 
     def digest(self) -> str:
-        """Return a hash of what all cases share.
+        """Return a hash of everything that all cases of the sweep share.
 
         It covers the version, all tables as written except [sweep], the --set strings, and the
         content of the files.
@@ -163,7 +163,7 @@ class SweepScene:
         return sha256(json.dumps(shared, sort_keys=True, default=str).encode()).hexdigest()
 
     def shares_meshes(self, keys: Sequence[str]) -> bool:
-        """Return whether the cases have patches whose mesh is chosen for all of them together.
+        """Return whether the cases have patches with a mesh chosen for all of them together.
 
         keys: those that change from case to case.
         """
@@ -181,7 +181,7 @@ class SweepScene:
 
 
 class _SweepBase(NamedTuple):
-    """What the scenes and models of all cases of a sweep derive from.
+    """Base from which the scenes and models of all cases of a sweep derive.
 
     scene: None if the text is no valid scene without the values of a case; models: by the names of
     the keys of the cases, None if no models can be derived.
@@ -193,7 +193,10 @@ class _SweepBase(NamedTuple):
 
 @lru_cache(maxsize=2)
 def _get_base(sweep_scene: SweepScene) -> _SweepBase:
-    """Return the base of the cases of a sweep; that of the last two sweeps is kept."""
+    """Return the cached base of the cases of a sweep.
+
+    Those of the last two sweeps are kept.
+    """
     try:
         return _SweepBase(BaseScene(sweep_scene._read(())), {})
     except SceneError:
@@ -201,5 +204,5 @@ def _get_base(sweep_scene: SweepScene) -> _SweepBase:
 
 
 def _case_mistakes(error: SceneError) -> list[str]:
-    """Return the mistakes of a case without the prefix of values that were set."""
+    """Return the mistakes of a case without the prefix of assigned values."""
     return [text.removeprefix("--set: ") for text in error.mistakes]

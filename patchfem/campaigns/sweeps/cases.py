@@ -15,7 +15,7 @@ import numpy as np
 from ...scene.axes import Axis
 from .case_models import SweepScene
 
-# Beginnings of the keys that change the pieces or their mesh.
+# These keys, by their beginnings, change the pieces or their mesh.
 PIECE_KEYS = (
     "contact.length",
     "contact.width",
@@ -74,7 +74,7 @@ class Cases:
         return tuple(reversed(out))
 
     def texts(self, number: int) -> tuple:
-        """Return the values of a case as written, axis by axis."""
+        """Return the values of a case as written in the request, axis by axis."""
         return tuple(axis.texts[place] for axis, place in zip(self.axes, self.places(number)))
 
     def sets(self, number: int) -> tuple:
@@ -82,14 +82,14 @@ class Cases:
         return tuple(f"{axis.key}={text}" for axis, text in zip(self.axes, self.texts(number)))
 
     def values(self, number: int) -> tuple:
-        """Return the values of a case, axis by axis.
+        """Return the values of a case in SI units, axis by axis.
 
-        They are floats in SI, or strings if a key has no number.
+        They are floats, or strings if a key has no number.
         """
         return tuple(axis.values[place] for axis, place in zip(self.axes, self.places(number)))
 
     def columns(self, numbers: Sequence[int]) -> np.ndarray | None:
-        """Return the values of cases (n, k) in SI; None if a key has no numbers."""
+        """Return the values of cases (n, k) in SI units; None if a key has no numbers."""
         if not all(isinstance(axis.values[0], float) for axis in self.axes):
             return None
         places = [numbers] * len(self.axes) if self.rows else np.unravel_index(numbers, self.shape)
@@ -100,9 +100,9 @@ class Cases:
         return np.array(columns).T
 
     def spread_cases(self, max_cases: int) -> list[int]:
-        """Return some case numbers, spread over all axes and including the ends of each.
+        """Return case numbers that are spread over all axes and include the ends of each axis.
 
-        All cases, if there are no more than `max_cases`.
+        These are all cases if there are no more than `max_cases`.
         """
         if len(self) <= max_cases:
             return list(range(len(self)))
@@ -120,7 +120,7 @@ class Cases:
         return numbers.tolist()
 
     def representative_cases(self, max_cases: int) -> list[int]:
-        """Return at most `max_cases` case numbers that represent all cases.
+        """Return at most `max_cases` case numbers that represent all cases of a sweep.
 
         For random cases these are the first ones, because every 8th point of a Sobol sequence may
         lie in the same half of a range; otherwise those of `spread_cases`.
@@ -130,33 +130,33 @@ class Cases:
         return self.spread_cases(max_cases)
 
     def neighbours(self, numbers: Sequence[int]) -> list[int]:
-        """Return cases in an order in which those with the same pieces follow one another.
+        """Sort cases such that those with the same pieces follow one another.
 
-        They share most of the work. Among them, cases with the same patch follow one another.
+        Such cases share most of the work. Among them, cases with the same patch follow one another.
         """
         slow = [k for k, axis in enumerate(self.axes) if axis.key.startswith("contact.")]
         if not slow:
             return list(numbers)
         slow.sort(key=lambda k: not self.axes[k].key.startswith(PIECE_KEYS))
-        # Equal values of an axis count as its first one.
+        # Equal values of an axis count as its first value.
         first_places = [{} for _ in self.axes]
         for first, axis in zip(first_places, self.axes):
             for place, value in enumerate(axis.values):
                 first.setdefault(value, place)
 
         def patch_places(number: int) -> list:
-            """Return the indices of the values of a case that change its patch."""
+            """Return the axis indices of a case for the keys that change its patch."""
             values = self.values(number)
             return [first_places[k][values[k]] for k in slow]
 
         return sorted(numbers, key=patch_places)
 
     def names(self, sweep_scene: SweepScene, numbers: Sequence[int] | None = None) -> np.ndarray:
-        """Return names (n,) uint64 of cases: hashes of their keys and values and of what all cases share.
+        """Return hashes (n,) uint64 of cases, which identify them across sweeps.
 
-        The same values in other units or in another order have the same name, also as part of
-        another sweep of the same scene, unless all cases of a sweep share a mesh that is chosen for
-        them.
+        A hash covers the keys and values of the case and what all cases share. The same values in
+        other units or in another order have the same hash, also as part of another sweep of the
+        same scene, unless all cases of a sweep share a mesh that is chosen for them.
 
         Parameters
         ----------
@@ -173,9 +173,9 @@ class Cases:
 
 
 class _CaseHasher:
-    """Hashes of cases, from what all cases share and their keys and values.
+    """Hash function of the cases of a sweep.
 
-    Values of random cases are not kept, because hardly any case has the value of another.
+    The hashes of random values are not cached, because hardly any case has the value of another.
     """
 
     def __init__(self, cases: Cases, sweep_scene: SweepScene):
@@ -188,7 +188,10 @@ class _CaseHasher:
         self.cached_json = lru_cache(0 if cases.drawn else None)(self._value_json)
 
     def hash_cases(self, shared: str, numbers: Sequence[int]) -> np.ndarray:
-        """Return a hash (n,) uint64 of each case; `shared` describes what all cases share."""
+        """Return a hash (n,) uint64 of each case.
+
+        `shared` describes what all cases share.
+        """
         hashes = np.empty(len(numbers), np.uint64)
         for k, number in enumerate(numbers):
             places = self.cases.places(number)
@@ -198,7 +201,7 @@ class _CaseHasher:
         return hashes
 
     def _value_json(self, axis: int, place: int) -> str:
-        """Return key and value as JSON, with the hash of the file that the value names."""
+        """Return a key and its value as JSON, with the hash of the file that the value names."""
         key = self.keys[axis]
         value = self.cases.axes[axis].values[place]
         if isinstance(value, float) and isfinite(value):

@@ -17,22 +17,19 @@ from .cases import Cases
 MAX_PLANNED_CASES = (
     9  # number of cases, spread over the sweep, whose plans estimate the cost of all
 )
-SWEEP_SECONDS = (
-    0.75  # seconds that a sweep needs in total to start and to write its files and its page
-)
-CASE_SECONDS = (
-    8e-3  # seconds of a case that is not computed in a batch, in addition to those of its plan
-)
-RANKING_SECONDS = 0.8  # seconds to rank the keys by their influence, from random cases
-# If the planned cases form at most this number of groups, all cases are assumed to form no more groups.
+SWEEP_SECONDS = 0.75  # CPU time [s] of a sweep to start and to write its files and its page
+CASE_SECONDS = 8e-3  # CPU time [s] of a case outside a batch, in addition to that of its plan
+RANKING_SECONDS = 0.8  # CPU time [s] to rank the keys by their influence, from random cases.
+# Largest number of groups of the planned cases that is assumed to hold for all cases.
 MAX_GROUPS = 3
-# Seconds to compute the columns of a case in a batch from its values (0.8 to 1.5 ms of 2000 lumped cases).
+# CPU time [s] to compute the columns of a case in a batch from its values (0.8 to 1.5 ms of 2000
+# lumped cases).
 BATCHED_CASE_SECONDS = 1.2e-3
 MAX_CASES_WITH_SUMMARY = (
-    1000  # maximum number of cases of which a sweep writes a summary each by default
+    1000  # largest number of cases for which a sweep writes individual summaries by default
 )
 MAX_CASES_WITH_TABLES = (
-    200_000  # maximum number of cases for which a sweep writes tables by default
+    200_000  # largest number of cases for which a sweep writes tables by default
 )
 # Bytes on disk per case with a summary; with tables, page and columns (10 000 cases); with columns
 # alone (a million cases).
@@ -42,7 +39,7 @@ COLUMN_BYTES = 400
 
 
 def estimate_sweep(sweep_scene: SweepScene, cases: Cases) -> dict:
-    """Return the plan of a sweep as a dict that can be written as JSON.
+    """Estimate time, memory and disk space of a sweep, as a dict that can be written as JSON.
 
     It is the plan of the first valid case, which `case` {key: value as written} names, with seconds
     for all cases on one core, the largest number of bytes of memory that a case needs, the number
@@ -84,7 +81,7 @@ def estimate_sweep(sweep_scene: SweepScene, cases: Cases) -> dict:
 
 
 def _predict_seconds(plans: list, batches: list, n_cases: int) -> float:
-    """Predict the seconds of all cases on one core.
+    """Predict the CPU time [s] of all cases on one core.
 
     Parameters
     ----------
@@ -118,14 +115,14 @@ def _predict_seconds(plans: list, batches: list, n_cases: int) -> float:
 
 
 def _bytes_per_case(n_cases: int) -> int:
-    """Return the bytes on disk of a case in a sweep of `n_cases`."""
+    """Return the bytes on disk per case in a sweep of `n_cases` cases."""
     if n_cases <= MAX_CASES_WITH_SUMMARY:
         return SUMMARY_BYTES
     return TABLE_BYTES if n_cases <= MAX_CASES_WITH_TABLES else COLUMN_BYTES
 
 
 def _split_shared_seconds(plans: list) -> tuple[float, list]:
-    """Return the seconds that all cases share, and the seconds of each planned case by itself.
+    """Split the CPU time [s] of planned cases into a shared and an individual part.
 
     A case of a sweep needs no start and no fields. Pieces that are the same in all cases are
     condensed once.
@@ -134,7 +131,7 @@ def _split_shared_seconds(plans: list) -> tuple[float, list]:
     left_out = {"start", "code", "fields"}
     patches = [case_plan.model.patch for case_plan in plans]
     if None not in patches:
-        # imported here, because sweeps of a point need no mesh
+        # This module is imported here, because sweeps of a point need no mesh.
         from ...runs.patch.meshes import geometry_key
 
         if len({geometry_key(patch) for patch in patches}) == 1:
@@ -149,5 +146,5 @@ def _split_shared_seconds(plans: list) -> tuple[float, list]:
 
 
 def _count_values(axis: Axis) -> int:
-    """Return the number of distinct values of a key; numbers are compared in SI, not as strings."""
+    """Return the number of distinct values of a key, compared in SI units."""
     return np.unique(axis.values).size if axis.unit else len(set(axis.texts))

@@ -1,4 +1,4 @@
-"""Read the request for a sweep: scene and cases, with all mistakes reported at once.
+"""Parser of the request for a sweep, which reports all mistakes at once.
 
 In: a file, --set strings and a `Request`. Out: `SweepScene` and `Cases`, or a SceneError.
 """
@@ -24,15 +24,15 @@ from . import samples, table
 from .case_models import SweepScene
 from .cases import Cases, combine_cases
 
-N_CHECKED = 32  # cases that are read before a sweep starts, to find a valid one
-MAX_PRINTED = 12  # number of mistakes that are printed
-MAX_SUGGESTIONS = 4  # number of measures that a mistyped name may mean
-MAX_CASES = 3_000_000  # maximum number of cases; the names and columns of more take gigabytes
+N_CHECKED = 32  # Number of cases that are read before a sweep starts, to find a valid one.
+MAX_PRINTED = 12  # Largest number of mistakes that are printed.
+MAX_SUGGESTIONS = 4  # Largest number of measures that a mistyped name may mean.
+MAX_CASES = 3_000_000  # Largest number of cases; the names and columns of more take gigabytes.
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """Which cases a sweep has.
+    """Request for a sweep: its swept keys, table of cases and random sampling.
 
     Attributes
     ----------
@@ -179,9 +179,10 @@ def _repeat_words(request: Request, folder: Path) -> tuple[str, ...]:
 
 
 def _check_measure(measure: str) -> list[str]:
-    """Return a mistake if no run has a measure, with the measures that may be meant.
+    """Return a mistake if no run has a requested measure, with similar names as suggestions.
 
-    They are those whose name contains the word, or else the one with the most similar name.
+    Suggested are the measures whose name contains the word, or else the one with the most similar
+    name.
     """
     known = [*rows.TABLE, *patch_rows.TABLE]
     if not measure or rows.remove_interface_number(measure) in known:
@@ -197,9 +198,9 @@ def _check_measure(measure: str) -> list[str]:
 
 
 def _find_equal_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[str]:
-    """Return a mistake for each key that means the same value as a key before it.
+    """Return a mistake for each swept key that means the same value as an earlier key.
 
-    Two keys do so if they name a mode by its name and by its number.
+    Two keys mean the same if they name a mode by its name and by its number.
     """
     first_keys: dict = {}
     mistakes = []

@@ -17,19 +17,23 @@ from typing import NamedTuple
 import numpy as np
 
 MAX_SURFACE_CASES = (
-    640  # number of cases that a surface interpolates, because its equations are dense
+    640  # largest number of cases that a surface interpolates, because its equations are dense
 )
-N_SOBOL_POINTS = 1024  # points of a Sobol sequence per key, which give an index to about 0.01
-N_HALF_SURFACES = 6  # number of surfaces through half of the cases
-SMOOTHINGS = (1e-8, 1e-4, 1e-2, 1.0)  # smoothing of a surface, from interpolation to almost a plane
-MIN_CASES_PER_KEY = 16  # cases per key; with fewer, surfaces through half of the cases do not show the error of an index
-INDEX_ERROR = 0.005  # error of an index due to the finite number N_SOBOL_POINTS
-# fraction of the variance that a surface has to explain in cases that it was not fitted to
+# Number of points of a Sobol sequence per key, which give an index to about 0.01.
+N_SOBOL_POINTS = 1024
+N_HALF_SURFACES = 6  # Number of surfaces that are fitted to half of the cases each.
+# Smoothing parameters of a surface, from interpolation to almost a plane.
+SMOOTHINGS = (1e-8, 1e-4, 1e-2, 1.0)
+# Smallest number of cases per key; with fewer, half-sample surfaces do not show the error of an
+# index.
+MIN_CASES_PER_KEY = 16
+INDEX_ERROR = 0.005  # Error of an index due to the finite number N_SOBOL_POINTS.
+# Smallest fraction of the variance that a surface has to explain in cases not used for its fit.
 MIN_EXPLAINED_FRACTION = 0.5
 
 
 class SobolIndex(NamedTuple):
-    """Sobol indices of one key for a measure.
+    """Sobol indices of a key for a measure of the sweep.
 
     first: first-order index; total: total index; low, high: interval of the total index.
     """
@@ -42,9 +46,10 @@ class SobolIndex(NamedTuple):
 
 
 def compute_sobol_indices(keys: Sequence[tuple], measures: dict, shape: tuple | None) -> dict:
-    """Compute the Sobol indices of each measure that changes, if the cases determine them.
+    """Compute the Sobol indices of each varying measure, if the cases determine them.
 
     A measure that a tenth of the cases lack is left out, because the other cases are not a random
+    sample.
     sample.
 
     Parameters
@@ -94,7 +99,7 @@ def compute_sobol_indices(keys: Sequence[tuple], measures: dict, shape: tuple | 
 
 
 def _group_by_known_cases(changing: dict) -> list:
-    """Return pairs (names of measures, cases (n,) bool that have them all)."""
+    """Group measures by the mask (n,) of cases that have a value of them."""
     groups: dict = {}
     for name, values in changing.items():
         known = np.isfinite(values)
@@ -104,7 +109,7 @@ def _group_by_known_cases(changing: dict) -> list:
 
 
 def _is_varying(values: np.ndarray, errors: np.ndarray) -> bool:
-    """Return whether most cases have a measure that varies by more than its errors and round-off."""
+    """Return whether a measure varies over the cases by more than errors and round-off."""
     known = np.isfinite(values)
     if known.mean() < 0.9:
         return False
@@ -120,7 +125,7 @@ def _rank_fraction(values: np.ndarray) -> np.ndarray:
 
 
 class _Indices(NamedTuple):
-    """First-order and total indices and the interval of the total, (keys,) each."""
+    """First-order and total Sobol indices of all keys, with intervals of the total."""
 
     first: np.ndarray
     total: np.ndarray
@@ -129,7 +134,7 @@ class _Indices(NamedTuple):
 
 
 def _grid_indices(values: np.ndarray) -> _Indices:
-    """Return the Sobol indices of values on a full grid."""
+    """Return the Sobol indices of values on a full grid of cases."""
     first = []
     total = []
     for axis in range(values.ndim):
@@ -141,9 +146,9 @@ def _grid_indices(values: np.ndarray) -> _Indices:
 
 
 def _random_indices(levels: np.ndarray, values: np.ndarray) -> list:
-    """Return the Sobol indices of each column of values from random cases.
+    """Estimate the Sobol indices of measures (columns) from random cases.
 
-    One _Indices per column; None if no surface explains it well enough.
+    The result has one _Indices per column; None if no surface explains it well enough.
 
     Parameters
     ----------
@@ -181,7 +186,7 @@ def _random_indices(levels: np.ndarray, values: np.ndarray) -> list:
 
 
 def _fit_surface(levels: np.ndarray, values: np.ndarray, smoothing: float):
-    """Return a smooth surface through values (n, columns) at levels (n, keys)."""
+    """Fit a smooth surface to values (n, columns) at uniform coordinates (n, keys)."""
     from scipy.interpolate import RBFInterpolator
 
     return RBFInterpolator(levels, values, kernel="cubic", smoothing=smoothing)
@@ -201,7 +206,7 @@ def _unexplained_variance(levels, values, order, half: int, smoothing: float) ->
 
 
 def _surface_indices(levels: np.ndarray, values: np.ndarray, smoothing: float) -> tuple:
-    """Return first-order and total Sobol indices, (columns, keys) each, of a surface through cases."""
+    """Return first-order and total Sobol indices of a fitted surface, (columns, keys) each."""
     from scipy.stats import sobol_indices, uniform
 
     surface = _fit_surface(levels, values, smoothing)
@@ -217,6 +222,6 @@ def _surface_indices(levels: np.ndarray, values: np.ndarray, smoothing: float) -
 
 
 def _sort_by_total(names: list, indices: Sequence) -> list:
-    """Return the SobolIndex of each key, the largest total first."""
+    """Return the Sobol indices of all keys, sorted by decreasing total index."""
     by_key = [SobolIndex(name, *map(float, numbers)) for name, *numbers in zip(names, *indices)]
     return sorted(by_key, key=lambda index: -index.total)

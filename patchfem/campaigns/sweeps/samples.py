@@ -14,7 +14,7 @@ from .cases import Cases
 def draw_cases(
     parts: Sequence[Axis | SampledRange], count: int, seed: int, *, sobol: bool = False
 ) -> Cases:
-    """Draw cases from ranges and lists of values; the same seed draws the same cases.
+    """Draw random cases from ranges and lists of values, reproducibly for a given seed.
 
     A range is sampled uniformly between its ends, or uniformly in its logarithm; the values of a
     list are equally likely.
@@ -45,13 +45,13 @@ def _sobol_points(width: int, count: int, seed: int) -> np.ndarray:
     from scipy.stats import qmc
 
     with warnings.catch_warnings():
-        # SciPy warns of counts that are no power of two
+        # SciPy warns of counts that are no power of two.
         warnings.simplefilter("ignore", UserWarning)
         return qmc.Sobol(width, scramble=True, rng=np.random.default_rng(seed)).random(count)
 
 
 def _select_values(axis: Axis | SampledRange, fractions: np.ndarray) -> Axis:
-    """Return the values of a key that random numbers (n,) between 0 and 1 select."""
+    """Return the values of a key that correspond to uniform random numbers (n,)."""
     if isinstance(axis, SampledRange):
         return axis.make_axis(fractions.tolist())
     n_values = len(axis.texts)

@@ -25,18 +25,20 @@ from ...runs.batch.meshes import Shared
 from .case_models import SweepScene
 from .cases import Cases
 
-# Failures of a case, the last as the only case of a chunk, after which it is abandoned.
+# Number of failures of a case, the last as the only case of a chunk, after which it is abandoned.
 MAX_DEATHS = 3
-# Seconds that a chunk should take: long compared with its transfer to a worker, short compared with
-# a sweep.
+# Target time of a chunk [s]: long compared with its transfer to a worker, short compared with a
+# sweep.
 CHUNK_SECONDS = 1.0
-MAX_CASES_PER_CHUNK = 4096  # maximum number of cases of a chunk
-MAX_MESH_CASES = 256  # maximum number of cases from which the meshes of a sweep are chosen
+MAX_CASES_PER_CHUNK = 4096  # Largest number of cases of a chunk.
+MAX_MESH_CASES = 256  # Largest number of cases from which the meshes of a sweep are chosen.
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """Data that a worker needs to compute any case; each worker receives them once.
+    """Common data from which a worker computes any case of a sweep.
+
+    Each worker receives them once.
 
     All functions are functions of a module or objects that can be pickled.
 
@@ -69,13 +71,13 @@ class Work:
 
 @dataclass(frozen=True, slots=True)
 class Died:
-    """Returned by an executor for a chunk that did not come back, with a short reason."""
+    """Marker that an executor returns for a lost chunk, with a short reason."""
 
     reason: str
 
 
 def warm_up(work: Work) -> None:
-    """Compile and import what the first case needs, although its meshes are not chosen yet.
+    """Compile and import what the first case needs before the meshes are chosen.
 
     Errors are ignored, because the run of the case reports them.
     """
@@ -90,7 +92,7 @@ def warm_up(work: Work) -> None:
 def compute_chunk(
     work: Work, numbers: Sequence[int], say: Callable | None = None
 ) -> tuple[CaseResults | None, list]:
-    """Compute a chunk of cases, as a worker does.
+    """Compute the results of a chunk of cases.
 
     Parameters
     ----------
@@ -119,7 +121,7 @@ def compute_chunk(
 
 
 def compute_timed(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple:
-    """Compute a chunk with `compute_chunk`, and measure the time.
+    """Compute the results of a chunk of cases, and measure the time.
 
     Parameters
     ----------
@@ -129,7 +131,7 @@ def compute_timed(work: Work, numbers: Sequence[int], say: Callable | None = Non
     Returns
     -------
     tuple
-        Seconds without compilation, which no later case needs, and the result of `compute_chunk`.
+        Time [s] without compilation, which no later case needs, and the result of `compute_chunk`.
     """
     begin = perf_counter()
     compile_seconds = compiled.COMPILE_SECONDS[0]
@@ -165,7 +167,7 @@ def write_or_return(
 def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels | None:
     """Return models of cases that differ only in plain numbers; None if they differ in more.
 
-    None as well for pressed patches in motion, and if `work.keep` needs every single run.
+    It is None as well for pressed patches in motion, and if `work.keep` needs every single run.
     """
     cases = np.asarray(numbers)
     values = work.cases.columns(numbers)
@@ -174,7 +176,7 @@ def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels |
     try:
         keys = [axis.key for axis in work.cases.axes]
         models = work.sweep_scene.similar_models(keys, values, work.cases.sets, cases)
-    except PatchfemError:  # the first case has no model
+    except PatchfemError:  # The first case has no model.
         return None
     if models is None or models.first.patch is None:
         return models
@@ -195,7 +197,10 @@ def _build_case_model(work: Work, number: int):
 
 
 def choose_meshes(work: Work) -> Work:
-    """Return the work with the meshes that all cases share, including cases already computed."""
+    """Choose the meshes that all cases share, and return the work data with these meshes.
+
+    Cases already computed are included.
+    """
     if work.meshes is not None:
         return work
     numbers = work.cases.spread_cases(MAX_MESH_CASES)
@@ -208,10 +213,9 @@ def choose_meshes(work: Work) -> Work:
 
 
 def _min_chunk_size(work: Work) -> int:
-    """Return the smallest number of cases of a chunk.
+    """Return the smallest number of cases of a chunk, for which a batch pays off.
 
-    It is the number for which a batch of the first case pays off, because the time of fewer cases
-    does not predict that of many.
+    The time of fewer cases than a batch needs does not predict the time of many.
     """
     try:
         batch = batches.choose_batch(_build_case_model(work, 0), len(work.cases))
@@ -221,7 +225,7 @@ def _min_chunk_size(work: Work) -> int:
 
 
 class Chunks:
-    """Cases that remain, in chunks of neighbours whose size follows from the measured time.
+    """Remaining cases, in chunks of neighbours whose size follows from the measured time.
 
     Parameters
     ----------
@@ -238,10 +242,11 @@ class Chunks:
         self.suspects: deque = deque()
         self.workers = max(workers, 1)
         self.deaths: dict[int, int] = {}
-        self.seconds_per_case = CHUNK_SECONDS  # of the last chunk
+        # This is the time of the last chunk per case; the first value is a guess.
+        self.seconds_per_case = CHUNK_SECONDS
 
     def take(self, *, idle: bool = True) -> list | None:
-        """Return the next chunk; None if there is none for now.
+        """Return the numbers of the next chunk of cases; None if there is none for now.
 
         idle: whether no chunk is being computed. Only then is a case handed out that was in a chunk
         that died, alone and after all others, because otherwise it would not be known which case
@@ -252,15 +257,15 @@ class Chunks:
             return self.suspects.popleft() if self.suspects and idle else None
         max_size = n_remaining
         if self.workers > 1:
-            # At most half of the remaining cases per worker, so that the last chunks end at the
-            # same time.
+            # A chunk has at most half of the remaining cases per worker, so that the last chunks
+            # end at the same time.
             max_size = -(-n_remaining // (2 * self.workers))
         size = max(int(CHUNK_SECONDS / max(self.seconds_per_case, 1e-9)), self.min_size)
         size = max(1, min(size, MAX_CASES_PER_CHUNK, max_size))
         return [self.remaining.popleft() for _ in range(size)]
 
     def record_time(self, numbers: Sequence[int], seconds: float) -> None:
-        """Record how long a chunk took."""
+        """Record the time [s] that a chunk took."""
         self.seconds_per_case = seconds / len(numbers)
 
     def record_death(self, numbers: Sequence[int]) -> list:
@@ -280,7 +285,7 @@ class Chunks:
 def iterate_chunks(
     work: Work, numbers: Sequence[int], executor, say: Callable | None = None
 ) -> Iterator[tuple]:
-    """Compute cases chunk by chunk and return the results as they come in.
+    """Compute cases chunk by chunk and yield the results as they arrive.
 
     Parameters
     ----------
@@ -307,7 +312,8 @@ def iterate_chunks(
         if hasattr(executor, "begin"):
             executor.begin(work, len(numbers), say)
         work = choose_meshes(work)
-        # With several workers, only the workers import the code that `_min_chunk_size` needs to run a case.
+        # With several workers, only the workers import the code that `_min_chunk_size` needs to run
+        # a case.
         min_size = _min_chunk_size(work) if executor.workers == 1 else 1
         chunks = Chunks(work.cases.neighbours(numbers), executor.workers, min_size)
         yield from _iterate_executor_results(chunks, executor.run(work, chunks.take, say))
@@ -317,7 +323,7 @@ def iterate_chunks(
 
 
 def _iterate_executor_results(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
-    """Yield what `iterate_chunks` yields, for the chunks that an executor has computed."""
+    """Yield the results of the chunks that an executor has computed."""
     for chunk, seconds, answer in done:
         if not isinstance(answer, Died):
             chunks.record_time(chunk, seconds)
@@ -332,7 +338,7 @@ def _iterate_executor_results(chunks: Chunks, done: Iterator) -> Iterator[tuple]
 
 
 class RemainingTime:
-    """Estimate of the remaining time of a sweep from the chunks so far.
+    """Estimator of the remaining time of a sweep from its finished chunks.
 
     The weight of a chunk halves with every later chunk. total: number of cases.
     """
@@ -345,7 +351,7 @@ class RemainingTime:
         self.cases = 0.0
 
     def __call__(self, count: int, seconds: float) -> float | None:
-        """Return the remaining seconds after a chunk; None if they are not known yet.
+        """Return the remaining time [s] after a chunk; None if it is not known yet.
 
         count: cases of the chunk; seconds: time that it took.
         """

@@ -1,4 +1,4 @@
-"""Cases of a sweep from a comma-separated file with a column per key and a case per row.
+"""Cases of a sweep from a CSV file with a column per key and a case per row.
 
 The unit of a key is in the header or in the cells. The tables that a sweep writes can be read as
 well.
@@ -18,12 +18,13 @@ from ...scene.axes import Axis, make_axis
 from .cases import Cases
 
 _HEAD = re.compile(r"\s*((?:[^\[\]]|\[[1-9][0-9]*\](?=\.))+?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
-OUTCOME_COLUMN = "outcome"  # column of a sweep.csv; this column and those after it are results
+# First result column of a sweep.csv; it and the columns after it are ignored.
+OUTCOME_COLUMN = "outcome"
 HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
 
 
 def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
-    """Read the cases of a file, and the mistakes in it.
+    """Read the cases of a CSV file, and the mistakes in it.
 
     Returns
     -------
@@ -81,14 +82,14 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
 
 
 class _Line(NamedTuple):
-    """Number of a line of a file, from 1, and its cells."""
+    """Line of a file: its number, from 1, and its cells."""
 
     number: int
     cells: list
 
 
 def _read_lines(file) -> list:
-    """Return the lines that are not empty."""
+    """Return the lines of a file that are not empty."""
     lines = []
     for number, row in enumerate(csv.reader(file), 1):
         cells = [cell.strip() for cell in row]
@@ -98,7 +99,7 @@ def _read_lines(file) -> list:
 
 
 def _parse_column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[tuple]]:
-    """Return the axis of a column of (line, cell), and its mistakes as (line or 0, message)."""
+    """Parse a column of (line, cell) to an axis, with its mistakes as (line or 0, message)."""
     axes = {}
     mistakes = []
     for number, cell in cells:

@@ -352,7 +352,7 @@ def _evaluate(
     for case in np.flatnonzero(may_ring).tolist():
         window = samples.response(case, accelerations[:, case])
         with np.errstate(all="ignore"):
-            rings, errors = run_events.measure_rings(
+            rings, errors = run_events.measure_ringing_in_sticks(
                 window, modes, drive, held=MAX_STICKING_SLIP * points[case].length
             )
         for name, value in rings.items():

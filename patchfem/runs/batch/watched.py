@@ -18,7 +18,7 @@ from ...dynamics.events import orbits as event_orbits
 from ...dynamics.harmonic import balance as point_balance
 from ...dynamics.harmonic import harmonic, point
 from ...response import measures
-from ...response.measures import measure_half_swing
+from ...response.measures import measure_half_range
 from ..rig import march, pieces, solve
 from ..rig.engines import ENGINES, MARCH, choose_steady_method
 from ..rig.numerics import choose
@@ -112,7 +112,7 @@ class MotionObserver:
             return seen
         window = seen.window
         return seen._replace(
-            displacement=measure_half_swing(
+            displacement=measure_half_range(
                 window.time, window.modal @ gauge, window.modal_rate @ gauge
             )
         )

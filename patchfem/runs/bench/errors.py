@@ -11,7 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects import is_bond_list, law_has_trait
-from ...response.coarser import CoarserRuns, estimate_errors, find_open_kinds, make_coarser_space
+from ...response.coarser import (
+    CoarserRuns,
+    estimate_errors,
+    find_open_kinds,
+    make_spatial_coarsening,
+)
 from ...response.errors import (
     FrictionScale,
     convergence_errors,
@@ -126,10 +131,10 @@ def list_coarse_passes(model, patches: list, fine_run, steps: int) -> list:
     elif meshed:
         # The number of modes is fixed, so that only the mesh changes.
         count = shear.count_shear_modes(model, patch) if model.partial_slip else None
-        out.append(make_coarser_space(quarter._replace(level=1, modes=count), quarter))
+        out.append(make_spatial_coarsening(quarter._replace(level=1, modes=count), quarter))
         if count:
             out.append(
-                make_coarser_space(
+                make_spatial_coarsening(
                     quarter._replace(modes=shear_modes.comparison_mode_count(count)),
                     quarter,
                     "modes",

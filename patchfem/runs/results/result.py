@@ -103,7 +103,7 @@ def meaning(name: str, apart: str = "interface") -> str:
         return patch_rows.TABLE[name].text
 
     first = rows.remove_interface_number(name)
-    row = patch_rows.TABLE.get(first) or rows.find_row(name)
+    row = patch_rows.TABLE.get(first) or rows.find_definition(name)
     return row.text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")
 
 

@@ -15,11 +15,11 @@ from ...core import NotConverged, PatchfemError
 from ...dynamics.harmonic import forces, quasi_static
 from ...dynamics.march import models
 from ...response.decay_curve import (
-    MIN_HALF_SWING,
+    MIN_HALF_CYCLE,
     DecayCurve,
-    compute_swing_curve,
-    find_turning_points,
-    half_swings_between,
+    fit_decay_curve,
+    locate_reversals,
+    make_half_cycles,
 )
 from ...response.errors import MAX_ORDER, error_of_change
 from ...slip.mesh_correction import SPREAD_FACTOR, spread_elements
@@ -75,8 +75,8 @@ def _read(run: Solution) -> DecayCurve:
     """
     motion = run.response
     mode = run.extra.get("tail")
-    reversals = find_turning_points(motion.time, motion.output, motion.output_rate)
-    swings = compute_swing_curve(half_swings_between(*reversals))
+    reversals = locate_reversals(motion.time, motion.output, motion.output_rate)
+    swings = fit_decay_curve(make_half_cycles(*reversals))
     if mode is None:
         return swings
     time = np.arange(mode.begin, mode.end, 0.5 / mode.frequency)
@@ -84,7 +84,7 @@ def _read(run: Solution) -> DecayCurve:
     amplitude = mode.displacement * np.exp(-rate * (time - mode.begin))
     zero = np.zeros(time.size)
     ringing = DecayCurve(time, amplitude, zero + mode.frequency, zero, zero + mode.damping, zero)
-    ringing = ringing.at(amplitude > MIN_HALF_SWING * np.abs(motion.output).max())
+    ringing = ringing.at(amplitude > MIN_HALF_CYCLE * np.abs(motion.output).max())
     slipping = swings.at(swings.time < mode.begin)
     return DecayCurve(*map(np.concatenate, zip(slipping, ringing)))
 

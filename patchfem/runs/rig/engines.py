@@ -16,7 +16,7 @@ import numpy as np
 from ...dynamics.events.elements import CELL_MERGES
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
-from ...response.coarser import CoarserRuns, make_coarser_space
+from ...response.coarser import CoarserRuns, make_spatial_coarsening
 from ...response.errors import (
     FrictionScale,
     coarser_errors,
@@ -226,7 +226,7 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     samples = [CoarserRuns((), sampling_errors)] if model.rig.friction.strips_slide_apart else []
     if not meshed:
         return samples
-    return [*samples, make_coarser_space(replace(numerics, coarse_patch=True))]
+    return [*samples, make_spatial_coarsening(replace(numerics, coarse_patch=True))]
 
 
 def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
@@ -276,9 +276,9 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
         coarser = replace(quarter, coarse_patch=True)
         if shape is not None:
             coarser = replace(coarser, shear_modes=shape.size)
-        coarser_runs.append(make_coarser_space(coarser, quarter))
+        coarser_runs.append(make_spatial_coarsening(coarser, quarter))
     for coarser in _numerics_of_meshes(model, quarter):
-        coarser_runs.append(make_coarser_space(coarser, quarter))
+        coarser_runs.append(make_spatial_coarsening(coarser, quarter))
     climbs = model.grooves is not None
     gathers = model.patch is not None and model.patch.mesh.can_gather_points
     # a patch reduced to few points states the error of its shear modes itself
@@ -288,7 +288,7 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     ):
         n_modes = shear_modes.comparison_mode_count(shape.size)
         coarser_runs.append(
-            make_coarser_space(replace(quarter, shear_modes=n_modes), quarter, "modes")
+            make_spatial_coarsening(replace(quarter, shear_modes=n_modes), quarter, "modes")
         )
     return [*coarser_runs, *_coarse_sums(model, quarter, patch, solution)]
 

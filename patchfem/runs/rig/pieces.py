@@ -18,7 +18,7 @@ from ...effects import law_has_trait
 from ...response import run_events
 from ...response.loops import interface_loops
 from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic, relative_gap
-from ...response.ringing import held_modes, make_ring, select_strongest
+from ...response.ringing import compute_stuck_vibration, make_ringing_measures, select_strongest
 from ...response.rows import NEEDS_RUN, stick_fraction
 from ...response.spectrum import distortion_ratio
 from ...structure.drive_sizes import (
@@ -221,16 +221,18 @@ class PieceReader(Reader):
         if not self.has_friction:
             return {}, {}
         if run.ring is not None:
-            return make_ring(*run.ring, run.acceleration), {}
-        if held := self.held_modes(run, run.window, drive):
+            return make_ringing_measures(*run.ring, run.acceleration), {}
+        if held := self.compute_stuck_vibration(run, run.window, drive):
             mode = select_strongest(held, "acceleration")
             omega = 2 * np.pi * mode.frequency
-            return make_ring(mode.acceleration, omega, mode.damping, run.acceleration), {}
-        return run_events.measure_rings(
+            return make_ringing_measures(
+                mode.acceleration, omega, mode.damping, run.acceleration
+            ), {}
+        return run_events.measure_ringing_in_sticks(
             run.window, self.model.rig.modes, drive, run.log, repeats=run.repeats
         )
 
-    def held_modes(self, run, motion, drive) -> list:
+    def compute_stuck_vibration(self, run, motion, drive) -> list:
         """Return the modes that ring while every interface is held by a single spring.
 
         The list is empty unless only a constant force acts in this part of the run, and every
@@ -254,7 +256,7 @@ class PieceReader(Reader):
         )
         if not held or is_periodic(drive) or not drive.segments or motion.time.size < 2:
             return []
-        return held_modes(self.model.rig.modes, np.concatenate(springs), motion)
+        return compute_stuck_vibration(self.model.rig.modes, np.concatenate(springs), motion)
 
     def tail(self, run, drive) -> dict:
         """Return the mode that rings after the last slip of a release, or {}."""
@@ -266,7 +268,7 @@ class PieceReader(Reader):
         ):
             return {}
         after = run.response.select(run.response.time > run.log.time[-1])
-        held = self.held_modes(run, after, drive)
+        held = self.compute_stuck_vibration(run, after, drive)
         return {"tail": select_strongest(held, "displacement")} if held else {}
 
     def stated_errors(self, run, drive, values: dict) -> dict:

@@ -18,7 +18,7 @@ from ...response.levels import LEVEL_MEASURES, Level
 from ...response.loops import reversal_evaluation
 from ...response.measures import slip_round_off, window_amplitudes, window_end_values
 from ...response.outcome import estimate_steady
-from ...response.rows import NEEDS_RUN, LastCycles, compute_measures, find_row
+from ...response.rows import NEEDS_RUN, LastCycles, compute_measures, find_definition
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from .solution import Solution, last_cycle_amplitude, mode_stiffness, normal_load
 
@@ -127,7 +127,7 @@ class Reader:
         """Measure frequency and damping of the ringing during stick, with errors."""
         if not self.has_friction or self.creeps:
             return {}, {}
-        return run_events.measure_rings(
+        return run_events.measure_ringing_in_sticks(
             run.window, self.model.rig.modes, drive, getattr(run, "log", None), self.held
         )
 
@@ -171,7 +171,7 @@ class Reader:
         errors = {}
         for name, change in absolute_change(values, coarse_values).items():
             if change > 0 and name not in ERROR_MEASURES:
-                row = find_row(name)
+                row = find_definition(name)
                 error = error_of_change(change, order=row.order)
                 errors[name] = error + row.sample_error / self.steps
         return errors

@@ -10,7 +10,7 @@ from time import perf_counter
 from ...core import IntegratedMeasures
 from ...dynamics.smooth import run as engine
 from ...response.measures import slip_round_off
-from ...response.rows import NEEDS_RUN, find_row
+from ...response.rows import NEEDS_RUN, find_definition
 from .interface import make_contact
 from .reading import FrictionWorks, Reader, thin_samples
 from .solution import Solution
@@ -108,7 +108,7 @@ class SmoothReader(Reader):
             if _has_clear_slip(run):
                 sampling[name] = CROSSING_FRACTION_ERROR
             elif name not in sampling:
-                sampling[name] = find_row(name).sample_error / self.steps
+                sampling[name] = find_definition(name).sample_error / self.steps
         errors = {}
         for name, value in values.items():
             size = abs(value)

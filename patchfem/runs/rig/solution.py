@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Measure, Outcome, Response
-from ...response.decay_curve import measure_last_swing
-from ...response.measures import compute_harmonic, measure_half_swing
+from ...response.decay_curve import measure_last_cycle_amplitude
+from ...response.measures import compute_harmonic, measure_half_range
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...structure.drive_sizes import find_drive_omega, has_full_cycle
 
@@ -98,7 +98,7 @@ def seen_by_gauge(model, raw: Solution) -> Solution:
         return raw
     name = "relative_displacement_amplitude"
     window = _histories_at_gauge(raw.window, gauge)
-    amplitude = measure_half_swing(window.time, window.output, window.output_rate)
+    amplitude = measure_half_range(window.time, window.output, window.output_rate)
     if model.rig.drive.kind == "free":
         amplitude = last_cycle_amplitude(window, model.rig.drive.signal.period, amplitude)
     ratio = max(1.0, amplitude / max(raw.values[name], 1e-300))
@@ -139,7 +139,7 @@ def last_cycle_amplitude(window, period: float, window_amplitude: float) -> floa
     window_amplitude : float
         Amplitude of the window [m], returned if it contains no whole cycle.
     """
-    swing = measure_last_swing(window.time, window.output, window.output_rate, period)
+    swing = measure_last_cycle_amplitude(window.time, window.output, window.output_rate, period)
     return window_amplitude if swing is None else swing
 
 

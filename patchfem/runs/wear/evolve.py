@@ -441,7 +441,7 @@ def _replay(patch_model, model, patch, other_patch, moments) -> tuple:
     patch_model : PatchModel
         With the strips of the other patch.
     model : Model
-    patch, other : Patch
+    patch, other_patch : Patch
         Patch of the moments, and the unworn patch that is worn.
     moments : sequence of Moment
     """
@@ -475,7 +475,7 @@ def evolve_and_save(storage, key: str, model, patch, coarse, progress=None) -> E
 
     Parameters
     ----------
-    kept
+    storage
         Storage of the state; None: the state is not saved.
     key : str
         Identifies what the state belongs to.

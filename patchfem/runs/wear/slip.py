@@ -274,7 +274,7 @@ def _thinned_error(compute_path, count: int, fine_path, weight, is_closed: bool 
         Function from indices of samples to the slip paths (m,) [m].
     count : int
         Number of samples.
-    fine, weight : (m,)
+    fine_path, weight : (m,)
         Slip paths from all samples [m], and their weights.
     is_closed : bool
         Whether the last sample is followed by the first one.

@@ -8,7 +8,7 @@ from scene_texts import COULOMB, MODE, POINT
 from patchfem import plan
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.events import event_list
-from patchfem.response.run_events import events_of_log
+from patchfem.response.run_events import convert_event_log
 from patchfem.runs.run import run
 from patchfem.structure.drives import PiecewiseDrive, make_levels
 
@@ -50,7 +50,7 @@ def test_exact_levels_of_a_scene_are_those_of_one_run():
     drive = model.rig.drive.signal
     assert isinstance(drive, PiecewiseDrive)
     limit = 0.3 * model.point.load
-    whole = events_of_log(event_run.simulate(model.rig.modes, drive, limit, limit, 100, 10).log)
+    whole = convert_event_log(event_run.simulate(model.rig.modes, drive, limit, limit, 100, 10).log)
     assert found.count == whole.count and found.kind.tolist() == whole.kind.tolist()
     assert found.time == pytest.approx(whole.time, abs=1e-10)
     assert found.slide == pytest.approx(whole.slide, abs=1e-12, nan_ok=True)
@@ -74,7 +74,7 @@ def test_exact_the_last_events_are_kept_and_all_counted():
 def test_exact_events_of_the_drive_at_the_onset():
     """phase 0.538622 of the release and 2.472613 of the slip at D = 0.8 and damping 0.003."""
     log = event_run.simulate(one_mode(), SineDrive(1.0, 1.0), 0.8, 0.8, 200, 2).log
-    found = events_of_log(log)
+    found = convert_event_log(log)
     release = (found.kind == 1) | (found.kind == 2)
     stop = found.kind == 0
     assert log.phase[np.flatnonzero(release)[-10:]] % np.pi == pytest.approx(0.538622, abs=1e-6)

@@ -7,7 +7,12 @@ from patchfem.compiled.no_jit import load_uncompiled
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics import InterfaceMeasure, RunMeasure, make_elements
 from patchfem.dynamics.events import histories
-from patchfem.response import find_reversals, mean_half_range, measure_rings, secant_stiffness
+from patchfem.response import (
+    find_reversals,
+    mean_half_range,
+    measure_ringing_in_sticks,
+    secant_stiffness,
+)
 
 read = load_uncompiled("patchfem.dynamics.events.read_kernels")
 PLACE, WEIGHT = np.polynomial.legendre.leggauss(16)
@@ -181,7 +186,7 @@ def test_exact_ring_of_an_element_that_holds():
         0.02 / np.sqrt(61.0)
     )
     assert amplitude > 1e-5
-    fitted, errors = measure_rings(done.window, modes, drive, done.log)
+    fitted, errors = measure_ringing_in_sticks(done.window, modes, drive, done.log)
     assert fitted["ring_frequency"] == pytest.approx(
         own / (2 * np.pi), abs=errors["ring_frequency"] + 1e-9
     )

@@ -152,7 +152,7 @@ def test_exact_what_is_read_off_samples_side_by_side(pairs):
                 "secant_stiffness": loops.secant_stiffness(turns),
             }
             | measures.compute_slip_measures(here, drive, STEPS)
-            | spectrum.wave_measures(*spectrum.odd_harmonics(here, drive))
+            | spectrum.harmonic_measures(*spectrum.odd_harmonics(here, drive))
             | loop
         )
         for name, value in expected.items():

@@ -1,4 +1,4 @@
-"""Executors, which compute the chunks of a sweep: in this process, in several, or with Dask.
+"""Executors that compute the chunks of a sweep: in this process, in several, or with Dask.
 
 Each has `workers` and `run(work, take, say)`, which yields (chunk, seconds, answer or Died) of
 every chunk that `take` returns; the answer is the result of `sweep.compute_chunk`. `make_executor`
@@ -20,7 +20,7 @@ class LocalExecutor:
     workers = 1
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
-        """Compute the chunks that `take` returns.
+        """Compute the chunks of cases that the callback `take` supplies.
 
         Parameters
         ----------
@@ -40,7 +40,7 @@ class LocalExecutor:
 
 
 def make_executor(name: str = "", jobs: int = 1):
-    """Return the executor of a name.
+    """Return the executor with a given name.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Executor for Dask: the workers of a cluster compute the chunks.
+"""Executor of a sweep on the workers of a Dask cluster.
 
 The cluster is a local one, or that of a scheduler with an address.
 """
@@ -23,13 +23,14 @@ from ..sweep import Died, Work, compute_timed, write_or_return
 _TLS = "DASK_DISTRIBUTED__COMM__TLS__"
 CERTIFICATES = f"{_TLS}CA_FILE, {_TLS}CLIENT__CERT and {_TLS}CLIENT__KEY"
 CHUNKS_PER_WORKER = (
-    2  # chunks that each worker holds beyond the present one, so it never waits for the next
+    # number of chunks a worker holds besides the present one, so that it never waits for the next
+    2
 )
-CONNECT_TIMEOUT = "10s"  # maximum time to wait for the scheduler
+CONNECT_TIMEOUT = "10s"  # Longest time to wait for the scheduler.
 
 
 class Cluster:
-    """Executor of a Dask cluster.
+    """Executor that computes chunks on the workers of a Dask cluster.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ class Cluster:
                     "distributed.nanny.pre-spawn-environ.PYTHONSAFEPATH": 1,
                 }
             )
-            # no dashboard, on a port of this machine
+            # The cluster has no dashboard and uses a port of this machine.
             scheduler_options = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
             self.own = distributed.LocalCluster(
                 workers or os.cpu_count() or 1,
@@ -79,7 +80,7 @@ class Cluster:
                 silence_logs="CRITICAL",
             )
         self.name = f"--executor dask{':' * bool(address)}{address}"
-        # Their messages are reported by this class.
+        # The messages of these loggers are reported by this class.
         loggers = (getLogger("tornado"), getLogger("asyncio"))
         for logger in (*getLogger("distributed").handlers, *loggers):
             logger.setLevel(CRITICAL)
@@ -103,7 +104,7 @@ class Cluster:
                 raise self._worker_error(worker_versions, environment_versions())
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
-        """Compute the chunks that `take` returns.
+        """Compute the chunks of cases that the callback `take` supplies.
 
         Parameters
         ----------
@@ -158,11 +159,11 @@ class Cluster:
                 self.own.close()
 
     def _connection_error(self) -> Missing:
-        """Return the error of a lost connection."""
+        """Return the error for a lost connection to the scheduler."""
         return Missing(f"{self.name}: the connection to the scheduler is lost")
 
     def _worker_error(self, on_worker: dict | Exception, here: dict) -> Missing:
-        """Return the error of a worker that cannot compute the work.
+        """Return the error for a worker that cannot compute the cases.
 
         on_worker: versions of the worker, or the exception in place of them; here: those of this
         machine.
@@ -190,7 +191,7 @@ class Cluster:
 
         Missing if the connection to the scheduler is lost.
         """
-        if future.status == "cancelled":  # nothing in this process cancels a chunk
+        if future.status == "cancelled":  # Nothing in this process cancels a chunk.
             raise self._connection_error()
         error = future.exception()
         kind = type(error).__name__
@@ -200,7 +201,7 @@ class Cluster:
 
 @cache
 def _source() -> str:
-    """Return a hash of the sources of this package."""
+    """Return a hash of the source files of this package."""
     root = Path(__file__).parents[3]
     paths = root.rglob("*.py")
     texts = [(path.relative_to(root).as_posix(), path.read_bytes()) for path in paths]
@@ -208,9 +209,9 @@ def _source() -> str:
 
 
 def environment_versions(work: Work | None = None) -> dict:
-    """Return what a worker must have in common with the process that sends it work.
+    """Return the versions and file hashes that a worker must share with this process.
 
-    These are versions by name and, as `files`, the hash of the scene with the files that it names.
+    The versions are given by name, the hash of the scene with the files that it names as `files`.
     """
     versions = {
         "patchfem": f"{__version__} (sources {_source()})",
@@ -223,14 +224,14 @@ def environment_versions(work: Work | None = None) -> dict:
 
 
 def _identity(work: Work) -> Work:
-    """Return the work unchanged; a call of this function stores the work on the cluster."""
+    """Return the work unchanged; calling this function stores the work on the cluster."""
     return work
 
 
 def _answer(work: Work, chunk: list, origin: tuple) -> tuple | dict:
-    """Compute a chunk in a worker; return (seconds, answer).
+    """Compute a chunk in a worker; return (CPU time [s], results).
 
-    If the worker has another version or other files, return what it has (`environment_versions`) instead.
+    If the worker has another version or other files, it returns its `environment_versions` instead.
 
     Parameters
     ----------

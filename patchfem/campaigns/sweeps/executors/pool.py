@@ -1,4 +1,4 @@
-"""Executor with several processes of this machine; one that dies is replaced.
+"""Executor with several processes of this machine, which replaces processes that die.
 
 A death loses only the chunk of that process. The standard pools give up all chunks when one process
 dies, and run the script of the caller again if processes are spawned; therefore each worker is a
@@ -41,7 +41,7 @@ main()
 
 
 class ComputedChunk(NamedTuple):
-    """A chunk, the seconds that it took, and the result of `sweep.compute_chunk`, or Died."""
+    """Chunk of cases, the time [s] that it took, and its results, or Died."""
 
     chunk: list
     seconds: float
@@ -49,7 +49,7 @@ class ComputedChunk(NamedTuple):
 
 
 class Worker:
-    """A process that computes one chunk after the other."""
+    """Worker process that computes chunks one after the other."""
 
     def __init__(self, work: Work, *, silent: bool = False):
         here, there = Pipe()
@@ -66,20 +66,20 @@ class Worker:
         self.process = subprocess.Popen(
             words, pass_fds=[there.fileno()], stdin=subprocess.DEVNULL, env=os.environ | ONE_THREAD
         )
-        there.close()  # the pipe then closes when the process dies
+        there.close()  # The pipe then closes when the process dies.
         self.pipe: Connection = here
         self.chunk = None
         self.pipe.send(work)
 
     def send_work(self, work: Work) -> None:
-        """Send the work with the meshes that its cases share."""
+        """Send the common data of all cases, with their shared meshes, to the worker process."""
         try:
             self.pipe.send(work)
         except OSError:
             pass  # The process is dead; `receive` notices this once it has a chunk.
 
     def send_chunk(self, chunk: list) -> None:
-        """Send a chunk."""
+        """Send the numbers of a chunk of cases to the worker process."""
         self.chunk = chunk
         try:
             self.pipe.send(chunk)
@@ -87,7 +87,7 @@ class Worker:
             pass  # The process is dead, which `receive` notices next.
 
     def receive(self) -> ComputedChunk:
-        """Receive the result of the chunk, with Died instead of the answer if the process died."""
+        """Receive the results of a chunk, or Died if the worker process died."""
         try:
             seconds, answer = self.pipe.recv()
         except (EOFError, OSError):
@@ -100,26 +100,26 @@ class Worker:
         return ComputedChunk(chunk, seconds, answer)
 
     def end(self) -> None:
-        """Kill the process."""
+        """Kill the worker process."""
         self.pipe.close()
         self.process.kill()
         self.process.wait()
 
 
 class Pool:
-    """Executor with several processes of this machine."""
+    """Executor that computes chunks in several processes of this machine."""
 
     def __init__(self, workers: int):
         self.workers = workers
         self.ready = []
 
     def begin(self, work: Work, count: int, say: Callable | None = None) -> None:
-        """Start the processes, which import what a case needs while the shared meshes are chosen.
+        """Start the processes, which import their code while the shared meshes are chosen.
 
         Parameters
         ----------
         work : Work
-            The work without these meshes.
+            Common data of all cases, without these meshes.
         count : int
             Number of cases.
         say : callable, optional
@@ -130,12 +130,12 @@ class Pool:
             self.ready.append(_start_worker(work, silent=say is None))
 
     def end(self) -> None:
-        """Kill the processes that wait for the meshes."""
+        """Kill the processes that wait for the shared meshes."""
         while self.ready:
             self.ready.pop().end()
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
-        """Compute the chunks that `take` returns.
+        """Compute the chunks of cases that the callback `take` supplies.
 
         Parameters
         ----------
@@ -176,7 +176,7 @@ class Pool:
                 worker.end()
 
     def _hand_out(self, workers: list, start: Callable, take: Callable) -> None:
-        """Give every idle process a chunk, and start processes while there are chunks and too few."""
+        """Give every idle process a chunk, and start new processes while chunks remain."""
         idle = [worker for worker in workers if worker.chunk is None]
         while idle or len(workers) < self.workers:
             chunk = take()
@@ -191,7 +191,7 @@ class Pool:
 
 
 def _start_worker(work: Work, *, silent: bool) -> Worker:
-    """Start a process; Missing if the system refuses."""
+    """Start a worker process; Missing if the system refuses."""
     try:
         return Worker(work, silent=silent)
     except OSError as error:
@@ -201,7 +201,7 @@ def _start_worker(work: Work, *, silent: bool) -> Worker:
 
 
 def _describe_status(status: int) -> str:
-    """Describe the exit status of a process."""
+    """Describe the exit status of a worker process."""
     if status == -9:
         return "killed by a user, or for lack of memory"
     return f"signal {-status}" if status < 0 else f"exit code {status}"

@@ -1,4 +1,4 @@
-"""A process of the pool, which computes chunks from a pipe until the pipe is closed."""
+"""Worker process of the pool, which computes chunks from a pipe until the pipe is closed."""
 
 import signal
 import sys
@@ -8,12 +8,12 @@ from .. import sweep
 
 
 def main() -> None:
-    """Compute the chunks that come through a pipe.
+    """Compute the chunks of cases that arrive through a pipe.
 
     The first word of the command line is the file descriptor of the pipe; a second word that is not
     empty suppresses messages.
     """
-    # an interrupt is handled by the process that started the sweep
+    # An interrupt is handled by the process that started the sweep.
     for name in ("SIGINT", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
@@ -25,15 +25,15 @@ def main() -> None:
         while True:
             message = pipe.recv()
             if isinstance(message, sweep.Work):
-                # the same work with the meshes that all cases share
+                # This is the same work with the meshes that all cases share.
                 work = message
             else:
                 pipe.send(sweep.compute_timed(work, message, say))
     except (EOFError, BrokenPipeError, ConnectionResetError):
-        # the process that started the sweep has ended
+        # The process that started the sweep has ended.
         return
 
 
 def _print_line(text: str) -> None:
-    """Print a line at once."""
+    """Print a line of text and flush the output."""
     print(text, file=sys.stderr, flush=True)

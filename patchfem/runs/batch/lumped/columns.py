@@ -19,10 +19,10 @@ from ....response.measures import energy_balance
 from ....response.outcome import (
     AMPLITUDE_ROUND_OFF,
     classify_periodic,
-    error_of_steady,
     is_drifting,
     is_still_changing,
     remaining_ringing,
+    steady_estimate_error,
     warn_of_ringing,
 )
 from ....response.reasons import (
@@ -189,7 +189,7 @@ def assemble_results(
         changes &= is_still_changing(steady, steady_error, values[MAIN_MEASURE], sizes.tolerance)
     has_estimate = (changes | is_transient) & ~np.isnan(steady) & ~runs.stuck
     values[STEADY_AMPLITUDE] = np.where(has_estimate, steady, np.nan)
-    errors[STEADY_AMPLITUDE] = error_of_steady(
+    errors[STEADY_AMPLITUDE] = steady_estimate_error(
         steady, steady_error, values[MAIN_MEASURE], errors[MAIN_MEASURE]
     )
     is_resolved, is_wide = _insert_measures(results, values, errors, sizes)

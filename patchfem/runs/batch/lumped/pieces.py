@@ -18,7 +18,7 @@ from ....friction.record import make_law
 from ....response import run_events
 from ....response.errors import merged_cell_errors
 from ....response.measures import COORDINATE_ROUND_OFF, energy_balance
-from ....response.ringing import make_ring
+from ....response.ringing import make_ringing_measures
 from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
 from ...rig.costs import count_merges
 from ...rig.engines import EXACT, PIECES, choose_engine
@@ -246,7 +246,7 @@ def _find_ring(case: Case, run, steady: bool) -> dict | None:
     The ringing is that of the run itself or, if `steady`, of a few more cycles with samples.
     """
     if run.ring is not None:
-        return make_ring(*run.ring, run.acceleration)
+        return make_ringing_measures(*run.ring, run.acceleration)
     if not steady or not run.slips:  # an interface that never slips as a whole excites no ringing
         return {}
     modes = case.model.rig.modes
@@ -260,7 +260,7 @@ def _find_ring(case: Case, run, steady: bool) -> dict | None:
     more = histories.simulate(
         modes, drive, case.groups, STICK_CYCLES, STICK_CYCLES, start=start, memory=memory
     )
-    rings = run_events.measure_rings(more.window, modes, drive, more.log, repeats=True)
+    rings = run_events.measure_ringing_in_sticks(more.window, modes, drive, more.log, repeats=True)
     return {} if rings == ({}, {}) else None
 
 

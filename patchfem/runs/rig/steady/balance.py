@@ -24,7 +24,7 @@ from ....dynamics.integrated import EngineResult
 from ....formatting import format_length
 from ....response.errors import finer_errors
 from ....response.measures import compute_acceleration_peak
-from ....response.spectrum import odd_harmonics, wave_measures
+from ....response.spectrum import harmonic_measures, odd_harmonics
 from ..interface import contact_model
 from ..reading import Reader, friction_works
 from ..solution import Solution, sampled_loop
@@ -268,7 +268,7 @@ class BalanceFinder:
         values = {
             COLUMN_MEASURES["amplitude"]: motion.amplitude(row),
             COLUMN_MEASURES["acceleration_peak"]: compute_acceleration_peak(response),
-            **wave_measures(*odd_harmonics(response, drive)),
+            **harmonic_measures(*odd_harmonics(response, drive)),
         }
         return {name: value for name, value in values.items() if value is not None}
 

@@ -17,8 +17,8 @@ from ....core import InitialState, Outcome, PatchfemError
 from ....dynamics.events import elements as event_elements
 from ....dynamics.events import histories, steady, stick_steady
 from ....dynamics.periodic import is_stable
-from ....response.measures import measure_half_swing
-from ....response.spectrum import wave_measures
+from ....response.measures import measure_half_range
+from ....response.spectrum import harmonic_measures
 from ....structure.drive_sizes import find_max_acceleration
 from ....structure.response import compute_receptance
 from ..pieces import PieceReader, RigidElements, YieldingElements
@@ -155,10 +155,10 @@ class Maps(Followed):
         gauge = self.modes.gauge
         amplitude = float(run.amplitudes[:, 1].max() - run.amplitudes[:, 0].min()) / 2
         if gauge is not None:
-            amplitude = measure_half_swing(
+            amplitude = measure_half_range(
                 window.time, window.modal @ gauge, window.modal_rate @ gauge
             )
-        waves = wave_measures(*map(float, run.reading.waves), find_max_acceleration(drive))
+        waves = harmonic_measures(*map(float, run.reading.waves), find_max_acceleration(drive))
         values = _curve_measures(amplitude, run.acceleration, waves)
         is_stuck = PieceReader(self.model, self.numerics, self.patch, self.contact_elements).sticks(
             run
@@ -274,7 +274,7 @@ class EventFinder(Maps):
         at_gauge, at_output = receptance[0, :, 0] * modes.mass
         acceleration = drive.acceleration * float(abs(drive.moving + drive.omega**2 * at_output))
         amplitude = drive.acceleration * float(abs(at_gauge))
-        values = _curve_measures(amplitude, acceleration, wave_measures(acceleration, 0.0))
+        values = _curve_measures(amplitude, acceleration, harmonic_measures(acceleration, 0.0))
         return CurvePoint(
             drive,
             values,
