@@ -32,9 +32,10 @@ from .export import convert, histories
 from .export import cost as cost_files
 from .export import folder as results_folder
 from .export import report as run_page
-from .export import reports as page_of_several
+from .export import reports as comparison_page
 from .export import summary as summaries
-from .export.drawing import pictures, swept
+from .export.drawing import pictures
+from .export.drawing import swept as sweep_charts
 from .export.fits import request as fits
 from .export.fits.options import FitOptions
 from .export.pages import headline, released, sentences
@@ -113,46 +114,49 @@ __all__ = [
 ]
 TEXT_NAME = "<text>"  # name of a scene that was given as a string
 DICT_NAME = "<dict>"  # name of a scene that was given as a dict
-# start of messages that locates a mistake in --set or a dict; a Python program has neither
+# prefix that locates a mistake in an option --set or in the text made from a dict; a Python caller wrote neither
 LOCATION_PATTERN = re.compile(rf"^(--set: |{DICT_NAME}(:\d+)?: )", re.MULTILINE)
 
 
-def _name_keys_only(function: Callable) -> Callable:
-    """Decorate a function so that its errors on a dict name only the key, not a file and line."""
+def _strip_file_and_line_from_errors(function: Callable) -> Callable:
+    """Decorate a function so that error messages for an input dict name only the key.
 
-    def remove_location(text: Any) -> Any:
-        return LOCATION_PATTERN.sub("", text) if isinstance(text, str) else text
+    The messages then contain no file and line.
+    """
+
+    def strip_file_and_line(message: Any) -> Any:
+        return LOCATION_PATTERN.sub("", message) if isinstance(message, str) else message
 
     @wraps(function)
-    def call(*args: Any, **keywords: Any) -> Any:
+    def call_and_strip_errors(*args: Any, **keywords: Any) -> Any:
         try:
             return function(*args, **keywords)
         except PatchfemError as error:
-            error.args = tuple(map(remove_location, error.args))
+            error.args = tuple(map(strip_file_and_line, error.args))
             if isinstance(error, SceneError):
-                error.mistakes = list(map(remove_location, error.mistakes))
+                error.mistakes = list(map(strip_file_and_line, error.mistakes))
             raise
 
-    return call
+    return call_and_strip_errors
 
 
-def _refuse_removed_options(function: Callable) -> Callable:
-    """Decorate a function so that it refuses removed arguments, in one sentence."""
+def _reject_removed_options(function: Callable) -> Callable:
+    """Decorate a function so that it rejects removed arguments with a one-line message."""
 
     @wraps(function)
-    def call(*args: Any, **keywords: Any) -> Any:
+    def check_options_and_call(*args: Any, **keywords: Any) -> Any:
         verb = function.__name__
         for name in keywords:
             if sentence := removed.describe_removed_option(verb, f"--{name}", f"{verb}: {name}"):
                 raise PatchfemError(sentence)
         return function(*args, **keywords)
 
-    return call
+    return check_options_and_call
 
 
-@_name_keys_only
+@_strip_file_and_line_from_errors
 def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene:
-    """Read a scene from a file, a text or a dict of its tables.
+    """Read a scene from a file, from its text, or from a dict of its tables.
 
     Parameters
     ----------
@@ -195,26 +199,27 @@ def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene
 
 
 def _is_scene_text(scene: Any) -> bool:
-    """Return whether a scene was given as its text instead of the name of its file."""
+    """Return whether a scene was given as its text and not as the name of its file."""
     return isinstance(scene, str) and ("\n" in scene or "[" in scene)
 
 
 def get_base_scene(scene: Scene) -> BaseScene:
-    """Return the `BaseScene` of a scene, from which scenes with a few other keys are made.
+    """Return the `BaseScene` of a scene, from which variants with changed keys are built.
 
-    It is cached for the last scene.
+    The one of the last scene is cached.
     """
-    for base in _last_bases:
-        if base.scene is scene:
-            return base
-    _last_bases[:] = [BaseScene(scene)]
-    return _last_bases[0]
+    for base_scene in _cached_base_scenes:
+        if base_scene.scene is scene:
+            return base_scene
+    _cached_base_scenes[:] = [BaseScene(scene)]
+    return _cached_base_scenes[0]
 
 
-_last_bases: list[BaseScene] = []  # at most one
+# the BaseScene of the last scene that was changed; empty before the first
+_cached_base_scenes: list[BaseScene] = []
 
 
-@_name_keys_only
+@_strip_file_and_line_from_errors
 def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
     """Build the model of a scene without solving anything.
 
@@ -245,14 +250,14 @@ def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
     ('patch', 115.65)
     """
     if isinstance(scene, Model):
-        _refuse_sets(sets, "Model")
+        _reject_changed_keys(sets, "Model")
         return scene
     return build_model(load(scene, **sets))
 
 
-@_name_keys_only
+@_strip_file_and_line_from_errors
 def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
-    """Plan the run of a scene: its engine, size, predicted cost and stiffnesses. Nothing is solved.
+    """Plan the run of a scene, its engine, size and predicted cost, without solving it.
 
     Parameters
     ----------
@@ -283,7 +288,7 @@ def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     return plan_model(build(scene, **sets))
 
 
-@_name_keys_only
+@_strip_file_and_line_from_errors
 def run(
     scene: str | Path | Scene | Model | Plan,
     /,
@@ -325,15 +330,16 @@ def run(
     ('done', 34.5)
     """
     if isinstance(scene, Plan):
-        _refuse_sets(sets, "Plan")
+        _reject_changed_keys(sets, "Plan")
     scene_plan = scene if isinstance(scene, Plan) else plan(scene, **sets)
     result = run_plan(scene_plan, _print_to_stderr if say is None else say, progress)
+    # the result of the engines becomes the public class, which has plots, tables and measures as attributes
     values = {field.name: getattr(result, field.name) for field in fields(result)}
     return Result(**values | {"measures": Measures(result.measures)})
 
 
 def demo(**sets: Any) -> Result:
-    """Run the scene that comes with the program: the rig of the 1985 report at 143 Hz and 5 g.
+    """Run the example scene of the program, the rig of the 1985 report at 143 Hz and 5 g.
 
     Parameters
     ----------
@@ -360,7 +366,7 @@ def demo(**sets: Any) -> Result:
 
 
 def new(kind: str, /) -> str:
-    """Return the text of a scene to start from, for `load` and `run`.
+    """Return the text of a template scene, for `load` and `run`.
 
     Parameters
     ----------
@@ -382,7 +388,7 @@ def new(kind: str, /) -> str:
     >>> pf.new("bench").splitlines()[0]
     'title = "A friction loop of one contact point"'
     """
-    return starting.read_template(_require_text(kind, "new"))
+    return starting.read_template(_require_string(kind, "new"))
 
 
 def cost(
@@ -394,7 +400,7 @@ def cost(
     say: Callable[[str], None] | None = None,
     **sets: Any,
 ) -> dict[str, Any]:
-    """Measure error against CPU seconds of a scene for several tolerances.
+    """Measure the errors and CPU times of runs of a scene at several tolerances.
 
     Parameters
     ----------
@@ -435,7 +441,7 @@ def cost(
     """
     model = build(scene, **sets)
     tolerance = model.accuracy.tolerance
-    setting = _require_text(over, "cost: over") or cost_curves.TOLERANCE
+    setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE
     curve = cost_curves.setting_curve(model, setting, _print_to_stderr if say is None else say)
     if out is not None:
         cost_files.write(Path(out), {setting: curve})
@@ -452,7 +458,9 @@ def backbone(
     method: str = "all",
     **sets: Any,
 ) -> Dataset:
-    """Compute frequency and damping ratio of a mode against its amplitude at the output, with errors.
+    """Compute frequency and damping ratio of a mode against its amplitude at the output.
+
+    Every value has a numerical error.
 
     Parameters
     ----------
@@ -490,24 +498,25 @@ def backbone(
     >>> found["quasi_static_frequency"].size
     5
     """
+    # modes that were measured with the joint contain its sticking stiffness, which the friction law would add again
     model = joint.remove_joint(build(scene, **sets))
-    is_all = _require_text(method, "backbone: method") == "all"
+    is_all = _require_string(method, "backbone: method") == "all"
     methods = backbones.METHODS if is_all else (method,)
     if unknown := set(methods) - set(backbones.METHODS):
         raise PatchfemError(
             f"backbone: method {unknown.pop()!r} does not exist; use one of "
             f"{', '.join(backbones.METHODS)}, or 'all'"
         )
-    values = None
+    lengths = None
     if amplitudes is not None:
-        values = axes.read_lengths(_format_lengths(amplitudes), "amplitudes")
+        lengths = axes.read_lengths(_format_lengths(amplitudes), "amplitudes")
     curves = backbones.compute_backbone(
-        model, _require_text(mode, "backbone: mode"), values, methods
+        model, _require_string(mode, "backbone: mode"), lengths, methods
     )
     return backbone_files.backbone_contents(curves, model.source.title).to_xarray()
 
 
-@_name_keys_only
+@_strip_file_and_line_from_errors
 def sweep(
     scene: str | Path | Scene,
     over: Mapping[str, Any] | None = None,
@@ -587,9 +596,9 @@ def sweep(
         results = sweep_run.compute_in_memory(sweep_scene, cases, pool, _print_to_stderr)
         names = []
     else:
-        place = sweep_run.SweepTarget(Path(out), resume)
-        results = sweep_run.sweep_into(sweep_scene, cases, place, pool, _print_to_stderr)
-        names = [] if place.kept_files(len(cases)) == "none" else cases.names(sweep_scene)
+        target = sweep_run.SweepTarget(Path(out), resume)
+        results = sweep_run.sweep_into(sweep_scene, cases, target, pool, _print_to_stderr)
+        names = [] if target.kept_files(len(cases)) == "none" else cases.names(sweep_scene)
     keys = [folder.case_folder_name(name) for name in names]
     table = page.sweep_table(sweep_scene, cases, results, (), Path(out or ""))
     answer = headline.summarise_sweep(table).answer()
@@ -597,23 +606,26 @@ def sweep(
 
 
 def _is_empty(values: Any) -> bool:
-    """Return whether the values of a key are a list or a text without content."""
+    """Return whether the values of a key are an empty list or string."""
     return hasattr(values, "__len__") and not len(values)
 
 
 def _format_range(key: str, values: Any) -> str:
-    """Return the values of a key as the string that `patchfem sweep --over` reads."""
+    """Return the values of a key as a string for the option `patchfem sweep --over`."""
     return values if isinstance(values, str) else ",".join(format_values(key, values))
 
 
 class SweepPlots:
-    """Pictures of sweeps and backbones, as matplotlib Axes: ``pf.plot.sweep(dataset, "loop_area")``."""
+    """Plots of sweeps and backbone curves as matplotlib Axes.
+
+    The instance `patchfem.plot` is used as in ``pf.plot.sweep(dataset, "loop_area")``.
+    """
 
     @staticmethod
     def sweep(dataset: Dataset, measure: str, ax: Axes | None = None) -> Axes:
-        """Plot a measure of a sweep, with its numerical errors, against the key that has most values.
+        """Plot a measure of a sweep against the key that has most values, with numerical errors.
 
-        Hollow points miss the tolerance. An axis is logarithmic if its values span more than two decades.
+        Hollow points exceed the tolerance. An axis is logarithmic if its values span more than two decades.
 
         Parameters
         ----------
@@ -644,12 +656,14 @@ class SweepPlots:
             raise PatchfemError(
                 "plot.sweep: a Dataset returned by pf.sweep is needed, with measures and their errors"
             )
-        figure = pictures.draw_charts.figure([swept.sweep_chart(dataset, measure)], onto=ax)
+        figure = pictures.draw_charts.figure([sweep_charts.sweep_chart(dataset, measure)], onto=ax)
         return figure.axes[0] if ax is None else ax
 
     @staticmethod
     def backbone(dataset: Dataset, ax: Axes | None = None) -> Axes:
-        """Plot the frequency of a mode against its amplitude for each method, with errors, and its damping ratio.
+        """Plot frequency and damping ratio of a mode against its amplitude, for each method.
+
+        The points have error bars.
 
         Parameters
         ----------
@@ -698,7 +712,7 @@ plot = SweepPlots()
 def run_many(
     models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[str], None] | None = None
 ) -> CaseResults:
-    """Run many models or scenes, and return a column per measure and a row per model.
+    """Run several scenes or models, and return their measures as columns with a row per model.
 
     Models that share work are computed together, with the same results as single runs. Patches of equal geometry share one
     mesh, as in a sweep.
@@ -747,7 +761,7 @@ def fit(
     say: Callable[[str], None] | None = None,
     **keywords: Any,
 ) -> dict[str, Any]:
-    r"""Find values of keys of a scene from measurements, with intervals.
+    r"""Fit values of keys of a scene to measurements, with 95 % intervals.
 
     Parameters
     ----------
@@ -811,9 +825,9 @@ def fit(
 
 
 def _check_fit_options(options: Any, changes: dict) -> FitOptions:
-    """Return options with some fields replaced, in the form in which the command line gives them.
+    """Return the options of a fit with some fields replaced, in the form of the command line.
 
-    Raises PatchfemError for values of another type.
+    `changes` holds the new values by the name of the field. Raises PatchfemError for values of another type.
     """
     if not isinstance(options, FitOptions):
         raise PatchfemError(f"fit: options: FitOptions are needed, not {options!r:.60}")
@@ -821,15 +835,17 @@ def _check_fit_options(options: Any, changes: dict) -> FitOptions:
     amplitudes = options.amplitudes
     return replace(
         options,
-        hold=_require_texts(options.hold, "fit: hold"),
-        offset=_require_texts(options.offset, "fit: offset"),
-        placebo=_require_texts(options.placebo, "fit: placebo"),
+        hold=_require_strings(options.hold, "fit: hold"),
+        offset=_require_strings(options.offset, "fit: offset"),
+        placebo=_require_strings(options.placebo, "fit: placebo"),
         amplitudes="" if amplitudes is None else _format_lengths(amplitudes),
     )
 
 
 def _format_ends(key: str, ends: Any) -> str:
-    """Return the string "low..high" of two values or of a range given as a string.
+    """Return the range of a free key as a string "low..high".
+
+    `ends` are two values, or a string that is returned unchanged.
 
     Raises PatchfemError for anything else.
     """
@@ -842,13 +858,13 @@ def _format_ends(key: str, ends: Any) -> str:
 
 
 def _format_lengths(lengths: float | str | Iterable) -> str:
-    """Return lengths [m] as the string that a command-line option reads."""
+    """Return lengths [m] as a string for an option of the command line."""
     if isinstance(lengths, str):
         return lengths
     return ",".join(format_values(axes.LENGTH_KEY, lengths))
 
 
-@_refuse_removed_options
+@_reject_removed_options
 def profile(
     *files: str | Path,
     cutoff: float | str | None = None,
@@ -863,7 +879,7 @@ def profile(
     cutoff : float or str, optional
         Wavelength that separates roughness from waviness, in m or as a text such as "0.25 mm".
     window : list, optional
-        First and last position, in m or as texts; for a scan those in x first.
+        First and last position, in m or as texts, or both in one text with a comma; for a scan those in x first.
     units : tuple of str, optional
         Units of x and z for files that give none, such as ("mm", "um").
 
@@ -889,29 +905,29 @@ def profile(
     1
     """
     length = _parse_length(cutoff, "profile: cutoff")
-    ends = None
+    limits = None
     if window is not None:
-        values = [window]
+        positions = [window]
         if isinstance(window, str):
-            values = window.split(",")
+            positions = window.split(",")
         elif isinstance(window, Iterable):
-            values = window
-        ends = tuple(_parse_length(value, "profile: window") for value in values)
+            positions = window
+        limits = tuple(_parse_length(position, "profile: window") for position in positions)
     if length is not None and not 0 < length < float("inf"):
         raise PatchfemError(f"profile: cutoff: a length above zero is needed, not {length:g} m")
     reports = []
     for file in files:
         surface = surfaces.read_surface(_require_path(file, "profile"), units)
-        reports.append(roughness_report.make_report(surface, cutoff=length, window=ends))
+        reports.append(roughness_report.make_report(surface, cutoff=length, window=limits))
     return {
         "profiles": [roughness.roughness_data(trace_report) for trace_report in reports],
         "means": roughness.means_data(reports),
     }
 
 
-@_refuse_removed_options
+@_reject_removed_options
 def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None = None) -> Path:
-    """Put results folders side by side on one page, or rebuild the page of a single sweep.
+    """Write a page that compares results folders, or rebuild the page of a single sweep.
 
     Parameters
     ----------
@@ -938,7 +954,7 @@ def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None
     'both.html'
     """
     target = None if out is None else _require_path(out, "report: out")
-    return Path(page_of_several.write_report(_require_paths(folders, "report"), target))
+    return Path(comparison_page.write_report(_require_paths(folders, "report"), target))
 
 
 def export(
@@ -950,7 +966,7 @@ def export(
     histories: bool = False,
     of: str = "",
 ) -> Path:
-    """Write a results folder, or the structure of a scene (.toml), in another format.
+    """Convert a results folder, or the structure of a scene (.toml), to another file format.
 
     Parameters
     ----------
@@ -1008,7 +1024,7 @@ def view(
     frame: int | None = None,
     magnify: float | None = None,
 ) -> None:
-    """Show the pieces of a results folder in a window, or draw them into a file.
+    """Show the pieces of a results folder in a window, or write a picture or film of them.
 
     Parameters
     ----------
@@ -1046,7 +1062,7 @@ def import_(
     decay: bool = False,
     **how: str,
 ) -> dict[str, Any]:
-    r"""Convert laboratory records (.uff, .mat, .csv) to a file that scenes and fits read.
+    r"""Convert a laboratory record (.uff, .mat, .csv) to a file for scenes and fits.
 
     Parameters
     ----------
@@ -1089,14 +1105,14 @@ def import_(
         raise PatchfemError(
             f"import_: {unknown.pop()}: unknown setting; use map, zero, {', '.join(sorted(names))}"
         )
-    texts = {name: _require_text(value, f"import_: {name}") for name, value in how.items()}
+    texts = {name: _require_string(value, f"import_: {name}") for name, value in how.items()}
     estimate = imported.Estimate(decay=decay, **texts)
-    channels = _require_texts(map, "import_: map")
+    channels = _require_strings(map, "import_: map")
     return {"file": str(out), **imported.convert_file(file, out, channels, zero, estimate)}
 
 
 def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> Path:
-    """Write the tagged mesh of the pieces of a scene.
+    """Write the finite-element mesh of the pieces of a scene, with tagged regions.
 
     Parameters
     ----------
@@ -1197,8 +1213,8 @@ def compare(
         "datum": datum,
     }
     files = [_require_path(file, "compare") for file in files]
-    _require_text(direction, "compare: direction")
-    _require_text(datum, "compare: datum")
+    _require_string(direction, "compare: direction")
+    _require_string(datum, "compare: datum")
     if pairs is None and len(files) > 1 and any(file.is_dir() for file in files):
         has_setting = units is not None or shift is not None or keep_spikes or datum or direction
         if len(files) > 2 or has_setting:
@@ -1216,7 +1232,10 @@ def compare(
 
 
 def _read_sweep_scene(scene: str | Path | Scene, measure: str) -> case_models.SweepScene:
-    """Return a scene that `load` takes, valid or not, for a sweep that is asked for a measure."""
+    """Return the text of a scene for a sweep, without checking that the scene is valid.
+
+    `scene` is as for `load`, and `measure` is the measure that the answer of the sweep states.
+    """
     sets: tuple = ()
     if isinstance(scene, Mapping):
         path = Path(DICT_NAME)
@@ -1235,7 +1254,10 @@ def _read_sweep_scene(scene: str | Path | Scene, measure: str) -> case_models.Sw
 
 
 def _require_path(value: Any, name: str) -> Path:
-    """Return a file or folder as a Path; raise PatchfemError for anything else."""
+    """Return the name of a file or folder as a Path.
+
+    Raises PatchfemError for a value of another type.
+    """
     if not isinstance(value, str | Path):
         needed = "a path, a text, a dict of tables or a Scene" if name == "a scene" else "a path"
         raise PatchfemError(f"{name}: {needed} is needed, not {value!r:.60}")
@@ -1243,15 +1265,15 @@ def _require_path(value: Any, name: str) -> Path:
 
 
 def _require_paths(value: Any, name: str) -> list:
-    """Return the paths of a list, or a single path as a list."""
+    """Return one or several paths as a list."""
     is_list = isinstance(value, Iterable) and not isinstance(value, str)
     return [_require_path(path, name) for path in (value if is_list else [value])]
 
 
 def _parse_length(value: Any, name: str) -> float | None:
-    """Return a length [m] from a number or a string with a unit; None if it is None.
+    """Convert a number [m], or a string with a unit, to a length [m].
 
-    Raises PatchfemError for anything else.
+    None is returned unchanged. Raises PatchfemError for anything else.
     """
     if value is None:
         return None
@@ -1264,25 +1286,32 @@ def _parse_length(value: Any, name: str) -> float | None:
         raise PatchfemError(f"{name}: {reason}") from None
 
 
-def _require_text(value: Any, name: str) -> str:
-    """Return a value that must be a string; raise PatchfemError for anything else."""
+def _require_string(value: Any, name: str) -> str:
+    """Return a value if it is a string; raise PatchfemError otherwise."""
     if not isinstance(value, str):
         raise PatchfemError(f"{name}: a text is needed, not {value!r:.60}")
     return value
 
 
-def _require_texts(value: str | Iterable[str], name: str) -> tuple:
-    """Return a text or texts as a tuple; raise PatchfemError for anything else."""
+def _require_strings(value: str | Iterable[str], name: str) -> tuple:
+    """Return one or several strings as a tuple.
+
+    Raises PatchfemError for values of another type.
+    """
     is_list = isinstance(value, Iterable) and not isinstance(value, str)
-    return tuple(_require_text(text, name) for text in (value if is_list else [value]))
+    return tuple(_require_string(string, name) for string in (value if is_list else [value]))
 
 
-def _print_to_stderr(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
+def _print_to_stderr(line: str) -> None:
+    """Print a line of text to the standard error stream."""
+    print(line, file=sys.stderr, flush=True)
 
 
-def _refuse_sets(sets: dict, kind: str) -> None:
-    """Raise PatchfemError if there are sets, because an object of this kind cannot be changed."""
+def _reject_changed_keys(sets: dict, kind: str) -> None:
+    """Raise PatchfemError if changed keys are given, because a Plan or Model cannot be changed.
+
+    `kind` is the name of the class.
+    """
     if sets:
         raise PatchfemError(
             f"{', '.join(sets)} cannot be set in a {kind}; set the value in the scene"
@@ -1290,7 +1319,9 @@ def _refuse_sets(sets: dict, kind: str) -> None:
 
 
 class Measures(Mapping):
-    """The measures of a run by name or as attributes, read-only. A notebook shows them as a table.
+    """Measures of a run, by name or as attributes, read-only.
+
+    A notebook shows them as a table.
 
     Examples
     --------
@@ -1306,11 +1337,11 @@ class Measures(Mapping):
     def __getitem__(self, name: str) -> Measure:
         if name in self._measures:
             return self._measures[name]
-        near = get_close_matches(str(name), self._measures, 1, 0.6)
-        raise KeyError(
-            f"no measure {name!r} in this run; "
-            + (f"did you mean {near[0]!r}?" if near else f"it has {', '.join(self._measures)}")
-        )
+        similar_names = get_close_matches(str(name), self._measures, 1, 0.6)
+        advice = f"it has {', '.join(self._measures)}"
+        if similar_names:
+            advice = f"did you mean {similar_names[0]!r}?"
+        raise KeyError(f"no measure {name!r} in this run; {advice}")
 
     def __getattr__(self, name: str) -> Measure:
         if name.startswith("_"):
@@ -1339,10 +1370,10 @@ class Measures(Mapping):
 
 
 class Plots:
-    """The pictures of a run, each as matplotlib Axes.
+    """Plots of a run, each returned as matplotlib Axes.
 
     Every method takes `ax`, the Axes to draw on. Without it the method makes a new figure, which may have more Axes than
-    the method returns. It raises PatchfemError if the run does not have what the picture needs.
+    the method returns. It raises PatchfemError if the run lacks the data of the plot.
 
     Examples
     --------
@@ -1365,7 +1396,7 @@ class Plots:
         return self._draw(ax, ("pressure", "faces"), reason)
 
     def loop(self, ax: Axes | None = None) -> Axes:
-        """Plot the friction force against the slide of the interface."""
+        """Plot the friction force against the relative displacement of the interface."""
         reason = self._explain_missing_motion() or "no friction acted, or nothing slid"
         return self._draw(ax, ("loop",), reason)
 
@@ -1377,7 +1408,7 @@ class Plots:
         return self._draw(ax, ("history",), self._explain_missing_motion())
 
     def levels(self, ax: Axes | None = None) -> Axes:
-        """Plot the amplitude at each level, or of the steady states against level or frequency."""
+        """Plot amplitude per level, or steady-state amplitude against level or frequency."""
         no_levels = (
             'the drive has no levels; use drive.waveform = "levels", or a sweep with '
             'accuracy.method = "harmonic"'
@@ -1400,29 +1431,36 @@ class Plots:
         return self._draw(ax, ("bodies",), reason, fields_of_bodies)
 
     def _explain_missing_motion(self) -> str:
-        """Return the reason why a run has no motion; "" if it has one."""
+        """Return the reason why a run has no motion; "" if it has motion."""
         if self._result.response is not None:
             return ""
         if self._result.plan.kind == "patch":
             return "a static patch does not move; add [friction] with [slide], or with [structure] and [drive]"
         return "no motion was computed"
 
-    def _draw(self, ax: Axes | None, names: tuple, reason: str, bodies: dict | None = None) -> Axes:
-        """Return the Axes of the first of these charts that the run has; refuse with `reason` if none."""
+    def _draw(
+        self, ax: Axes | None, chart_names: tuple, reason: str, bodies: dict | None = None
+    ) -> Axes:
+        """Plot the first of several named charts for which the run has data.
+
+        Raises PatchfemError with `reason` if the run has data for none of them. `bodies` holds the fields of the
+        pieces.
+        """
         if ax is not None and not hasattr(ax, "errorbar"):
             raise PatchfemError(
-                f"plot.{names[0]}: matplotlib Axes are needed as ax, not {ax!r:.60}"
+                f"plot.{chart_names[0]}: matplotlib Axes are needed as ax, not {ax!r:.60}"
             )
-        drawn = run_page.draw_axes(self._result, names, ax, bodies)
-        if drawn is None:
-            raise PatchfemError(f"plot.{names[0]}: nothing to draw: {reason}")
-        return drawn
+        axes_of_chart = run_page.draw_axes(self._result, chart_names, ax, bodies)
+        if axes_of_chart is None:
+            raise PatchfemError(f"plot.{chart_names[0]}: nothing to draw: {reason}")
+        return axes_of_chart
 
 
 class Result(run_result.Result):
-    """A finished run: `outcome`, `measures`, `warnings`, `notes`, `seconds`, and the histories in `response`.
+    """Finished run with its outcome, measures, warnings and notes, and its time histories.
 
-    `outcome.sentence` says how the run ended. `measures[name]` has `value`, `error`, `unit` and `text`, in SI.
+    `outcome.sentence` says how the run ended. `measures[name]` has `value`, `error`, `unit` and `text`, in SI. `response`
+    holds the histories, and `seconds` the CPU seconds by part of the run.
 
     Examples
     --------
@@ -1436,7 +1474,7 @@ class Result(run_result.Result):
     measures: Measures
 
     def _repr_html_(self) -> str:
-        """Return the answer for a notebook: outcome, headline, measures in their groups, warnings."""
+        """Return the HTML that a notebook displays: outcome, headline, measures and warnings."""
         summary = summaries.summarise_run(self)
         return sentences.notebook_html(
             summary,
@@ -1447,16 +1485,16 @@ class Result(run_result.Result):
 
     @property
     def notes(self) -> list[str]:
-        """Sentences on what the model neglects."""
+        """Sentences on effects that the model neglects."""
         return list(self.extra.get("notes", ()))
 
     @property
     def plot(self) -> Plots:
-        """The pictures of the run: pressure(), stress(), loop(), history(), levels()."""
+        """Plots of the run: pressure(), stress(), loop(), history(), levels()."""
         return Plots(self)
 
     def table(self) -> Any:
-        """Return the measures as rows of name, value, error and unit in SI.
+        """Return the measures of the run as a table of name, value, error and unit, in SI.
 
         Returns
         -------
@@ -1474,11 +1512,13 @@ class Result(run_result.Result):
         return DataFrame(rows).set_index("measure")
 
     def to_xarray(self) -> Dataset:
-        """Return the Dataset of result.nc: histories and fields with units, and the scene."""
+        """Return the histories and fields of the run, with units and the scene, as in result.nc."""
         return histories.result_contents(self).to_xarray()
 
     def save(self, folder: str | Path) -> Path:
-        """Write the results folder, as `patchfem run -o` does. An older results folder is replaced.
+        """Write the results folder of the run, as `patchfem run -o` does.
+
+        An older results folder is replaced.
 
         Parameters
         ----------

@@ -44,17 +44,19 @@ __all__ = [
     "frozen_array",
 ]
 
-# slip speed over its peak in the cycle; below it a law with memory counts as sticking
+# slip speed / its peak in the cycle; below it a law with memory counts as sticking
 STICK_SPEED_RATIO = 1e-2
 G_N = 9.80665  # standard gravity [m s-2]
-# relative round-off of squared frequencies that a spring must not lower
+# relative round-off of squared frequencies, by which a spring may seem to lower them
 _STIFFENING_ROUND_OFF = 1e-9
-_ZERO_OVERLAP = 1e-30  # overlap of two shapes that counts as 0, so that its logarithm is finite
-_FORBIDDEN_PAIR_COST = 1e6  # larger than the cost of any allowed pairing of modes
+# smallest overlap of two mode shapes, so that the logarithm of no overlap is infinite
+_ZERO_OVERLAP = 1e-30
+# cost of a pair of modes that is not allowed; larger than that of any allowed assignment
+_FORBIDDEN_PAIR_COST = 1e6
 
 
 class Outcome(StrEnum):
-    """How a run ended."""
+    """State in which a run ended, such as steady, stuck or not converged."""
 
     DONE = "done"
     STEADY = "steady"
@@ -222,7 +224,7 @@ class ModalBasis:
         return np.diag(2 * self.zeta * self.omega) if self.damping is None else self.damping
 
     def compute_stuck_mode(self, rows, stiffness, number: int) -> tuple:
-        """Return the mode that a coordinate becomes if the interfaces stick.
+        """Return the natural mode that a modal coordinate becomes if the interfaces stick.
 
         The modes with springs are assigned to the coordinates one to one, so that their shapes overlap most and none is
         slower than its coordinate, because a spring lowers no frequency.
@@ -254,7 +256,11 @@ class ModalBasis:
 
 
 def _assign_modes(lower, values, overlap) -> np.ndarray:
-    """Assign a value (n,) to each lower bound (n,) so that the product of the overlaps (n, n) is largest."""
+    """Assign the modes with springs to the coordinates so that the product of the overlaps is largest.
+
+    `values` (n,) are the squared frequencies of the modes, `lower` (n,) lower bounds for each coordinate, and `overlap`
+    (n, n) the overlaps of the shapes. Returns the index (n,) of the mode of each coordinate.
+    """
     if values.size == 1:
         return np.zeros(1, int)
     from scipy.optimize import linear_sum_assignment
@@ -279,15 +285,15 @@ class InitialState:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DriveSegment:
-    """Part of a drive in closed form, from `start` until the next segment starts.
+    """Segment of a drive in closed form: a constant plus a sinusoid.
 
-    The drive is constant + amplitude sin(omega (t - start) + phase).
+    From `start` until the next segment starts, the drive is constant + amplitude sin(omega (t - start) + phase).
 
     - start: start of the segment [s].
     - constant: constant part [m s-2].
-    - amplitude: amplitude of the sine [m s-2].
-    - omega: circular frequency of the sine [rad/s].
-    - phase: phase of the sine at the start of the segment [rad].
+    - amplitude: amplitude of the sinusoid [m s-2].
+    - omega: circular frequency of the sinusoid [rad/s].
+    - phase: phase of the sinusoid at the start of the segment [rad].
     """
 
     start: float
@@ -299,7 +305,7 @@ class DriveSegment:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SineDrive:
-    """Drive +a sin(omega t) from t = 0.
+    """Sinusoidal drive a sin(omega t) that starts at t = 0.
 
     Every class of drives has the attributes `period`, `moving` and `segments` (empty without a closed form) and the
     method `values`.
@@ -324,7 +330,7 @@ class SineDrive:
         return (DriveSegment(0.0, 0.0, self.acceleration, self.omega),)
 
     def values(self, t):
-        """Return the drive [m s-2] at times t (k,) >= 0 [s]."""
+        """Return the drive acceleration [m s-2] at times t (k,) >= 0 [s]."""
         return self.acceleration * np.sin(self.omega * np.asarray(t, float))
 
 
@@ -352,7 +358,10 @@ class Measure:
     engine: str = ""
 
     def error_ratio(self, tolerance: float) -> float:
-        """Return the error over the allowed error; 0 without a value or an error."""
+        """Return the numerical error divided by the error that a tolerance allows.
+
+        The ratio is 0 without a value or an error.
+        """
         if self.value is None or self.error is None:
             return 0.0
         return self.error / max(compute_allowed_error(tolerance, self.value, self.floor), 1e-300)
@@ -385,7 +394,7 @@ def compute_allowed_error(tolerance, value, floor):
 
 
 class MeasureDefinition(NamedTuple):
-    """Definition of a measure: how it is computed from a solution and how exact it must be.
+    """Definition of a measure: its computation from a solution and its allowed error.
 
     - name, unit: name in files and on pages, and SI unit.
     - floor: absolute floor of the allowed error.
@@ -417,7 +426,7 @@ class MeasureDefinition(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Response:
-    """Time histories of a run at the samples that are kept.
+    """Time histories of a run at its stored samples.
 
     - time (k,): time from the start of the run [s].
     - modal, modal_rate (k, n): modal coordinates [m] and their rates [m/s].
@@ -446,7 +455,10 @@ class Response:
     extra: dict = field(default_factory=dict)
 
     def select(self, samples) -> "Response":
-        """Return the samples that a slice, indices or booleans (k,) select, without extras of other lengths."""
+        """Return the response at some of its samples.
+
+        `samples` is a slice, indices or booleans (k,). Further histories of other lengths are left out.
+        """
         names = [name for name in self.__dataclass_fields__ if name != "extra"]
         columns = {name: getattr(self, name)[samples] for name in names}
         extra = {}
@@ -478,7 +490,7 @@ class InterfaceLoop(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class IntegratedMeasures:
-    """Quantities that an engine integrated over the last cycles itself.
+    """Quantities of the last cycles that an engine computed without samples of the motion.
 
     An engine that has its motion in closed form, or as polynomials, knows peaks, times without slip and work better
     than samples of the motion show them. A quantity that is None, or an empty tuple, is read from samples instead
@@ -489,7 +501,7 @@ class IntegratedMeasures:
     - drift: time mean of the relative displacement in the last cycle less that in the first, per cycle between them
       [m], or None.
     - acceleration_harmonics: sizes of the first and third harmonic of the absolute acceleration [m s-2], or None.
-    - loops: one for each interface.
+    - loops: friction loop of each interface.
     - slip_start_phases (s,): phases of the drive [rad], modulo pi, at which the first interface begins to slip, or
       None.
     - friction_works: friction work [J] from samples, from the energy balance, and the sum of its absolute values, or

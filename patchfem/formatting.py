@@ -11,12 +11,12 @@ from math import isfinite, log10
 
 MAX_SIGNIFICANT_DIGITS = 7  # significant digits of a value; nobody reads an error below the seventh
 DIGITS_WITHOUT_ERROR = 6  # significant digits of a value whose error is unknown
-MAX_ROUND_OFF_FRACTION = 1e-6  # of its floor, below which a number with a unit is round-off
-MAX_RATIO_ROUND_OFF = 0.1  # the same for a number without a unit
-MAX_RELATIVE_ERROR = 0.1  # error / value; above it a value below its floor may as well be 0
+MAX_ROUND_OFF_FRACTION = 1e-6  # number with a unit / its floor; a smaller one is round-off
+MAX_RATIO_ROUND_OFF = 0.1  # number without a unit / its floor; a smaller one is round-off
+MAX_RELATIVE_ERROR = 0.1  # error / value; a value below its floor with a larger one is shown as 0
 MIN_PLAIN_POWER = -4  # smallest power of ten of a number that is written without an exponent
 FIRST_EXPONENT_POWER = 7  # numbers from this power of ten on are written with an exponent
-ZERO_ERROR_POWER = -400  # stands for the power of ten of an error of 0; below that of any float
+ZERO_ERROR_POWER = -400  # power of ten that stands for an error of 0; below that of any float
 
 UNIT_LADDERS = {  # SI unit: (unit shown, number of these in one SI unit), from small to large
     "m": (("nm", 1e9), ("um", 1e6), ("mm", 1e3), ("m", 1.0)),
@@ -43,12 +43,12 @@ _POWER_PATTERN = re.compile(
 
 
 def choose_unit(ladder: tuple, size: float) -> tuple:
-    """Choose the unit of a ladder in which a size is read most easily.
+    """Choose the unit in which a number has few digits before and after the point.
 
     Parameters
     ----------
     ladder : tuple
-        Value of UNIT_LADDERS.
+        Units and scales, a value of UNIT_LADDERS.
     size : float
         Size to show [SI].
 
@@ -65,7 +65,10 @@ def choose_unit(ladder: tuple, size: float) -> tuple:
 
 
 def choose_axis_unit(values, unit: str) -> tuple:
-    """Return the unit (name, scale) of an axis that shows values [SI]; `unit` is a key of UNIT_LADDERS."""
+    """Return the unit (name, scale) of an axis that shows given values [SI].
+
+    `unit` is the SI unit of the values, a key of UNIT_LADDERS.
+    """
     import numpy as np  # imported here because the messages of `check` need no arrays
 
     values = np.asarray(values)
@@ -73,7 +76,10 @@ def choose_axis_unit(values, unit: str) -> tuple:
 
 
 def needs_log_scale(values) -> bool:
-    """Return whether an axis should be logarithmic: no value below 0, and positive values over three decades."""
+    """Return whether an axis of given values should be logarithmic.
+
+    It should if no value is negative and the positive values span more than three decades.
+    """
     import numpy as np
 
     values = np.asarray(values, float)
@@ -112,19 +118,19 @@ def round_to_error(
         return format_number(value, DIGITS_WITHOUT_ERROR), "" if error is None else f"{error:g}"
     if value == 0:
         return "0", format_number(error, 2) if error else ""
-    size = math.floor(log10(abs(value)))
-    last = _find_second_digit_power(error)
-    if last < size - MAX_SIGNIFICANT_DIGITS + 1:  # every digit shown is exact
-        exact = max(
-            size - MAX_SIGNIFICANT_DIGITS + 1,
+    value_power = math.floor(log10(abs(value)))
+    last_power = _find_second_digit_power(error)
+    if last_power < value_power - MAX_SIGNIFICANT_DIGITS + 1:  # every digit shown is exact
+        first_exact_power = max(
+            value_power - MAX_SIGNIFICANT_DIGITS + 1,
             math.ceil(log10(error)) if error else ZERO_ERROR_POWER,
         )
-        return format_number(round(value, -exact), MAX_SIGNIFICANT_DIGITS), ""
-    if _is_plain_power(size) or _is_plain_power(last + 1):
-        return _format_to_digit(value, error, last)
-    power = max(size, last + 1)
-    texts = _format_to_digit(value / 10.0**power, error / 10.0**power, last - power)
-    return tuple(f"{text}e{power}" for text in texts)
+        return format_number(round(value, -first_exact_power), MAX_SIGNIFICANT_DIGITS), ""
+    if _is_plain_power(value_power) or _is_plain_power(last_power + 1):
+        return _format_to_digit(value, error, last_power)
+    power = max(value_power, last_power + 1)
+    mantissas = _format_to_digit(value / 10.0**power, error / 10.0**power, last_power - power)
+    return tuple(f"{text}e{power}" for text in mantissas)
 
 
 def format_number(value: float, digits: int) -> str:
@@ -132,16 +138,19 @@ def format_number(value: float, digits: int) -> str:
     if value == 0 or not isfinite(value):
         return "0" if value == 0 else f"{value:g}"
     rounded_value = float(f"{value:.{digits}g}")
-    size = math.floor(log10(abs(rounded_value)))
-    if not _is_plain_power(size):
+    value_power = math.floor(log10(abs(rounded_value)))
+    if not _is_plain_power(value_power):
         mantissa, power = f"{rounded_value:.{digits - 1}e}".split("e")
         return f"{float(mantissa):g}e{int(power)}"
-    text = f"{rounded_value:.{max(digits - 1 - size, 0)}f}"
+    text = f"{rounded_value:.{max(digits - 1 - value_power, 0)}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def choose_display_unit(value: float, unit: str, error: float | None = None) -> tuple:
-    """Return the unit (name, scale) in which a value [SI] and its error are shown; the name is "" without a unit."""
+    """Return the unit (name, scale) in which a value [SI] and its error are shown.
+
+    The name is "" for a value without a unit.
+    """
     if unit not in UNIT_LADDERS:
         return ("" if unit == "1" else unit), 1.0
     if not isfinite(value):
@@ -175,9 +184,9 @@ def format_value(
 
 
 def format_with_error(value: str, error: str, unit: str) -> str:
-    """Join the strings of `round_to_error` and a unit, such as `(0.5 ± 1.0)e-8`.
+    """Join the strings of a value, its error and a unit, such as `(0.5 ± 1.0)e-8`.
 
-    A common power of ten is written once.
+    The strings are those of `round_to_error`. A common power of ten is written once.
     """
     if not error:
         return f"{value} {unit}".strip()
@@ -235,7 +244,7 @@ def rewrite_powers_of_ten(text: str) -> str:
 
 
 def _is_zero(value: float, error: float | None, floor: float, is_ratio: bool) -> bool:
-    """Return whether a value is zero within its error and the floor of the measure."""
+    """Return whether a value is to be shown as 0, given its error and the floor of the measure."""
     if abs(value) > floor or (error or 0.0) > floor:
         return False
     round_off = (MAX_RATIO_ROUND_OFF if is_ratio else MAX_ROUND_OFF_FRACTION) * floor
@@ -248,11 +257,15 @@ def _is_plain_power(power: int) -> bool:
 
 
 def _find_second_digit_power(error: float) -> int:
-    """Return the power of ten of the second digit of an error."""
+    """Return the power of ten of the second significant digit of an error."""
     return int(f"{error:.1e}".split("e")[1]) - 1 if error else ZERO_ERROR_POWER
 
 
-def _format_to_digit(value: float, error: float, last: int) -> tuple:
-    """Format a value and its error up to the digit of the power of ten `last`; a rounded 0 has no sign."""
-    texts = [f"{round(number, -last) + 0.0:.{max(-last, 0)}f}" for number in (value, error)]
-    return texts[0] if float(texts[0]) else "0", texts[1]
+def _format_to_digit(value: float, error: float, last_power: int) -> tuple:
+    """Format a value and its error to the same last digit.
+
+    `last_power` is the power of ten of this digit. A value that is rounded to 0 has no sign.
+    """
+    n_decimals = max(-last_power, 0)
+    formatted = [f"{round(number, -last_power) + 0.0:.{n_decimals}f}" for number in (value, error)]
+    return formatted[0] if float(formatted[0]) else "0", formatted[1]

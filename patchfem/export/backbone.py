@@ -1,4 +1,4 @@
-"""A backbone on disk (table, netCDF, picture and page), and its results as text."""
+"""Files, page and text of a backbone curve: frequency and damping ratio against amplitude."""
 
 from html import escape
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from .results import Folder
 from .summary import write_json
 
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error")
-HEAD = (
+CSV_HEADERS = (
     "method",
     "amplitude [m]",
     "frequency [Hz]",
@@ -39,45 +39,47 @@ DESCRIPTIONS = {
     "friction law.",
 }
 COLOURS = {"balance": "accent", "decay": "warm", "quasi-static": "#2f9e63"}
-LEFT_OUT = (
+LEFT_OUT_NOTE = (
     " Frequencies with errors larger than the frequency itself are left out of the picture, not "
     "of the table."
 )
-MAX_WHOLE = 25  # Number of amplitudes up to which the screen shows all of them.
-N_SHOWN = 9  # Number of amplitudes of a longer curve that the screen shows.
-FLOOR_FACTOR = 0.1  # Lower end of a bar on a logarithmic axis / smallest value.
+MAX_LISTED_AMPLITUDES = (
+    25  # largest number of amplitudes of a curve that the screen lists completely
+)
+N_LISTED_AMPLITUDES = 9  # number of amplitudes of a longer curve that the screen lists
+BAR_FLOOR_FACTOR = 0.1  # lower end of an error bar on a logarithmic axis / smallest value
 
 
-def backbone_data(found: Backbone) -> dict:
-    """Return the object that `patchfem backbone --json` prints, in SI units."""
-    frequencies = found.frequencies
-    exponents = found.exponents
+def backbone_data(backbone: Backbone) -> dict:
+    """Return a backbone as the dict that `patchfem backbone --json` prints, in SI units."""
+    frequencies = backbone.frequencies
+    exponents = backbone.exponents
     curves = {
         method: {name: getattr(curve, name).tolist() for name in COLUMNS}
-        for method, curve in found.curves.items()
+        for method, curve in backbone.curves.items()
     }
     return {
-        "mode": found.mode,
+        "mode": backbone.mode,
         "free_frequency": frequencies.free,
         "stuck_frequency": frequencies.stuck,
         "stuck_frequency_error": frequencies.stuck_error,
         "curves": curves,
-        "missing": found.missing,
+        "missing": backbone.missing,
         "exponent": {
             "micro": exponents.micro,
             "gross": exponents.gross,
             "micro_theory": exponents.micro_theory,
         },
-        "flutter_amplitude": found.flutter,
-        "notes": list(found.notes),
+        "flutter_amplitude": backbone.flutter,
+        "notes": list(backbone.notes),
     }
 
 
-def backbone_contents(found: Backbone, title: str = "") -> Contents:
-    """Return backbone.nc: each curve under the name of its method, over its amplitudes."""
+def backbone_contents(backbone: Backbone, title: str = "") -> Contents:
+    """Return the contents of backbone.nc: the curve of each method over its amplitudes."""
     variables = {}
     coordinates = {}
-    for method, curve in found.curves.items():
+    for method, curve in backbone.curves.items():
         prefix = method.replace("-", "_")
         dimension = f"{prefix}_amplitude"
         description = {"units": "m", "long_name": "half the peak-to-peak motion at the output"}
@@ -85,30 +87,32 @@ def backbone_contents(found: Backbone, title: str = "") -> Contents:
         for name, (unit, text) in VARIABLES.items():
             description = {"units": unit, "long_name": f"{text}, by {method}"}
             variables[f"{prefix}_{name}"] = (dimension, getattr(curve, name), description)
-    attributes = {"title": title, "patchfem": __version__, "mode": found.mode}
-    if found.missing:
-        reasons = [f"{method}: {text}" for method, text in found.missing.items()]
+    attributes = {"title": title, "patchfem": __version__, "mode": backbone.mode}
+    if backbone.missing:
+        reasons = [f"{method}: {text}" for method, text in backbone.missing.items()]
         attributes["missing"] = "; ".join(reasons)
     numbers = {
-        "free_frequency": found.frequencies.free,
-        "stuck_frequency": found.frequencies.stuck,
-        "exponent_micro": found.exponents.micro,
-        "exponent_gross": found.exponents.gross,
-        "flutter_amplitude": found.flutter,
-        "notes": "; ".join(found.notes) or None,
+        "free_frequency": backbone.frequencies.free,
+        "stuck_frequency": backbone.frequencies.stuck,
+        "exponent_micro": backbone.exponents.micro,
+        "exponent_gross": backbone.exponents.gross,
+        "flutter_amplitude": backbone.flutter,
+        "notes": "; ".join(backbone.notes) or None,
     }
     attributes |= {name: value for name, value in numbers.items() if value is not None}
     return Contents(variables, coordinates, attributes)
 
 
 def write_backbone(
-    found: Backbone, title: str, resolved: str, folder: Folder, with_page: bool = True
+    backbone: Backbone, title: str, resolved: str, folder: Folder, with_page: bool = True
 ) -> dict:
-    """Write a backbone into an open results folder and return its answer.
+    """Write the files of a backbone into an open results folder.
+
+    Returns the dict of `backbone_data`.
 
     Parameters
     ----------
-    found : Backbone
+    backbone : Backbone
     title : str
         Title of the scene.
     resolved : str
@@ -116,26 +120,26 @@ def write_backbone(
     folder : Folder
     with_page : bool
     """
-    answer = backbone_data(found)
-    rows: list = [HEAD]
-    for method, curve in found.curves.items():
+    answer = backbone_data(backbone)
+    rows: list = [CSV_HEADERS]
+    for method, curve in backbone.curves.items():
         columns = np.column_stack([getattr(curve, name) for name in COLUMNS])
         rows += [[method, *map(repr, row)] for row in columns.tolist()]
     write_rows(folder.path / "backbone.csv", rows)
-    write_netcdf(backbone_contents(found, title), folder.path / "backbone.nc")
+    write_netcdf(backbone_contents(backbone, title), folder.path / "backbone.nc")
     write_json(answer, folder.path / "backbone.json")
     write_text(folder.path / "scene.resolved.toml", resolved)
-    if found.curves:
+    if backbone.curves:
         write_text(
-            folder.path / "backbone.svg", pictures.draw_charts(backbone_charts(found.curves))
+            folder.path / "backbone.svg", pictures.draw_charts(backbone_charts(backbone.curves))
         )
     if with_page:
-        write_text(folder.path / "report.html", page_html(found, title))
+        write_text(folder.path / "report.html", page_html(backbone, title))
     return answer
 
 
 def backbone_charts(curves: dict) -> list:
-    """Return the charts of frequency and damping ratio against amplitude, with errors.
+    """Chart frequency and damping ratio of a backbone against amplitude, with errors.
 
     A frequency whose error is larger than itself would stretch the axis, so it is left out.
     """
@@ -161,36 +165,39 @@ def backbone_charts(curves: dict) -> list:
 
 
 def _curve_marks(method: str, x, y, errors, is_log: bool) -> list:
-    """Return a line through the points of a method, and their error bars."""
+    """Return the marks of a curve: a line through the points of a method, and their error bars."""
     style = {"shape": "circle", "errors": errors}
     if is_log:
-        style["floor"] = FLOOR_FACTOR * float(y.min(initial=1.0))
+        style["floor"] = BAR_FLOOR_FACTOR * float(y.min(initial=1.0))
     colour = COLOURS[method]
     return [charts.make_line(x, y, colour, method), charts.make_dots(x, y, colour, **style)]
 
 
 def _has_small_error(curve: Curve) -> np.ndarray:
-    """Return whether the frequency of each point (k,) exceeds its error; all True if none does."""
-    found = curve.frequency_error <= curve.frequency
-    return found | (not found.any())
+    """Return whether the frequency of each point (k,) of a curve exceeds its error.
+
+    All values are True if no frequency does.
+    """
+    is_small = curve.frequency_error <= curve.frequency
+    return is_small | (not is_small.any())
 
 
-def page_html(found: Backbone, title: str) -> str:
+def page_html(backbone: Backbone, title: str) -> str:
     """Return the HTML page of a backbone."""
     made = []
-    if found.curves:
+    if backbone.curves:
         made = [
-            one | {"anchor": f"chart{k}"} for k, one in enumerate(backbone_charts(found.curves))
+            one | {"anchor": f"chart{k}"} for k, one in enumerate(backbone_charts(backbone.curves))
         ]
-    first, *more = summarise_backbone(found)
+    first, *more = summarise_backbone(backbone)
     paragraphs = "".join(f"<p>{sentence_html(text)}</p>" for text in more)
     lead = f"<div class=verdict><b>{sentence_html(first)}</b>{paragraphs}</div>"
     sections = [
-        Section("curves", "Frequency and damping against amplitude", _charts_html(found, made)),
-        Section("ways", "How the curves were computed", _methods_html(found)),
-        Section("values", "Values", _values_table(found)),
+        Section("curves", "Frequency and damping against amplitude", _charts_html(backbone, made)),
+        Section("ways", "How the curves were computed", _methods_html(backbone)),
+        Section("values", "Values", _values_table(backbone)),
     ]
-    heading = f"Mode {found.mode}: frequency and damping against amplitude"
+    heading = f"Mode {backbone.mode}: frequency and damping against amplitude"
     if title:
         heading = f"{heading}: {title}"
     data = {"charts": made} if made else None
@@ -198,8 +205,8 @@ def page_html(found: Backbone, title: str) -> str:
     return document_html(heading, lead, sections, data, scripts)
 
 
-def _charts_html(found: Backbone, made: list) -> str:
-    """Return the containers of the charts on the page, with a caption."""
+def _charts_html(backbone: Backbone, made: list) -> str:
+    """Return the HTML elements of the charts of a backbone, with a caption."""
     if not made:
         return "<p>No curve was found.</p>"
     cells = "".join(
@@ -207,34 +214,36 @@ def _charts_html(found: Backbone, made: list) -> str:
         for one in made
     )
     caption = "The bars show the numerical errors."
-    if not all(_has_small_error(curve).all() for curve in found.curves.values()):
-        caption += LEFT_OUT
+    if not all(_has_small_error(curve).all() for curve in backbone.curves.values()):
+        caption += LEFT_OUT_NOTE
     return f"<figure><div class=row>{cells}</div><figcaption>{caption}</figcaption></figure>"
 
 
-def _methods_html(found: Backbone) -> str:
-    """Return the description of each method, or why it has no curve, and the notes."""
+def _methods_html(backbone: Backbone) -> str:
+    """Return the HTML table that describes the methods of a backbone, and the notes."""
     rows = []
     for method, text in DESCRIPTIONS.items():
-        if method in found.curves:
+        if method in backbone.curves:
             rows.append([escape(method), sentence_html(text)])
-        elif method in found.missing:
-            rows.append([escape(method), sentence_html(f"not known: {found.missing[method]}")])
-    notes = "".join(f"<p>{sentence_html(text[0].upper() + text[1:])}.</p>" for text in found.notes)
+        elif method in backbone.missing:
+            rows.append([escape(method), sentence_html(f"not known: {backbone.missing[method]}")])
+    notes = "".join(
+        f"<p>{sentence_html(text[0].upper() + text[1:])}.</p>" for text in backbone.notes
+    )
     return table_html(("", ""), rows) + notes
 
 
-def _values_table(found: Backbone) -> str:
-    """Return a table of all points with errors."""
+def _values_table(backbone: Backbone) -> str:
+    """Return the HTML table of all points of a backbone with their errors."""
     rows = []
-    for method, curve in found.curves.items():
+    for method, curve in backbone.curves.items():
         for k in range(curve.amplitude.size):
             rows.append([method, *(escape(text) for text in _format_point(curve, k))])
     return table_html(("method", ">amplitude", ">frequency", ">damping ratio"), rows)
 
 
 class FormattedPoint(NamedTuple):
-    """Amplitude, frequency and damping ratio of a point as text, with errors."""
+    """Amplitude, frequency and damping ratio of a point of a backbone as text, with errors."""
 
     amplitude: str
     frequency: str
@@ -242,7 +251,7 @@ class FormattedPoint(NamedTuple):
 
 
 def _format_point(curve: Curve, k: int) -> FormattedPoint:
-    """Format a point of a curve."""
+    """Format point k of the curve of a method."""
     return FormattedPoint(
         formatting.format_quantity(curve.amplitude[k], "m", 3),
         formatting.format_value(curve.frequency[k], curve.frequency_error[k], unit="Hz"),
@@ -250,26 +259,26 @@ def _format_point(curve: Curve, k: int) -> FormattedPoint:
     )
 
 
-def _format_stuck(found: Backbone) -> str:
-    """Format the frequency with a sticking contact, with its error if it is known."""
-    _, stuck, error = found.frequencies
+def _format_stuck(backbone: Backbone) -> str:
+    """Format the frequency of the mode while the contact sticks, with its error if known."""
+    _, stuck, error = backbone.frequencies
     if error:
         return formatting.format_value(stuck, error, unit="Hz")
     return formatting.format_quantity(stuck, "Hz", 5)
 
 
-def summarise_backbone(found: Backbone) -> list:
-    """Return the results in sentences; the first one is on both ends of the best curve."""
-    free = formatting.format_quantity(found.frequencies.free, "Hz", 5)
+def summarise_backbone(backbone: Backbone) -> list:
+    """Return sentences on the results of a backbone, first on both ends of its best curve."""
+    free = formatting.format_quantity(backbone.frequencies.free, "Hz", 5)
     stuck = ""
-    if found.frequencies.stuck is not None:
-        stuck = f", and {_format_stuck(found)} while the contact sticks"
-    out = [f"The natural frequency of mode {found.mode} is {free} without the contact{stuck}."]
-    ordered = [found.curves.get(method) for method in ("balance", "quasi-static", "decay")]
+    if backbone.frequencies.stuck is not None:
+        stuck = f", and {_format_stuck(backbone)} while the contact sticks"
+    out = [f"The natural frequency of mode {backbone.mode} is {free} without the contact{stuck}."]
+    ordered = [backbone.curves.get(method) for method in ("balance", "quasi-static", "decay")]
     curve = next((one for one in ordered if one is not None), None)
     if curve is not None:
-        out = [_describe_ends(found.mode, curve), *out, *_describe_largest_damping(curve)]
-    exponents = found.exponents
+        out = [_describe_ends(backbone.mode, curve), *out, *_describe_largest_damping(curve)]
+    exponents = backbone.exponents
     theory = ""
     if exponents.micro_theory is not None:
         theory = f" (theory: {exponents.micro_theory:.3g})"
@@ -283,23 +292,23 @@ def summarise_backbone(found: Backbone) -> list:
             "The energy that the contact dissipates per cycle grows with the amplitude "
             f"{' and '.join(powers)}."
         )
-    if found.flutter is not None:
+    if backbone.flutter is not None:
         out.append(
-            f"At amplitudes above {formatting.format_quantity(found.flutter, 'm', 3)} the mode gains energy, "
+            f"At amplitudes above {formatting.format_quantity(backbone.flutter, 'm', 3)} the mode gains energy, "
             "because friction dissipates less than the negative damping supplies."
         )
     return out
 
 
 def _describe_ends(mode: str, curve: Curve) -> str:
-    """Return a sentence about frequency and damping at the smallest and the largest amplitude."""
+    """Describe frequency and damping ratio at the smallest and the largest amplitude."""
     ends = [_format_point(curve, k) for k in sorted({0, curve.amplitude.size - 1})]
     parts = [f"{one.amplitude}: {one.frequency}, damping ratio {one.damping}" for one in ends]
     return f"Mode {mode} at {'; at '.join(parts)}."
 
 
 def _describe_largest_damping(curve: Curve) -> list:
-    """Return a sentence about the largest damping ratio of several amplitudes."""
+    """Describe the largest damping ratio of a curve; [] for a single amplitude."""
     count = curve.amplitude.size
     if count < 2:
         return []
@@ -312,13 +321,13 @@ def _describe_largest_damping(curve: Curve) -> list:
     ]
 
 
-def format_backbone(found: Backbone) -> list:
-    """Return the results in lines for the screen: sentences, a table, missing curves."""
+def format_backbone(backbone: Backbone) -> list:
+    """Return the results of a backbone as lines of text: sentences, a table, missing curves."""
     head = f"{'method':<13}{'amplitude':>12}{'frequency':>26}{'damping ratio':>26}"
-    out = [*summarise_backbone(found), head]
-    for method, curve in found.curves.items():
+    out = [*summarise_backbone(backbone), head]
+    for method, curve in backbone.curves.items():
         count = curve.amplitude.size
-        n_shown = count if count <= MAX_WHOLE else N_SHOWN
+        n_shown = count if count <= MAX_LISTED_AMPLITUDES else N_LISTED_AMPLITUDES
         shown = np.unique(np.linspace(0, count - 1, n_shown).round().astype(int))
         for k in shown:
             amplitude, frequency, damping = _format_point(curve, k)
@@ -327,5 +336,5 @@ def format_backbone(found: Backbone) -> list:
             out.append(
                 f"{method}: {shown.size} of {count} amplitudes are shown; backbone.csv has all"
             )
-    out += [f"{method}: not known: {text}" for method, text in found.missing.items()]
+    out += [f"{method}: not known: {text}" for method, text in backbone.missing.items()]
     return out

@@ -16,7 +16,7 @@ from .files import (
 )
 from .text import format_values
 
-HEAD = (
+CSV_HEADERS = (
     "amplitude [m]",
     "frequency [Hz]",
     "frequency_error [Hz]",
@@ -28,25 +28,25 @@ HEAD = (
 
 
 def describe_curve_fit(fitted: FittedCurve, folder: Path) -> FitFiles:
-    """Return the files of a fit to a curve.
+    """Describe the files of a fit to a curve of frequency and damping ratio.
 
-    folder: the paths in the fitted scene are relative to it.
+    The paths in the fitted scene are relative to `folder`.
     """
-    answer = _fit_json(fitted)
-    rms = answer["rms"]
+    fit_data = _collect_fit_data(fitted)
+    rms = fit_data["rms"]
     head = (
-        f"{answer['outcome']}: {answer['rows']} amplitudes of {answer['measured']} by "
-        f"{answer['method']}, {answer['evaluations']} evaluations"
+        f"{fit_data['outcome']}: {fit_data['rows']} amplitudes of {fit_data['measured']} by "
+        f"{fit_data['method']}, {fit_data['evaluations']} evaluations"
     )
     rest = [
         f"  rms of the residual   {100 * rms['frequency']:.2g} % of the frequency, "
         f"{100 * rms['damping']:.2g} % of the damping ratio",
-        *(f"  note: {text}" for text in answer["notes"]),
+        *(f"  note: {text}" for text in fit_data["notes"]),
     ]
     scene = fitted_scene_text(fitted.keys, fitted.path.name, folder)
     return FitFiles(
-        answer=answer,
-        lines=[head, *format_values(answer), *rest],
+        answer=fit_data,
+        lines=[head, *format_values(fit_data), *rest],
         summary=[head, *rest],
         scenes={FITTED_SCENE: scene},
         rows=_csv_rows(fitted),
@@ -56,8 +56,8 @@ def describe_curve_fit(fitted: FittedCurve, folder: Path) -> FitFiles:
     )
 
 
-def _fit_json(fitted: FittedCurve) -> dict:
-    """Return the object of fit.json."""
+def _collect_fit_data(fitted: FittedCurve) -> dict:
+    """Return the contents of fit.json of a fit to a curve."""
     keys = fitted.keys
     measured = fitted.measured
     deviation = (fitted.model - measured.value) / np.abs(measured.value)
@@ -78,7 +78,10 @@ def _fit_json(fitted: FittedCurve) -> dict:
 
 
 def _csv_rows(fitted: FittedCurve) -> list:
-    """Return the rows of fit.csv; errors are half the width of a 95 % interval."""
+    """Return the rows of fit.csv of a fit to a curve.
+
+    Errors are half the width of a 95 % interval.
+    """
     measured = fitted.measured
     errors = 2 * measured.error
     columns = np.column_stack(
@@ -91,11 +94,11 @@ def _csv_rows(fitted: FittedCurve) -> list:
             *fitted.model,
         ]
     )
-    return [HEAD, *([*map(repr, row)] for row in columns.tolist())]
+    return [CSV_HEADERS, *([*map(repr, row)] for row in columns.tolist())]
 
 
 def _draw_charts(fitted: FittedCurve) -> list:
-    """Return charts of frequency and damping ratio against amplitude, measured with errors and fitted."""
+    """Chart measured and fitted frequency and damping ratio against amplitude."""
     measured = fitted.measured
     unit, scale = choose_axis_unit(measured.amplitude, "m")
     along = charts.make_axis("amplitude", unit, True)

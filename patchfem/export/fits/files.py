@@ -1,4 +1,4 @@
-"""Files of a fit: a record of them, and the function that writes them."""
+"""Contents of the files of a fit, and their writing."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -21,16 +21,16 @@ FITTED_SCENE = "scene.fitted.toml"
 
 
 class FitFiles(NamedTuple):
-    """Files of a fit.
+    """Contents of the files that a fit writes.
 
     Attributes
     ----------
     answer : dict
         Content of fit.json in SI units.
     lines : list of str
-        The result as text.
+        Lines of text with the result.
     summary : list of str
-        The lines with which the page begins.
+        Lines of text at the top of the page.
     scenes : dict
         Text of each scene by the name of its file.
     rows : list
@@ -38,7 +38,7 @@ class FitFiles(NamedTuple):
     charts : list
         Charts of fit.svg.
     caption : str
-        Caption of this picture.
+        Caption of fit.svg.
     """
 
     answer: dict
@@ -51,7 +51,10 @@ class FitFiles(NamedTuple):
 
 
 def write_fit(files: FitFiles, folder: Folder) -> None:
-    """Write fit.json, fit.csv, fit.svg, the scenes and the page into an open results folder."""
+    """Write all files of a fit into an open results folder.
+
+    They are fit.json, fit.csv, fit.svg, the scenes and the page.
+    """
     write_json(files.answer, folder.path / "fit.json")
     for name, text in files.scenes.items():
         write_text(folder.path / name, text)
@@ -73,7 +76,7 @@ def write_fit(files: FitFiles, folder: Folder) -> None:
 
 
 def describe_measurement(title: str, measured: str, quantity: str, outcome) -> dict:
-    """Return the first entries of every fit.json."""
+    """Return the first entries of fit.json: program, title, measurement and outcome."""
     return {
         "patchfem": __version__,
         "title": title,
@@ -84,12 +87,12 @@ def describe_measurement(title: str, measured: str, quantity: str, outcome) -> d
 
 
 def describe_values(keys: FittedKeys) -> dict:
-    """Return the fitted keys as written in fit.json."""
+    """Return the fitted values by key, as written in fit.json."""
     return {bound.key: describe_value(bound, keys.fit, k) for k, bound in enumerate(keys.ranges)}
 
 
 def describe_value(bound: Range, fit: Fit, k: int) -> dict:
-    """Return value number k of a fit as written in fit.json."""
+    """Return value k of a fit with its interval and range, as written in fit.json."""
     ends = fit.intervals.ends[k].tolist()
     low, high = ends if np.isfinite(ends).all() else (None, None)
     return {
@@ -106,7 +109,7 @@ def describe_value(bound: Range, fit: Fit, k: int) -> dict:
 
 
 def describe_unknown(bounds: list, fit: Fit) -> list:
-    """Return the directions in which the residual does not change, as written in fit.json."""
+    """Return the changes of fitted values that leave the residual unchanged, for fit.json."""
     return [
         {bound.key: part for bound, part in zip(bounds, row) if part}
         for row in fit.intervals.unknown.tolist()
@@ -114,7 +117,7 @@ def describe_unknown(bounds: list, fit: Fit) -> list:
 
 
 def describe_correlation(fit: Fit) -> list:
-    """Return the correlation of the values as written in fit.json."""
+    """Return the correlation matrix of the fitted values, as written in fit.json."""
     return [
         [part if np.isfinite(part) else None for part in row]
         for row in fit.intervals.correlation.tolist()
@@ -122,7 +125,7 @@ def describe_correlation(fit: Fit) -> list:
 
 
 def fitted_scene_text(keys: FittedKeys, measured: str, folder: Path) -> str:
-    """Return the fitted scene in SI units with all defaults.
+    """Return the text of the fitted scene, in SI units with all defaults.
 
     Parameters
     ----------
@@ -141,6 +144,8 @@ def fitted_scene_text(keys: FittedKeys, measured: str, folder: Path) -> str:
         if np.isfinite(ends).all():
             interval = f", 95 % in [{ends[0]!r}, {ends[1]!r}]"
         comments.append(f"# {bound.key} fitted to {measured}: {value!r} {bound.unit}{interval}")
-    model = build(scene)  # The files of the scene are relative to its former folder.
+    model = build(
+        scene
+    )  # built before the scene moves, because its file names are relative to its folder
     text = write_resolved(move_scene(scene, folder / FITTED_SCENE), model)
     return "\n".join(comments) + "\n\n" + text

@@ -20,30 +20,30 @@ from .files import (
 from .text import format_values
 
 LABELS = {"force": ("force", "N"), "friction_ratio": ("friction ratio", "1")}
-DOT_SIZE = 3.5  # Diameter of a measured row in the picture [points].
+DOT_SIZE = 3.5  # diameter of the dots of measured rows in fit.svg [points]
 
 
 def describe_loop_fit(fitted: FittedLoop, folder: Path) -> FitFiles:
-    """Return the files of a fit to a loop.
+    """Describe the files of a fit to a friction loop.
 
-    folder: the paths in the fitted scene are relative to it.
+    The paths in the fitted scene are relative to `folder`.
     """
-    answer = _fit_json(fitted)
-    share = answer["rms"] / answer["peak"]
+    fit_data = _collect_fit_data(fitted)
+    rms_fraction = fit_data["rms"] / fit_data["peak"]
     head = (
-        f"{answer['outcome']}: {answer['rows']} rows of {answer['measured']}, "
-        f"{answer['evaluations']} evaluations"
+        f"{fit_data['outcome']}: {fit_data['rows']} rows of {fit_data['measured']}, "
+        f"{fit_data['evaluations']} evaluations"
     )
-    rms = format_quantity(answer["rms"], answer["unit"], 4)
-    rest = [f"  rms of the residual   {rms}, {format_number(share, 2)} of the peak"]
-    if answer["held"] is not None:
-        held = answer["held"]
-        rms = format_quantity(held["rms"], answer["unit"], 4)
+    rms = format_quantity(fit_data["rms"], fit_data["unit"], 4)
+    rest = [f"  rms of the residual   {rms}, {format_number(rms_fraction, 2)} of the peak"]
+    if fit_data["held"] is not None:
+        held = fit_data["held"]
+        rms = format_quantity(held["rms"], fit_data["unit"], 4)
         rest.append(f"  rms of held-out rows   {rms} ({held['rows']} rows)")
     scene = fitted_scene_text(fitted.keys, fitted.loop.path.name, folder)
     return FitFiles(
-        answer=answer,
-        lines=[head, *format_values(answer), *rest],
+        answer=fit_data,
+        lines=[head, *format_values(fit_data), *rest],
         summary=[head, *rest],
         scenes={FITTED_SCENE: scene},
         rows=_csv_rows(fitted),
@@ -52,14 +52,14 @@ def describe_loop_fit(fitted: FittedLoop, folder: Path) -> FitFiles:
     )
 
 
-def _fit_json(fitted: FittedLoop) -> dict:
-    """Return the object of fit.json."""
+def _collect_fit_data(fitted: FittedLoop) -> dict:
+    """Return the contents of fit.json of a fit to a friction loop."""
     keys = fitted.keys
     loop = fitted.loop
-    found = keys.fit
+    fit = keys.fit
     first = len(keys.ranges)
     offsets = {
-        offset.name: describe_value(offset.range, found, first + k)
+        offset.name: describe_value(offset.range, fit, first + k)
         for k, offset in enumerate(fitted.offsets)
     }
     bounds = [*keys.ranges, *(offset.range for offset in fitted.offsets)]
@@ -70,26 +70,29 @@ def _fit_json(fitted: FittedLoop) -> dict:
     return describe_measurement(keys.scene.title, measured, loop.quantity, keys.outcome) | {
         "values": describe_values(keys),
         "offsets": offsets,
-        "unknown": describe_unknown(bounds, found),
-        "correlation": describe_correlation(found),
+        "unknown": describe_unknown(bounds, fit),
+        "correlation": describe_correlation(fit),
         "unit": LABELS[loop.quantity][1],
         "rows": int((~fitted.held_out).sum()),
-        "effective_rows": None if np.isnan(found.intervals.rows) else found.intervals.rows,
+        "effective_rows": None if np.isnan(fit.intervals.rows) else fit.intervals.rows,
         "rms": fitted.rms,
         "held": held,
         "peak": float(np.abs(loop.reading).max()),
         "step_error": fitted.step_error,
         "steps_between_rows": fitted.pieces,
-        "evaluations": found.counts.evaluations,
-        "failures": found.counts.failures,
-        "descents_agreed": found.agreed,
+        "evaluations": fit.counts.evaluations,
+        "failures": fit.counts.failures,
+        "descents_agreed": fit.agreed,
         "warnings": keys.warnings,
         "seconds": round(keys.seconds, 6),
     }
 
 
 def _csv_rows(fitted: FittedLoop) -> list:
-    """Return the rows of fit.csv in SI units, which can be used as input of another fit."""
+    """Return the rows of fit.csv of a fit to a friction loop, in SI units.
+
+    The file can be the measurement of another fit.
+    """
     loop = fitted.loop
     unit = LABELS[loop.quantity][1]
     head = ["displacement [m]", f"{loop.quantity} [{unit}]", "fitted", "held"]
@@ -103,7 +106,7 @@ def _csv_rows(fitted: FittedLoop) -> list:
 
 
 def _draw_charts(fitted: FittedLoop) -> list:
-    """Return charts of the reading against displacement, and of the residual of each row."""
+    """Chart a measured and fitted friction loop, and the residual of each row."""
     loop = fitted.loop
     name, unit = LABELS[loop.quantity]
     along, size = choose_axis_unit(loop.displacement, "m")

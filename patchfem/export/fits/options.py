@@ -6,7 +6,9 @@ from dataclasses import dataclass, fields
 
 @dataclass(frozen=True, slots=True)
 class FitOptions:
-    """Options of a fit besides the free keys; each kind of fit refuses those that it does not have.
+    """Options of a fit to a measurement or a patch, besides the free keys.
+
+    Each kind of fit refuses the options that it does not have.
 
     Attributes
     ----------
@@ -51,5 +53,5 @@ class FitOptions:
     amplitudes: str | Sequence = ""
 
     def names_given(self) -> list:
-        """Return the names of the options that differ from their default."""
+        """Return the names of the fit options that differ from their defaults."""
         return [field.name for field in fields(self) if getattr(self, field.name) != field.default]

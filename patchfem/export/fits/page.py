@@ -22,18 +22,24 @@ FILES = {
 
 
 def page_html(
-    answer: dict, lines: Sequence, summary: Sequence, *, picture: str, caption: str, scene_text: str
+    fit_data: dict,
+    lines: Sequence,
+    summary: Sequence,
+    *,
+    picture: str,
+    caption: str,
+    scene_text: str,
 ) -> str:
-    """Return the HTML page of a fit.
+    """Return the HTML page of a fit: values, picture, correlation and files.
 
     Parameters
     ----------
-    answer : dict
-        The object of fit.json.
+    fit_data : dict
+        Contents of fit.json.
     lines : sequence of str
-        The answer as text.
+        The fit_data as text.
     summary : sequence of str
-        The lines that stand at the top of the page.
+        Lines of text at the top of the page.
     picture : str
         SVG text of fit.svg; "" without one.
     caption : str
@@ -41,13 +47,13 @@ def page_html(
     scene_text : str
         Text of the fitted scene.
     """
-    values = named_values(answer)
+    values = named_values(fit_data)
     sections = [Section("values", "Fitted values", _values_table(values))]
     if picture:
         shown = figure_html(0, picture, f"{caption}.", caption)
         sections.append(Section("picture", "Measured and fitted", shown))
-    if len(answer.get("correlation", ())) > 1:
-        rows = _correlation_table(answer["correlation"], list(values))
+    if len(fit_data.get("correlation", ())) > 1:
+        rows = _correlation_table(fit_data["correlation"], list(values))
         sections.append(Section("correlation", "Correlation of the values", rows))
     whole = escape("\n".join(lines))
     text = f"<pre style='white-space:pre-wrap'>{whole}</pre>"
@@ -56,35 +62,35 @@ def page_html(
     items = "".join(f"<li><a href={name}>{name}</a>: {FILES[name]}</li>" for name in names)
     origin = (
         f"<ul>{items}</ul><details><summary>Fitted scene</summary><pre>{escape(scene_text)}</pre>"
-        f"</details><p class=soft>patchfem {answer['patchfem']}</p>"
+        f"</details><p class=soft>patchfem {fit_data['patchfem']}</p>"
     )
     sections.append(Section("origin", "Scene and files", origin))
-    title = f"{answer['title'] or 'Fit'}: fitted to {Path(answer['measured']).name}"
-    return document_html(title, _verdict_html(answer, values, summary), sections)
+    title = f"{fit_data['title'] or 'Fit'}: fitted to {Path(fit_data['measured']).name}"
+    return document_html(title, _verdict_html(fit_data, values, summary), sections)
 
 
-def _verdict_html(answer: dict, values: dict, summary: Sequence) -> str:
-    """Return the values with their intervals, the summary and the warnings."""
+def _verdict_html(fit_data: dict, values: dict, summary: Sequence) -> str:
+    """Return the top of the page of a fit: values with intervals, summary and warnings."""
     short = "; ".join(f"{escape(key)} = {_value_with_ends(one)}" for key, one in values.items())
-    law = f"{answer['law']}: " if "law" in answer else ""
+    law = f"{fit_data['law']}: " if "law" in fit_data else ""
     sentence = "; ".join(" ".join(line.split()) for line in summary)
     has_intervals = any(value.get("interval") for value in values.values())
     brackets = " Brackets enclose 95 % intervals." if has_intervals else ""
     return (
         f"<div class=verdict><b>{law}{short}</b><p>{sentence_html(sentence)}.{brackets}</p></div>"
-        f"{warning_box(answer['warnings'])}"
+        f"{warning_box(fit_data['warnings'])}"
     )
 
 
 def _value_with_ends(described: dict) -> str:
-    """Write a value with its interval."""
+    """Format a fitted value of fit.json with its interval."""
     value, unit, ends = format_fitted(described)
     interval = f" ({ends[0]} to {ends[1]})" if ends else ""
     return f"{value} {unit}".strip() + interval
 
 
 def _values_table(values: dict) -> str:
-    """Return the table of the value, the interval and the range of each key."""
+    """Return the HTML table of the value, interval and range of each fitted key."""
     rows = []
     for key, described in values.items():
         value, unit, ends = format_fitted(described)
@@ -103,13 +109,13 @@ def _values_table(values: dict) -> str:
 
 
 def _format_bound(described: dict, end: float) -> str:
-    """Write a bound of a value."""
+    """Format a bound of the range of a fitted value."""
     value, unit, _ = format_fitted(described | {"value": end, "interval": None})
     return f"{value} {unit}"
 
 
 def _correlation_table(correlation: list, names: list) -> str:
-    """Return the table of the correlations between the errors of the values."""
+    """Return the HTML table of the correlations between the errors of the fitted values."""
     rows = []
     for name, row in zip(names, correlation):
         cells = ["&ndash;" if part is None else f"{part:.2f}" for part in row]

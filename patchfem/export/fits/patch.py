@@ -20,23 +20,25 @@ from ...scene.sets import format_scene
 from ..drawing import charts
 from .files import FITTED_SCENE, FitFiles, describe_measurement
 
-PARTS = ("stiffness", "dissipation")
+COMPARED_QUANTITIES = ("stiffness", "dissipation")
 COLOURS = dict(zip(FITTED_LAWS, ("accent", "warm", "soft"), strict=True))
 PATCH_COLOUR = "#000000"
-Y_MARGIN = 1.05  # Height of the axis of stiffness / largest stiffness.
+Y_MARGIN = 1.05  # upper end of the axis of stiffness / largest stiffness
 
 
 def describe_patch_fit(fitted: FittedPatch, folder: Path) -> FitFiles:
-    """Return the files of the fitted laws.
+    """Describe the files of laws of a single point that are fitted to a patch.
 
-    folder: the paths in the fitted scenes are relative to it.
+    The paths in the fitted scenes are relative to `folder`.
     """
-    answer = _fit_json(fitted)
-    lines = _format_answer(answer)
+    fit_data = _collect_fit_data(fitted)
+    lines = _format_fit_data(fit_data)
     names = {FITTED_SCENE: fitted.best} | {f"scene.{law}.toml": law for law in FITTED_LAWS}
-    scenes = {name: _scene_text(fitted, law, answer, folder / name) for name, law in names.items()}
+    scenes = {
+        name: _scene_text(fitted, law, fit_data, folder / name) for name, law in names.items()
+    }
     return FitFiles(
-        answer=answer,
+        answer=fit_data,
         lines=lines,
         summary=lines[:1],
         scenes=scenes,
@@ -47,8 +49,8 @@ def describe_patch_fit(fitted: FittedPatch, folder: Path) -> FitFiles:
     )
 
 
-def _fit_json(fitted: FittedPatch) -> dict:
-    """Return the object of fit.json."""
+def _collect_fit_data(fitted: FittedPatch) -> dict:
+    """Return the contents of fit.json of laws that are fitted to a patch."""
     patch = fitted.patch
     laws = {law: _describe_law(law, one, fitted) for law, one in fitted.laws.items()}
     best = laws[fitted.best]
@@ -73,7 +75,7 @@ def _fit_json(fitted: FittedPatch) -> dict:
 
 
 def _describe_law(law: str, one: FittedLaw, fitted: FittedPatch) -> dict:
-    """Return a law as written in fit.json."""
+    """Return the values and errors of a fitted law, as written in fit.json."""
     units = FITTED_LAWS[law].units
     sizes = _difference_sizes(one.deviations, fitted.patch.slides)
     return {
@@ -88,9 +90,12 @@ def _describe_law(law: str, one: FittedLaw, fitted: FittedPatch) -> dict:
 
 
 def _difference_sizes(deviations, slides) -> dict:
-    """Return the largest and the rms relative difference (2, k) of stiffness and loss."""
+    """Return the largest and the rms difference of stiffness and loss between two curves.
+
+    `deviations` (2, k) are the relative differences of both at the amplitudes `slides` (k,).
+    """
     out = {}
-    for name, row in zip(PARTS, deviations):
+    for name, row in zip(COMPARED_QUANTITIES, deviations):
         k = np.abs(row).argmax()
         out[name] = {
             "largest": float(row[k]),
@@ -101,11 +106,10 @@ def _difference_sizes(deviations, slides) -> dict:
 
 
 def _relative_loss(one: FittedLaw, fitted: FittedPatch) -> dict:
-    """Return the largest difference of the loss relative to that of the patch.
+    """Return the largest difference of the loss of a law from that of the patch.
 
-    Tiny losses count as well.
-
-    If the patch dissipates nothing, the difference is that of `one.deviations`.
+    It is relative to the loss of the patch, also where this loss is tiny. If the patch
+    dissipates nothing, the difference is that of `one.deviations`.
     """
     own = fitted.patch.curves.loss
     loss = one.curves.loss
@@ -114,8 +118,8 @@ def _relative_loss(one: FittedLaw, fitted: FittedPatch) -> dict:
     return {"relative": float(share[k]), "relative_at": float(fitted.patch.slides[k])}
 
 
-def _scene_text(fitted: FittedPatch, law: str, answer: dict, path: Path) -> str:
-    """Return the scene with a law in place of its patch, in SI units with all defaults."""
+def _scene_text(fitted: FittedPatch, law: str, fit_data: dict, path: Path) -> str:
+    """Return the text of the scene with a fitted law in place of its patch, in SI units."""
     scene = fitted.scene
     tables = tomllib.loads(scene.resolved())
     tables.pop("contact")
@@ -126,14 +130,14 @@ def _scene_text(fitted: FittedPatch, law: str, answer: dict, path: Path) -> str:
     whole = loads(format_scene(tables), scene.path)
     comments = [
         f"law '{law}' in place of the patch of {scene.path.name}",
-        *_error_sentences(law, answer),
+        *_error_sentences(law, fit_data),
     ]
     head = "\n".join(f"# {line}" for line in comments)
     return f"{head}\n\n{write_resolved(move_scene(whole, path), build(whole))}"
 
 
 def _csv_rows(fitted: FittedPatch) -> list:
-    """Return the rows of fit.csv."""
+    """Return the rows of fit.csv: force and loss of the patch and of each fitted law."""
     curves = {"patch": fitted.patch.curves} | {law: one.curves for law, one in fitted.laws.items()}
     parts = ("force [N]", "loss [J]")
     head = ["slide [m]", *(f"{name} {part}" for name in curves for part in parts)]
@@ -144,20 +148,20 @@ def _csv_rows(fitted: FittedPatch) -> list:
 
 
 def _draw_charts(fitted: FittedPatch) -> list:
-    """Return charts of the stiffness and the loss per cycle against the amplitude of the slide."""
+    """Chart the stiffness and the loss per cycle against the slide amplitude."""
     slides = fitted.patch.slides
     unit, scale = choose_axis_unit(slides, "m")
     along = charts.make_axis("amplitude of the slide", unit, True)
     x = slides * scale
     own = fitted.patch.curves
     stiffness = [charts.make_dots(x, own.force / slides, PATCH_COLOUR, "patch", size=4)]
-    loss = [charts.make_dots(x, _above_zero(own.loss), PATCH_COLOUR, "patch", size=4)]
+    loss = [charts.make_dots(x, _mask_nonpositive(own.loss), PATCH_COLOUR, "patch", size=4)]
     peak = float((own.force / slides).max())
     for law, one in fitted.laws.items():
         values = one.curves.force / slides
         peak = max(peak, float(values.max()))
         stiffness.append(charts.make_line(x, values, COLOURS[law], law))
-        loss.append(charts.make_line(x, _above_zero(one.curves.loss), COLOURS[law], law))
+        loss.append(charts.make_line(x, _mask_nonpositive(one.curves.loss), COLOURS[law], law))
     from_zero = charts.make_axis("stiffness", "N/m") | {"range": [0.0, Y_MARGIN * peak]}
     return [
         charts.make_chart("Stiffness", along, from_zero, stiffness),
@@ -167,37 +171,37 @@ def _draw_charts(fitted: FittedPatch) -> list:
     ]
 
 
-def _above_zero(values) -> np.ndarray:
-    """Return values with NaN in place of those that a logarithmic axis cannot show."""
+def _mask_nonpositive(values) -> np.ndarray:
+    """Return values with NaN in place of those that are not positive, for a logarithmic axis."""
     return np.where(values > 0, values, np.nan)
 
 
-def _format_answer(answer: dict) -> list:
-    """Return the answer as lines of text."""
-    low, high = (format_quantity(end, "m", 3) for end in answer["amplitudes"])
+def _format_fit_data(fit_data: dict) -> list:
+    """Return the fit_data as lines of text."""
+    low, high = (format_quantity(end, "m", 3) for end in fit_data["amplitudes"])
     out = [
-        f"{answer['outcome']}: laws of a single point fitted to a patch under a load of "
-        f"{format_quantity(answer['load'], 'N', 4)}; the patch slips as a whole at "
-        f"{format_quantity(answer['slip_force'], 'N', 4)} and has {_format_stiffness(answer)} while the "
-        f"whole patch sticks; {answer['rows']} amplitudes of the slide from {low} to {high}. "
-        f"{_best_law_sentence(answer)}",
+        f"{fit_data['outcome']}: laws of a single point fitted to a patch under a load of "
+        f"{format_quantity(fit_data['load'], 'N', 4)}; the patch slips as a whole at "
+        f"{format_quantity(fit_data['slip_force'], 'N', 4)} and has {_format_stiffness(fit_data)} while the "
+        f"whole patch sticks; {fit_data['rows']} amplitudes of the slide from {low} to {high}. "
+        f"{_best_law_sentence(fit_data)}",
         f"  {'law':<16}{'error of stiffness':>22}{'error of loss':>22}   values",
     ]
-    for law, one in answer["laws"].items():
+    for law, one in fit_data["laws"].items():
         cells = [
             f"{_format_percent(one[part]['largest'])} (rms {_format_percent(one[part]['rms'])})"
-            for part in PARTS
+            for part in COMPARED_QUANTITIES
         ]
         values = ", ".join(
             f"{key.partition('.')[2]} {_format_in_unit(value['value'], value['unit'])}"
             for key, value in one["values"].items()
         )
         out.append(f"  {law:<16}{cells[0]:>22}{cells[1]:>22}   {values}")
-    out += [f"  {line}" for line in _error_sentences(answer["law"], answer)]
-    if answer["mesh"] is not None:
-        stiffness, loss = (answer["mesh"][part] for part in PARTS)
+    out += [f"  {line}" for line in _error_sentences(fit_data["law"], fit_data)]
+    if fit_data["mesh"] is not None:
+        stiffness, loss = (fit_data["mesh"][part] for part in COMPARED_QUANTITIES)
         out.append(
-            f"  A mesh coarser than the present one ({answer['mesh']['nodes']} interface nodes) "
+            f"  A mesh coarser than the present one ({fit_data['mesh']['nodes']} interface nodes) "
             "changes the stiffness of the patch by at most "
             f"{_format_percent(abs(stiffness['largest']))}, and the energy dissipated per cycle by at "
             f"most {_format_percent(abs(loss['largest']))} (at {format_quantity(loss['at'], 'm', 3)}) and by "
@@ -206,30 +210,30 @@ def _format_answer(answer: dict) -> list:
     return out
 
 
-def _format_stiffness(answer: dict) -> str:
-    """Format the stiffness while nothing slips, with its error if it is known."""
-    value = answer["stiffness"]
-    error = answer["stiffness_error"]
+def _format_stiffness(fit_data: dict) -> str:
+    """Format the stiffness of the sticking patch, with its error if it is known."""
+    value = fit_data["stiffness"]
+    error = fit_data["stiffness_error"]
     if error is None:
         return _format_in_unit(value, "N/m")
     return format_value(value, error, unit=SENTENCE_UNITS["N/m"])
 
 
-def _best_law_sentence(answer: dict) -> str:
-    """Name the best law, with the signs and sizes of its largest errors."""
-    stiffness, loss = (answer["laws"][answer["law"]][part] for part in PARTS)
+def _best_law_sentence(fit_data: dict) -> str:
+    """Name the best law and its largest errors with their signs."""
+    stiffness, loss = (fit_data["laws"][fit_data["law"]][part] for part in COMPARED_QUANTITIES)
     return (
-        f"Law '{answer['law']}' fits best; its largest errors over this range are "
+        f"Law '{fit_data['law']}' fits best; its largest errors over this range are "
         f"{_format_signed_percent(stiffness['largest'])} of the stiffness "
         f"(at {format_quantity(stiffness['at'], 'm', 3)}) and {_format_signed_percent(loss['relative'])} of the "
         f"energy loss per cycle (at {format_quantity(loss['relative_at'], 'm', 3)})"
     )
 
 
-def _error_sentences(law: str, answer: dict) -> list:
-    """Return sentences about the error of a law in place of the patch."""
-    low, high = (format_quantity(end, "m", 3) for end in answer["amplitudes"])
-    stiffness, loss = (answer["laws"][law][part] for part in PARTS)
+def _error_sentences(law: str, fit_data: dict) -> list:
+    """Describe the errors that a law has in place of the patch."""
+    low, high = (format_quantity(end, "m", 3) for end in fit_data["amplitudes"])
+    stiffness, loss = (fit_data["laws"][law][part] for part in COMPARED_QUANTITIES)
     side = "larger" if loss["largest"] > 0 else "smaller"
     return [
         f"For slide amplitudes from {low} to {high} the stiffness of '{law}' differs from that of "
@@ -247,7 +251,10 @@ def _error_sentences(law: str, answer: dict) -> list:
 
 
 def _relative_sentence(loss: dict) -> str:
-    """Return a sentence about the largest difference relative to the patch, if it differs."""
+    """Describe the largest difference of the loss relative to the loss of the patch.
+
+    "" if it equals the largest difference that is already stated.
+    """
     if loss["relative"] == loss["largest"]:
         return ""
     return (
@@ -268,5 +275,5 @@ def _format_signed_percent(fraction: float) -> str:
 
 
 def _format_in_unit(value: float, unit: str) -> str:
-    """Format a value in a suitable unit."""
+    """Format a value [SI] in a readable unit."""
     return format_quantity(value, SENTENCE_UNITS.get(unit, unit), 5)

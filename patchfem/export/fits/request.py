@@ -23,10 +23,10 @@ from .files import FitFiles, write_fit
 from .loop import describe_loop_fit
 from .options import FitOptions
 from .patch import describe_patch_fit
-from .rows import Starts, describe_rows_fit
+from .rows import SearchCheckpoint, describe_rows_fit
 from .wear import describe_wear_fit
 
-DEFAULT_ROW_STARTS = 8  # Random starts of a fit to rows.
+DEFAULT_ROW_STARTS = 8  # number of random starting points of a fit to rows
 LOOP_OPTIONS = ("offset", "warm_up")
 ROW_OPTIONS = ("leave_out", "seed", "unstable", "placebo", "resume")
 OPTIONS_BY_KIND = {
@@ -43,23 +43,24 @@ KINDS = {
     "curve": "a rig, fitted to a curve of frequency and damping against amplitude",
     "patch": "fitted to its own patch",
 }
-_LOOPS = "fits to a loop under a prescribed slide"
-_ROWS = "fits to rows of a rig"
+_LOOP_FITS = "fits to a loop under a prescribed slide"
+_ROW_FITS = "fits to rows of a rig"
 FITS_BY_OPTION = {
-    "hold": f"{_LOOPS} or to rows of a rig",
-    "starts": f"{_ROWS} or to its curve of frequency and damping against amplitude",
+    "hold": f"{_LOOP_FITS} or to rows of a rig",
+    "starts": f"{_ROW_FITS} or to its curve of frequency and damping against amplitude",
     "amplitudes": "fits with --from-patch",
-    **dict.fromkeys(LOOP_OPTIONS, _LOOPS),
-    **dict.fromkeys(ROW_OPTIONS, _ROWS),
+    **dict.fromkeys(LOOP_OPTIONS, _LOOP_FITS),
+    **dict.fromkeys(ROW_OPTIONS, _ROW_FITS),
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Listener:
-    """Callbacks of a fit.
+    """Functions by which a fit reports to its caller.
 
-    say: takes a line; progress: takes the completed fraction; format_option: option -> its name for
-    the caller.
+    - say: takes a line of text.
+    - progress: takes the completed fraction, from 0 to 1.
+    - format_option: takes the name of an option and returns its spelling for the caller.
     """
 
     say: Callable | None = None
@@ -75,7 +76,7 @@ def fit_into(
     target: Path,
     listener: Listener = Listener(),
 ) -> FitFiles:
-    """Fit a scene and write the results folder.
+    """Fit keys of a scene to a measurement, and write the results folder.
 
     Parameters
     ----------
@@ -123,8 +124,8 @@ def fit_into(
             fitted = fit_curve(scene, Path(to), free, listener.say, starts)
             files = describe_curve_fit(fitted, folder.target)
         elif kind == "loop":
-            how = LoopOptions(options.offset, options.warm_up)
-            fitted = fit_loop(scene, Path(to), free, options.hold, listener.say, how)
+            loop_options = LoopOptions(options.offset, options.warm_up)
+            fitted = fit_loop(scene, Path(to), free, options.hold, listener.say, loop_options)
             files = describe_loop_fit(fitted, folder.target)
         else:
             coefficient = fit_wear(build(scene), to, free, listener.progress)
@@ -134,7 +135,7 @@ def fit_into(
 
 
 def choose_kind(scene: Scene, to: str) -> str:
-    """Return the kind of fit by the tables of the scene and the measured file."""
+    """Choose the kind of fit by the tables of a scene and the measured file."""
     if scene.wear is not None:
         return "wear"
     if scene.kind not in ("rig", "linear"):
@@ -143,7 +144,7 @@ def choose_kind(scene: Scene, to: str) -> str:
 
 
 def _check_options(kind: str, options: FitOptions, format_option: Callable) -> None:
-    """Raise PatchfemError for an option that this kind of fit does not have, or a wrong value."""
+    """Raise PatchfemError for fit options that are invalid or belong to another kind of fit."""
     others = [name for name in options.names_given() if name not in OPTIONS_BY_KIND[kind]]
     if others:
         belong = "; ".join(
@@ -171,7 +172,10 @@ def _fit_rows(
     folder: Folder,
     listener: Listener,
 ) -> FitFiles:
-    """Fit a rig to rows; searches that are done are stored in the folder."""
+    """Fit a rig to rows of measured responses.
+
+    Finished searches are stored in the folder, so that an interrupted fit can be continued.
+    """
     ranges = parse_ranges(free)
     question = (
         scene.resolved(),
@@ -183,9 +187,9 @@ def _fit_rows(
         options.unstable,
         path.read_bytes() if path.is_file() else "",
     )
-    stored_starts = Starts(folder.path / STARTS, question, options.resume)
+    checkpoint = SearchCheckpoint(folder.path / STARTS, question, options.resume)
     starts = options.starts or DEFAULT_ROW_STARTS
-    search = SearchSettings(starts, options.seed, options.unstable, stored_starts)
+    search = SearchSettings(starts, options.seed, options.unstable, checkpoint)
     row_options = RowsOptions(options.hold, options.leave_out, options.placebo, search)
     fitted = fit_rows(FitRequest(scene, ranges, path), row_options, listener.say, listener.progress)
     return describe_rows_fit(fitted, folder.target)

@@ -26,22 +26,22 @@ from .files import (
 )
 from .text import format_values
 
-MIL = 25.4e-6  # [m]
-PARTS = ("fitted", "held_out", "left_out")
-KEY_WIDTH = 28  # Characters of the longest key of a rig in the printed result.
-AXIS_MARGIN = 1.1  # Ratio of the end of the line of equal values to the last point.
+MIL = 25.4e-6  # a thousandth of an inch, the unit of displacement readings [m]
+SCORED_GROUPS = ("fitted", "held_out", "left_out")
+KEY_WIDTH = 28  # characters of the longest key of a rig, which aligns the printed values
+AXIS_MARGIN = 1.1  # end of the line of equal values / largest value of a point
 
 
-class Starts:
-    """Results of searches by name, which are stored in a file while a fit runs.
+class SearchCheckpoint:
+    """Results of searches by name, stored in a file while a fit runs.
 
-    Results of another question do not count.
+    Results that were stored for other inputs are ignored.
 
     Parameters
     ----------
     path : Path
     question : iterable
-        Texts on which the results depend.
+        Inputs of the fit on which the results depend.
     resume : bool
         Whether results in the file are used.
     """
@@ -60,7 +60,7 @@ class Starts:
                 self.known = content["ends"]
 
     def __call__(self, name: str, ends: list | None = None):
-        """Return the result under a name, None if there is none; store `ends` under it if given."""
+        """Return the stored result of a search, or None; first store `ends` as its result if given."""
         if ends is not None:
             self.known[name] = ends
             write_text(self.path, json.dumps({"question": self.key, "ends": self.known}))
@@ -68,26 +68,29 @@ class Starts:
 
 
 def describe_rows_fit(fitted: FittedRows, folder: Path) -> FitFiles:
-    """Return the files of a fit to rows.
+    """Describe the files of a fit to rows of measured responses.
 
-    folder: the paths in the fitted scene are relative to it.
+    The paths in the fitted scene are relative to `folder`.
     """
-    answer = describe_answer(fitted)
-    lines = _format_answer(answer)
+    fit_data = rows_fit_data(fitted)
+    lines = _format_fit_data(fit_data)
     scene = fitted_scene_text(fitted.keys, fitted.cells.path.name, folder)
     return FitFiles(
-        answer=answer,
+        answer=fit_data,
         lines=lines,
         summary=lines[:1],
         scenes={FITTED_SCENE: scene},
-        rows=_csv_rows(answer),
-        charts=_draw_charts(answer),
+        rows=_csv_rows(fit_data),
+        charts=_draw_charts(fit_data),
         caption="Computed against measured readings; the line is where both are equal",
     )
 
 
-def describe_answer(fitted: FittedRows) -> dict:
-    """Return the object of fit.json; scores are root mean squares of ln(computed/measured)."""
+def rows_fit_data(fitted: FittedRows) -> dict:
+    """Return the contents of fit.json of a fit to rows.
+
+    Scores are root mean squares of ln(computed/measured).
+    """
     keys = fitted.keys
     cells = fitted.cells
     found = keys.fit
@@ -124,7 +127,7 @@ def describe_answer(fitted: FittedRows) -> dict:
 
 
 def _instrument_settings(fitted: FittedRows) -> dict:
-    """Return the settings of the instruments, with fitted or given gains."""
+    """Return the settings and gains of the instruments of a rig."""
     read = fitted.models.read
     out = {
         "reading": "peak" if read is None else read.reading,
@@ -139,7 +142,7 @@ def _instrument_settings(fitted: FittedRows) -> dict:
 
 
 def _search_starts(fitted: FittedRows) -> list:
-    """Return where each search began and ended, with its training score."""
+    """Return the first and last values of each search, and its training score."""
     names = [bound.key for bound in fitted.keys.ranges]
     found = fitted.search
     out = []
@@ -156,7 +159,7 @@ def _search_starts(fitted: FittedRows) -> list:
 
 
 def _fold_scores(fitted: FittedRows) -> list:
-    """Return the fits without the readings of each value, and their scores on these readings."""
+    """Return the fits that leave out readings, and their scores on these readings."""
     names = [bound.key for bound in fitted.keys.ranges]
     return [
         {
@@ -184,7 +187,7 @@ def _placebo_scores(fitted: FittedRows) -> list:
 
 
 def _row_entries(fitted: FittedRows) -> list:
-    """Return every row as measured and computed, in SI units."""
+    """Return the measured and computed readings of every row, in SI units."""
     cells = fitted.cells
     keys = zip(cells.row.tolist(), map(bool, cells.felt))
     number = {key: n for n, key in enumerate(keys)}
@@ -205,8 +208,8 @@ def _row_entries(fitted: FittedRows) -> list:
     return out
 
 
-def _csv_rows(answer: dict) -> list:
-    """Return the rows of fit.csv in g and mil, with the computed readings."""
+def _csv_rows(fit_data: dict) -> list:
+    """Return the rows of fit.csv: measured and computed readings in g and mil."""
     rows: list = [
         [
             "frequency [Hz]",
@@ -219,7 +222,7 @@ def _csv_rows(answer: dict) -> list:
             "held",
         ]
     ]
-    for row in answer["rows"]:
+    for row in fit_data["rows"]:
         pairs = ((row["acceleration"], G_N), (row["displacement"], MIL))
         measured = [_format_cell(reading["measured"], unit) for reading, unit in pairs]
         computed = [_format_cell(reading["computed"], unit) for reading, unit in pairs]
@@ -230,22 +233,22 @@ def _csv_rows(answer: dict) -> list:
 
 
 def _format_cell(value: float | None, unit: float) -> str:
-    """Format a reading in a unit; "" if there is none."""
+    """Format a reading [SI] in the unit of its column; "" if there is no reading."""
     return "" if value is None else f"{value / unit:.6g}"
 
 
-def _draw_charts(answer: dict) -> list:
-    """Return charts of computed against measured accelerations and displacements."""
+def _draw_charts(fit_data: dict) -> list:
+    """Chart computed against measured accelerations and displacements."""
     return [
-        _draw_chart(answer, "acceleration", "g", G_N),
-        _draw_chart(answer, "displacement", "mil", MIL),
+        _draw_chart(fit_data, "acceleration", "g", G_N),
+        _draw_chart(fit_data, "displacement", "mil", MIL),
     ]
 
 
-def _draw_chart(answer: dict, name: str, unit: str, scale: float) -> dict:
-    """Return the chart of computed against measured readings of one kind, fitted and held out."""
+def _draw_chart(fit_data: dict, name: str, unit: str, scale: float) -> dict:
+    """Chart computed against measured readings of one quantity, fitted and held out."""
     groups: dict = {}
-    for row in answer["rows"]:
+    for row in fit_data["rows"]:
         reading = row[name]
         if reading["measured"] and reading["computed"]:
             group = groups.setdefault((bool(reading["held"]), "U" in row["flag"]), [])
@@ -272,32 +275,32 @@ def _draw_chart(answer: dict, name: str, unit: str, scale: float) -> dict:
     )
 
 
-def _format_answer(answer: dict) -> list:
-    """Return the values, and the scores of the rig and of the models without mechanics."""
-    good = [one["training"] for one in answer["starts"] if one["training"] is not None]
+def _format_fit_data(fit_data: dict) -> list:
+    """Return the fitted values and the scores of all models as lines of text."""
+    good = [one["training"] for one in fit_data["starts"] if one["training"] is not None]
     alike = sum(rms <= min(good) * SAME_SCORE for rms in good)
     out = [
-        f"{answer['outcome']}: {answer['readings']} readings of {answer['measured']} fitted, "
-        f"{answer['held']} held out; {alike} of {len(answer['starts'])} starts led to within 1 % of "
+        f"{fit_data['outcome']}: {fit_data['readings']} readings of {fit_data['measured']} fitted, "
+        f"{fit_data['held']} held out; {alike} of {len(fit_data['starts'])} starts led to within 1 % of "
         "the best training score"
     ]
-    out += format_values(answer, KEY_WIDTH)
+    out += format_values(fit_data, KEY_WIDTH)
     heading = "rms of ln(computed/measured)"
     out.append(f"  {heading:<36} {'acceleration':>12} {'displacement':>12} {'all':>8}")
-    for part in PARTS:
-        score = answer["scores"][part]
+    for part in SCORED_GROUPS:
+        score = fit_data["scores"][part]
         if score is not None:
             out.append(_score_line(part.replace("_", " "), score))
             out += [
-                _score_line(f"  null {name}", answer["nulls"][name][part]) for name in NULL_MODELS
+                _score_line(f"  null {name}", fit_data["nulls"][name][part]) for name in NULL_MODELS
             ]
-            stable = answer["scores_stable"][part]
+            stable = fit_data["scores_stable"][part]
             if stable != score:
                 out.append(_score_line("  without rows flagged U", stable))
-    for fold in answer["folds"]:
+    for fold in fit_data["folds"]:
         name = f"without {fold['left_out']}: training {fold['training']:.3f}"
         out.append(_score_line(name, fold["scores"]))
-    for placebo in answer["placebos"]:
+    for placebo in fit_data["placebos"]:
         for part, score in placebo["scores"].items():
             if score is not None:
                 out.append(_score_line(f"{placebo['set']}, {part.replace('_', ' ')}", score))
@@ -305,7 +308,7 @@ def _format_answer(answer: dict) -> list:
 
 
 def _score_line(name: str, score: dict | None) -> str:
-    """Format the scores of a prediction as a line."""
+    """Format the scores of a model as a line of a table."""
     cells = []
     for kind in ("acceleration", "displacement", "all"):
         value = None if score is None else score[kind]

@@ -6,7 +6,7 @@ from ...formatting import SENTENCE_UNITS, choose_display_unit, round_to_error
 
 
 class FormattedValue(NamedTuple):
-    """A value and the bounds of its interval, or [], in a suitable unit."""
+    """Fitted value and the ends of its interval ([] without one) as text, with their unit."""
 
     value: str
     unit: str
@@ -14,7 +14,7 @@ class FormattedValue(NamedTuple):
 
 
 def format_fitted(described: dict) -> FormattedValue:
-    """Format a value of fit.json."""
+    """Format a fitted value of fit.json and its interval in a readable unit."""
     unit, scale = choose_display_unit(
         described["value"], SENTENCE_UNITS.get(described["unit"], described["unit"])
     )
@@ -25,19 +25,19 @@ def format_fitted(described: dict) -> FormattedValue:
     return FormattedValue(value, unit, ends)
 
 
-def format_values(answer: dict, width: int = 26) -> list:
-    """Return a line of text for each value of fit.json."""
-    return [format_line(f"{key:<{width}}", value) for key, value in named_values(answer).items()]
+def format_values(fit_data: dict, width: int = 26) -> list:
+    """Return a line of text for each fitted value of fit.json."""
+    return [format_line(f"{key:<{width}}", value) for key, value in named_values(fit_data).items()]
 
 
-def named_values(answer: dict) -> dict:
-    """Return the fitted keys and offsets of fit.json by their names for the reader."""
-    offsets = answer.get("offsets", {})
-    return answer["values"] | {f"offset of the {name}": one for name, one in offsets.items()}
+def named_values(fit_data: dict) -> dict:
+    """Return the fitted keys and offsets of fit.json by the names that a page shows."""
+    offsets = fit_data.get("offsets", {})
+    return fit_data["values"] | {f"offset of the {name}": one for name, one in offsets.items()}
 
 
 def format_line(name: str, described: dict) -> str:
-    """Return a line with a value of fit.json, its interval and its bound."""
+    """Return a line of text with a fitted value, its interval and the bound that it reaches."""
     value, unit, ends = format_fitted(described)
     interval = "not determined"
     if ends:

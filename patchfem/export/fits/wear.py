@@ -9,10 +9,15 @@ from .files import FITTED_SCENE, FitFiles, describe_measurement
 
 
 def describe_wear_fit(fitted: FittedCoefficient, scene: Scene) -> FitFiles:
-    """Return the files of a fitted wear coefficient; scene: before the fit."""
+    """Describe the files of a fitted wear coefficient.
+
+    `scene` is the scene before the fit.
+    """
     measured = fitted.measured
     bounds = fitted.bounds
-    whole = loads(scene.text, scene.path, [*scene.sets, bounds.format_assignment(fitted.value)])
+    fitted_scene = loads(
+        scene.text, scene.path, [*scene.sets, bounds.format_assignment(fitted.value)]
+    )
     value = {
         "value": fitted.value,
         "unit": "m2 N-1",
@@ -21,7 +26,7 @@ def describe_wear_fit(fitted: FittedCoefficient, scene: Scene) -> FitFiles:
         "interval": [fitted.low, fitted.high],
         "bounds": [bounds.low, bounds.high],
     }
-    answer = describe_measurement(scene.title, measured.source, measured.name, "done") | {
+    fit_data = describe_measurement(scene.title, measured.source, measured.name, "done") | {
         "runs": fitted.runs,
         "model": fitted.model,
         "data": {"value": measured.value, "low": measured.low, "high": measured.high},
@@ -33,8 +38,10 @@ def describe_wear_fit(fitted: FittedCoefficient, scene: Scene) -> FitFiles:
     number, low, high = (format_number(one, 4) for one in numbers)
     line = f"{KEY} {number} {value['unit']}, {low} to {high} from the interval of {measured.name}"
     return FitFiles(
-        answer=answer,
+        answer=fit_data,
         lines=[line],
         summary=[line],
-        scenes={FITTED_SCENE: f"# {KEY} fitted to {measured.name}{source}\n\n{whole.resolved()}"},
+        scenes={
+            FITTED_SCENE: f"# {KEY} fitted to {measured.name}{source}\n\n{fitted_scene.resolved()}"
+        },
     )

@@ -16,7 +16,7 @@ from patchfem.campaigns.rows.condition_models import ConditionModels
 from patchfem.campaigns.rows.fit import SearchSettings
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N, PatchfemError
-from patchfem.export.fits.rows import Starts, describe_answer
+from patchfem.export.fits.rows import SearchCheckpoint, rows_fit_data
 from patchfem.runs import MotionObserver
 from patchfem.scene import load, loads, read_ranges
 
@@ -127,7 +127,7 @@ def test_exact_a_linear_rig_is_recovered_from_closed_forms(tmp_path):
         starts=3,
     )
     assert found.keys.fit.values == pytest.approx([141.0, 0.03, 1.3, 0.8], rel=1e-6)
-    assert describe_answer(found)["reading"] == {
+    assert rows_fit_data(found)["reading"] == {
         "reading": "peak",
         "reading_cutoff": None,
         "acceleration_gain": found.keys.fit.values[2],
@@ -372,7 +372,7 @@ def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
     file = tmp_path / "starts.json"
 
     def go(question, resume):
-        how = SearchSettings(2, 0, "bound", Starts(file, question, resume))
+        how = SearchSettings(2, 0, "bound", SearchCheckpoint(file, question, resume))
         return fit_rows(FitRequest(scene, wanted, path), RowsOptions(search=how))
 
     first = go("one", False)
@@ -392,7 +392,7 @@ def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
 def test_exact_starts_of_another_shape_count_for_nothing(tmp_path, text):
     """The first two once ended `fit --resume` with an internal fault."""
     (tmp_path / "starts.json").write_text(text)
-    assert Starts(tmp_path / "starts.json", "one", True).known == {}
+    assert SearchCheckpoint(tmp_path / "starts.json", "one", True).known == {}
 
 
 def test_placebos_are_complete_fits(tmp_path):
