@@ -1,4 +1,4 @@
-"""Matched grooves, whose flanks the load climbs.
+"""Matched grooves of two surfaces, whose flanks the load climbs.
 
 The height is z = A (1 - cos(k q - phase)) and the slope of the flank t = dz/dq = A k sin(k q - phase).
 
@@ -19,14 +19,15 @@ from math import inf, pi
 
 import numpy as np
 
-# mu t below which the friction loss is computed as a power series, because the closed form suffers from cancellation
+# Maximum of mu t for which the friction loss is computed as a power series, because the closed form suffers from
+# cancellation.
 MAX_SERIES_SLOPE = 0.1
-N_SERIES_TERMS = 18  # number of terms of this series; 0.1^18 is round-off
+N_SERIES_TERMS = 18  # Number of terms of this series; 0.1^18 is round-off.
 
 
 @dataclass(frozen=True, slots=True)
 class Grooves:
-    """Sinusoidal grooves that match those of the other piece.
+    """Sinusoidal grooves that match those of the opposite surface.
 
     - wavelength, amplitude [m]: the amplitude is half the height from bottom to crest
     - phase [rad]: the bottom is at the relative displacement q = phase/k
@@ -72,7 +73,7 @@ class Grooves:
         return replace(self, amplitude=amplitude) if amplitude > 0 else None
 
     def _angle(self, q):
-        """Return the angle k q - phase [rad] at relative displacements q [m]."""
+        """Return the phase angle k q - phase [rad] at relative displacements q [m]."""
         return self.wave_number * np.asarray(q, float) - self.phase
 
     def height(self, q):
@@ -84,11 +85,11 @@ class Grooves:
         return self.max_slope * np.sin(self._angle(q))
 
     def slope_derivative(self, q):
-        """Return the derivative t' = A k^2 cos(k q - phase) [1/m] of the slope at q [m]."""
+        """Return the slope derivative t' = A k^2 cos(k q - phase) [1/m] at displacements q [m]."""
         return self.max_slope * self.wave_number * np.cos(self._angle(q))
 
     def force_ratio(self, q, direction, friction: float):
-        """Return tangential / vertical force (t + phi)/(1 - phi t) [1] at q [m].
+        """Return the ratio of tangential to vertical force, (t + phi)/(1 - phi t), at q [m].
 
         Parameters
         ----------
@@ -108,7 +109,7 @@ class Grooves:
         return (slope + phi) / (1 - phi * slope)
 
     def stiffness(self, load: float) -> float:
-        """Return the stiffness N k^2 A [N/m] of small oscillations about the bottom under a load N [N]."""
+        """Return the stiffness N k^2 A [N/m] of small oscillations under a load N [N]."""
         return load * self.wave_number**2 * self.amplitude
 
     def max_force(self, load: float, friction: float) -> float:
@@ -152,7 +153,7 @@ class Grooves:
         return loss / self.wave_number
 
     def _integrate_series(self, start, end, signed_friction):
-        """Integrate mu (1 + t^2)/(1 - mu t) over angles, expanded in powers of mu t."""
+        """Integrate the friction loss mu (1 + t^2)/(1 - mu t) over angles as a power series."""
         powers = _integrate_sine_powers(start, end, N_SERIES_TERMS + 2)
         b = signed_friction * self.max_slope
         total = 0.0
@@ -161,7 +162,7 @@ class Grooves:
         return signed_friction * total
 
     def _integrate_loss(self, start, end, signed_friction):
-        """Integrate mu (1 + t^2)/(1 - mu t) over angles, in closed form."""
+        """Integrate the friction loss mu (1 + t^2)/(1 - mu t) over angles in closed form."""
         moves = signed_friction != 0
         mu = np.where(moves, signed_friction, 1.0)
         b = signed_friction * self.max_slope
@@ -179,7 +180,7 @@ class Grooves:
         return np.where(moves, mu * total, 0.0)
 
     def min_mass_ratio(self, friction: float) -> float:
-        """Return the minimum of t (t - mu)/(1 + mu t) [1] over the slopes t of the flanks.
+        """Return the minimum of t (t - mu)/(1 + mu t) over the slopes t of the flanks.
 
         Where it is negative, its product with the lifted mass reduces the mass that the interface moves.
         """
@@ -190,7 +191,7 @@ class Grooves:
 
 
 def _integrate_sine_powers(start, end, count: int) -> list:
-    """Return the integrals of sin^j from start to end (k,) [rad], j = 0 .. count - 1, by recursion."""
+    """Return the integrals of powers of the sine from start to end (k,) [rad] by recursion."""
     integrals = [end - start, 2 * np.sin(0.5 * (end - start)) * np.sin(0.5 * (end + start))]
     for j in range(2, count):
         boundary = np.cos(start) * np.sin(start) ** (j - 1) - np.cos(end) * np.sin(end) ** (j - 1)

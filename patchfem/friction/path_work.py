@@ -4,7 +4,7 @@ import numpy as np
 
 
 def sampled_work(rel_disp, force, force_after=None) -> np.ndarray:
-    """Integrate the friction force over each step between samples by the trapezoidal rule.
+    """Integrate the friction force over the displacement between samples (trapezoidal rule).
 
     An engine that integrates its energy balance from path means of the force cannot notice a wrong mean. This sum uses
     the samples alone, so it is an independent check.

@@ -1,4 +1,4 @@
-"""Protocol of a friction law: NumPy form for benches, and `Element` for compiled engines.
+"""Protocol of a friction law: NumPy form for benches, `Element` for compiled engines.
 
 A law under a pressure that changes along the path or in time has these methods. None of them changes the state that it
 is given. No traction remains without pressure, and at rest no traction exceeds mu sigma.
@@ -19,7 +19,7 @@ import numpy as np
 
 
 class Step(NamedTuple):
-    """Result of a law for an increment.
+    """Result of a friction law for an increment of the relative displacement.
 
     - mean: path mean (m,) [Pa] of the traction, positive against slip to +x
     - dissipated: energy per area (m,) [J/m2], negative only if the law creates energy
@@ -32,27 +32,29 @@ class Step(NamedTuple):
 
 
 class SteadyLoop(NamedTuple):
-    """Steady friction loop: force [N] at the reversals, and area [J]."""
+    """Steady friction loop: force [N] at the reversals, and enclosed area [J]."""
 
     force: float | np.ndarray
     area: float | np.ndarray
 
 
 class LastTraction:
-    """Base of laws without a stretch: the state is the last traction (m,) [Pa].
+    """Base class of friction laws whose state is the last traction (m,) [Pa].
 
     A subclass has `limit(sigma, direction)`, `limit_fraction(increment, dt)` and `step`.
     """
 
     __slots__ = ()
-    can_change_load = True  # the load may change within a step of the motion
+    can_change_load = True  # Whether the load may change within a step of the motion.
 
     def start(self, sigma):
-        """Return the state before any motion: no traction."""
+        """Return the traction before any motion, which is 0."""
         return np.zeros_like(sigma)
 
     def press(self, state, s0, s1) -> Step:
-        """Change the pressure at rest: the traction is reduced to the new limit without dissipation.
+        """Reduce the traction at rest to the friction limit under a new pressure.
+
+        No energy is dissipated.
 
         Parameters
         ----------
@@ -75,12 +77,12 @@ class LastTraction:
         return state
 
     def stored_energy(self, state):
-        """Return the elastic energy per area (m,) [J/m2], which is 0."""
+        """Return the elastic energy per area (m,) [J/m2], which is 0 for a law without a stretch."""
         return np.zeros_like(state)
 
 
 class Element(NamedTuple):
-    """Law of one contact for compiled engines.
+    """Friction law of one contact in the form that compiled engines take.
 
     - kernels: module of the compiled functions in this package
     - numbers, memory: parameters (k,), of which the first is reserved for the engines, and initial memory (l,)

@@ -7,16 +7,16 @@ from typing import NamedTuple
 
 from ..compiled.jit import NJIT_NO_REFCOUNT, njit
 
-IS_SET_VALUED = False  # whether the law sticks without any elastic stretch, as Coulomb's does
-HAS_ZERO_KINK = False  # whether the rate equation has a kink at zero stretch
-# whether the stretch depends on the path alone and is given by `integrate_stretch`
+IS_SET_VALUED = False  # Whether the law sticks without any elastic stretch, as Coulomb's law does.
+HAS_ZERO_KINK = False  # Whether the rate equation has a kink at zero stretch.
+# Whether the stretch depends on the path alone and is given by `integrate_stretch`.
 IS_RATE_INDEPENDENT = False
-# whether the force changes steeply over a narrow range of velocities around 0
+# Whether the force changes steeply over a narrow range of velocities around 0.
 HAS_SPEED_LAYER = False
 
 
 class Reading(NamedTuple):
-    """State of a law: force [N], stored energy [J], irreversible displacement [m]."""
+    """State of a friction law: force [N], stored energy [J], irreversible displacement [m]."""
 
     force: float
     stored_energy: float
@@ -24,7 +24,7 @@ class Reading(NamedTuple):
 
 
 class StepSolution(NamedTuple):
-    """Increment [m] and path-mean force [N] of a step, if it has a closed form."""
+    """Closed-form solution of a step: displacement increment [m] and path-mean force [N]."""
 
     increment: float
     mean_force: float
@@ -32,7 +32,7 @@ class StepSolution(NamedTuple):
 
 
 class RelaxedStretch(NamedTuple):
-    """Stretch [m] after a step, and its derivatives."""
+    """Stretch [m] after a step, and its derivatives by initial stretch, increment and time."""
 
     stretch: float
     by_stretch: float
@@ -41,7 +41,7 @@ class RelaxedStretch(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Force [N], derivative of the stretch along the slip [1], derivatives of the force."""
+    """Rate equation of a friction law: force [N], stretch rate [1] and force derivatives."""
 
     force: float
     stretch_rate: float
@@ -50,7 +50,7 @@ class Rates(NamedTuple):
 
 
 class IntegratedStretch(NamedTuple):
-    """Stretch [m] after a path, mean square of the stretches [m2], work of the force [J]."""
+    """Stretch after a path [m], mean square stretch [m2] and work of the friction force [J]."""
 
     stretch: float
     mean_square: float
@@ -59,7 +59,7 @@ class IntegratedStretch(NamedTuple):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def step_bond_length(numbers, memory, velocity, dt):
-    """Return 0: a law without growing bonds needs no bond length.
+    """Return 0, because a law without growing bonds has no bond length.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def step_bond_length(numbers, memory, velocity, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(numbers, memory, free, compliance):
-    """Return a StepSolution that is not solved, because the step of the law has no closed form.
+    """Return an unsolved step, because the law has no closed form for a step.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def solve_step(numbers, memory, free, compliance):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def integrate_stretch(numbers, stretch, mean_square, increment, direction):
-    """Return the stretch unchanged, for a law that is given by its rate equation alone.
+    """Return the stretch unchanged, because the law is given by its rate equation alone.
 
     Parameters
     ----------

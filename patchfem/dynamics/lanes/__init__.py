@@ -26,7 +26,7 @@ sine; `runs.batch.lumped.lanes` says so. Cost per step and case: 4 to 6 ns for C
 to 12 ns for bonds and LuGre, 25 to 40 ns for Iwan and Jenkins elements, 200 ns for Bouc-Wen. A cycle of 96 steps takes 0.4
 to 4 us, and 20 us for Bouc-Wen.
 
-In: `run.Cases`. Out: `run.Marched`, from which `reading` computes what the engine `events` reads of its runs. Read
+In: `run.Cases`. Out: `run.LaneResults`, from which `reading` computes what the engine `events` reads of its runs. Read
 `rigid_kernels` first, which is the pattern of a law, then `rows_kernels` (the workspace), `lane_kernels`, `loop_kernels`
 and `run`.
 """

@@ -31,24 +31,26 @@ from .rows_kernels import (
     PERIODIC_TOL,
     STATE_ROWS,
     SUM_ROWS,
-    At,
     CycleEnd,
+    RowStart,
 )
 
-# The motion is near a periodic one if a cycle changes its state by less than this fraction of the range.
+# The motion is near a periodic one if a cycle changes its state by less than this fraction of the range; the map is
+# then nearly linear.
 MAX_CYCLE_CHANGE = 1e-2
-# The predicted state at the end of the run may be wrong by this fraction of the range.
+# Accepted error of the predicted state at the end of the run, as a fraction of the range.
 STATE_TOL = 1e-7
-# A predicted sum may be wrong by this fraction of its value.
+# Accepted error of a predicted sum over the cycles, as a fraction of its value.
 SUM_TOL = 1e-6
-# Two changes have the same direction up to this square of the sine of the angle between them; the map is then a number.
+# Two changes count as parallel up to this square of the sine of the angle between them; the map is then a single
+# factor.
 PARALLEL_TOL = 1e-6
-# Numbers of a cycle in the history: its extremes and its phasor.
+# Numbers of a cycle in the history: its two extremes and the two parts of its phasor.
 N_HISTORY = 4
 
 
 class CycleMap(NamedTuple):
-    """The coefficients a and b of the module docstring, and whether the map is accurate enough."""
+    """Coefficients a and b of the linear map from cycle to cycle, and whether it is accurate."""
 
     a: float
     b: float
@@ -56,7 +58,7 @@ class CycleMap(NamedTuple):
 
 
 class Changes(NamedTuple):
-    """Last three changes of a number from cycle to cycle, the latest first."""
+    """Last three changes of a quantity from cycle to cycle, the latest first."""
 
     last: float
     second: float
@@ -65,7 +67,7 @@ class Changes(NamedTuple):
 
 @njit(**NJIT_INLINE)
 def cycle_end_element(k, place, lane):
-    """Return the element of the workspace with a number of a cycle end.
+    """Return the workspace index of a quantity in a stored cycle end.
 
     Parameters
     ----------
@@ -84,7 +86,7 @@ def cycle_end_element(k, place, lane):
 
 @njit(**NJIT_INLINE)
 def last_changes(value, place, workspace, lane):
-    """Return the last `Changes` of a number.
+    """Return the last three changes of a quantity from cycle to cycle.
 
     Parameters
     ----------
@@ -107,9 +109,9 @@ def last_changes(value, place, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def push_cycle_end(lane, workspace):
-    """Store the present cycle end in front of those of the cycles before."""
+    """Store the state and sums at the present end of a cycle in front of the earlier ones."""
     for k in range(N_CYCLE_ENDS - 1, 0, -1):
-        for n in range(CycleEnd.LAW_STATE + law.N_KEPT):
+        for n in range(CycleEnd.LAW_STATE + law.N_LAW_VARIABLES):
             older = workspace[cycle_end_element(k - 1, n, lane)]
             workspace[cycle_end_element(k, n, lane)] = older
     for n in range(len(STATE_ROWS)):
@@ -117,14 +119,14 @@ def push_cycle_end(lane, workspace):
     for n in range(len(SUM_ROWS)):
         value = workspace[SUM_ROWS[n] * LANES + lane]
         workspace[cycle_end_element(0, CycleEnd.SLIP_PATH + n, lane)] = value
-    for n in range(law.N_KEPT):
+    for n in range(law.N_LAW_VARIABLES):
         value = workspace[(LAW_STATE + n) * LANES + lane]
         workspace[cycle_end_element(0, CycleEnd.LAW_STATE + n, lane)] = value
 
 
 @njit(**NJIT_INLINE)
 def has_cut_extremes(lane, workspace, lowest, highest):
-    """Return whether an extreme of the last cycle is at its start or end instead of a reversal.
+    """Return whether an extreme of the last cycle lies at its start or end, not at a reversal.
 
     Parameters
     ----------
@@ -137,17 +139,17 @@ def has_cut_extremes(lane, workspace, lowest, highest):
     -------
     bool
     """
-    x = workspace[At.SLIDE + lane]
+    x = workspace[RowStart.SLIDE + lane]
     start = workspace[cycle_end_element(0, CycleEnd.SLIDE, lane)]
     start_speed = workspace[cycle_end_element(0, CycleEnd.SPEED, lane)]
-    ends_cut = workspace[At.SPEED + lane] != 0.0 and (x == lowest or x == highest)
+    ends_cut = workspace[RowStart.SPEED + lane] != 0.0 and (x == lowest or x == highest)
     starts_cut = start_speed != 0.0 and (start == lowest or start == highest)
     return ends_cut or starts_cut
 
 
 @njit(**NJIT_INLINE)
 def fit_cycle_map(lane, workspace, history, size):
-    """Fit the linear map of a cycle to the last cycles.
+    """Fit the linear map from cycle to cycle to the last cycles.
 
     Parameters
     ----------
@@ -164,9 +166,9 @@ def fit_cycle_map(lane, workspace, history, size):
     CycleMap
     """
     n_done = len(history)
-    x = last_changes(workspace[At.SLIDE + lane], CycleEnd.SLIDE, workspace, lane)
-    v = last_changes(workspace[At.SPEED + lane], CycleEnd.SPEED, workspace, lane)
-    p = last_changes(workspace[At.MEMORY + lane], CycleEnd.MEMORY, workspace, lane)
+    x = last_changes(workspace[RowStart.SLIDE + lane], CycleEnd.SLIDE, workspace, lane)
+    v = last_changes(workspace[RowStart.SPEED + lane], CycleEnd.SPEED, workspace, lane)
+    p = last_changes(workspace[RowStart.MEMORY + lane], CycleEnd.MEMORY, workspace, lane)
     is_near = (
         max(abs(x.last), abs(v.last)) < MAX_CYCLE_CHANGE * size
         and law.can_extrapolate(workspace, lane)
@@ -174,7 +176,7 @@ def fit_cycle_map(lane, workspace, history, size):
     )
     for n in range(N_CYCLE_ENDS):
         sign = workspace[cycle_end_element(n, CycleEnd.SLIP_SIGN, lane)]
-        is_near = is_near and sign == workspace[At.SLIP_SIGN + lane]
+        is_near = is_near and sign == workspace[RowStart.SLIP_SIGN + lane]
     if not is_near:
         return CycleMap(0.0, 0.0, False)
     cross = x.second * v.third - v.second * x.third
@@ -193,7 +195,7 @@ def fit_cycle_map(lane, workspace, history, size):
         third = history[n_done - 3, n]
         older = third - history[n_done - 4, n]
         miss = max(miss, abs(last - second - a * (second - third) - b * older))
-    # The slower eigenvalue of the map says how much of the error of all later cycles that of one cycle is.
+    # The larger magnitude of the eigenvalues bounds how the error of one cycle accumulates over all later cycles.
     discriminant = a * a + 4 * b
     slow = 0.5 * (abs(a) + sqrt(discriminant)) if discriminant > 0.0 else sqrt(-b)
     fraction = (1 - slow) * (1 - slow * slow)
@@ -213,7 +215,9 @@ def fit_cycle_map(lane, workspace, history, size):
 
 @njit(**NJIT_INLINE)
 def extrapolate_cycles(lane, workspace, history, n_done, until):
-    """Move a lane on by the map of its cycle, up to the cycle `until` or to one that repeats.
+    """Extrapolate the motion of a lane over cycles by the linear map from cycle to cycle.
+
+    It ends at the cycle `until`, or at one that repeats.
 
     Parameters
     ----------
@@ -237,19 +241,19 @@ def extrapolate_cycles(lane, workspace, history, n_done, until):
     a, b, is_sure = fit_cycle_map(lane, workspace, history[:n_done], size)
     if not is_sure:
         return n_done
-    # The change of a number in the nth cycle from here is p times its last change and q times the one before.
+    # The change of a number in the nth cycle from here is p times its last change plus q times the change before.
     p = 1.0
     q = 0.0
     p_before = 0.0
     q_before = 1.0
-    # The sum of those changes is c and d times the two, and the sum of these sums e and f times.
+    # The sum of those changes is c and d times these two changes, and the sum of the sums is e and f times them.
     c = 0.0
     d = 0.0
     e = 0.0
     f = 0.0
     n = 0
-    x = last_changes(workspace[At.SLIDE + lane], CycleEnd.SLIDE, workspace, lane)
-    v = last_changes(workspace[At.SPEED + lane], CycleEnd.SPEED, workspace, lane)
+    x = last_changes(workspace[RowStart.SLIDE + lane], CycleEnd.SLIDE, workspace, lane)
+    v = last_changes(workspace[RowStart.SPEED + lane], CycleEnd.SPEED, workspace, lane)
     is_moving = True
     while is_moving:
         p_next = a * p + b * p_before
@@ -276,7 +280,7 @@ def extrapolate_cycles(lane, workspace, history, n_done, until):
         change = e * (sums.last - sums.second) + f * (sums.second - sums.third)
         workspace[SUM_ROWS[m] * LANES + lane] += n * sums.last + change
     predict_next_end(lane, workspace, (c, d), (a * p + b * p_before, a * q + b * q_before))
-    for m in range(law.N_KEPT):
+    for m in range(law.N_LAW_VARIABLES):
         value = workspace[(LAW_STATE + m) * LANES + lane]
         number = last_changes(value, CycleEnd.LAW_STATE + m, workspace, lane)
         workspace[(LAW_STATE + m) * LANES + lane] += c * number.last + d * number.second
@@ -287,7 +291,7 @@ def extrapolate_cycles(lane, workspace, history, n_done, until):
 
 @njit(**NJIT_INLINE)
 def predict_next_end(lane, workspace, change, next_change):
-    """Move the state by a change, and replace the latest cycle end by the predicted next one.
+    """Advance the state by an extrapolated change, and store the predicted next cycle end.
 
     Parameters
     ----------
@@ -313,8 +317,8 @@ def predict_next_end(lane, workspace, change, next_change):
 
 @njit(**NJIT_INLINE)
 def confirms_extrapolation(lane, workspace):
-    """Return whether the cycle after an extrapolation ends as the map predicts."""
-    size = workspace[At.MAX_SLIDE + lane] - workspace[At.MIN_SLIDE + lane]
+    """Return whether the cycle after an extrapolation ends as the linear map predicts."""
+    size = workspace[RowStart.MAX_SLIDE + lane] - workspace[RowStart.MIN_SLIDE + lane]
     confirms = True
     for m in range(len(STATE_ROWS) - 1):
         predicted = workspace[cycle_end_element(0, m, lane)]

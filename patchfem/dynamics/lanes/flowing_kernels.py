@@ -1,4 +1,4 @@
-"""A step under a law of one stretch, of one case, by the Runge-Kutta rule of order 4.
+"""Step of one case under a friction law with a single stretch, by a Runge-Kutta method.
 
 The equation in the angle of the drive is x'' + D x' + W x = P sin - f(z, x'), with z' = g(z, x') x'. MEMORY is the stretch
 z [m]. The functions f and g are those of the module `friction` (tanh, Bouc-Wen, LuGre, bonds), whose numbers have lengths
@@ -27,11 +27,11 @@ from .rigid_kernels import (
     newton_on_cubic,
     prepare_step,
 )
-from .rows_kernels import LANES, At, StretchAt
+from .rows_kernels import LANES, RowStart, StretchRowStart
 
 __all__ = [
     "EVENT_KEEPS_STICK",
-    "N_KEPT",
+    "N_LAW_VARIABLES",
     "PROOF_TOL",
     "STICK_IS_RIGID",
     "can_extrapolate",
@@ -53,27 +53,38 @@ __all__ = [
 
 STICK_IS_RIGID = False
 EVENT_KEEPS_STICK = False
-N_KEPT = 2  # the friction and the mean square of the stretches follow the map of a cycle
+# The friction and the mean square of the stretches follow the linear map of a cycle.
+N_LAW_VARIABLES = 2
 
-MAX_PARTS = 4  # a step has at most a reversal, and a kink on either side of it
-# Newton steps for the time of an event, because a cubic across a kink has an error of second order
+MAX_PARTS = 4  # Maximum number of parts of a step, which has at most one reversal and a kink on either side of it.
+# Number of Newton steps for the time of an event; a cubic across a kink has an error of second order, so two are
+# needed.
 N_CORRECTIONS = 2
-MAX_LAYER_PARTS = 64  # number of parts of a step through a layer
-LAYER_EDGE = 5.0  # speed over that of the layer beyond which the force is taken as constant
-# Change of the speed in a part of a step, over the speed of the layer and the angle of the step.
-LAYER_STEP = 20.0
-MIN_LAYER_STEP = 0.25  # smallest change of the speed in a part, over the speed of the layer
-# The speed goes one way while the other forces exceed the friction by this factor
+# Maximum number of parts of a step through a regularisation layer; it bounds the cost of a step.
+MAX_LAYER_PARTS = 64
+# Speed at the edge of a regularisation layer over the regularisation speed; beyond it the force is taken as constant.
+LAYER_EDGE_RATIO = 5.0
+# Change of the speed in a part of a step, over the regularisation speed and the angle of the step.
+LAYER_STEP_RATIO = 20.0
+# Minimum change of the speed in a part of a step, over the regularisation speed.
+MIN_LAYER_STEP_RATIO = 0.25
+# The speed changes monotonically while the other forces exceed the friction by this factor.
 FREE_FLIGHT_FACTOR = 2.0
-SLIP_FRACTION = 0.5  # an interface slips while more than this fraction of the slide is irreversible
-N_HALVINGS = 24  # bisections for the start of a slip, which leave 6e-8 of a segment
-SIGN_IN_LAYER = 1.0  # a law with a layer of speeds does not depend on the sign of the slip
-AT_START = 0  # instants of a step as in `observation_kernels`
+# An interface slips while more than this fraction of a change of its relative displacement is irreversible.
+SLIP_FRACTION = 0.5
+N_HALVINGS = 24  # Number of bisections for the start of a slip; they leave 6e-8 of a segment.
+# Sign of the slip that is passed to a law with a regularisation layer, which does not depend on it.
+SIGN_IN_LAYER = 1.0
+AT_START = 0  # Codes of the instants of a step, as in `observation_kernels`.
 AT_END = 3
 
 
 class FlowState(NamedTuple):
-    """Slide, its derivative, friction over the mass and stretch [m]; mean square stretch [m^2]."""
+    """Displacement, speed, friction over mass and stretch [m], and mean square stretch [m^2].
+
+    The displacement is the relative displacement of the interface, and the speed its derivative
+    with respect to the angle of the drive.
+    """
 
     slide: float
     speed: float
@@ -83,14 +94,17 @@ class FlowState(NamedTuple):
 
 
 class FirstEvent(NamedTuple):
-    """Fraction of a part at which its first event happens (1 without one), and whether the slide reverses there."""
+    """First event in a part of a step: its fraction of the part, and whether it is a reversal.
+
+    The fraction is 1 where there is no event.
+    """
 
     fraction: float
     is_reversal: bool
 
 
 class LayerPlan(NamedTuple):
-    """Division into parts of a step that passes through a layer of speeds.
+    """Division of a step through a regularisation layer of the friction law into parts.
 
     - `flies`: whether the other forces drive the speed one way whatever the friction is; the parts
       are then equal in speed, otherwise equal in angle.
@@ -110,7 +124,7 @@ class LayerPlan(NamedTuple):
 
 
 class LayerPart(NamedTuple):
-    """Angle of a part of a step, the state at its end, and its friction work [m^2]."""
+    """Part of a step: angle [rad], state at its end, and friction work over mass [m^2]."""
 
     angle: float
     end: FlowState
@@ -119,11 +133,11 @@ class LayerPart(NamedTuple):
 
 @njit(**NJIT_INLINE)
 def law_numbers(workspace, lane):
-    """Return the numbers of the law (7,), as its `rate_equation` takes them.
+    """Return the parameters (7,) of the friction law of a lane for its rate equation.
 
     The first number is not used.
     """
-    first = At.LAW_NUMBERS + lane
+    first = RowStart.LAW_NUMBERS + lane
     return (
         0.0,
         workspace[first],
@@ -137,16 +151,18 @@ def law_numbers(workspace, lane):
 
 @njit(**NJIT_INLINE)
 def speed_layer(numbers, angle):
-    """Return the speed at the edge of the layer, and the change of the speed in a part of a step through it.
+    """Return the edge speed of the regularisation layer, and the speed change of a part in it.
 
     The numbers of a law with a layer begin with its limit and 1 over the speed of the layer.
     """
-    return LAYER_EDGE / numbers[2], max(LAYER_STEP * angle, MIN_LAYER_STEP) / numbers[2]
+    return LAYER_EDGE_RATIO / numbers[2], max(
+        LAYER_STEP_RATIO * angle, MIN_LAYER_STEP_RATIO
+    ) / numbers[2]
 
 
 @njit(**NJIT_INLINE)
 def friction_force(state, sine, workspace, lane):
-    """Return the friction over the mass in the angle of the drive [m], positive if it resists positive slip.
+    """Return the friction force over mass [m] from the rate equation of the law.
 
     Parameters
     ----------
@@ -163,7 +179,7 @@ def friction_force(state, sine, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def friction_rate(state, acceleration, workspace, lane, when):
-    """Return the rate of the friction.
+    """Return the derivative of the friction over mass with respect to the drive angle.
 
     Parameters
     ----------
@@ -183,7 +199,7 @@ def friction_rate(state, acceleration, workspace, lane, when):
 
 @njit(**NJIT_INLINE)
 def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
-    """Return the friction at a reversal of the slide, which follows from the stretch there.
+    """Return the friction over mass at a reversal, from the stretch there.
 
     Parameters
     ----------
@@ -199,7 +215,7 @@ def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def irreversible_slide(x, memory, workspace, lane):
-    """Return the irreversible part of a slide [m].
+    """Return the irreversible part of the relative displacement [m].
 
     Parameters
     ----------
@@ -215,7 +231,9 @@ def irreversible_slide(x, memory, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def slip_increment(memory, event_memory, memory1, workspace, lane):
-    """Return the friction work of the last step over the mass [m^2], which replaces the slip path.
+    """Return the friction work of the last step over mass [m^2].
+
+    In laws of one stretch it replaces the slip path.
 
     Parameters
     ----------
@@ -226,12 +244,12 @@ def slip_increment(memory, event_memory, memory1, workspace, lane):
     -------
     float
     """
-    return workspace[StretchAt.STEP_WORK + lane]
+    return workspace[StretchRowStart.STEP_WORK + lane]
 
 
 @njit(**NJIT_INLINE)
 def stretch_after(numbers, stretch, slide, rise, slip_sign):
-    """Return the stretch after a slide that raises it by `rise`.
+    """Return the stretch after an increment of the relative displacement.
 
     A rate-independent law is integrated in closed form.
 
@@ -252,7 +270,7 @@ def stretch_after(numbers, stretch, slide, rise, slip_sign):
 
 @njit(**NJIT_INLINE)
 def runge_kutta_step(workspace, lane, state, slip_sign, sines, angle):
-    """Integrate the motion over an angle by the Runge-Kutta rule of order 4.
+    """Integrate the motion over a drive angle by a Runge-Kutta method of order 4.
 
     Parameters
     ----------
@@ -274,9 +292,9 @@ def runge_kutta_step(workspace, lane, state, slip_sign, sines, angle):
     """
     x, v, f, z, q = state
     k = law_numbers(workspace, lane)
-    drive = workspace[At.DRIVE + lane]
-    damping = workspace[At.DAMPING + lane]
-    stiffness = workspace[At.STIFFNESS + lane]
+    drive = workspace[RowStart.DRIVE + lane]
+    damping = workspace[RowStart.DAMPING + lane]
+    stiffness = workspace[RowStart.STIFFNESS + lane]
     half = angle / 2
     g = friction.rate_equation(k, z, v, slip_sign)[1] * v
     a = drive * sines[0] - damping * v - stiffness * x - f
@@ -309,14 +327,14 @@ def runge_kutta_step(workspace, lane, state, slip_sign, sines, angle):
 
 @njit(**NJIT_INLINE)
 def set_derived_state(workspace, lane):
-    """Set the friction of a lane from its state."""
+    """Set the friction of a lane from its stretch and speed."""
     state = LaneState(
-        workspace[At.SLIDE + lane],
-        workspace[At.SPEED + lane],
-        workspace[At.SLIP_SIGN + lane],
-        workspace[At.MEMORY + lane],
+        workspace[RowStart.SLIDE + lane],
+        workspace[RowStart.SPEED + lane],
+        workspace[RowStart.SLIP_SIGN + lane],
+        workspace[RowStart.MEMORY + lane],
     )
-    workspace[StretchAt.FRICTION + lane] = friction_force(state, 0.0, workspace, lane)
+    workspace[StretchRowStart.FRICTION + lane] = friction_force(state, 0.0, workspace, lane)
 
 
 restore_derived_state = set_derived_state
@@ -324,19 +342,21 @@ restore_derived_state = set_derived_state
 
 @njit(**NJIT_INLINE)
 def flow_state(workspace, lane):
-    """Return the `FlowState` of a lane."""
+    """Return the displacement, speed, friction and stretch of a lane."""
     return FlowState(
-        workspace[At.SLIDE + lane],
-        workspace[At.SPEED + lane],
-        workspace[StretchAt.FRICTION + lane],
-        workspace[At.MEMORY + lane],
-        workspace[StretchAt.STRETCH_SQUARE + lane],
+        workspace[RowStart.SLIDE + lane],
+        workspace[RowStart.SPEED + lane],
+        workspace[StretchRowStart.FRICTION + lane],
+        workspace[RowStart.MEMORY + lane],
+        workspace[StretchRowStart.STRETCH_SQUARE + lane],
     )
 
 
 @njit(**NJIT_INLINE)
 def is_sticking(v, slip_sign, memory, workspace, lane):
-    """Return 1 if at most SLIP_FRACTION of the slide is irreversible, otherwise 0.
+    """Return 1 if the interface sticks, otherwise 0.
+
+    It sticks if at most SLIP_FRACTION of a change of the relative displacement is irreversible.
 
     Parameters
     ----------
@@ -353,7 +373,7 @@ def is_sticking(v, slip_sign, memory, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def try_step(workspace, lane, step, is_observed):
-    """Compute a step as if no event lay inside it: no reversal, no kink of the law and no layer of speeds.
+    """Try a step without events: no reversal, no kink, no regularisation layer crossed.
 
     A step that is read must not contain the start or the end of a stick, nor a change of sign of the stretch.
 
@@ -366,9 +386,9 @@ def try_step(workspace, lane, step, is_observed):
     -------
     TriedStep
     """
-    slip_sign = workspace[At.SLIP_SIGN + lane]
+    slip_sign = workspace[RowStart.SLIP_SIGN + lane]
     state = flow_state(workspace, lane)
-    sines = (step.s0, workspace[At.MIDPOINT_FACTOR + lane] * (step.s0 + step.s1), step.s1)
+    sines = (step.s0, workspace[RowStart.MIDPOINT_FACTOR + lane] * (step.s0 + step.s1), step.s1)
     end, work = runge_kutta_step(workspace, lane, state, slip_sign, sines, step.angle)
     if friction.HAS_SPEED_LAYER:
         edge_speed, width = speed_layer(law_numbers(workspace, lane), step.angle)
@@ -389,16 +409,16 @@ def try_step(workspace, lane, step, is_observed):
                 )
             )
         )
-    workspace[StretchAt.FRICTION + lane] = state.friction if event else end.friction
-    workspace[StretchAt.STRETCH_SQUARE + lane] = state.square if event else end.square
-    workspace[StretchAt.STEP_WORK + lane] = work
-    workspace[StretchAt.IS_OBSERVED + lane] = 1.0 if is_observed else 0.0
+    workspace[StretchRowStart.FRICTION + lane] = state.friction if event else end.friction
+    workspace[StretchRowStart.STRETCH_SQUARE + lane] = state.square if event else end.square
+    workspace[StretchRowStart.STEP_WORK + lane] = work
+    workspace[StretchRowStart.IS_OBSERVED + lane] = 1.0 if is_observed else 0.0
     return TriedStep(end.slide, end.speed, end.stretch, event)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def hermite_root(y0, y1, m0, m1):
-    """Return the root in [0, 1] of a cubic by Newton's method, which starts at its secant.
+def find_hermite_root(y0, y1, m0, m1):
+    """Return the root in [0, 1] of a cubic given by its values and slopes at 0 and 1.
 
     Parameters
     ----------
@@ -416,7 +436,7 @@ def hermite_root(y0, y1, m0, m1):
 
 @njit(**NJIT_INLINE)
 def flow_acceleration(workspace, lane, state, sine):
-    """Return the acceleration of a `FlowState`.
+    """Return the acceleration of the relative displacement over the squared drive frequency [m].
 
     Parameters
     ----------
@@ -432,16 +452,16 @@ def flow_acceleration(workspace, lane, state, sine):
         [m]
     """
     return (
-        workspace[At.DRIVE + lane] * sine
-        - workspace[At.DAMPING + lane] * state.speed
-        - workspace[At.STIFFNESS + lane] * state.slide
+        workspace[RowStart.DRIVE + lane] * sine
+        - workspace[RowStart.DAMPING + lane] * state.speed
+        - workspace[RowStart.STIFFNESS + lane] * state.slide
         - state.friction
     )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_first_event(workspace, lane, start, end, slip_sign, sines, angle):
-    """Find the first event of a part of a step, by cubics of the speed and of the stretch.
+    """Find the first event in a part of a step by cubics of speed and stretch.
 
     Parameters
     ----------
@@ -464,11 +484,11 @@ def find_first_event(workspace, lane, start, end, slip_sign, sines, angle):
         if slip_sign * v > 0.0:
             a = flow_acceleration(workspace, lane, start, sines[0])
             a1 = flow_acceleration(workspace, lane, end, sines[2])
-            fraction = hermite_root(v, v1, angle * a, angle * a1)
+            fraction = find_hermite_root(v, v1, angle * a, angle * a1)
     if friction.HAS_ZERO_KINK and start.stretch * end.stretch < 0.0:
         gain = friction.rate_equation(numbers, start.stretch, v, slip_sign)[1]
         gain1 = friction.rate_equation(numbers, end.stretch, v1, slip_sign)[1]
-        kink = hermite_root(start.stretch, end.stretch, angle * v * gain, angle * v1 * gain1)
+        kink = find_hermite_root(start.stretch, end.stretch, angle * v * gain, angle * v1 * gain1)
         if kink < fraction:
             fraction = kink
             is_reversal = False
@@ -477,7 +497,7 @@ def find_first_event(workspace, lane, start, end, slip_sign, sines, angle):
 
 @njit(**NJIT_INLINE)
 def hermite_cubic(y0, y1, m0, m1, u):
-    """Return the value at u of the cubic with these values and slopes at the ends of [0, 1].
+    """Evaluate the cubic with given values and slopes at 0 and 1.
 
     Parameters
     ----------
@@ -493,13 +513,15 @@ def hermite_cubic(y0, y1, m0, m1, u):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def records_own_peaks():
-    """Return whether `resolve_step` adds the peaks and the work of a step to the readings itself."""
+    """Return whether `resolve_step` adds peaks and work of a step to the readings itself."""
     return friction.HAS_SPEED_LAYER
 
 
 @njit(**NJIT_INLINE)
 def slide_at_reversal(x, v, x1, v1, angle):
-    """Return the slide at a reversal in a step without an event, otherwise that of its end.
+    """Return the relative displacement at a reversal in a step without an event.
+
+    Without a reversal it is that at the end of the step.
 
     Parameters
     ----------
@@ -517,7 +539,7 @@ def slide_at_reversal(x, v, x1, v1, angle):
 
 @njit(**NJIT_INLINE)
 def advance_angle(sine, cosine, angle):
-    """Return sine and cosine after a further angle of up to a fifth of a radian, to 1e-9.
+    """Return sine and cosine of the drive after a further angle up to 0.2 rad, to 1e-9.
 
     Parameters
     ----------
@@ -541,8 +563,8 @@ def advance_angle(sine, cosine, angle):
 
 
 @njit(**NJIT_INLINE)
-def step_in_speed(workspace, lane, state, sine, cosine, end_speed):
-    """Integrate the motion until it has a given speed, by the Runge-Kutta rule of order 4 over the speed.
+def step_to_speed(workspace, lane, state, sine, cosine, end_speed):
+    """Integrate the motion up to a given speed, with the speed as independent variable.
 
     The force of a layer depends on the speed alone, so it is known beforehand.
 
@@ -561,15 +583,15 @@ def step_in_speed(workspace, lane, state, sine, cosine, end_speed):
     """
     x, v, f, z, q = state
     numbers = law_numbers(workspace, lane)
-    drive = workspace[At.DRIVE + lane]
-    damping = workspace[At.DAMPING + lane]
-    stiffness = workspace[At.STIFFNESS + lane]
+    drive = workspace[RowStart.DRIVE + lane]
+    damping = workspace[RowStart.DAMPING + lane]
+    stiffness = workspace[RowStart.STIFFNESS + lane]
     half = (end_speed - v) / 2
     middle = v + half
     third = half / 3
     fm = friction.rate_equation(numbers, z, middle, SIGN_IN_LAYER)[0]
     fe = friction.rate_equation(numbers, z, end_speed, SIGN_IN_LAYER)[0]
-    # The angles per speed at the stages of the rule.
+    # These are the angles per speed at the stages of the Runge-Kutta method.
     r = 1 / (drive * sine - damping * v - stiffness * x - f)
     sine1 = advance_angle(sine, cosine, half * r)[0]
     r1 = 1 / (drive * sine1 - damping * middle - stiffness * (x + half * v * r) - fm)
@@ -588,7 +610,7 @@ def step_in_speed(workspace, lane, state, sine, cosine, end_speed):
 
 @njit(**NJIT_INLINE)
 def add_part_readings(workspace, lane, start, first, end, last, angle):
-    """Add the peaks and the loop of a part of a step to the readings.
+    """Add peaks and loop work of a part of a step to the readings.
 
     Parameters
     ----------
@@ -600,11 +622,11 @@ def add_part_readings(workspace, lane, start, first, end, last, angle):
     angle : float
         [rad]
     """
-    output = workspace[At.OUTPUT_GAIN + lane]
-    base = workspace[At.BASE_GAIN + lane]
-    drive = workspace[At.DRIVE + lane]
-    damping = workspace[At.DAMPING + lane]
-    stiffness = workspace[At.STIFFNESS + lane]
+    output = workspace[RowStart.OUTPUT_GAIN + lane]
+    base = workspace[RowStart.BASE_GAIN + lane]
+    drive = workspace[RowStart.DRIVE + lane]
+    damping = workspace[RowStart.DAMPING + lane]
+    stiffness = workspace[RowStart.STIFFNESS + lane]
     sine, cosine, a = first
     sine1, cosine1, a1 = last
     first_state = LaneState(start.slide, start.speed, SIGN_IN_LAYER, 0.0)
@@ -620,15 +642,17 @@ def add_part_readings(workspace, lane, start, first, end, last, angle):
     )
     force = cubic_peak(start.friction, end.friction, angle * rate, angle * rate1)
     work = 0.5 * (start.friction + end.friction) * (end.slide - start.slide)
-    workspace[At.MAX_ACCELERATION + lane] = max(workspace[At.MAX_ACCELERATION + lane], peak)
-    workspace[At.MAX_FORCE + lane] = max(workspace[At.MAX_FORCE + lane], force)
-    workspace[At.LOOP_WORK + lane] += work
-    workspace[At.LOOP_WORK_SIZE + lane] += abs(work)
+    workspace[RowStart.MAX_ACCELERATION + lane] = max(
+        workspace[RowStart.MAX_ACCELERATION + lane], peak
+    )
+    workspace[RowStart.MAX_FORCE + lane] = max(workspace[RowStart.MAX_FORCE + lane], force)
+    workspace[RowStart.LOOP_WORK + lane] += work
+    workspace[RowStart.LOOP_WORK_SIZE + lane] += abs(work)
 
 
 @njit(**NJIT_INLINE)
 def count_layer_parts(workspace, lane, state, s0, s1, angle):
-    """Return the number of equal parts in which a step passes through a layer of speeds.
+    """Return the number of equal parts in which a step crosses a regularisation layer.
 
     Parameters
     ----------
@@ -647,7 +671,7 @@ def count_layer_parts(workspace, lane, state, s0, s1, angle):
     """
     numbers = law_numbers(workspace, lane)
     edge_speed, width = speed_layer(numbers, angle)
-    sines = (s0, workspace[At.MIDPOINT_FACTOR + lane] * (s0 + s1), s1)
+    sines = (s0, workspace[RowStart.MIDPOINT_FACTOR + lane] * (s0 + s1), s1)
     end, _ = runge_kutta_step(workspace, lane, state, SIGN_IN_LAYER, sines, angle)
     v = state.speed
     slowest = 0.0 if v * end.speed < 0.0 else min(abs(v), abs(end.speed))
@@ -658,7 +682,7 @@ def count_layer_parts(workspace, lane, state, s0, s1, angle):
 
 @njit(**NJIT_INLINE)
 def plan_layer_step(workspace, lane, state, step):
-    """Return the `LayerPlan` of a step.
+    """Plan how a step through a regularisation layer is divided into parts.
 
     Parameters
     ----------
@@ -673,9 +697,9 @@ def plan_layer_step(workspace, lane, state, step):
     LayerPlan
     """
     numbers = law_numbers(workspace, lane)
-    drive = workspace[At.DRIVE + lane]
-    damping = workspace[At.DAMPING + lane]
-    stiffness = workspace[At.STIFFNESS + lane]
+    drive = workspace[RowStart.DRIVE + lane]
+    damping = workspace[RowStart.DAMPING + lane]
+    stiffness = workspace[RowStart.STIFFNESS + lane]
     edge_speed, width = speed_layer(numbers, step.angle)
     free = drive * step.s0 - damping * state.speed - stiffness * state.slide
     side = 1.0 if free > 0.0 else -1.0
@@ -690,7 +714,7 @@ def plan_layer_step(workspace, lane, state, step):
 
 @njit(**NJIT_INLINE)
 def next_layer_part(workspace, lane, state, rest, plan, is_last):
-    """Compute the next part of a step through a layer of speeds.
+    """Compute the next part of a step through a regularisation layer.
 
     Parameters
     ----------
@@ -716,7 +740,7 @@ def next_layer_part(workspace, lane, state, rest, plan, is_last):
         end_speed = v + side * plan.width
         if side * v < -plan.edge_speed:
             end_speed = -side * plan.edge_speed
-        part = step_in_speed(workspace, lane, state, rest.s0, rest.c0, end_speed)
+        part = step_to_speed(workspace, lane, state, rest.s0, rest.c0, end_speed)
         if 0.0 < part.angle < rest.angle:
             return part, False
     is_last = plan.flies or is_last
@@ -729,7 +753,7 @@ def next_layer_part(workspace, lane, state, rest, plan, is_last):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def resolve_layer_step(workspace, lane, step):
-    """Compute a step of a law with a layer of speeds in parts that follow the layer.
+    """Compute a step of a law with a regularisation layer in parts that resolve the layer.
 
     The function adds to the sums of the step what the trapezoidal rule between its ends leaves out.
 
@@ -768,13 +792,13 @@ def resolve_layer_step(workspace, lane, step):
         v = state.speed
         v1 = end.speed
         a1 = flow_acceleration(workspace, lane, end, s2)
-        if workspace[StretchAt.IS_OBSERVED + lane] > 0.0:
+        if workspace[StretchRowStart.IS_OBSERVED + lane] > 0.0:
             add_part_readings(workspace, lane, state, (s, c, a), end, (s2, c2, a1), t)
         if v * v1 <= 0.0 and v != 0.0:
-            place = hermite_root(v, v1, t * a, t * a1)
+            place = find_hermite_root(v, v1, t * a, t * a1)
             event = (elapsed + place * t) / angle
             event_slide = hermite_cubic(state.slide, end.slide, t * v, t * v1, place)
-        # Hermite's rule of the integrals of sin x' and x'^2 over the part.
+        # Hermite's rule gives the integrals of sin x' and of x'^2 over the part.
         work_sum += t * (s * v + s2 * v1 + t / 6 * (c * v + s * a - c2 * v1 - s2 * a1)) / 2
         loss_sum += t * (v * v + v1 * v1 + t / 3 * (v * a - v1 * a1)) / 2
         work += part.work
@@ -790,13 +814,15 @@ def resolve_layer_step(workspace, lane, step):
     # The trapezoidal rule over the run adds the ends of this step, and its correction the ends of the run.
     work_ends = angle / 12 * (step.c1 * v1 + step.s1 * a - step.c0 * v - step.s0 * start_rate)
     loss_ends = angle / 6 * (v1 * a - v * start_rate)
-    workspace[At.WORK_SUM + lane] += work_sum / angle + work_ends - (step.s0 * v + step.s1 * v1) / 2
-    workspace[At.LOSS_SUM + lane] += loss_sum / angle + loss_ends - (v * v + v1 * v1) / 2
-    workspace[StretchAt.FRICTION + lane] = state.friction
-    workspace[StretchAt.STRETCH_SQUARE + lane] = state.square
-    workspace[StretchAt.STEP_WORK + lane] = work
+    workspace[RowStart.WORK_SUM + lane] += (
+        work_sum / angle + work_ends - (step.s0 * v + step.s1 * v1) / 2
+    )
+    workspace[RowStart.LOSS_SUM + lane] += loss_sum / angle + loss_ends - (v * v + v1 * v1) / 2
+    workspace[StretchRowStart.FRICTION + lane] = state.friction
+    workspace[StretchRowStart.STRETCH_SQUARE + lane] = state.square
+    workspace[StretchRowStart.STEP_WORK + lane] = work
     is_reversed = event_slide == event_slide
-    slip_sign = -workspace[At.SLIP_SIGN + lane]
+    slip_sign = -workspace[RowStart.SLIP_SIGN + lane]
     if v1 != 0.0:
         slip_sign = 1.0 if v1 > 0.0 else -1.0
     if not is_reversed:
@@ -818,7 +844,7 @@ def resolve_layer_step(workspace, lane, step):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def resolve_step(workspace, lane, step):
-    """Compute a step that ends and starts anew where the slide reverses and where the law has a kink.
+    """Compute a step that is split at reversals and at kinks of the friction law.
 
     The irreversible part of the slide reverses at a kink, so its range is updated here.
 
@@ -835,7 +861,7 @@ def resolve_step(workspace, lane, step):
         return resolve_layer_step(workspace, lane, step)
     numbers = law_numbers(workspace, lane)
     state = flow_state(workspace, lane)
-    first_sign = workspace[At.SLIP_SIGN + lane]
+    first_sign = workspace[RowStart.SLIP_SIGN + lane]
     slip_sign = first_sign
     event = 1.0
     at_reversal = state
@@ -876,17 +902,17 @@ def resolve_step(workspace, lane, step):
             z = reached.stretch if first.is_reversal else 0.0
             force = friction.rate_equation(numbers, z, v, slip_sign)[0]
             state = FlowState(reached.slide, v, force, z, reached.square)
-            if not first.is_reversal and workspace[StretchAt.IS_OBSERVED + lane] > 0.0:
+            if not first.is_reversal and workspace[StretchRowStart.IS_OBSERVED + lane] > 0.0:
                 slip = reached.slide
-                workspace[At.MAX_SLIP + lane] = max(workspace[At.MAX_SLIP + lane], slip)
-                workspace[At.MIN_SLIP + lane] = min(workspace[At.MIN_SLIP + lane], slip)
+                workspace[RowStart.MAX_SLIP + lane] = max(workspace[RowStart.MAX_SLIP + lane], slip)
+                workspace[RowStart.MIN_SLIP + lane] = min(workspace[RowStart.MIN_SLIP + lane], slip)
         if first.is_reversal:
             slip_sign = -slip_sign
             event = elapsed / step.angle
             at_reversal = state
-    workspace[StretchAt.FRICTION + lane] = end.friction
-    workspace[StretchAt.STRETCH_SQUARE + lane] = end.square
-    workspace[StretchAt.STEP_WORK + lane] = work + part_work
+    workspace[StretchRowStart.FRICTION + lane] = end.friction
+    workspace[StretchRowStart.STRETCH_SQUARE + lane] = end.square
+    workspace[StretchRowStart.STEP_WORK + lane] = work + part_work
     if slip_sign == first_sign:
         event = 1.0
         at_reversal = end
@@ -938,7 +964,7 @@ def stretch_in_segment(start, end, numbers, angle, u):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def is_stuck_in_segment(start, end, numbers, angle, u):
-    """Return whether the interface sticks inside a segment of a step.
+    """Return whether the interface sticks at a point of a segment of a step.
 
     Parameters
     ----------
@@ -1010,7 +1036,9 @@ def find_zero_stretch(start, end, numbers, angle):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def stick_fractions(start, end, workspace, lane, angle):
-    """Return the `StickReading` of a segment of a step, between whose ends slide, speed and stretch are cubics.
+    """Return the stick and slip fractions in a segment of a step.
+
+    Relative displacement, speed and stretch are cubics between the ends of the segment.
 
     The irreversible slide reverses where the stretch is 0; at a kink `resolve_step` notes where.
 
@@ -1040,7 +1068,7 @@ def stick_fractions(start, end, workspace, lane, angle):
         return StickReading(u if sticks else 1 - u, u if sticks else 2.0, extreme_slip)
     if sticks or not is_stuck_in_segment(start, end, numbers, angle, turnover):
         return StickReading(1.0 if sticks else 0.0, 2.0, extreme_slip)
-    # The interface slips at both ends, with stretches of opposite sign.
+    # The interface slips at both ends, with stretches of opposite sign, so it may stick in between.
     release = find_stick_change(start, end, numbers, angle, turnover, 1.0)
     stick = find_stick_change(start, end, numbers, angle, 0.0, turnover)
     return StickReading(release - stick, release, extreme_slip)

@@ -9,23 +9,23 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
 from . import rigid_kernels as law
 from .rigid_kernels import LaneState
-from .rows_kernels import FIRST_NUMBER, LANES, LAW_STATE, N_NUMBERS, N_STATE, At
+from .rows_kernels import FIRST_NUMBER, LANES, LAW_STATE, N_NUMBERS, N_STATE, RowStart
 
 
 @njit(**NJIT_INLINE)
 def lane_state(workspace, lane):
-    """Return the `LaneState` of a lane."""
+    """Return the state of a lane: displacement, speed, sign of the slip and memory."""
     return LaneState(
-        workspace[At.SLIDE + lane],
-        workspace[At.SPEED + lane],
-        workspace[At.SLIP_SIGN + lane],
-        workspace[At.MEMORY + lane],
+        workspace[RowStart.SLIDE + lane],
+        workspace[RowStart.SPEED + lane],
+        workspace[RowStart.SLIP_SIGN + lane],
+        workspace[RowStart.MEMORY + lane],
     )
 
 
 @njit(**NJIT_INLINE)
 def resolve_lane_step(workspace, lane, step):
-    """Move a lane over a step that contains an event, and add to its sums.
+    """Advance a lane over a step that contains an event, and update its sums.
 
     Parameters
     ----------
@@ -44,31 +44,33 @@ def resolve_lane_step(workspace, lane, step):
     outcome = law.resolve_step(workspace, lane, step)
     x1 = outcome.slide
     v1 = outcome.speed
-    workspace[At.SLIDE + lane] = x1
-    workspace[At.SPEED + lane] = v1
-    workspace[At.SLIP_SIGN + lane] = outcome.slip_sign
-    workspace[At.MEMORY + lane] = outcome.memory
-    workspace[At.SLIP_PATH + lane] += law.slip_increment(
+    workspace[RowStart.SLIDE + lane] = x1
+    workspace[RowStart.SPEED + lane] = v1
+    workspace[RowStart.SLIP_SIGN + lane] = outcome.slip_sign
+    workspace[RowStart.MEMORY + lane] = outcome.memory
+    workspace[RowStart.SLIP_PATH + lane] += law.slip_increment(
         before.memory, outcome.event_memory, outcome.memory, workspace, lane
     )
-    # A jump of the acceleration inside the step adds this to the error of the trapezoidal rule.
+    # A jump of the acceleration inside the step adds this term to the error of the trapezoidal rule.
     u = outcome.event
     edge = outcome.jump * step.angle * (u * (1 - u) / 2 - 1 / 12)
-    workspace[At.WORK_SUM + lane] += step.s1 * v1 - (step.s0 + u * (step.s1 - step.s0)) * edge
-    workspace[At.LOSS_SUM + lane] += v1 * v1 - 2 * outcome.event_speed * edge
-    workspace[At.POWER_SUM + lane] += abs(step.s1 * v1)
+    workspace[RowStart.WORK_SUM + lane] += step.s1 * v1 - (step.s0 + u * (step.s1 - step.s0)) * edge
+    workspace[RowStart.LOSS_SUM + lane] += v1 * v1 - 2 * outcome.event_speed * edge
+    workspace[RowStart.POWER_SUM + lane] += abs(step.s1 * v1)
     highest = max(x1, outcome.reversal_slide)
     lowest = min(x1, outcome.reversal_slide)
-    workspace[At.MAX_SLIDE + lane] = max(workspace[At.MAX_SLIDE + lane], highest)
-    workspace[At.MIN_SLIDE + lane] = min(workspace[At.MIN_SLIDE + lane], lowest)
-    workspace[At.COS_SUM + lane] += x1 * step.c1
-    workspace[At.SIN_SUM + lane] += x1 * step.s1
+    workspace[RowStart.MAX_SLIDE + lane] = max(workspace[RowStart.MAX_SLIDE + lane], highest)
+    workspace[RowStart.MIN_SLIDE + lane] = min(workspace[RowStart.MIN_SLIDE + lane], lowest)
+    workspace[RowStart.COS_SUM + lane] += x1 * step.c1
+    workspace[RowStart.SIN_SUM + lane] += x1 * step.s1
     return before, outcome
 
 
 @njit(**NJIT_INLINE)
 def accept_step(workspace, lane, before, step, tried, extreme):
-    """Move a lane by a tried step and add to its sums, unless the step contains an event: the lane is then marked.
+    """Accept a tried step of a lane and update its sums, unless it contains an event.
+
+    A lane with an event is marked.
 
     Parameters
     ----------
@@ -88,27 +90,27 @@ def accept_step(workspace, lane, before, step, tried, extreme):
     event = tried.has_event
     moves = 0.0 if event else 1.0
     power = moves * (step.s1 * tried.speed)
-    highest = workspace[At.MAX_SLIDE + lane]
-    lowest = workspace[At.MIN_SLIDE + lane]
+    highest = workspace[RowStart.MAX_SLIDE + lane]
+    lowest = workspace[RowStart.MIN_SLIDE + lane]
     path = law.slip_increment(before.memory, tried.memory, tried.memory, workspace, lane)
-    workspace[At.HAS_EVENT + lane] = 1.0 - moves
-    workspace[At.SLIDE + lane] = before.slide if event else tried.slide
-    workspace[At.SPEED + lane] = before.speed if event else tried.speed
-    workspace[At.MEMORY + lane] = before.memory if event else tried.memory
-    workspace[At.SLIP_PATH + lane] += moves * path
-    workspace[At.WORK_SUM + lane] += power
-    workspace[At.LOSS_SUM + lane] += moves * (tried.speed * tried.speed)
-    workspace[At.POWER_SUM + lane] += abs(power)
-    workspace[At.MAX_SLIDE + lane] = highest if event else max(highest, extreme)
-    workspace[At.MIN_SLIDE + lane] = lowest if event else min(lowest, extreme)
-    workspace[At.COS_SUM + lane] += moves * (tried.slide * step.c1)
-    workspace[At.SIN_SUM + lane] += moves * (tried.slide * step.s1)
+    workspace[RowStart.HAS_EVENT + lane] = 1.0 - moves
+    workspace[RowStart.SLIDE + lane] = before.slide if event else tried.slide
+    workspace[RowStart.SPEED + lane] = before.speed if event else tried.speed
+    workspace[RowStart.MEMORY + lane] = before.memory if event else tried.memory
+    workspace[RowStart.SLIP_PATH + lane] += moves * path
+    workspace[RowStart.WORK_SUM + lane] += power
+    workspace[RowStart.LOSS_SUM + lane] += moves * (tried.speed * tried.speed)
+    workspace[RowStart.POWER_SUM + lane] += abs(power)
+    workspace[RowStart.MAX_SLIDE + lane] = highest if event else max(highest, extreme)
+    workspace[RowStart.MIN_SLIDE + lane] = lowest if event else min(lowest, extreme)
+    workspace[RowStart.COS_SUM + lane] += moves * (tried.slide * step.c1)
+    workspace[RowStart.SIN_SUM + lane] += moves * (tried.slide * step.s1)
     return moves
 
 
 @njit(**NJIT_INLINE)
 def try_lane_step(workspace, lane, step):
-    """Move a lane over a step without an event.
+    """Try a step of a lane without an event, and accept it if none occurs.
 
     A lane with an event stays where it is and is marked.
 
@@ -129,7 +131,7 @@ def try_lane_step(workspace, lane, step):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def collect_marked_lanes(workspace, marked, n_busy):
-    """List the marked lanes.
+    """Collect the indices of the lanes that are marked for an event.
 
     Parameters
     ----------
@@ -148,13 +150,13 @@ def collect_marked_lanes(workspace, marked, n_busy):
     count = 0
     for lane in range(n_busy):
         marked[count] = lane
-        count += 1 if workspace[At.HAS_EVENT + lane] > 0.0 else 0
+        count += 1 if workspace[RowStart.HAS_EVENT + lane] > 0.0 else 0
     return count
 
 
 @njit(**NJIT_INLINE)
 def load_case(case, lane, cases, motion, workspace):
-    """Put a case into a lane.
+    """Load a case into a lane: parameters and motion.
 
     Parameters
     ----------
@@ -173,15 +175,15 @@ def load_case(case, lane, cases, motion, workspace):
         workspace[table + n] = cases[case, N_NUMBERS + n]
     for n in range(motion.shape[1]):
         workspace[(n if n < N_STATE else n - N_STATE + LAW_STATE) * LANES + lane] = motion[case, n]
-    workspace[At.CASE_INDEX + lane] = case
-    workspace[At.CYCLE_INDEX + lane] = 0.0
-    note_cycle_start(lane, workspace)
+    workspace[RowStart.CASE_INDEX + lane] = case
+    workspace[RowStart.CYCLE_INDEX + lane] = 0.0
+    store_cycle_start(lane, workspace)
     law.set_derived_state(workspace, lane)
 
 
 @njit(**NJIT_INLINE)
 def copy_lane(lane, other, workspace, table_size):
-    """Put the case of another lane into a lane.
+    """Copy the case of one lane into another lane.
 
     Parameters
     ----------
@@ -202,7 +204,7 @@ def copy_lane(lane, other, workspace, table_size):
 
 @njit(**NJIT_INLINE)
 def store_motion(case, lane, workspace, motion):
-    """Write the motion of a lane into the row of its case.
+    """Store the motion of a lane in the row of its case.
 
     Parameters
     ----------
@@ -216,24 +218,24 @@ def store_motion(case, lane, workspace, motion):
 
 
 @njit(**NJIT_INLINE)
-def note_cycle_start(lane, workspace):
-    """Note the state at the start of a cycle."""
-    workspace[At.START_SLIDE + lane] = workspace[At.SLIDE + lane]
-    workspace[At.START_SPEED + lane] = workspace[At.SPEED + lane]
-    workspace[At.START_MEMORY + lane] = workspace[At.MEMORY + lane]
+def store_cycle_start(lane, workspace):
+    """Store the state of a lane at the start of a cycle."""
+    workspace[RowStart.START_SLIDE + lane] = workspace[RowStart.SLIDE + lane]
+    workspace[RowStart.START_SPEED + lane] = workspace[RowStart.SPEED + lane]
+    workspace[RowStart.START_MEMORY + lane] = workspace[RowStart.MEMORY + lane]
 
 
 @njit(**NJIT_INLINE)
 def start_cycle(lane, workspace):
-    """Note the state at the start of a cycle, and begin its extremes there."""
-    x = workspace[At.SLIDE + lane]
-    workspace[At.MAX_SLIDE + lane] = workspace[At.MIN_SLIDE + lane] = x
-    note_cycle_start(lane, workspace)
+    """Start a cycle of a lane: store its state and reset its extremes."""
+    x = workspace[RowStart.SLIDE + lane]
+    workspace[RowStart.MAX_SLIDE + lane] = workspace[RowStart.MIN_SLIDE + lane] = x
+    store_cycle_start(lane, workspace)
 
 
 @njit(**NJIT_INLINE)
 def finish_cycle(lane, workspace, cycle_history, phasor_factor):
-    """Write the extremes and the phasor of a cycle, and start the next cycle.
+    """Store extremes and phasor of a completed cycle of a lane, and start the next cycle.
 
     Parameters
     ----------
@@ -244,10 +246,10 @@ def finish_cycle(lane, workspace, cycle_history, phasor_factor):
     phasor_factor : float
         2 over the number of steps of a cycle.
     """
-    drift = workspace[At.START_SLIDE + lane] - workspace[At.SLIDE + lane]
-    cycle_history[0] = workspace[At.MIN_SLIDE + lane]
-    cycle_history[1] = workspace[At.MAX_SLIDE + lane]
-    cycle_history[2] = phasor_factor * (workspace[At.COS_SUM + lane] + 0.5 * drift)
-    cycle_history[3] = phasor_factor * workspace[At.SIN_SUM + lane]
-    workspace[At.COS_SUM + lane] = workspace[At.SIN_SUM + lane] = 0.0
+    drift = workspace[RowStart.START_SLIDE + lane] - workspace[RowStart.SLIDE + lane]
+    cycle_history[0] = workspace[RowStart.MIN_SLIDE + lane]
+    cycle_history[1] = workspace[RowStart.MAX_SLIDE + lane]
+    cycle_history[2] = phasor_factor * (workspace[RowStart.COS_SUM + lane] + 0.5 * drift)
+    cycle_history[3] = phasor_factor * workspace[RowStart.SIN_SUM + lane]
+    workspace[RowStart.COS_SUM + lane] = workspace[RowStart.SIN_SUM + lane] = 0.0
     start_cycle(lane, workspace)

@@ -1,4 +1,4 @@
-"""March of many cases in lanes: all lanes take a step before the next one begins.
+"""March of many cases in lanes: all lanes take a step before the next step begins.
 
 `march` takes the cases to their steady state or to a given cycle, `observe` takes them over their last cycles and reads
 these. The law is a part of the text: `run.kernels` makes an instance of it per law. A step of a case costs 2 to 5 ns on a
@@ -12,12 +12,20 @@ from . import lane_kernels as lanes
 from . import observation_kernels as observation
 from . import rigid_kernels as law
 from .rigid_kernels import AngleStep
-from .rows_kernels import FIRST_READING, GROUP_BITS, LANES, N_NUMBERS, N_READINGS, PERIODIC_TOL, At
+from .rows_kernels import (
+    FIRST_READING,
+    GROUP_BITS,
+    LANES,
+    N_NUMBERS,
+    N_READINGS,
+    PERIODIC_TOL,
+    RowStart,
+)
 
 
 @njit(**NJIT_INLINE)
 def march_cycle(workspace, marked, table, n_busy):
-    """March the lanes that have a case over a cycle of the drive.
+    """March the busy lanes over one cycle of the drive.
 
     Parameters
     ----------
@@ -39,18 +47,18 @@ def march_cycle(workspace, marked, table, n_busy):
 
 @njit(**NJIT_INLINE)
 def is_periodic(lane, workspace):
-    """Return whether the cycle of a lane ends where it started."""
-    size = workspace[At.MAX_SLIDE + lane] - workspace[At.MIN_SLIDE + lane]
-    slide = workspace[At.SLIDE + lane] - workspace[At.START_SLIDE + lane]
-    speed = workspace[At.SPEED + lane] - workspace[At.START_SPEED + lane]
-    memory = workspace[At.MEMORY + lane] - workspace[At.START_MEMORY + lane]
+    """Return whether the cycle of a lane ends at the state where it started."""
+    size = workspace[RowStart.MAX_SLIDE + lane] - workspace[RowStart.MIN_SLIDE + lane]
+    slide = workspace[RowStart.SLIDE + lane] - workspace[RowStart.START_SLIDE + lane]
+    speed = workspace[RowStart.SPEED + lane] - workspace[RowStart.START_SPEED + lane]
+    memory = workspace[RowStart.MEMORY + lane] - workspace[RowStart.START_MEMORY + lane]
     tolerance = PERIODIC_TOL * size
     return abs(slide) <= tolerance and abs(speed) <= tolerance and abs(memory) <= tolerance
 
 
 @njit(cache=True, nogil=True, **NJIT_KERNEL)
 def march(cases, order, motion, table, until, history, n_cycles, workspace, marked):
-    """March cases up to the end of a cycle, or of one that repeats.
+    """March cases up to a given number of cycles, or until their motion repeats.
 
     A case is extrapolated once the map of its cycle is known (`extrapolation_kernels`). A law that asks for a proof
     marches one more cycle; if it does not end as predicted, the case goes back and is marched to the end. A lane whose
@@ -85,8 +93,8 @@ def march(cases, order, motion, table, until, history, n_cycles, workspace, mark
         march_cycle(workspace, marked, table, n_busy)
         lane = 0
         while lane < n_busy:
-            case = int(workspace[At.CASE_INDEX + lane])
-            k = int(workspace[At.CYCLE_INDEX + lane])
+            case = int(workspace[RowStart.CASE_INDEX + lane])
+            k = int(workspace[RowStart.CYCLE_INDEX + lane])
             is_proof = n_cycles[case] > 0
             if is_proof:
                 repeats = extrapolation.confirms_extrapolation(lane, workspace)
@@ -99,7 +107,7 @@ def march(cases, order, motion, table, until, history, n_cycles, workspace, mark
                 goes_on = False
                 if not (repeats and law.can_extrapolate(workspace, lane)):
                     lanes.load_case(case, lane, cases, motion, workspace)
-                    workspace[At.CYCLE_INDEX + lane] = n_cycles[case]
+                    workspace[RowStart.CYCLE_INDEX + lane] = n_cycles[case]
                     n_cycles[case] = -1
                     lane += 1
                     continue
@@ -113,7 +121,7 @@ def march(cases, order, motion, table, until, history, n_cycles, workspace, mark
                 if proof and not goes_on:
                     n_cycles[case] = k + 1
                     goes_on = True
-            workspace[At.CYCLE_INDEX + lane] = n_done
+            workspace[RowStart.CYCLE_INDEX + lane] = n_done
             if goes_on:
                 if n_cycles[case] <= 0:
                     extrapolation.push_cycle_end(lane, workspace)
@@ -144,7 +152,7 @@ def observe(
     workspace,
     marked,
 ):
-    """March cases over their last cycles and read these.
+    """March cases over their last cycles and collect their readings.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Step of one case behind parallel sliders (Masing's rule).
+"""Step of one case with parallel sliders in the Masing (Iwan) model.
 
 It has order 4 between reversals of the slide and closings of loops.
 
@@ -34,20 +34,20 @@ from .rows_kernels import (
     CYCLE_ENDS,
     LANES,
     LAW_STATE,
-    MAX_KEPT,
+    MAX_LAW_VARIABLES,
     MAX_REVERSALS,
     N_CYCLE_ENDS,
     REVERSAL_SIZE,
-    At,
     CycleEnd,
-    SliderAt,
+    RowStart,
     SliderRow,
-    TableAt,
+    SliderRowStart,
+    TableRowStart,
 )
 
 __all__ = [
     "EVENT_KEEPS_STICK",
-    "N_KEPT",
+    "N_LAW_VARIABLES",
     "PROOF_TOL",
     "STICK_IS_RIGID",
     "can_extrapolate",
@@ -70,9 +70,9 @@ __all__ = [
 STICK_IS_RIGID = False
 EVENT_KEEPS_STICK = True
 
-N_KEPT = MAX_KEPT
-# The extrapolation is possible while these rows are the same at the ends of the last cycles.
-FORM_ROWS = (
+N_LAW_VARIABLES = MAX_LAW_VARIABLES
+# Extrapolation is possible while these rows, which describe the form of the stack, are equal at the last cycle ends.
+STACK_FORM_ROWS = (
     int(SliderRow.DIRECTION),
     int(SliderRow.BRANCH_SCALE),
     int(SliderRow.KEEPS_FIRST_LOADING),
@@ -80,14 +80,17 @@ FORM_ROWS = (
     int(SliderRow.N_REVERSALS),
 )
 
-MIN_PLACE = 1e-30  # smallest abscissa on the curve, because a power needs its logarithm
-EVENT_TOL = 1e-9  # last Newton step, as a fraction of a step; the error left is its square
+MIN_ABSCISSA = 1e-30  # Smallest abscissa on the curve of the first loading, because a power needs its logarithm.
+# Last Newton step as a fraction of a step, below which an event is found; the remaining error is its square.
+EVENT_TOL = 1e-9
 N_NEWTON = 6
-MAX_EVENTS = 32  # number of events in a step
-BEYOND_ALL = 1e300  # slide of an event that does not happen [m]
-SAME_SLIDE = 1e-9  # fraction of the branch by which a slide may miss an event that is at it
+MAX_EVENTS = 32  # Maximum number of events in a step; further events are ignored.
+# Relative displacement [m] of an event that does not happen; no motion reaches it.
+NO_EVENT_SLIDE = 1e300
+SAME_SLIDE_TOL = 1e-9  # Fraction of the branch within which a relative displacement counts as equal to that of an event.
 
-# Kinds of events. Of several events in a step the one with the largest number is reported.
+# Kinds of events in increasing order of priority; of several events in a step the kind with the largest number is
+# reported.
 NO_EVENT = 0
 CLOSING = 1
 REVERSAL = 2
@@ -95,7 +98,7 @@ SLIP_CHANGE = 3
 
 
 class BranchState(NamedTuple):
-    """Slide, its derivative, friction, and slope of the friction over the slide."""
+    """Displacement, speed, friction over mass and tangent stiffness on a hysteresis branch."""
 
     slide: float
     speed: float
@@ -104,7 +107,10 @@ class BranchState(NamedTuple):
 
 
 class FirstEvent(NamedTuple):
-    """Fraction of a step at which its first event happens, and the kind of the event; 1 and NO_EVENT if none."""
+    """First event in a step of a branch: its fraction of the step and its kind.
+
+    Without an event they are 1 and NO_EVENT.
+    """
 
     fraction: float
     kind: int
@@ -112,22 +118,27 @@ class FirstEvent(NamedTuple):
 
 @njit(**NJIT_INLINE)
 def set_derived_state(workspace, lane):
-    """Set the rows that follow from the numbers of the case and from its branch."""
-    length = workspace[At.YIELD_LENGTH + lane]
-    branch_length = workspace[SliderAt.BRANCH_SCALE + lane] * length
-    full_force = workspace[At.SPRING + lane] * length
-    workspace[SliderAt.INVERSE_LENGTH + lane] = workspace[SliderAt.DIRECTION + lane] / branch_length
-    workspace[SliderAt.FORCE_RATIO + lane] = full_force / workspace[At.KINETIC + lane]
+    """Set the rows of the workspace that follow from the case parameters and the branch."""
+    length = workspace[RowStart.YIELD_LENGTH + lane]
+    branch_length = workspace[SliderRowStart.BRANCH_SCALE + lane] * length
+    full_force = workspace[RowStart.SPRING + lane] * length
+    workspace[SliderRowStart.INVERSE_LENGTH + lane] = (
+        workspace[SliderRowStart.DIRECTION + lane] / branch_length
+    )
+    workspace[SliderRowStart.FORCE_RATIO + lane] = full_force / workspace[RowStart.KINETIC + lane]
 
 
 @njit(**NJIT_INLINE)
 def can_extrapolate(workspace, lane):
-    """Return whether the stack has had the same form at the last cycle ends, and is kept in full there."""
-    n_stacked = REVERSAL_SIZE * workspace[SliderAt.N_REVERSALS + lane]
-    is_same = n_stacked <= LAW_STATE + N_KEPT - SliderRow.REVERSALS
+    """Return whether the stack of reversals had the same form at the last cycle ends.
+
+    It must also be kept in full at these cycle ends.
+    """
+    n_stacked = REVERSAL_SIZE * workspace[SliderRowStart.N_REVERSALS + lane]
+    is_same = n_stacked <= LAW_STATE + N_LAW_VARIABLES - SliderRow.REVERSALS
     for k in range(N_CYCLE_ENDS):
         first = CYCLE_ENDS + k * CYCLE_END_SIZE + CycleEnd.LAW_STATE - LAW_STATE
-        for row in FORM_ROWS:
+        for row in STACK_FORM_ROWS:
             before = workspace[(first + row) * LANES + lane]
             is_same = is_same and before == workspace[row * LANES + lane]
     return is_same
@@ -135,14 +146,16 @@ def can_extrapolate(workspace, lane):
 
 @njit(**NJIT_INLINE)
 def restore_derived_state(workspace, lane):
-    """Set the rows that follow from an extrapolated motion."""
+    """Set the rows of the workspace that follow from an extrapolated motion."""
     set_derived_state(workspace, lane)
-    curve.start_lookup(clamped_place(workspace[At.SLIDE + lane], workspace, lane), workspace, lane)
+    curve.start_lookup(
+        clamped_abscissa(workspace[RowStart.SLIDE + lane], workspace, lane), workspace, lane
+    )
 
 
 @njit(**NJIT_INLINE)
-def place_on_curve(x, workspace, lane):
-    """Return the slide since the last reversal over that at which all sliders slip.
+def curve_abscissa(x, workspace, lane):
+    """Return the displacement since the last reversal over that at which all sliders slip.
 
     Parameters
     ----------
@@ -155,12 +168,16 @@ def place_on_curve(x, workspace, lane):
     -------
     float
     """
-    return workspace[SliderAt.INVERSE_LENGTH + lane] * (x - workspace[SliderAt.TURN_SLIDE + lane])
+    return workspace[SliderRowStart.INVERSE_LENGTH + lane] * (
+        x - workspace[SliderRowStart.TURN_SLIDE + lane]
+    )
 
 
 @njit(**NJIT_INLINE)
-def clamped_place(x, workspace, lane):
-    """Return the abscissa of a slide on the curve, limited to [MIN_PLACE, slip of all sliders].
+def clamped_abscissa(x, workspace, lane):
+    """Return the abscissa of a relative displacement on the loading curve, within its bounds.
+
+    The bounds are MIN_ABSCISSA and the slip of all sliders.
 
     A branch whose sliders do not all slip yet goes on to 2, so that a step beyond 1 finds where its event is.
 
@@ -175,13 +192,13 @@ def clamped_place(x, workspace, lane):
     -------
     float
     """
-    place = max(place_on_curve(x, workspace, lane), MIN_PLACE)
-    return min(place, 2.0 - workspace[SliderAt.ALL_SLIP + lane])
+    place = max(curve_abscissa(x, workspace, lane), MIN_ABSCISSA)
+    return min(place, 2.0 - workspace[SliderRowStart.ALL_SLIP + lane])
 
 
 @njit(**NJIT_INLINE)
 def branch_friction(x, workspace, lane, when=curve.IN_TABLE):
-    """Return the friction of the branch at a slide and its slope.
+    """Return friction over mass and tangent stiffness of a branch at a relative displacement.
 
     Parameters
     ----------
@@ -199,18 +216,20 @@ def branch_friction(x, workspace, lane, when=curve.IN_TABLE):
     float
         Slope.
     """
-    m = workspace[SliderAt.BRANCH_SCALE + lane]
-    side = workspace[SliderAt.DIRECTION + lane]
-    spring = workspace[At.SPRING + lane]
-    force, slope = curve.force_and_slope(clamped_place(x, workspace, lane), workspace, lane, when)
-    friction = side * m * spring * workspace[At.YIELD_LENGTH + lane] * force
-    tangent = (1.0 - workspace[SliderAt.ALL_SLIP + lane]) * spring * slope
-    return workspace[SliderAt.TURN_FORCE + lane] + friction, tangent
+    m = workspace[SliderRowStart.BRANCH_SCALE + lane]
+    side = workspace[SliderRowStart.DIRECTION + lane]
+    spring = workspace[RowStart.SPRING + lane]
+    force, slope = curve.force_and_slope(
+        clamped_abscissa(x, workspace, lane), workspace, lane, when
+    )
+    friction = side * m * spring * workspace[RowStart.YIELD_LENGTH + lane] * force
+    tangent = (1.0 - workspace[SliderRowStart.ALL_SLIP + lane]) * spring * slope
+    return workspace[SliderRowStart.TURN_FORCE + lane] + friction, tangent
 
 
 @njit(**NJIT_INLINE)
 def irreversible_slide(x, memory, workspace, lane, when=curve.IN_TABLE):
-    """Return the irreversible part of a slide [m]: the mean over the sliders, weighted by their friction.
+    """Return the irreversible displacement [m], the mean over sliders weighted by friction.
 
     Parameters
     ----------
@@ -225,20 +244,22 @@ def irreversible_slide(x, memory, workspace, lane, when=curve.IN_TABLE):
     -------
     float
     """
-    m = workspace[SliderAt.BRANCH_SCALE + lane]
-    side = workspace[SliderAt.DIRECTION + lane]
-    length = workspace[At.YIELD_LENGTH + lane]
-    full_force = workspace[At.SPRING + lane] * length
-    u = place_on_curve(x, workspace, lane)
+    m = workspace[SliderRowStart.BRANCH_SCALE + lane]
+    side = workspace[SliderRowStart.DIRECTION + lane]
+    length = workspace[RowStart.YIELD_LENGTH + lane]
+    full_force = workspace[RowStart.SPRING + lane] * length
+    u = curve_abscissa(x, workspace, lane)
     w = min(u, 1.0)
-    force = side * (memory - workspace[SliderAt.TURN_FORCE + lane]) / (m * full_force)
-    slip = workspace[SliderAt.FORCE_RATIO + lane] * curve.mean_slip(w, force, workspace, lane, when)
-    return workspace[SliderAt.TURN_SLIP + lane] + side * m * length * (slip + (u - w))
+    force = side * (memory - workspace[SliderRowStart.TURN_FORCE + lane]) / (m * full_force)
+    slip = workspace[SliderRowStart.FORCE_RATIO + lane] * curve.mean_slip(
+        w, force, workspace, lane, when
+    )
+    return workspace[SliderRowStart.TURN_SLIP + lane] + side * m * length * (slip + (u - w))
 
 
 @njit(**NJIT_KERNEL)
 def slider_energy(x, memory, slip, workspace, lane):
-    """Return the elastic energy of the sliders over the mass [m^2].
+    """Return the elastic energy of the sliders over mass [m^2].
 
     It is the energy at the last reversal and the work of the friction since then, less what slip dissipates.
 
@@ -255,24 +276,24 @@ def slider_energy(x, memory, slip, workspace, lane):
     -------
     float
     """
-    m = workspace[SliderAt.BRANCH_SCALE + lane]
-    side = workspace[SliderAt.DIRECTION + lane]
-    length = workspace[At.YIELD_LENGTH + lane]
-    limit = workspace[At.KINETIC + lane]
-    full_force = workspace[At.SPRING + lane] * length
-    distance = side * (x - workspace[SliderAt.TURN_SLIDE + lane])
-    turn_force = side * workspace[SliderAt.TURN_FORCE + lane]
+    m = workspace[SliderRowStart.BRANCH_SCALE + lane]
+    side = workspace[SliderRowStart.DIRECTION + lane]
+    length = workspace[RowStart.YIELD_LENGTH + lane]
+    limit = workspace[RowStart.KINETIC + lane]
+    full_force = workspace[RowStart.SPRING + lane] * length
+    distance = side * (x - workspace[SliderRowStart.TURN_SLIDE + lane])
+    turn_force = side * workspace[SliderRowStart.TURN_FORCE + lane]
     w = min(distance / (m * length), 1.0)
     force = (side * memory - turn_force) / (m * full_force)
     loading = full_force * length * curve.loading_work(w, force, workspace, lane)
     work = m * m * (loading + limit * (distance / m - w * length))
-    slip_loss = limit * side * (slip - workspace[SliderAt.TURN_SLIP + lane])
-    return workspace[SliderAt.TURN_ENERGY + lane] + turn_force * distance + work - slip_loss
+    slip_loss = limit * side * (slip - workspace[SliderRowStart.TURN_SLIP + lane])
+    return workspace[SliderRowStart.TURN_ENERGY + lane] + turn_force * distance + work - slip_loss
 
 
 @njit(**NJIT_INLINE)
 def friction_force(state, sine, workspace, lane):
-    """Return the friction over the mass in the angle of the drive [m], which is the memory of the case.
+    """Return the friction force over mass [m], which is the memory of the case.
 
     Parameters
     ----------
@@ -288,7 +309,9 @@ def friction_force(state, sine, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def friction_rate(state, acceleration, workspace, lane, when):
-    """Return the rate of the friction, by the slope that the last step noted for this instant.
+    """Return the derivative of the friction over mass with respect to the drive angle.
+
+    It follows from the tangent stiffness that the last step stored for this instant.
 
     Parameters
     ----------
@@ -299,12 +322,12 @@ def friction_rate(state, acceleration, workspace, lane, when):
     -------
     float
     """
-    return state.speed * workspace[SliderAt.TANGENT_START + when * LANES + lane]
+    return state.speed * workspace[SliderRowStart.TANGENT_START + when * LANES + lane]
 
 
 @njit(**NJIT_INLINE)
 def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
-    """Return the friction at the last reversal.
+    """Return the friction over mass at the last reversal [m].
 
     Parameters
     ----------
@@ -315,12 +338,12 @@ def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
     -------
     float
     """
-    return workspace[SliderAt.REVERSAL_FORCE + lane]
+    return workspace[SliderRowStart.REVERSAL_FORCE + lane]
 
 
 @njit(**NJIT_INLINE)
 def stick_fractions(start, end, workspace, lane, angle):
-    """Return the `StickReading` of a segment of a step.
+    """Return the stick and slip fractions in a segment of a step.
 
     The interface sticks while less than half of the friction slips.
 
@@ -334,9 +357,9 @@ def stick_fractions(start, end, workspace, lane, angle):
     StickReading
     """
     slip = irreversible_slide(end.state.slide, end.state.memory, workspace, lane)
-    # The noted fraction is that of the first segment, so it is deleted after that one has been read.
-    first_fraction = workspace[SliderAt.STICK_FRACTION + lane]
-    workspace[SliderAt.STICK_FRACTION + lane] = 0.0
+    # The stored fraction is that of the first segment, so it is reset after that segment has been read.
+    first_fraction = workspace[SliderRowStart.STICK_FRACTION + lane]
+    workspace[SliderRowStart.STICK_FRACTION + lane] = 0.0
     if start.state.slip_sign == 0.0:
         return StickReading(1.0, 2.0, slip)
     return StickReading(first_fraction, 1.0 if first_fraction > 0.0 else 2.0, slip)
@@ -344,7 +367,7 @@ def stick_fractions(start, end, workspace, lane, angle):
 
 @njit(**NJIT_INLINE)
 def slip_increment(memory, event_memory, memory1, workspace, lane):
-    """Return the path of slip of the last step [m].
+    """Return the slip path of the last step [m].
 
     Parameters
     ----------
@@ -355,12 +378,12 @@ def slip_increment(memory, event_memory, memory1, workspace, lane):
     -------
     float
     """
-    return workspace[SliderAt.STEP_SLIP + lane]
+    return workspace[SliderRowStart.STEP_SLIP + lane]
 
 
 @njit(**NJIT_INLINE)
 def acceleration_and_rate(workspace, lane, state, s0, c0):
-    """Return the acceleration of a `BranchState` and the rate of the acceleration.
+    """Return the acceleration on a branch and its derivative with respect to the drive angle.
 
     Parameters
     ----------
@@ -377,9 +400,9 @@ def acceleration_and_rate(workspace, lane, state, s0, c0):
     float
         Its rate [m].
     """
-    damping = workspace[At.DAMPING + lane]
-    stiffness = workspace[At.STIFFNESS + lane]
-    drive = workspace[At.DRIVE + lane]
+    damping = workspace[RowStart.DAMPING + lane]
+    stiffness = workspace[RowStart.STIFFNESS + lane]
+    drive = workspace[RowStart.DRIVE + lane]
     a0 = drive * s0 - damping * state.speed - stiffness * state.slide - state.friction
     j0 = drive * c0 - damping * a0 - (stiffness + state.tangent) * state.speed
     return a0, j0
@@ -387,18 +410,18 @@ def acceleration_and_rate(workspace, lane, state, s0, c0):
 
 @njit(**NJIT_INLINE)
 def branch_state(workspace, lane):
-    """Return the `BranchState` of a lane."""
+    """Return the displacement, speed, friction and tangent stiffness of a lane on its branch."""
     return BranchState(
-        workspace[At.SLIDE + lane],
-        workspace[At.SPEED + lane],
-        workspace[At.MEMORY + lane],
-        workspace[SliderAt.TANGENT + lane],
+        workspace[RowStart.SLIDE + lane],
+        workspace[RowStart.SPEED + lane],
+        workspace[RowStart.MEMORY + lane],
+        workspace[SliderRowStart.TANGENT + lane],
     )
 
 
 @njit(**NJIT_INLINE)
 def prepare_step(workspace, s0, c0):
-    """Look up the curves of all lanes at the predicted slides at the end of the next step.
+    """Look up the loading curves of all lanes at the predicted end of the next step.
 
     A Taylor series predicts the slides.
 
@@ -409,18 +432,18 @@ def prepare_step(workspace, s0, c0):
     """
     if curve.LOOKS_AHEAD:
         for lane in range(LANES):
-            t = workspace[At.STEP + lane]
+            t = workspace[RowStart.STEP + lane]
             state = branch_state(workspace, lane)
             a0, j0 = acceleration_and_rate(workspace, lane, state, s0, c0)
             x1 = state.slide + t * (state.speed + t * (a0 / 2 + t * j0 / 6))
-            workspace[TableAt.CURVE_PLACE + lane] = clamped_place(x1, workspace, lane)
+            workspace[TableRowStart.CURVE_PLACE + lane] = clamped_abscissa(x1, workspace, lane)
         for lane in range(LANES):
             curve.prepare_lookup(workspace, lane)
 
 
 @njit(**NJIT_INLINE)
 def hermite_step(workspace, lane, start, step, when=curve.IN_TABLE):
-    """Integrate the motion of a branch over an angle by Hermite's rule.
+    """Integrate the motion on a branch over a drive angle by Hermite's rule of order 4.
 
     The rule uses the acceleration and its rate at both ends. The law is evaluated once, at the slide that a Taylor series
     predicts, and is followed from there along its slope.
@@ -438,9 +461,9 @@ def hermite_step(workspace, lane, start, step, when=curve.IN_TABLE):
     -------
     BranchState
     """
-    damping = workspace[At.DAMPING + lane]
-    stiffness = workspace[At.STIFFNESS + lane]
-    drive = workspace[At.DRIVE + lane]
+    damping = workspace[RowStart.DAMPING + lane]
+    stiffness = workspace[RowStart.STIFFNESS + lane]
+    drive = workspace[RowStart.DRIVE + lane]
     x = start.slide
     v = start.speed
     t = step.angle
@@ -460,7 +483,9 @@ def hermite_step(workspace, lane, start, step, when=curve.IN_TABLE):
 
 @njit(**NJIT_INLINE)
 def next_event_slide(x, workspace, lane):
-    """Return the slide at which a step ends at the latest: that of the next event, or the longest step.
+    """Return the displacement at which a step ends at the latest.
+
+    It is that of the next event, or that of the longest step.
 
     Parameters
     ----------
@@ -474,17 +499,17 @@ def next_event_slide(x, workspace, lane):
     float
         [m]
     """
-    side = workspace[SliderAt.DIRECTION + lane]
-    length = workspace[SliderAt.BRANCH_SCALE + lane] * workspace[At.YIELD_LENGTH + lane]
-    longest = curve.MAX_STEP + BEYOND_ALL * workspace[SliderAt.ALL_SLIP + lane]
-    event = workspace[SliderAt.NEXT_EVENT + lane]
+    side = workspace[SliderRowStart.DIRECTION + lane]
+    length = workspace[SliderRowStart.BRANCH_SCALE + lane] * workspace[RowStart.YIELD_LENGTH + lane]
+    longest = curve.MAX_STEP + NO_EVENT_SLIDE * workspace[SliderRowStart.ALL_SLIP + lane]
+    event = workspace[SliderRowStart.NEXT_EVENT + lane]
     end = x + side * length * longest
     return min(event, end) if side > 0.0 else max(event, end)
 
 
 @njit(**NJIT_INLINE)
 def try_step(workspace, lane, step, is_observed):
-    """Compute a step as if no event lay inside it: no reversal and no closing of a loop.
+    """Try a step of a lane without events: no reversal and no closing of a loop.
 
     Parameters
     ----------
@@ -496,7 +521,7 @@ def try_step(workspace, lane, step, is_observed):
     TriedStep
     """
     state = branch_state(workspace, lane)
-    side = workspace[SliderAt.DIRECTION + lane]
+    side = workspace[SliderRowStart.DIRECTION + lane]
     end = hermite_step(workspace, lane, state, step, curve.PREPARED)
     event = (
         side * end.speed < 0.0
@@ -504,19 +529,19 @@ def try_step(workspace, lane, step, is_observed):
         or (is_observed and end.speed == 0.0)
     )
     if is_observed:
-        workspace[SliderAt.TANGENT_START + lane] = state.tangent
-        workspace[SliderAt.TANGENT_END + lane] = end.tangent
-    workspace[SliderAt.TANGENT + lane] = state.tangent if event else end.tangent
+        workspace[SliderRowStart.TANGENT_START + lane] = state.tangent
+        workspace[SliderRowStart.TANGENT_END + lane] = end.tangent
+    workspace[SliderRowStart.TANGENT + lane] = state.tangent if event else end.tangent
     slip = irreversible_slide(state.slide, state.friction, workspace, lane, curve.AT_START)
     slip1 = irreversible_slide(end.slide, end.friction, workspace, lane, curve.PREPARED)
-    workspace[SliderAt.STEP_SLIP + lane] = side * (slip1 - slip)
+    workspace[SliderRowStart.STEP_SLIP + lane] = side * (slip1 - slip)
     curve.finish_step(workspace, lane, event)
     return TriedStep(end.slide, end.speed, end.friction, event)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_first_event(workspace, lane, start, a0, end, a1, angle):
-    """Find the first event of a step of a branch by Newton's method.
+    """Find the first event in a step of a branch by Newton's method.
 
     The speed is a cubic over the step, and the slide its integral.
 
@@ -534,7 +559,7 @@ def find_first_event(workspace, lane, start, a0, end, a1, angle):
     -------
     FirstEvent
     """
-    side = workspace[SliderAt.DIRECTION + lane]
+    side = workspace[SliderRowStart.DIRECTION + lane]
     x = start.slide
     v = start.speed
     event_slide = next_event_slide(x, workspace, lane)
@@ -576,7 +601,7 @@ def find_first_event(workspace, lane, start, a0, end, a1, angle):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def stacked_slide(k, workspace, lane):
-    """Return the slide of the kth reversal on the stack.
+    """Return the relative displacement of a stacked reversal [m].
 
     Parameters
     ----------
@@ -590,12 +615,12 @@ def stacked_slide(k, workspace, lane):
     float
         [m]
     """
-    return workspace[SliderAt.REVERSALS + REVERSAL_SIZE * k * LANES + lane]
+    return workspace[SliderRowStart.REVERSALS + REVERSAL_SIZE * k * LANES + lane]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def restore_reversal(k, workspace, lane):
-    """Continue from the kth reversal on the stack, and forget those after it.
+    """Continue the branch from a stacked reversal and discard the later reversals.
 
     Parameters
     ----------
@@ -605,41 +630,41 @@ def restore_reversal(k, workspace, lane):
         See `rigid_kernels.friction_force`.
     """
     for n in range(REVERSAL_SIZE):
-        stacked = workspace[SliderAt.REVERSALS + (REVERSAL_SIZE * k + n) * LANES + lane]
-        workspace[SliderAt.TURN_SLIDE + n * LANES + lane] = stacked
-    is_first_loading = k == 0 and workspace[SliderAt.KEEPS_FIRST_LOADING + lane] > 0.0
-    workspace[SliderAt.N_REVERSALS + lane] = k
-    workspace[SliderAt.BRANCH_SCALE + lane] = 1.0 if is_first_loading else 2.0
+        stacked = workspace[SliderRowStart.REVERSALS + (REVERSAL_SIZE * k + n) * LANES + lane]
+        workspace[SliderRowStart.TURN_SLIDE + n * LANES + lane] = stacked
+    is_first_loading = k == 0 and workspace[SliderRowStart.KEEPS_FIRST_LOADING + lane] > 0.0
+    workspace[SliderRowStart.N_REVERSALS + lane] = k
+    workspace[SliderRowStart.BRANCH_SCALE + lane] = 1.0 if is_first_loading else 2.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def drop_smallest_loop(workspace, lane):
-    """Drop the loop from a full stack whose loss changes the motion least.
+    """Remove the loop from a full stack whose loss changes the motion least.
 
     It is the loop that is nearest in size to the next one.
     """
     best = 1
-    smallest_gap = BEYOND_ALL
+    smallest_gap = NO_EVENT_SLIDE
     for k in range(1, MAX_REVERSALS - 2):
         gap = abs(stacked_slide(k + 2, workspace, lane) - stacked_slide(k, workspace, lane))
         if gap < smallest_gap:
             best = k
             smallest_gap = gap
     size = abs(stacked_slide(best, workspace, lane) - stacked_slide(best + 1, workspace, lane))
-    workspace[SliderAt.MAX_DROPPED_GAP + lane] = max(
-        workspace[SliderAt.MAX_DROPPED_GAP + lane], smallest_gap / size
+    workspace[SliderRowStart.MAX_DROPPED_GAP + lane] = max(
+        workspace[SliderRowStart.MAX_DROPPED_GAP + lane], smallest_gap / size
     )
     for k in range(best, MAX_REVERSALS - 2):
         for n in range(REVERSAL_SIZE):
-            workspace[SliderAt.REVERSALS + (REVERSAL_SIZE * k + n) * LANES + lane] = workspace[
-                SliderAt.REVERSALS + (REVERSAL_SIZE * (k + 2) + n) * LANES + lane
-            ]
-    workspace[SliderAt.N_REVERSALS + lane] = MAX_REVERSALS - 2
+            workspace[SliderRowStart.REVERSALS + (REVERSAL_SIZE * k + n) * LANES + lane] = (
+                workspace[SliderRowStart.REVERSALS + (REVERSAL_SIZE * (k + 2) + n) * LANES + lane]
+            )
+    workspace[SliderRowStart.N_REVERSALS + lane] = MAX_REVERSALS - 2
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_branch(x, friction, slip, workspace, lane):
-    """Push the last reversal onto the stack and start a branch at a new one.
+    """Push the last reversal onto the stack and start a branch at a new reversal.
 
     Parameters
     ----------
@@ -649,31 +674,31 @@ def start_branch(x, friction, slip, workspace, lane):
         See `rigid_kernels.friction_force`.
     """
     energy = slider_energy(x, friction, slip, workspace, lane)
-    if workspace[SliderAt.ALL_SLIP + lane] > 0.0:
-        # A slip of all sliders deletes their history.
-        workspace[SliderAt.KEEPS_FIRST_LOADING + lane] = 0.0
-        workspace[SliderAt.N_REVERSALS + lane] = 0.0
+    if workspace[SliderRowStart.ALL_SLIP + lane] > 0.0:
+        # A slip of all sliders erases their history, so the stack is cleared.
+        workspace[SliderRowStart.KEEPS_FIRST_LOADING + lane] = 0.0
+        workspace[SliderRowStart.N_REVERSALS + lane] = 0.0
     else:
-        if workspace[SliderAt.N_REVERSALS + lane] >= MAX_REVERSALS:
+        if workspace[SliderRowStart.N_REVERSALS + lane] >= MAX_REVERSALS:
             drop_smallest_loop(workspace, lane)
-        k = int(workspace[SliderAt.N_REVERSALS + lane])
+        k = int(workspace[SliderRowStart.N_REVERSALS + lane])
         for n in range(REVERSAL_SIZE):
-            last = workspace[SliderAt.TURN_SLIDE + n * LANES + lane]
-            workspace[SliderAt.REVERSALS + (REVERSAL_SIZE * k + n) * LANES + lane] = last
-        workspace[SliderAt.N_REVERSALS + lane] = k + 1
-    workspace[SliderAt.TURN_SLIDE + lane] = x
-    workspace[SliderAt.TURN_FORCE + lane] = friction
-    workspace[SliderAt.TURN_SLIP + lane] = slip
-    workspace[SliderAt.TURN_ENERGY + lane] = energy
-    workspace[SliderAt.REVERSAL_FORCE + lane] = friction
-    workspace[SliderAt.DIRECTION + lane] = -workspace[SliderAt.DIRECTION + lane]
-    workspace[SliderAt.BRANCH_SCALE + lane] = 2.0
-    workspace[SliderAt.ALL_SLIP + lane] = 0.0
+            last = workspace[SliderRowStart.TURN_SLIDE + n * LANES + lane]
+            workspace[SliderRowStart.REVERSALS + (REVERSAL_SIZE * k + n) * LANES + lane] = last
+        workspace[SliderRowStart.N_REVERSALS + lane] = k + 1
+    workspace[SliderRowStart.TURN_SLIDE + lane] = x
+    workspace[SliderRowStart.TURN_FORCE + lane] = friction
+    workspace[SliderRowStart.TURN_SLIP + lane] = slip
+    workspace[SliderRowStart.TURN_ENERGY + lane] = energy
+    workspace[SliderRowStart.REVERSAL_FORCE + lane] = friction
+    workspace[SliderRowStart.DIRECTION + lane] = -workspace[SliderRowStart.DIRECTION + lane]
+    workspace[SliderRowStart.BRANCH_SCALE + lane] = 2.0
+    workspace[SliderRowStart.ALL_SLIP + lane] = 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def close_loop(x, slip, workspace, lane):
-    """Take a loop that closes at this slide off the stack.
+    """Remove a loop that closes at this relative displacement from the stack.
 
     If the outermost loop closes and the first loading is forgotten, all sliders slip; the branch then continues from the
     reversal at which it would have had to start.
@@ -685,45 +710,47 @@ def close_loop(x, slip, workspace, lane):
     workspace, lane
         See `rigid_kernels.friction_force`.
     """
-    k = int(workspace[SliderAt.N_REVERSALS + lane])
-    side = workspace[SliderAt.DIRECTION + lane]
-    length = workspace[At.YIELD_LENGTH + lane]
+    k = int(workspace[SliderRowStart.N_REVERSALS + lane])
+    side = workspace[SliderRowStart.DIRECTION + lane]
+    length = workspace[RowStart.YIELD_LENGTH + lane]
     if side * (x - closing_slide(workspace, lane)) < 0.0 or k == 0:
         return
-    if k == 1 and workspace[SliderAt.KEEPS_FIRST_LOADING + lane] == 0.0:
-        limit = workspace[At.KINETIC + lane]
-        full_force = workspace[At.SPRING + lane] * length
+    if k == 1 and workspace[SliderRowStart.KEEPS_FIRST_LOADING + lane] == 0.0:
+        limit = workspace[RowStart.KINETIC + lane]
+        full_force = workspace[RowStart.SPRING + lane] * length
         force = limit / full_force
         mean_slip = curve.mean_slip(1.0, force, workspace, lane, curve.IN_TABLE)
         work = curve.loading_work(1.0, force, workspace, lane)
         slip_of_branch = side * 2 * length * full_force / limit * mean_slip
-        workspace[SliderAt.N_REVERSALS + lane] = 0.0
-        workspace[SliderAt.BRANCH_SCALE + lane] = 2.0
-        workspace[SliderAt.TURN_SLIDE + lane] = x - side * 2 * length
-        workspace[SliderAt.TURN_FORCE + lane] = -side * limit
-        workspace[SliderAt.TURN_SLIP + lane] = slip - slip_of_branch
-        workspace[SliderAt.TURN_ENERGY + lane] = full_force * length * (work - mean_slip)
+        workspace[SliderRowStart.N_REVERSALS + lane] = 0.0
+        workspace[SliderRowStart.BRANCH_SCALE + lane] = 2.0
+        workspace[SliderRowStart.TURN_SLIDE + lane] = x - side * 2 * length
+        workspace[SliderRowStart.TURN_FORCE + lane] = -side * limit
+        workspace[SliderRowStart.TURN_SLIP + lane] = slip - slip_of_branch
+        workspace[SliderRowStart.TURN_ENERGY + lane] = full_force * length * (work - mean_slip)
     else:
         restore_reversal(k - 1 if k == 1 else k - 2, workspace, lane)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def closing_slide(workspace, lane):
-    """Return the slide at which the loop closes, or at which all sliders slip."""
-    k = int(workspace[SliderAt.N_REVERSALS + lane])
-    start = workspace[SliderAt.TURN_SLIDE + lane]
+    """Return the displacement at which the loop closes, or at which all sliders slip."""
+    k = int(workspace[SliderRowStart.N_REVERSALS + lane])
+    start = workspace[SliderRowStart.TURN_SLIDE + lane]
     if k == 0:
-        length = workspace[SliderAt.BRANCH_SCALE + lane] * workspace[At.YIELD_LENGTH + lane]
-        return start + workspace[SliderAt.DIRECTION + lane] * length
+        length = (
+            workspace[SliderRowStart.BRANCH_SCALE + lane] * workspace[RowStart.YIELD_LENGTH + lane]
+        )
+        return start + workspace[SliderRowStart.DIRECTION + lane] * length
     before = stacked_slide(k - 1, workspace, lane)
-    if k == 1 and workspace[SliderAt.KEEPS_FIRST_LOADING + lane] > 0.0:
+    if k == 1 and workspace[SliderRowStart.KEEPS_FIRST_LOADING + lane] > 0.0:
         return 2 * before - start
     return before
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_next_event(x, workspace, lane):
-    """Store the slide of the next event, and whether half of the friction slips.
+    """Store the displacement of the next event, and whether half of the friction slips.
 
     Parameters
     ----------
@@ -733,25 +760,30 @@ def find_next_event(x, workspace, lane):
         See `rigid_kernels.friction_force`.
     """
     set_derived_state(workspace, lane)
-    side = workspace[SliderAt.DIRECTION + lane]
-    length = workspace[SliderAt.BRANCH_SCALE + lane] * workspace[At.YIELD_LENGTH + lane]
-    half_length = length * workspace[At.HALF_SLIP + lane]
-    distance = side * (x - workspace[SliderAt.TURN_SLIDE + lane])
+    side = workspace[SliderRowStart.DIRECTION + lane]
+    length = workspace[SliderRowStart.BRANCH_SCALE + lane] * workspace[RowStart.YIELD_LENGTH + lane]
+    half_length = length * workspace[RowStart.HALF_SLIP + lane]
+    distance = side * (x - workspace[SliderRowStart.TURN_SLIDE + lane])
     end = closing_slide(workspace, lane)
-    slips = distance >= half_length * (1 - SAME_SLIDE)
-    half = workspace[SliderAt.TURN_SLIDE + lane] + side * half_length
-    if distance >= length * (1 - SAME_SLIDE) and workspace[SliderAt.N_REVERSALS + lane] == 0.0:
-        end = side * BEYOND_ALL
-        workspace[SliderAt.ALL_SLIP + lane] = 1.0
-    workspace[SliderAt.NEXT_EVENT + lane] = end if slips or side * (half - end) > 0.0 else half
-    workspace[At.SLIP_SIGN + lane] = side if slips else 0.0
+    slips = distance >= half_length * (1 - SAME_SLIDE_TOL)
+    half = workspace[SliderRowStart.TURN_SLIDE + lane] + side * half_length
+    if (
+        distance >= length * (1 - SAME_SLIDE_TOL)
+        and workspace[SliderRowStart.N_REVERSALS + lane] == 0.0
+    ):
+        end = side * NO_EVENT_SLIDE
+        workspace[SliderRowStart.ALL_SLIP + lane] = 1.0
+    workspace[SliderRowStart.NEXT_EVENT + lane] = (
+        end if slips or side * (half - end) > 0.0 else half
+    )
+    workspace[RowStart.SLIP_SIGN + lane] = side if slips else 0.0
     if slips:
-        workspace[SliderAt.EVER_SLIPPED + lane] = 1.0
+        workspace[SliderRowStart.EVER_SLIPPED + lane] = 1.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def resolve_step(workspace, lane, step):
-    """Compute a step with its reversals and closings of loops.
+    """Compute a step with the reversals and closings of loops inside it.
 
     The event of the outcome is the start or the end of a slip of half of the friction, otherwise a reversal.
 
@@ -770,12 +802,12 @@ def resolve_step(workspace, lane, step):
     event_kind = NO_EVENT
     reversal_slide = state.slide
     is_reversed = False
-    rest = step  # what is left of the step
+    rest = step  # remainder of the step
     path = 0.0
     stick_angle = 0.0
     slip = irreversible_slide(state.slide, state.friction, workspace, lane)
-    workspace[SliderAt.TANGENT_START + lane] = state.tangent
-    workspace[SliderAt.STICK_FRACTION + lane] = 0.0
+    workspace[SliderRowStart.TANGENT_START + lane] = state.tangent
+    workspace[SliderRowStart.STICK_FRACTION + lane] = 0.0
     for n_events in range(MAX_EVENTS + 1):
         end = hermite_step(workspace, lane, state, rest)
         a0, _ = acceleration_and_rate(workspace, lane, state, rest.s0, rest.c0)
@@ -786,7 +818,7 @@ def resolve_step(workspace, lane, step):
         t = first.fraction * rest.angle
         se, ce = drive_after(rest.s0, rest.c0, t)
         slip_before = slip
-        sign_before = workspace[At.SLIP_SIGN + lane]
+        sign_before = workspace[RowStart.SLIP_SIGN + lane]
         reached = hermite_step(workspace, lane, state, AngleStep(rest.s0, rest.c0, se, ce, t))
         x = reached.slide
         v = 0.0 if first.kind == REVERSAL else reached.speed
@@ -806,29 +838,29 @@ def resolve_step(workspace, lane, step):
         if first.kind == CLOSING:
             slip = irreversible_slide(x, friction, workspace, lane)
         state = BranchState(x, v, friction, tangent)
-        changes_slip = workspace[At.SLIP_SIGN + lane] != sign_before
+        changes_slip = workspace[RowStart.SLIP_SIGN + lane] != sign_before
         kind = SLIP_CHANGE if changes_slip else first.kind
         if kind >= event_kind:
             event_kind = kind
             event_fraction = 1 - rest.angle / step.angle
             event = state
-            workspace[SliderAt.TANGENT_BEFORE + lane] = tangent_before
-            workspace[SliderAt.TANGENT_AFTER + lane] = tangent
+            workspace[SliderRowStart.TANGENT_BEFORE + lane] = tangent_before
+            workspace[SliderRowStart.TANGENT_AFTER + lane] = tangent
             fraction = stick_angle / (step.angle - rest.angle) if changes_slip else 0.0
-            workspace[SliderAt.STICK_FRACTION + lane] = fraction
+            workspace[SliderRowStart.STICK_FRACTION + lane] = fraction
     last_slip = irreversible_slide(end.slide, end.friction, workspace, lane)
-    workspace[SliderAt.STEP_SLIP + lane] = path + abs(last_slip - slip)
-    workspace[SliderAt.TANGENT + lane] = end.tangent
-    workspace[SliderAt.TANGENT_END + lane] = end.tangent
-    curve.start_lookup(clamped_place(end.slide, workspace, lane), workspace, lane)
+    workspace[SliderRowStart.STEP_SLIP + lane] = path + abs(last_slip - slip)
+    workspace[SliderRowStart.TANGENT + lane] = end.tangent
+    workspace[SliderRowStart.TANGENT_END + lane] = end.tangent
+    curve.start_lookup(clamped_abscissa(end.slide, workspace, lane), workspace, lane)
     if event_kind == NO_EVENT:
         event = end
-        workspace[SliderAt.TANGENT_BEFORE + lane] = end.tangent
-        workspace[SliderAt.TANGENT_AFTER + lane] = end.tangent
+        workspace[SliderRowStart.TANGENT_BEFORE + lane] = end.tangent
+        workspace[SliderRowStart.TANGENT_AFTER + lane] = end.tangent
     return StepOutcome(
         end.slide,
         end.speed,
-        workspace[At.SLIP_SIGN + lane],
+        workspace[RowStart.SLIP_SIGN + lane],
         end.friction,
         event_fraction,
         event.slide,

@@ -12,9 +12,9 @@ from ...friction.flags_kernels import NJIT_INLINE
 from . import lane_kernels as lanes
 from . import rigid_kernels as law
 from .rigid_kernels import AngleStep, LaneState, cubic_peak, drive_after
-from .rows_kernels import FIRST_READING, GROUP_BITS, LANES, N_READINGS, At
+from .rows_kernels import FIRST_READING, GROUP_BITS, LANES, N_READINGS, RowStart
 
-# `friction_rate` of a law is asked for at these instants of a step.
+# Codes of the instants of a step for which `friction_rate` of a law may be evaluated.
 AT_START = 0
 BEFORE_EVENT = 1
 AFTER_EVENT = 2
@@ -22,7 +22,7 @@ AT_END = 3
 
 
 class Instant(NamedTuple):
-    """Sine and cosine of the drive, state, friction and acceleration of a lane at an instant."""
+    """State of a lane at an instant: drive, displacement, friction over mass and acceleration."""
 
     sine: float
     cosine: float
@@ -32,7 +32,7 @@ class Instant(NamedTuple):
 
 
 class Peaks(NamedTuple):
-    """Largest absolute output acceleration [m s-2] and friction over the mass [m] in a segment."""
+    """Peak absolute output acceleration [m s-2] and peak friction over mass [m] in a segment."""
 
     acceleration: float
     friction: float
@@ -40,7 +40,7 @@ class Peaks(NamedTuple):
 
 @njit(**NJIT_INLINE)
 def make_instant(workspace, lane, sine, cosine, state):
-    """Return the `Instant` of a state.
+    """Return the instant of a lane for a given drive angle and state.
 
     Parameters
     ----------
@@ -56,9 +56,9 @@ def make_instant(workspace, lane, sine, cosine, state):
     """
     friction = law.friction_force(state, sine, workspace, lane)
     acceleration = (
-        workspace[At.DRIVE + lane] * sine
-        - workspace[At.DAMPING + lane] * state.speed
-        - workspace[At.STIFFNESS + lane] * state.slide
+        workspace[RowStart.DRIVE + lane] * sine
+        - workspace[RowStart.DAMPING + lane] * state.speed
+        - workspace[RowStart.STIFFNESS + lane] * state.slide
         - friction
     )
     return Instant(sine, cosine, state, friction, acceleration)
@@ -66,7 +66,7 @@ def make_instant(workspace, lane, sine, cosine, state):
 
 @njit(**NJIT_INLINE)
 def output_acceleration(workspace, lane, instant):
-    """Return the absolute acceleration of the output.
+    """Return the absolute output acceleration [m s-2] at an instant.
 
     Parameters
     ----------
@@ -80,14 +80,14 @@ def output_acceleration(workspace, lane, instant):
         [m s-2]
     """
     return (
-        workspace[At.OUTPUT_GAIN + lane] * instant.acceleration
-        + workspace[At.BASE_GAIN + lane] * instant.sine
+        workspace[RowStart.OUTPUT_GAIN + lane] * instant.acceleration
+        + workspace[RowStart.BASE_GAIN + lane] * instant.sine
     )
 
 
 @njit(**NJIT_INLINE)
 def output_jerk(workspace, lane, instant, friction_rate):
-    """Return the rate of the absolute acceleration of the output in the angle of the drive.
+    """Return the derivative of the output acceleration with respect to the drive angle.
 
     Parameters
     ----------
@@ -103,20 +103,20 @@ def output_jerk(workspace, lane, instant, friction_rate):
         [m s-2]
     """
     free_rate = (
-        workspace[At.DRIVE + lane] * instant.cosine
-        - workspace[At.DAMPING + lane] * instant.acceleration
-        - workspace[At.STIFFNESS + lane] * instant.state.speed
+        workspace[RowStart.DRIVE + lane] * instant.cosine
+        - workspace[RowStart.DAMPING + lane] * instant.acceleration
+        - workspace[RowStart.STIFFNESS + lane] * instant.state.speed
     )
     # The output of an interface that sticks rigidly moves with the base alone.
     is_fixed = law.STICK_IS_RIGID and instant.state.slip_sign == 0.0
-    gain = 0.0 if is_fixed else workspace[At.OUTPUT_GAIN + lane]
-    base_rate = workspace[At.BASE_GAIN + lane] * instant.cosine
+    gain = 0.0 if is_fixed else workspace[RowStart.OUTPUT_GAIN + lane]
+    base_rate = workspace[RowStart.BASE_GAIN + lane] * instant.cosine
     return gain * (free_rate - friction_rate) + base_rate
 
 
 @njit(**NJIT_INLINE)
 def segment_peaks(workspace, lane, first, last, angle, when, last_when):
-    """Return the peaks between two instants, by cubics through values and rates.
+    """Return the peaks between two instants, from cubics through values and derivatives.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def segment_peaks(workspace, lane, first, last, angle, when, last_when):
 
 @njit(**NJIT_INLINE)
 def instant_friction_rate(workspace, lane, instant, when):
-    """Return the rate of the friction at an instant of the step.
+    """Return the derivative of the friction over mass with respect to the drive angle.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def instant_friction_rate(workspace, lane, instant, when):
 
 @njit(**NJIT_INLINE)
 def observe_step(workspace, lane, step):
-    """Move a lane over a step without an event and add its readings.
+    """Advance a lane over a step without an event and update its readings.
 
     A lane that has an event is marked and stays.
 
@@ -186,40 +186,41 @@ def observe_step(workspace, lane, step):
     last = make_instant(workspace, lane, step.s1, step.c1, end)
     slip = law.irreversible_slide(x1, tried.memory, workspace, lane)
     peaks = segment_peaks(workspace, lane, first, last, step.angle, AT_START, AT_END)
-    # All rows are read before the first one is written, otherwise a compiler does not take several lanes at once.
-    highest = workspace[At.MAX_SLIDE + lane]
-    lowest = workspace[At.MIN_SLIDE + lane]
-    current_stick = workspace[At.CURRENT_STICK + lane]
-    longest = workspace[At.LONGEST_STICK + lane]
-    max_slip = workspace[At.MAX_SLIP + lane]
-    min_slip = workspace[At.MIN_SLIP + lane]
-    force_at_max = workspace[At.FORCE_AT_MAX + lane]
-    force_at_min = workspace[At.FORCE_AT_MIN + lane]
-    acceleration = workspace[At.MAX_ACCELERATION + lane]
-    friction = workspace[At.MAX_FORCE + lane]
+    # All rows are read before the first one is written, because otherwise a compiler does not compute several lanes at
+    # once.
+    highest = workspace[RowStart.MAX_SLIDE + lane]
+    lowest = workspace[RowStart.MIN_SLIDE + lane]
+    current_stick = workspace[RowStart.CURRENT_STICK + lane]
+    longest = workspace[RowStart.LONGEST_STICK + lane]
+    max_slip = workspace[RowStart.MAX_SLIP + lane]
+    min_slip = workspace[RowStart.MIN_SLIP + lane]
+    force_at_max = workspace[RowStart.FORCE_AT_MAX + lane]
+    force_at_min = workspace[RowStart.FORCE_AT_MIN + lane]
+    acceleration = workspace[RowStart.MAX_ACCELERATION + lane]
+    friction = workspace[RowStart.MAX_FORCE + lane]
     stick_now = current_stick + step.angle * stick
     moves = lanes.accept_step(workspace, lane, state, step, tried, x1)
     work = moves * 0.5 * (first.friction + last.friction) * (x1 - state.slide)
-    workspace[At.MAX_ACCELERATION + lane] = (
+    workspace[RowStart.MAX_ACCELERATION + lane] = (
         acceleration if event else max(acceleration, peaks.acceleration)
     )
-    workspace[At.MAX_FORCE + lane] = friction if event else max(friction, peaks.friction)
-    workspace[At.STICK_ANGLE + lane] += moves * step.angle * stick
-    workspace[At.LONGEST_STICK + lane] = longest if event else max(longest, stick_now)
-    workspace[At.CURRENT_STICK + lane] = current_stick if event else stick * stick_now
-    workspace[At.MAX_SLIP + lane] = max_slip if event else max(max_slip, slip)
-    workspace[At.MIN_SLIP + lane] = min_slip if event else min(min_slip, slip)
-    workspace[At.LOOP_WORK + lane] += work
-    workspace[At.LOOP_WORK_SIZE + lane] += abs(work)
+    workspace[RowStart.MAX_FORCE + lane] = friction if event else max(friction, peaks.friction)
+    workspace[RowStart.STICK_ANGLE + lane] += moves * step.angle * stick
+    workspace[RowStart.LONGEST_STICK + lane] = longest if event else max(longest, stick_now)
+    workspace[RowStart.CURRENT_STICK + lane] = current_stick if event else stick * stick_now
+    workspace[RowStart.MAX_SLIP + lane] = max_slip if event else max(max_slip, slip)
+    workspace[RowStart.MIN_SLIP + lane] = min_slip if event else min(min_slip, slip)
+    workspace[RowStart.LOOP_WORK + lane] += work
+    workspace[RowStart.LOOP_WORK_SIZE + lane] += abs(work)
     add_sample(workspace, lane, step.s1, step.c1, moves * x1, moves * last.friction)
-    # The slide does not reverse at an extreme of a step without an event.
-    workspace[At.FORCE_AT_MAX + lane] = force_at_max if event or not x1 > highest else nan
-    workspace[At.FORCE_AT_MIN + lane] = force_at_min if event or not x1 < lowest else nan
+    # The relative displacement does not reverse at an extreme of a step without an event.
+    workspace[RowStart.FORCE_AT_MAX + lane] = force_at_max if event or not x1 > highest else nan
+    workspace[RowStart.FORCE_AT_MIN + lane] = force_at_min if event or not x1 < lowest else nan
 
 
 @njit(**NJIT_INLINE)
 def add_sample(workspace, lane, sine, cosine, slide, friction):
-    """Add a sample to the phasors and to the means.
+    """Add the displacement and friction at the end of a step to the phasors and means.
 
     Parameters
     ----------
@@ -230,25 +231,27 @@ def add_sample(workspace, lane, sine, cosine, slide, friction):
     slide, friction : float
         [m]
     """
-    workspace[At.COS_1 + lane] += slide * cosine
-    workspace[At.SIN_1 + lane] += slide * sine
-    workspace[At.COS_3 + lane] += slide * (cosine * (4 * cosine * cosine - 3))
-    workspace[At.SIN_3 + lane] += slide * (sine * (3 - 4 * sine * sine))
-    workspace[At.SLIDE_SUM + lane] += slide
-    workspace[At.FORCE_SUM + lane] += friction
+    workspace[RowStart.COS_1 + lane] += slide * cosine
+    workspace[RowStart.SIN_1 + lane] += slide * sine
+    workspace[RowStart.COS_3 + lane] += slide * (cosine * (4 * cosine * cosine - 3))
+    workspace[RowStart.SIN_3 + lane] += slide * (sine * (3 - 4 * sine * sine))
+    workspace[RowStart.SLIDE_SUM + lane] += slide
+    workspace[RowStart.FORCE_SUM + lane] += friction
 
 
 @njit(**NJIT_INLINE)
 def observe_event_step(workspace, lane, step):
-    """Move a lane over a step with an event and add its readings, those before and after the event.
+    """Advance a lane over a step with an event and update its readings.
+
+    The segments before and after the event are read separately.
 
     Parameters
     ----------
     workspace, lane, step
         See `lane_kernels.resolve_lane_step`.
     """
-    highest = workspace[At.MAX_SLIDE + lane]
-    lowest = workspace[At.MIN_SLIDE + lane]
+    highest = workspace[RowStart.MAX_SLIDE + lane]
+    lowest = workspace[RowStart.MIN_SLIDE + lane]
     start, outcome = lanes.resolve_lane_step(workspace, lane, step)
     event_angle = outcome.event * step.angle
     se, ce = drive_after(step.s0, step.c0, event_angle)
@@ -280,20 +283,20 @@ def observe_event_step(workspace, lane, step):
             add_peaks(workspace, lane, 0.0, abs(reversal_force))
         work = 0.5 * (first.friction + first_end.friction) * (x - start.slide)
         last_work = 0.5 * (second.friction + last.friction) * (outcome.slide - x)
-        workspace[At.LOOP_WORK + lane] += work + last_work
-        workspace[At.LOOP_WORK_SIZE + lane] += abs(work) + abs(last_work)
+        workspace[RowStart.LOOP_WORK + lane] += work + last_work
+        workspace[RowStart.LOOP_WORK_SIZE + lane] += abs(work) + abs(last_work)
     add_sample(workspace, lane, step.s1, step.c1, outcome.slide, last.friction)
     is_reversed = start.speed != 0.0 and start.speed * outcome.speed <= 0.0
     force = reversal_force if is_reversed else nan
     if max(outcome.slide, outcome.reversal_slide) > highest:
-        workspace[At.FORCE_AT_MAX + lane] = force
+        workspace[RowStart.FORCE_AT_MAX + lane] = force
     if min(outcome.slide, outcome.reversal_slide) < lowest:
-        workspace[At.FORCE_AT_MIN + lane] = force
+        workspace[RowStart.FORCE_AT_MIN + lane] = force
 
 
 @njit(**NJIT_INLINE)
 def add_peaks(workspace, lane, acceleration, friction):
-    """Update the largest acceleration and the largest friction.
+    """Update the peak acceleration and the peak friction of a lane.
 
     Parameters
     ----------
@@ -304,13 +307,15 @@ def add_peaks(workspace, lane, acceleration, friction):
     friction : float
         Absolute friction over the mass [m].
     """
-    workspace[At.MAX_ACCELERATION + lane] = max(workspace[At.MAX_ACCELERATION + lane], acceleration)
-    workspace[At.MAX_FORCE + lane] = max(workspace[At.MAX_FORCE + lane], friction)
+    workspace[RowStart.MAX_ACCELERATION + lane] = max(
+        workspace[RowStart.MAX_ACCELERATION + lane], acceleration
+    )
+    workspace[RowStart.MAX_FORCE + lane] = max(workspace[RowStart.MAX_FORCE + lane], friction)
 
 
 @njit(**NJIT_INLINE)
 def add_slip_range(workspace, lane, event, end):
-    """Update the range of the irreversible slide with the states at the event and at the end of a step.
+    """Update the range of the irreversible displacement at the event and the end of a step.
 
     Parameters
     ----------
@@ -321,13 +326,19 @@ def add_slip_range(workspace, lane, event, end):
     """
     slip = law.irreversible_slide(event.slide, event.memory, workspace, lane)
     last_slip = law.irreversible_slide(end.slide, end.memory, workspace, lane)
-    workspace[At.MAX_SLIP + lane] = max(workspace[At.MAX_SLIP + lane], max(slip, last_slip))
-    workspace[At.MIN_SLIP + lane] = min(workspace[At.MIN_SLIP + lane], min(slip, last_slip))
+    workspace[RowStart.MAX_SLIP + lane] = max(
+        workspace[RowStart.MAX_SLIP + lane], max(slip, last_slip)
+    )
+    workspace[RowStart.MIN_SLIP + lane] = min(
+        workspace[RowStart.MIN_SLIP + lane], min(slip, last_slip)
+    )
 
 
 @njit(**NJIT_INLINE)
 def add_sticks(workspace, lane, first, second, event, angle):
-    """Add the sticks and the start of a slip in a step with an event, and the extremes of the slip.
+    """Add the stick and slip fractions of a step with an event to the readings.
+
+    The start of a slip and the extremes of the slip are included.
 
     Parameters
     ----------
@@ -347,12 +358,14 @@ def add_sticks(workspace, lane, first, second, event, angle):
     last_stick = law.stick_fractions(second[0], second[1], workspace, lane, angle - event_angle)
     stick_angle = angle * (event * stick.fraction)
     last_angle = angle * ((1 - event) * last_stick.fraction)
-    workspace[At.STICK_ANGLE + lane] += stick_angle + last_angle
-    current = workspace[At.CURRENT_STICK + lane] + stick_angle
-    workspace[At.LONGEST_STICK + lane] = max(workspace[At.LONGEST_STICK + lane], current)
+    workspace[RowStart.STICK_ANGLE + lane] += stick_angle + last_angle
+    current = workspace[RowStart.CURRENT_STICK + lane] + stick_angle
+    workspace[RowStart.LONGEST_STICK + lane] = max(
+        workspace[RowStart.LONGEST_STICK + lane], current
+    )
     continues = event >= 1.0 or (law.EVENT_KEEPS_STICK and last_sign == 0.0)
     current = current if stick.fraction > 0.0 and continues else 0.0
-    workspace[At.CURRENT_STICK + lane] = current + last_angle
+    workspace[RowStart.CURRENT_STICK + lane] = current + last_angle
     is_released = slip_sign == 0.0 and last_sign != 0.0
     start = event_angle + (angle - event_angle) * last_stick.slip_start
     if stick.slip_start <= 1.0:
@@ -361,20 +374,20 @@ def add_sticks(workspace, lane, first, second, event, angle):
         start = event_angle
     if is_released or stick.slip_start <= 1.0 or last_stick.slip_start <= 1.0:
         sine, cosine = drive_after(first[0].sine, first[0].cosine, start)
-        workspace[At.SLIP_STARTS + lane] += 1.0
-        workspace[At.START_COS + lane] += 1 - 2 * sine * sine
-        workspace[At.START_SIN + lane] += 2 * sine * cosine
-    workspace[At.MAX_SLIP + lane] = max(
-        workspace[At.MAX_SLIP + lane], max(stick.extreme_slip, last_stick.extreme_slip)
+        workspace[RowStart.SLIP_STARTS + lane] += 1.0
+        workspace[RowStart.START_COS + lane] += 1 - 2 * sine * sine
+        workspace[RowStart.START_SIN + lane] += 2 * sine * cosine
+    workspace[RowStart.MAX_SLIP + lane] = max(
+        workspace[RowStart.MAX_SLIP + lane], max(stick.extreme_slip, last_stick.extreme_slip)
     )
-    workspace[At.MIN_SLIP + lane] = min(
-        workspace[At.MIN_SLIP + lane], min(stick.extreme_slip, last_stick.extreme_slip)
+    workspace[RowStart.MIN_SLIP + lane] = min(
+        workspace[RowStart.MIN_SLIP + lane], min(stick.extreme_slip, last_stick.extreme_slip)
     )
 
 
 @njit(**NJIT_INLINE)
 def lane_friction(lane, workspace, sine):
-    """Return the friction over the mass of a lane [m] at a sine of the drive.
+    """Return the friction over mass of a lane [m], given the sine of the drive angle.
 
     Parameters
     ----------
@@ -393,18 +406,18 @@ def lane_friction(lane, workspace, sine):
 
 @njit(**NJIT_INLINE)
 def start_observed_cycle(lane, workspace):
-    """Begin the readings of a cycle."""
-    workspace[At.CYCLE_START + lane] = workspace[At.SLIDE + lane]
-    workspace[At.SLIDE_SUM + lane] = 0.0
-    workspace[At.FORCE_SUM + lane] = 0.5 * lane_friction(lane, workspace, 0.0)
-    is_fixed = law.STICK_IS_RIGID and workspace[At.SLIP_SIGN + lane] == 0.0
-    workspace[At.FORCE_AT_MAX + lane] = 0.0 if is_fixed else nan
-    workspace[At.FORCE_AT_MIN + lane] = 0.0 if is_fixed else nan
+    """Start the readings of a lane for one cycle."""
+    workspace[RowStart.CYCLE_START + lane] = workspace[RowStart.SLIDE + lane]
+    workspace[RowStart.SLIDE_SUM + lane] = 0.0
+    workspace[RowStart.FORCE_SUM + lane] = 0.5 * lane_friction(lane, workspace, 0.0)
+    is_fixed = law.STICK_IS_RIGID and workspace[RowStart.SLIP_SIGN + lane] == 0.0
+    workspace[RowStart.FORCE_AT_MAX + lane] = 0.0 if is_fixed else nan
+    workspace[RowStart.FORCE_AT_MIN + lane] = 0.0 if is_fixed else nan
 
 
 @njit(**NJIT_INLINE)
 def finish_observed_cycle(lane, workspace, is_first, n_cycles, angle):
-    """Add the range, the secant stiffness and the means of a cycle to the readings.
+    """Add range, secant stiffness and means of a completed cycle to the readings.
 
     Parameters
     ----------
@@ -417,31 +430,34 @@ def finish_observed_cycle(lane, workspace, is_first, n_cycles, angle):
     angle : float
         Angle of a step [rad].
     """
-    size = workspace[At.MAX_SLIDE + lane] - workspace[At.MIN_SLIDE + lane]
-    drift = workspace[At.CYCLE_START + lane] - workspace[At.SLIDE + lane]
-    force_at_max = workspace[At.FORCE_AT_MAX + lane]
-    force_at_min = workspace[At.FORCE_AT_MIN + lane]
-    # The slide of a rigid stick has an extreme at an end of the cycle without a reversal; its mean friction is 0.
+    size = workspace[RowStart.MAX_SLIDE + lane] - workspace[RowStart.MIN_SLIDE + lane]
+    drift = workspace[RowStart.CYCLE_START + lane] - workspace[RowStart.SLIDE + lane]
+    force_at_max = workspace[RowStart.FORCE_AT_MAX + lane]
+    force_at_min = workspace[RowStart.FORCE_AT_MIN + lane]
+    # The displacement of a rigid stick has an extreme at an end of the cycle without a reversal; its mean friction is
+    # 0.
     if law.STICK_IS_RIGID and size > 0.0:
         force_at_max = force_at_max if force_at_max == force_at_max else 0.0
         force_at_min = force_at_min if force_at_min == force_at_min else 0.0
     secant = (force_at_max - force_at_min) / size
-    workspace[At.MEAN_RANGE + lane] += size / n_cycles
+    workspace[RowStart.MEAN_RANGE + lane] += size / n_cycles
     if secant == secant and size > 0.0:
-        workspace[At.N_SECANTS + lane] += 1.0
-        workspace[At.SECANT_SUM + lane] += secant
-    slide = angle * (workspace[At.SLIDE_SUM + lane] + 0.5 * drift)
-    friction = angle * (workspace[At.FORCE_SUM + lane] - 0.5 * lane_friction(lane, workspace, 0.0))
+        workspace[RowStart.N_SECANTS + lane] += 1.0
+        workspace[RowStart.SECANT_SUM + lane] += secant
+    slide = angle * (workspace[RowStart.SLIDE_SUM + lane] + 0.5 * drift)
+    friction = angle * (
+        workspace[RowStart.FORCE_SUM + lane] - 0.5 * lane_friction(lane, workspace, 0.0)
+    )
     if is_first:
-        workspace[At.FIRST_MEAN_SLIDE + lane] = slide
-        workspace[At.FIRST_MEAN_FORCE + lane] = friction
-    workspace[At.LAST_MEAN_SLIDE + lane] = slide
-    workspace[At.LAST_MEAN_FORCE + lane] = friction
+        workspace[RowStart.FIRST_MEAN_SLIDE + lane] = slide
+        workspace[RowStart.FIRST_MEAN_FORCE + lane] = friction
+    workspace[RowStart.LAST_MEAN_SLIDE + lane] = slide
+    workspace[RowStart.LAST_MEAN_FORCE + lane] = friction
 
 
 @njit(**NJIT_INLINE)
 def record_accelerations(workspace, acceleration, step, sine):
-    """Write the acceleration of the output after a step.
+    """Write the output acceleration of every lane after a step.
 
     Parameters
     ----------
@@ -453,7 +469,7 @@ def record_accelerations(workspace, acceleration, step, sine):
         Sine of the drive.
     """
     for lane in range(LANES if acceleration.shape[1] > 0 else 0):
-        case = workspace[At.CASE_INDEX + lane]
+        case = workspace[RowStart.CASE_INDEX + lane]
         if case >= 0.0:
             instant = make_instant(workspace, lane, sine, 0.0, lanes.lane_state(workspace, lane))
             acceleration[int(case), step] = output_acceleration(workspace, lane, instant)
@@ -461,7 +477,7 @@ def record_accelerations(workspace, acceleration, step, sine):
 
 @njit(**NJIT_INLINE)
 def load_observed_cases(first, cases, order, motion, workspace):
-    """Put cases into the lanes and clear their readings.
+    """Load cases into the lanes and clear their readings.
 
     Parameters
     ----------
@@ -475,17 +491,19 @@ def load_observed_cases(first, cases, order, motion, workspace):
         for n in range(FIRST_READING, FIRST_READING + N_READINGS):
             workspace[n * LANES + lane] = 0.0
         slip = law.irreversible_slide(
-            workspace[At.SLIDE + lane], workspace[At.MEMORY + lane], workspace, lane
+            workspace[RowStart.SLIDE + lane], workspace[RowStart.MEMORY + lane], workspace, lane
         )
-        workspace[At.MAX_SLIP + lane] = slip
-        workspace[At.MIN_SLIP + lane] = slip
+        workspace[RowStart.MAX_SLIP + lane] = slip
+        workspace[RowStart.MIN_SLIP + lane] = slip
         if first + lane >= len(order):
-            workspace[At.CASE_INDEX + lane] = -1.0
+            workspace[RowStart.CASE_INDEX + lane] = -1.0
 
 
 @njit(**NJIT_INLINE)
 def observe_cycle(workspace, marked, table, n_busy, acceleration, first_step):
-    """March the first lanes, `n_busy` of them, over a cycle and read it.
+    """March the first lanes over one cycle and collect its readings.
+
+    They are the first `n_busy` lanes.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Force of Segalman's Iwan law in its first loading, in closed form.
+"""First-loading curve of Segalman's Iwan model, in closed form.
 
 With the force over the stiffness and YIELD_LENGTH, the slide over YIELD_LENGTH w, and the numbers chi and q of the law,
 
@@ -11,23 +11,25 @@ import numpy as np
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
-from .rows_kernels import LANES, At
+from .rows_kernels import LANES, RowStart
 
-FRACTION = 1  # position of q in the numbers of the law; the first of them is chi + 1
-# Longest step, over YIELD_LENGTH: the curve bends so little that no step is too long.
+FRACTION = 1  # Index of q in the parameters of the law; the first of them is chi + 1.
+# Maximum step over YIELD_LENGTH; the curve bends so little that no step is too long.
 MAX_STEP = 1e300
-LOOKS_AHEAD = False  # whether `prepare_lookup` has something to do
-# The numbers of the curve are everywhere the same; see `table_curve_kernels`.
+LOOKS_AHEAD = False  # Whether `prepare_lookup` has an effect.
+# Codes of the place where the numbers of the curve are stored; a closed form needs none, see `table_curve_kernels`.
 IN_TABLE = 0
 PREPARED = 0
 AT_START = 0
-# 1.5 * 2^52: after adding it the last bits are the nearest whole number
-ROUND_TO_WHOLE = 6755399441055744.0
+# 1.5 * 2^52: after this number is added, the last bits of the sum are the nearest integer.
+ROUNDING_CONSTANT = 6755399441055744.0
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def power(w, a):
-    """Return w^a to 3e-13, for masing_kernels.MIN_PLACE <= w <= 2 and 0 < a <= 1.
+    """Return the power w^a to a relative accuracy of 3e-13.
+
+    It holds for masing_kernels.MIN_ABSCISSA <= w <= 2 and 0 < a <= 1.
 
     It uses the bits of a number, without a branch or a call, so that a compiler takes several lanes at once: the series of
     the logarithm of the mantissa, then that of the power of two. It is compiled without fast-math, because the rounding
@@ -57,8 +59,8 @@ def power(w, a):
         )
     )
     y = a * (((bits >> 52) - 1023) + is_large + log)
-    whole = y + ROUND_TO_WHOLE
-    g = 0.6931471805599453 * (y - (whole - ROUND_TO_WHOLE))
+    whole = y + ROUNDING_CONSTANT
+    g = 0.6931471805599453 * (y - (whole - ROUNDING_CONSTANT))
     e = 1 + g * (
         1
         + g
@@ -90,7 +92,7 @@ def power(w, a):
 
 @njit(**NJIT_INLINE)
 def force_and_slope(w, workspace, lane, when):
-    """Return the force at w > 0 and its slope.
+    """Return force and slope of the first-loading curve at an abscissa w > 0.
 
     Parameters
     ----------
@@ -108,14 +110,16 @@ def force_and_slope(w, workspace, lane, when):
     float
         Slope.
     """
-    exponent = workspace[At.LAW_NUMBERS + lane]
-    p = workspace[At.LAW_NUMBERS + FRACTION * LANES + lane] * power(w, exponent)
+    exponent = workspace[RowStart.LAW_NUMBERS + lane]
+    p = workspace[RowStart.LAW_NUMBERS + FRACTION * LANES + lane] * power(w, exponent)
     return w * (1 - p / (exponent + 1)), 1 - p
 
 
 @njit(**NJIT_INLINE)
 def mean_slip(w, force, workspace, lane, when):
-    """Return the slip at w, weighted by the friction of the sliders, over the stiffness and YIELD_LENGTH.
+    """Return the mean slip of the sliders, weighted by friction, in scaled form.
+
+    It is the slip at w over the stiffness and YIELD_LENGTH.
 
     Parameters
     ----------
@@ -129,13 +133,13 @@ def mean_slip(w, force, workspace, lane, when):
     -------
     float
     """
-    exponent = workspace[At.LAW_NUMBERS + lane]
+    exponent = workspace[RowStart.LAW_NUMBERS + lane]
     return exponent / (exponent + 2) * w * (w - force)
 
 
 @njit(**NJIT_INLINE)
 def loading_work(w, force, workspace, lane):
-    """Return the integral of the force up to an abscissa.
+    """Return the integral of the first-loading force up to an abscissa.
 
     Parameters
     ----------
@@ -146,17 +150,17 @@ def loading_work(w, force, workspace, lane):
     -------
     float
     """
-    return w * (w / 2 - (w - force) / (workspace[At.LAW_NUMBERS + lane] + 2))
+    return w * (w / 2 - (w - force) / (workspace[RowStart.LAW_NUMBERS + lane] + 2))
 
 
 @njit(**NJIT_INLINE)
 def prepare_lookup(workspace, lane):
-    """Do nothing: a power is evaluated without a table."""
+    """Do nothing, because a power is evaluated without a table."""
 
 
 @njit(**NJIT_INLINE)
 def finish_step(workspace, lane, event):
-    """Do nothing: a power is evaluated without a table.
+    """Do nothing, because a power is evaluated without a table.
 
     Parameters
     ----------
@@ -169,7 +173,7 @@ def finish_step(workspace, lane, event):
 
 @njit(**NJIT_INLINE)
 def start_lookup(w, workspace, lane):
-    """Do nothing: a power is evaluated without a table.
+    """Do nothing, because a power is evaluated without a table.
 
     Parameters
     ----------

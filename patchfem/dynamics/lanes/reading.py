@@ -1,4 +1,4 @@
-"""Energies and readings of a march in lanes, in the form of those of `dynamics.events`.
+"""Energies and measures of a march in lanes, in the form of those of `dynamics.events`.
 
 Sums of a march are those of the trapezoidal rule; the formula of Euler and Maclaurin corrects them at their ends.
 """
@@ -11,10 +11,10 @@ from ..events.positions_kernels import InterfaceMeasure, RunMeasure
 from ..events.reading import Reading
 from . import rows_kernels as rows
 from .rows_kernels import Row
-from .run import MASING, Cases, Marched, has_one_stretch, law_state
+from .run import MASING_LAWS, Cases, LaneResults, has_one_stretch, law_state
 
-# Readings of the interface of `dynamics.events` and of the lanes, and their unit; that of the lanes has m for N, and angles
-# of the drive for times.
+# Measures of an interface in `dynamics.events`, the readings of the lanes that give them, and their units; the lanes
+# have m for N, and drive angles for times.
 INTERFACE_READINGS = (
     (InterfaceMeasure.MAX_SLIP, "MAX_SLIP", "m"),
     (InterfaceMeasure.MIN_SLIP, "MIN_SLIP", "m"),
@@ -37,14 +37,17 @@ RUN_READINGS = (
 
 
 class Integrals(NamedTuple):
-    """Integrals (n,) over the observed cycles with the cosine and the sine of the drive."""
+    """Integrals (n,) of a quantity times cosine and sine of the drive over the observed cycles."""
 
     cosine: np.ndarray
     sine: np.ndarray
 
 
 class Harmonics(NamedTuple):
-    """Integrals of the slide, of the acceleration of the output, of the friction, and of the acceleration at 3 times."""
+    """Drive-frequency integrals of displacement, output acceleration and friction.
+
+    The integrals of the output acceleration at three times the drive frequency are included.
+    """
 
     slide: Integrals
     acceleration: Integrals
@@ -52,15 +55,15 @@ class Harmonics(NamedTuple):
     third_acceleration: Integrals
 
 
-def run_energies(law: str, cases: Cases, marched: Marched, energy) -> dict:
-    """Return the energies (n,) [J] of whole runs by name.
+def run_energies(law: str, cases: Cases, marched: LaneResults, energy) -> dict:
+    """Return the energies (n,) [J] of complete runs by name.
 
     Parameters
     ----------
     law : str
         As `run.load_loop` names it.
     cases : Cases
-    marched : Marched
+    marched : LaneResults
     energy : (n,) array
         Energy per square of a length [kg s-2].
 
@@ -106,18 +109,18 @@ def run_energies(law: str, cases: Cases, marched: Marched, energy) -> dict:
 
 
 def _free_acceleration(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the acceleration (n,) of a motion where the drive passes 0."""
+    """Return the acceleration (n,) of the relative displacement where the drive passes 0."""
     x = motion[:, Row.SLIDE]
     v = motion[:, Row.SPEED]
     return -cases.damping * v - cases.stiffness * x - _friction(law, cases, motion)
 
 
 def _friction(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the friction over the mass (n,) [m] of a motion where the drive passes 0."""
+    """Return the friction over mass (n,) [m] where the drive passes 0."""
     x = motion[:, Row.SLIDE]
     memory = motion[:, Row.MEMORY]
     slip_sign = motion[:, Row.SLIP_SIGN]
-    if law in MASING:
+    if law in MASING_LAWS:
         return memory
     if has_one_stretch(law):
         return law_state(law, motion, "FRICTION")
@@ -126,8 +129,8 @@ def _friction(law: str, cases: Cases, motion) -> np.ndarray:
 
 
 def _elastic_energy(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the elastic energy (n,) of the interface over the mass [m^2]."""
-    if law in MASING:
+    """Return the elastic energy (n,) of the interface over mass [m^2]."""
+    if law in MASING_LAWS:
         return _slider_energy(law, cases, motion)
     if has_one_stretch(law):
         square = law_state(law, motion, "STRETCH_SQUARE")
@@ -137,7 +140,10 @@ def _elastic_energy(law: str, cases: Cases, motion) -> np.ndarray:
 
 
 def _slider_energy(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the elastic energy (n,) of the sliders of Masing's rule, as `masing_kernels.slider_energy` computes it."""
+    """Return the elastic energy (n,) of the sliders of the Masing (Iwan) model over mass [m^2].
+
+    It is computed as in `masing_kernels.slider_energy`.
+    """
     side = law_state(law, motion, "DIRECTION")
     m = law_state(law, motion, "BRANCH_SCALE")
     turn_force = law_state(law, motion, "TURN_FORCE")
@@ -163,8 +169,10 @@ def _slider_energy(law: str, cases: Cases, motion) -> np.ndarray:
     return law_state(law, motion, "TURN_ENERGY") + m * branch
 
 
-def reading_of_runs(law: str, cases: Cases, marched: Marched, energy, omega, extremes) -> Reading:
-    """Return the `Reading` of the observed cycles of n runs.
+def reading_of_runs(
+    law: str, cases: Cases, marched: LaneResults, energy, omega, extremes
+) -> Reading:
+    """Return the measures of the observed cycles of n runs.
 
     Parameters
     ----------
@@ -222,8 +230,8 @@ def reading_of_runs(law: str, cases: Cases, marched: Marched, energy, omega, ext
     return Reading(run, face[:, None], angle / omega, 2 * np.pi / omega)
 
 
-def integrate_harmonics(law: str, cases: Cases, marched: Marched, angle) -> Harmonics:
-    """Return integrals over the observed cycles with the cosine and the sine of the drive.
+def integrate_harmonics(law: str, cases: Cases, marched: LaneResults, angle) -> Harmonics:
+    """Integrate displacement, acceleration and friction with cosine and sine of the drive.
 
     The integrals of x'' follow from those of x by parts, and those of the friction from the equation. The sums of x are
     corrected at their ends to the sixth order, or to the fourth for a law of one stretch.
@@ -268,7 +276,7 @@ def integrate_harmonics(law: str, cases: Cases, marched: Marched, angle) -> Harm
 
 
 def _end_differences(law: str, cases: Cases, start, end) -> tuple:
-    """Return the differences (n,) of x'' and of x''' between two motions where the drive passes 0.
+    """Return differences (n,) of x'' and x''' between two motions where the drive passes 0.
 
     The friction of a law of one stretch is taken as constant, because its steps are finer.
     """
@@ -283,8 +291,8 @@ def _end_differences(law: str, cases: Cases, start, end) -> tuple:
 
 
 def _friction_rate(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the rate of the friction (n,) of a motion."""
-    if law in MASING:
+    """Return the derivative (n,) of the friction over mass with respect to the drive angle."""
+    if law in MASING_LAWS:
         tangent = law_state(law, motion, "TANGENT")
     else:
         tangent = cases.spring * (motion[:, Row.SLIP_SIGN] == 0)

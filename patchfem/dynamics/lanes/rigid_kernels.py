@@ -13,19 +13,24 @@ from typing import NamedTuple
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
-from .rows_kernels import At
+from .rows_kernels import RowStart
 
-STICK_IS_RIGID = True  # whether nothing moves in a stick
-EVENT_KEEPS_STICK = False  # whether a stick may go on after an event
-# Accepted error of an extrapolated cycle, as a fraction of its range; 0 asks for no proof
+STICK_IS_RIGID = True  # Whether nothing moves during a stick.
+EVENT_KEEPS_STICK = False  # Whether a stick may continue after an event.
+# Accepted error of an extrapolated cycle, as a fraction of its range; 0 requests no check.
 PROOF_TOL = 0.0
-N_KEPT = 0  # numbers of the state of the law that follow the map of a cycle
-N_NEWTON = 3  # Newton steps from the secant; the cubic of a step is then solved to round-off
-N_CROSSING = 4  # Newton steps from a guess that is worse than the secant
+# Number of law variables that follow the linear map of a cycle; Coulomb's law has none.
+N_LAW_VARIABLES = 0
+# Number of Newton steps from the secant; the cubic of a step is then solved to round-off.
+N_NEWTON = 3
+N_NEWTON_FROM_GUESS = 4  # Number of Newton steps from a guess that is worse than the secant.
 
 
 class LaneState(NamedTuple):
-    """State of a lane: slide and its derivative [m], sign of the slip (0 in a stick) and memory of the law."""
+    """State of a lane: displacement and speed [m], sign of the slip and memory of the law.
+
+    The sign is 0 in a stick.
+    """
 
     slide: float
     speed: float
@@ -34,7 +39,7 @@ class LaneState(NamedTuple):
 
 
 class AngleStep(NamedTuple):
-    """Step over an angle [rad] of the drive.
+    """Step of a march over an angle [rad] of the drive.
 
     - `s0`, `c0`, `s1`, `c1`: sine and cosine of the drive at its start and at its end.
     - `angle`: angle of the step [rad].
@@ -48,7 +53,7 @@ class AngleStep(NamedTuple):
 
 
 class TriedStep(NamedTuple):
-    """State after a step computed without events, and whether an event makes it invalid."""
+    """State after a step tried without events, and whether an event makes it invalid."""
 
     slide: float
     speed: float
@@ -57,7 +62,7 @@ class TriedStep(NamedTuple):
 
 
 class StepOutcome(NamedTuple):
-    """State at the end of a step and its event.
+    """State of a lane at the end of a step, and the event in the step.
 
     - `slide`, `speed`, `slip_sign`, `memory`: at the end of the step.
     - `event`: fraction of the step before the event, 1 without an event.
@@ -79,7 +84,7 @@ class StepOutcome(NamedTuple):
 
 
 class StickReading(NamedTuple):
-    """Stick and slip in a segment of a step.
+    """Fractions of stick and slip in a segment of a step.
 
     - `fraction`: fraction of the segment in which the interface sticks.
     - `slip_start`: fraction of the segment at which a slip starts inside it, 2 if none does.
@@ -92,7 +97,7 @@ class StickReading(NamedTuple):
 
 
 class CubicRoot(NamedTuple):
-    """Place of a root in [0, 1], and the value, slope and integral of the cubic there."""
+    """Root of a cubic in [0, 1], with value, slope and integral of the cubic there."""
 
     place: float
     value: float
@@ -101,15 +106,15 @@ class CubicRoot(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Slide and its derivative [m]."""
+    """Relative displacement [m] and its derivative with respect to the drive angle [m]."""
 
     slide: float
     speed: float
 
 
 @njit(**NJIT_INLINE)
-def cubic_root(y0, y1, m0, m1, lowest):
-    """Find where a cubic over [0, 1] crosses 0, by Newton's method from the secant.
+def find_cubic_root(y0, y1, m0, m1, lowest):
+    """Find the zero of a cubic on [0, 1] by Newton's method from the secant.
 
     Parameters
     ----------
@@ -139,7 +144,7 @@ def cubic_root(y0, y1, m0, m1, lowest):
 
 @njit(**NJIT_INLINE)
 def cubic_peak(g0, g1, m0, m1):
-    """Return the largest absolute value of a cubic over [0, 1].
+    """Return the largest absolute value of a cubic on [0, 1].
 
     The extremum inside is taken where the straight line through the slopes at the ends is 0.
 
@@ -161,7 +166,7 @@ def cubic_peak(g0, g1, m0, m1):
 
 @njit(**NJIT_INLINE)
 def drive_after(sine, cosine, angle):
-    """Return sine and cosine of the drive after a further angle, by their Taylor series.
+    """Return sine and cosine of the drive after a further angle, by Taylor series.
 
     Parameters
     ----------
@@ -185,7 +190,9 @@ def drive_after(sine, cosine, angle):
 
 @njit(**NJIT_INLINE)
 def friction_force(state, sine, workspace, lane):
-    """Return the friction over the mass in the angle of the drive [m], positive if it resists positive slip.
+    """Return the friction force over mass [m], positive if it resists positive slip.
+
+    Times are angles of the drive, so a force over mass is a length.
 
     Parameters
     ----------
@@ -200,17 +207,17 @@ def friction_force(state, sine, workspace, lane):
     -------
     float
     """
-    stiffness = workspace[At.STIFFNESS + lane]
-    stick_force = workspace[At.DRIVE + lane] * sine - stiffness * state.slide
-    limit = workspace[At.STATIC + lane]
+    stiffness = workspace[RowStart.STIFFNESS + lane]
+    stick_force = workspace[RowStart.DRIVE + lane] * sine - stiffness * state.slide
+    limit = workspace[RowStart.STATIC + lane]
     if state.slip_sign == 0.0:
         return min(max(stick_force, -limit), limit)
-    return state.slip_sign * workspace[At.KINETIC + lane]
+    return state.slip_sign * workspace[RowStart.KINETIC + lane]
 
 
 @njit(**NJIT_INLINE)
 def friction_rate(state, acceleration, workspace, lane, when):
-    """Return the rate of the friction.
+    """Return the derivative of the friction over mass with respect to the drive angle.
 
     The result is 0 for a rigid contact, whose output does not move in a stick.
 
@@ -233,7 +240,7 @@ def friction_rate(state, acceleration, workspace, lane, when):
 
 @njit(**NJIT_INLINE)
 def prepare_step(workspace, s0, c0):
-    """Prepare a step of all lanes; there is nothing to prepare.
+    """Prepare a step of all lanes; Coulomb's law needs no preparation.
 
     Parameters
     ----------
@@ -246,13 +253,13 @@ def prepare_step(workspace, s0, c0):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def records_own_peaks():
-    """Return whether `resolve_step` adds the peaks and the work of a step to the readings itself."""
+    """Return whether `resolve_step` adds peaks and work of a step to the readings itself."""
     return False
 
 
 @njit(**NJIT_INLINE)
 def slide_at_reversal(x, v, x1, v1, angle):
-    """Return the slide at a reversal in a step without an event.
+    """Return the relative displacement at a reversal in a step without an event.
 
     Such a step has no reversal, so the result is the slide at its end.
 
@@ -272,7 +279,7 @@ def slide_at_reversal(x, v, x1, v1, angle):
 
 @njit(**NJIT_INLINE)
 def irreversible_slide(x, memory, workspace, lane):
-    """Return the irreversible part of a slide.
+    """Return the irreversible part of the relative displacement [m].
 
     Parameters
     ----------
@@ -293,7 +300,7 @@ def irreversible_slide(x, memory, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def slip_increment(memory, event_memory, memory1, workspace, lane):
-    """Return the path of slip of a step.
+    """Return the slip path of a step [m].
 
     Parameters
     ----------
@@ -312,7 +319,9 @@ def slip_increment(memory, event_memory, memory1, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
-    """Return the friction at a reversal of the slide; 0, the mean of its values before and after the reversal.
+    """Return the friction over mass at a reversal.
+
+    It is 0, the mean of the values before and after the reversal.
 
     Parameters
     ----------
@@ -350,7 +359,7 @@ def is_sticking(v, slip_sign, memory, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def stick_fractions(start, end, workspace, lane, angle):
-    """Return the `StickReading` of a segment of a step.
+    """Return the stick and slip fractions in a segment of a step.
 
     Parameters
     ----------
@@ -371,23 +380,26 @@ def stick_fractions(start, end, workspace, lane, angle):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def set_derived_state(workspace, lane):
-    """Set the state of the law that follows from the common state of a new case; there is none."""
+    """Set the law variables of a new case that follow from its state; Coulomb's law has none."""
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def can_extrapolate(workspace, lane):
-    """Return whether the memory has had the same form at the last cycle ends, so that it follows the map of a cycle."""
+    """Return whether the memory may follow the linear map of a cycle.
+
+    It may if it has had the same form at the last cycle ends.
+    """
     return True
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def restore_derived_state(workspace, lane):
-    """Set the state of the law that follows from an extrapolated motion; there is none."""
+    """Set the law variables that follow from an extrapolated motion; Coulomb's law has none."""
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def newton_on_cubic(y0, m0, c2, c3, guess):
-    """Find the root of y0 + m0 u + c2 u^2 + c3 u^3 in [0, 1] by Newton's method from a guess.
+    """Find the root of y0 + m0 u + c2 u^2 + c3 u^3 in [0, 1] by Newton's method.
 
     Parameters
     ----------
@@ -398,7 +410,7 @@ def newton_on_cubic(y0, m0, c2, c3, guess):
     float
     """
     u = guess
-    for _ in range(N_CROSSING):
+    for _ in range(N_NEWTON_FROM_GUESS):
         slope = m0 + u * (2 * c2 + 3 * c3 * u)
         u = u - (y0 + u * (m0 + u * (c2 + u * c3))) / slope if slope != 0.0 else u
         u = min(max(u, 0.0), 1.0)
@@ -407,7 +419,7 @@ def newton_on_cubic(y0, m0, c2, c3, guess):
 
 @njit(**NJIT_INLINE)
 def linear_step(workspace, lane, s0, c0):
-    """Return the `Motion` after a step in a slip, by the coefficients of the exact step.
+    """Return the motion after a step during slip, from the exact step coefficients.
 
     Parameters
     ----------
@@ -420,29 +432,29 @@ def linear_step(workspace, lane, s0, c0):
     -------
     Motion
     """
-    x = workspace[At.SLIDE + lane]
-    v = workspace[At.SPEED + lane]
-    friction = workspace[At.SLIP_SIGN + lane] * workspace[At.KINETIC + lane]
+    x = workspace[RowStart.SLIDE + lane]
+    v = workspace[RowStart.SPEED + lane]
+    friction = workspace[RowStart.SLIP_SIGN + lane] * workspace[RowStart.KINETIC + lane]
     x1 = (
-        workspace[At.A11 + lane] * x
-        + workspace[At.A12 + lane] * v
-        + workspace[At.SX + lane] * s0
-        + workspace[At.CX + lane] * c0
-        - friction * workspace[At.RX + lane]
+        workspace[RowStart.A11 + lane] * x
+        + workspace[RowStart.A12 + lane] * v
+        + workspace[RowStart.SX + lane] * s0
+        + workspace[RowStart.CX + lane] * c0
+        - friction * workspace[RowStart.RX + lane]
     )
     v1 = (
-        workspace[At.A21 + lane] * x
-        + workspace[At.A22 + lane] * v
-        + workspace[At.SV + lane] * s0
-        + workspace[At.CV + lane] * c0
-        - friction * workspace[At.RV + lane]
+        workspace[RowStart.A21 + lane] * x
+        + workspace[RowStart.A22 + lane] * v
+        + workspace[RowStart.SV + lane] * s0
+        + workspace[RowStart.CV + lane] * c0
+        - friction * workspace[RowStart.RV + lane]
     )
     return Motion(x1, v1)
 
 
 @njit(**NJIT_INLINE)
 def try_step(workspace, lane, step, is_observed):
-    """Compute a step as if no event lay inside it: no stop, release or reversal.
+    """Try a step without events: no stop, release or reversal.
 
     Parameters
     ----------
@@ -456,12 +468,12 @@ def try_step(workspace, lane, step, is_observed):
     -------
     TriedStep
     """
-    x = workspace[At.SLIDE + lane]
-    slip_sign = workspace[At.SLIP_SIGN + lane]
+    x = workspace[RowStart.SLIDE + lane]
+    slip_sign = workspace[RowStart.SLIP_SIGN + lane]
     end = linear_step(workspace, lane, step.s0, step.c0)
     is_stuck = slip_sign == 0.0
-    force = workspace[At.DRIVE + lane] * step.s1 - workspace[At.STIFFNESS + lane] * x
-    is_released = abs(force) > workspace[At.STATIC + lane]
+    force = workspace[RowStart.DRIVE + lane] * step.s1 - workspace[RowStart.STIFFNESS + lane] * x
+    is_released = abs(force) > workspace[RowStart.STATIC + lane]
     stops = slip_sign * end.speed < 0.0 or (is_observed and end.speed == 0.0)
     x1 = x if is_stuck else end.slide
     return TriedStep(x1, 0.0 if is_stuck else end.speed, x1, is_released if is_stuck else stops)
@@ -469,7 +481,9 @@ def try_step(workspace, lane, step, is_observed):
 
 @njit(**NJIT_INLINE)
 def motion_from_rest(workspace, lane, angle, force, force_rate, force_bend):
-    """Return the `Motion` an angle after rest under force + force_rate t + force_bend t^2/2, by its Taylor series.
+    """Return the motion a given drive angle after rest, by Taylor series.
+
+    The force is force + force_rate t + force_bend t^2/2.
 
     Parameters
     ----------
@@ -483,18 +497,18 @@ def motion_from_rest(workspace, lane, angle, force, force_rate, force_bend):
     -------
     Motion
     """
-    damping = workspace[At.DAMPING + lane]
-    stiffness = workspace[At.STIFFNESS + lane]
+    damping = workspace[RowStart.DAMPING + lane]
+    stiffness = workspace[RowStart.STIFFNESS + lane]
     t = angle
     t2 = t * t
     e2 = damping * damping - stiffness
     slide = (
-        force * slide_by_force(t, damping, stiffness)
+        force * unit_force_slide(t, damping, stiffness)
         + force_rate * (t2 * t * (1.0 / 6 + t * (-damping / 24 + t * e2 / 120)))
         + force_bend * (t2 * t2 * (1.0 / 24 - t * damping / 120))
     )
     speed = (
-        force * speed_by_force(t, damping, stiffness)
+        force * unit_force_speed(t, damping, stiffness)
         + force_rate * (t2 * (0.5 + t * (-damping / 6 + t * e2 / 24)))
         + force_bend * (t2 * t * (1.0 / 6 - t * damping / 24))
     )
@@ -502,8 +516,8 @@ def motion_from_rest(workspace, lane, angle, force, force_rate, force_bend):
 
 
 @njit(**NJIT_INLINE)
-def slide_by_force(t, damping, stiffness):
-    """Return the slide after rest under a force of 1.
+def unit_force_slide(t, damping, stiffness):
+    """Return the displacement after rest under a unit force.
 
     Parameters
     ----------
@@ -521,13 +535,13 @@ def slide_by_force(t, damping, stiffness):
 
 
 @njit(**NJIT_INLINE)
-def speed_by_force(t, damping, stiffness):
-    """Return the speed after rest under a force of 1.
+def unit_force_speed(t, damping, stiffness):
+    """Return the speed after rest under a unit force.
 
     Parameters
     ----------
     t, damping, stiffness
-        See `slide_by_force`.
+        See `unit_force_slide`.
 
     Returns
     -------
@@ -552,14 +566,14 @@ def resolve_step(workspace, lane, step):
     -------
     StepOutcome
     """
-    if workspace[At.SLIP_SIGN + lane] == 0.0:
+    if workspace[RowStart.SLIP_SIGN + lane] == 0.0:
         return resolve_release(workspace, lane, step)
     return resolve_stop(workspace, lane, step)
 
 
 @njit(**NJIT_INLINE)
 def resolve_release(workspace, lane, step):
-    """Compute a step from a stick, in which the interface may start to slip.
+    """Compute a step that begins in stick and may contain a release.
 
     Parameters
     ----------
@@ -570,10 +584,10 @@ def resolve_release(workspace, lane, step):
     -------
     StepOutcome
     """
-    x = workspace[At.SLIDE + lane]
-    stiffness = workspace[At.STIFFNESS + lane]
-    drive = workspace[At.DRIVE + lane]
-    static = workspace[At.STATIC + lane]
+    x = workspace[RowStart.SLIDE + lane]
+    stiffness = workspace[RowStart.STIFFNESS + lane]
+    drive = workspace[RowStart.DRIVE + lane]
+    static = workspace[RowStart.STATIC + lane]
     n0 = drive * step.s0 - stiffness * x
     n1 = drive * step.s1 - stiffness * x
     side = 1.0 if n1 > 0.0 else -1.0
@@ -583,9 +597,9 @@ def resolve_release(workspace, lane, step):
         return StepOutcome(x, 0.0, 0.0, x, 1.0, x, 0.0, x, x, 0.0)
     lowest = -1.0 if reserve < 0.0 else 0.0
     slope = -step.angle * side * drive * step.c0
-    root = cubic_root(reserve, reserve1, slope, -step.angle * side * drive * step.c1, lowest)
+    root = find_cubic_root(reserve, reserve1, slope, -step.angle * side * drive * step.c1, lowest)
     force = side * (static - root.value)
-    net_force = force - side * workspace[At.KINETIC + lane]
+    net_force = force - side * workspace[RowStart.KINETIC + lane]
     force_rate = -side * root.slope / step.angle
     force_bend = -(force + stiffness * x)
     rest = step.angle - root.place * step.angle
@@ -596,7 +610,9 @@ def resolve_release(workspace, lane, step):
 
 @njit(**NJIT_INLINE)
 def resolve_stop(workspace, lane, step):
-    """Compute a step from a slip, which may stop and then stick or slip back.
+    """Compute a step that begins in slip and may contain a stop.
+
+    After the stop the interface sticks or slips back.
 
     Parameters
     ----------
@@ -607,13 +623,13 @@ def resolve_stop(workspace, lane, step):
     -------
     StepOutcome
     """
-    x = workspace[At.SLIDE + lane]
-    v = workspace[At.SPEED + lane]
-    sign = workspace[At.SLIP_SIGN + lane]
-    damping = workspace[At.DAMPING + lane]
-    stiffness = workspace[At.STIFFNESS + lane]
-    drive = workspace[At.DRIVE + lane]
-    friction = sign * workspace[At.KINETIC + lane]
+    x = workspace[RowStart.SLIDE + lane]
+    v = workspace[RowStart.SPEED + lane]
+    sign = workspace[RowStart.SLIP_SIGN + lane]
+    damping = workspace[RowStart.DAMPING + lane]
+    stiffness = workspace[RowStart.STIFFNESS + lane]
+    drive = workspace[RowStart.DRIVE + lane]
+    friction = sign * workspace[RowStart.KINETIC + lane]
     end = linear_step(workspace, lane, step.s0, step.c0)
     if not sign * end.speed < 0.0:
         return StepOutcome(
@@ -630,10 +646,10 @@ def resolve_stop(workspace, lane, step):
         )
     rate = sign * (drive * step.s0 - stiffness * x - damping * v - friction)
     rate1 = sign * (drive * step.s1 - stiffness * end.slide - damping * end.speed - friction)
-    root = cubic_root(sign * v, sign * end.speed, step.angle * rate, step.angle * rate1, 0.0)
+    root = find_cubic_root(sign * v, sign * end.speed, step.angle * rate, step.angle * rate1, 0.0)
     stop_slide = x + sign * step.angle * root.integral
     acceleration = root.slope * sign / step.angle
-    sticks = abs(acceleration + friction) <= workspace[At.STATIC + lane]
+    sticks = abs(acceleration + friction) <= workspace[RowStart.STATIC + lane]
     if sticks:
         return StepOutcome(
             stop_slide,
@@ -648,8 +664,8 @@ def resolve_stop(workspace, lane, step):
             -acceleration,
         )
     rest = step.angle - root.place * step.angle
-    x1 = end.slide + 2 * friction * slide_by_force(rest, damping, stiffness)
-    v1 = end.speed + 2 * friction * speed_by_force(rest, damping, stiffness)
+    x1 = end.slide + 2 * friction * unit_force_slide(rest, damping, stiffness)
+    v1 = end.speed + 2 * friction * unit_force_speed(rest, damping, stiffness)
     return StepOutcome(
         x1, v1, -sign, x1, root.place, stop_slide, 0.0, stop_slide, stop_slide, 2 * friction
     )

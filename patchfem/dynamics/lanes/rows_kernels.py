@@ -1,21 +1,23 @@
-"""Rows of the workspace of `loop_kernels`; no compiled code.
+"""Row layout of the workspace of `loop_kernels`, without compiled code.
 
-The workspace is a flat array in which row r of lane i is the element r * LANES + i, so that a compiler knows the distance
-of any two elements and takes several lanes at once. Kernels write `workspace[At.SLIDE + lane]`: `At` has the elements of
-lane 0 for every row of `Row`, and `StretchAt`, `SliderAt` and `TableAt` for the rows of the state of a law. Lengths are in
-m and times are angles of the drive [rad], so a force over the mass is in m and an energy over the mass in m^2.
+The workspace is a flat array in which row r of lane i is the element r * LANES + i, so that a compiler knows the
+distance of any two elements and takes several lanes at once. Kernels write `workspace[RowStart.SLIDE + lane]`:
+`RowStart` has the elements of lane 0 for every row of `Row`, and `StretchRowStart`, `SliderRowStart` and
+`TableRowStart` for the rows of the state of a law. Lengths are in m and times are angles of the drive [rad], so a
+force over the mass is in m and an energy over the mass in m^2.
 """
 
 from enum import IntEnum
 
-LANES = 32  # number of cases that march side by side
-GROUP_BITS = 3  # lanes march in groups of two to this power while a lane of the group has a case
-# Two cycles are equal if their ends differ by less than this fraction of their range
+LANES = 32  # Number of cases that march side by side; a compiler computes several of them at once.
+# Lanes march in groups of two to this power as long as a lane of the group has a case.
+GROUP_BITS = 3
+# Two cycles count as equal if their ends differ by less than this fraction of their range.
 PERIODIC_TOL = 1e-9
 
 
 class Row(IntEnum):
-    """Rows that every law has.
+    """Row indices of the workspace that all friction laws share.
 
     Motion: the state, then the sums of the run, then the extremes and the phasor of the cycle.
 
@@ -167,8 +169,8 @@ N_LAW_NUMBERS = 6
 FIRST_READING = int(Row.MAX_ACCELERATION)
 N_READINGS = Row.CASE_INDEX - Row.MAX_ACCELERATION
 
-# After these rows come the ends of the last cycles, the latest first. A cycle end holds STATE_ROWS, SUM_ROWS and the
-# first numbers of the state of the law, from which `extrapolation_kernels` learns how the motion settles.
+# These rows are followed by the ends of the last cycles, the latest first. A cycle end holds STATE_ROWS, SUM_ROWS and
+# the first variables of the law, from which `extrapolation_kernels` learns how the motion settles.
 CYCLE_ENDS = len(Row)
 N_CYCLE_ENDS = 4
 STATE_ROWS = (int(Row.SLIDE), int(Row.SPEED), int(Row.MEMORY), int(Row.SLIP_SIGN))
@@ -176,7 +178,7 @@ SUM_ROWS = (int(Row.SLIP_PATH), int(Row.WORK_SUM), int(Row.LOSS_SUM), int(Row.PO
 
 
 class CycleEnd(IntEnum):
-    """Places in the end of a cycle: those of STATE_ROWS, of SUM_ROWS, and of the first number of the law."""
+    """Indices of the quantities in a stored cycle end: state, sums and law variables."""
 
     SLIDE = 0
     SPEED = 1
@@ -189,15 +191,15 @@ class CycleEnd(IntEnum):
     LAW_STATE = 8
 
 
-MAX_KEPT = 38  # largest number of numbers of the state of a law in a cycle end
-CYCLE_END_SIZE = CycleEnd.LAW_STATE + MAX_KEPT
+MAX_LAW_VARIABLES = 38  # Maximum number of law variables in a cycle end.
+CYCLE_END_SIZE = CycleEnd.LAW_STATE + MAX_LAW_VARIABLES
 
-# From this row on there is the state of a law in addition to MEMORY. In a motion it follows the first N_STATE numbers.
+# This is the first row of the law variables in addition to MEMORY. In a motion they follow the first N_STATE numbers.
 LAW_STATE = CYCLE_ENDS + N_CYCLE_ENDS * CYCLE_END_SIZE
 
 
 class StretchRow(IntEnum):
-    """Rows of the state of a law of one stretch.
+    """Row indices of the variables of a friction law with a single stretch.
 
     - FRICTION: friction over the mass [m]
     - STRETCH_SQUARE: mean square of the stretches [m^2]
@@ -212,7 +214,7 @@ class StretchRow(IntEnum):
 
 
 class SliderRow(IntEnum):
-    """Rows of the state of parallel sliders (Masing's rule).
+    """Row indices of the variables of parallel sliders in the Masing (Iwan) model.
 
     - DIRECTION: sign of the speed
     - BRANCH_SCALE: m of Masing's rule
@@ -263,13 +265,15 @@ class SliderRow(IntEnum):
     REVERSALS = LAW_STATE + 22
 
 
-REVERSAL_SIZE = 4  # numbers of a reversal on the stack
+REVERSAL_SIZE = 4  # Number of quantities of a reversal on the stack.
 MAX_REVERSALS = 63
 CURVE_STATE = SliderRow.REVERSALS + REVERSAL_SIZE * MAX_REVERSALS
 
 
 class TableRow(IntEnum):
-    """Rows of a first loading that is looked up in a table, after those of the sliders.
+    """Row indices of a first-loading curve that is looked up in a table.
+
+    They follow the rows of the sliders.
 
     - CURVE_PLACE: abscissa that is looked up
     - YIELD_INDEX: number of the last yield before it
@@ -287,7 +291,7 @@ class TableRow(IntEnum):
 
 
 class YieldColumn(IntEnum):
-    """Columns of a yield in the table of a first loading.
+    """Column indices of a yield in the table of a first-loading curve.
 
     - YIELD: its slide over YIELD_LENGTH
     - FORCE, SLOPE, MOMENT: F, S and B of `table_curve_kernels` from there on
@@ -300,22 +304,23 @@ class YieldColumn(IntEnum):
 
 
 N_COLUMNS = len(YieldColumn)
-N_YIELDS = 512  # number of yields of a table; the first is at 0 and the last beyond all slides
-N_PARTS = 128  # number of equal parts of the range of the yields
-# After the yields a table has the number of yields before each part of their range, the first yield, and the number of
-# parts per slide.
+N_YIELDS = 512  # Number of yields in a table; the first is at 0 and the last beyond all motions.
+# Number of equal parts of the range of the yields, which shorten the search for a yield.
+N_PARTS = 128
+# After the yields a table holds the number of yields before each part of their range, the first yield, and the number
+# of parts per displacement.
 PART_STARTS = N_COLUMNS * N_YIELDS
 FIRST_YIELD = PART_STARTS + N_PARTS
 PARTS_PER_SLIDE = FIRST_YIELD + 1
 TABLE_SIZE = FIRST_YIELD + 2
 
 
-def find_elements(name: str, rows: type[IntEnum]) -> type[IntEnum]:
-    """Return an enumeration of the elements of the workspace at which the rows begin."""
+def make_row_starts(name: str, rows: type[IntEnum]) -> type[IntEnum]:
+    """Return an enumeration of the workspace indices at which the given rows begin."""
     return IntEnum(name, {row: LANES * value for row, value in rows.__members__.items()})
 
 
-At = find_elements("At", Row)
-StretchAt = find_elements("StretchAt", StretchRow)
-SliderAt = find_elements("SliderAt", SliderRow)
-TableAt = find_elements("TableAt", TableRow)
+RowStart = make_row_starts("RowStart", Row)
+StretchRowStart = make_row_starts("StretchRowStart", StretchRow)
+SliderRowStart = make_row_starts("SliderRowStart", SliderRow)
+TableRowStart = make_row_starts("TableRowStart", TableRow)

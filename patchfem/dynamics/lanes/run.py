@@ -1,4 +1,4 @@
-"""Cases of one mode, one interface and a sine as arrays, and their march in lanes."""
+"""March in lanes of cases with one mode, one interface and a sinusoidal drive."""
 
 from functools import cache
 from typing import NamedTuple
@@ -9,16 +9,23 @@ from ...compiled import instantiate, load
 from . import rows_kernels as rows
 from .rows_kernels import Row
 
-HERE = "dynamics.lanes"
-MASING = ("masing", "table")  # laws of Masing's rule, named by the curve of their first loading
-N_TERMS = 24  # terms of a Taylor series over a step; the rest is below round-off for rates up to 2 per step
-NO_YIELD = 1e300  # yield slide of the unused entries of a table after its last yield
-MAX_SLIDE = 1e100  # a larger slide [m] is that of a march that ran away with too long steps; its energies overflow
-N_PERIODIC = 3  # number of cycles that are read of a motion that repeats
+LANES_PACKAGE = "dynamics.lanes"
+MASING_LAWS = (
+    "masing",
+    "table",
+)  # Laws of the Masing (Iwan) model, named by the form of their first-loading curve.
+# Number of terms of a Taylor series over a step; the remainder is below round-off for rates up to 2 per step.
+N_TAYLOR_TERMS = 24
+NO_YIELD = 1e300  # Yield displacement of the unused entries of a table after its last yield.
+# A larger displacement [m] belongs to a march that diverged with too long steps; its energies would overflow.
+MAX_SLIDE = 1e100
+N_REPEATED_CYCLES_READ = 3  # Number of cycles that are measured of a motion that repeats.
 
 
 class Cases(NamedTuple):
-    """n cases of x'' + D x' + W x = P sin - f in the angle of their drive; x is the slide [m].
+    """Cases of one mode and one interface: x'' + D x' + W x = P sin - f.
+
+    Times are angles of the drive, and x is the relative displacement [m].
 
     - `damping`, `stiffness`, `drive` (n,): D, W and P.
     - `kinetic`, `static` (n,): friction over the mass in a slip, and its maximum in a stick [m].
@@ -29,7 +36,7 @@ class Cases(NamedTuple):
     - `x`, `v` (n,): slide and speed at the start.
     - `law` (n, k): further numbers of the law. Laws of one stretch: as their `rate_equation` takes
       them. Masing's rule: two numbers of the curve (chi + 1 and q of a power), the fraction of
-      `yield_length` at which half of the friction slips, and the table of a curve (`curve_tables`).
+      `yield_length` at which half of the friction slips, and the table of a curve (`make_curve_tables`).
     """
 
     damping: np.ndarray
@@ -46,8 +53,8 @@ class Cases(NamedTuple):
     law: np.ndarray
 
 
-class Marched(NamedTuple):
-    """Results of n cases that were marched.
+class LaneResults(NamedTuple):
+    """Results of a march of n cases in lanes.
 
     - `start`, `observed_start`, `motion` (n, N_STATE and the state of the law): motion at the
       start, at the start of the observed cycles, and at the end.
@@ -67,12 +74,12 @@ class Marched(NamedTuple):
     step: float
 
     def reading(self, name: str) -> np.ndarray:
-        """Return a reading (n,) by its name in `rows_kernels`."""
+        """Return a reading (n,) of the observed cycles by its name in `rows_kernels`."""
         return self.readings[:, Row[name] - rows.FIRST_READING]
 
 
 def has_one_stretch(law: str) -> bool:
-    """Return whether the memory of a law is one stretch.
+    """Return whether the memory of a friction law is a single stretch.
 
     The law is then named by the module of its kernels, such as "friction.laws.tanh_kernels".
     """
@@ -81,35 +88,42 @@ def has_one_stretch(law: str) -> bool:
 
 @cache
 def load_loop(law: str):
-    """Load the compiled loop of a law: "rigid", "yielding", "masing", "table" or the kernels of a law of one stretch."""
-    loop = f"{HERE}.loop_kernels"
+    """Load the compiled march for a friction law.
+
+    The law is "rigid", "yielding", "masing", "table" or the module of the kernels of a law of
+    one stretch.
+    """
+    loop = f"{LANES_PACKAGE}.loop_kernels"
     if law == "rigid":
         return load(loop)
     if has_one_stretch(law):
-        kernels = instantiate(f"{HERE}.flowing_kernels", {"friction": law})
+        kernels = instantiate(f"{LANES_PACKAGE}.flowing_kernels", {"friction": law})
     elif law == "table":
-        curve = f"{HERE}.table_curve_kernels"
-        kernels = instantiate(f"{HERE}.masing_kernels", {"curve": curve})
+        curve = f"{LANES_PACKAGE}.table_curve_kernels"
+        kernels = instantiate(f"{LANES_PACKAGE}.masing_kernels", {"curve": curve})
     else:
-        kernels = f"{HERE}.{law}_kernels"
-    parts = {"law": kernels, "lanes": instantiate(f"{HERE}.lane_kernels", {"law": kernels})}
-    extrapolation = instantiate(f"{HERE}.extrapolation_kernels", parts)
-    observation = instantiate(f"{HERE}.observation_kernels", parts)
+        kernels = f"{LANES_PACKAGE}.{law}_kernels"
+    parts = {
+        "law": kernels,
+        "lanes": instantiate(f"{LANES_PACKAGE}.lane_kernels", {"law": kernels}),
+    }
+    extrapolation = instantiate(f"{LANES_PACKAGE}.extrapolation_kernels", parts)
+    observation = instantiate(f"{LANES_PACKAGE}.observation_kernels", parts)
     return instantiate(loop, parts | {"extrapolation": extrapolation, "observation": observation})
 
 
 def count_law_rows(law: str) -> int:
-    """Return the number of rows of the state of a law in addition to that of every law."""
+    """Return the number of workspace rows for the additional variables of a friction law."""
     if has_one_stretch(law):
         return len(rows.StretchRow)
-    if law in MASING:
+    if law in MASING_LAWS:
         n_table_rows = len(rows.TableRow) if law == "table" else 0
         return rows.CURVE_STATE - rows.LAW_STATE + n_table_rows
     return 0
 
 
-def curve_tables(groups) -> np.ndarray:
-    """Return the numbers (n, m) that Masing's rule needs for n sets of Jenkins elements.
+def make_curve_tables(groups) -> np.ndarray:
+    """Return the tables (n, m) of the first-loading curves of n sets of Jenkins elements.
 
     Parameters
     ----------
@@ -151,8 +165,8 @@ def curve_tables(groups) -> np.ndarray:
     return np.concatenate([heads, tables], axis=1)
 
 
-def number_scales(law: str, force, omega) -> np.ndarray:
-    """Return the factors (n, k) that turn the numbers of a law of one stretch into those of cases.
+def law_number_scales(law: str, force, omega) -> np.ndarray:
+    """Return the factors (n, k) that scale the parameters of a law to those of cases.
 
     Parameters
     ----------
@@ -180,7 +194,7 @@ def number_scales(law: str, force, omega) -> np.ndarray:
 
 
 def taylor_step(damping, stiffness, angle: float, start: tuple, forces: tuple) -> tuple:
-    """Integrate x'' + D x' + W x = g over an angle by its Taylor series.
+    """Integrate x'' + D x' + W x = g over an angle by Taylor series.
 
     Parameters
     ----------
@@ -203,7 +217,7 @@ def taylor_step(damping, stiffness, angle: float, start: tuple, forces: tuple) -
     x = y[0] + angle * y[1]
     v = y[1]
     power = 1.0
-    for k in range(N_TERMS):
+    for k in range(N_TAYLOR_TERMS):
         force = forces[k] if k < len(forces) else 0.0
         y.append(force - damping * y[k + 1] - stiffness * y[k])
         power *= angle / (k + 1)
@@ -212,8 +226,8 @@ def taylor_step(damping, stiffness, angle: float, start: tuple, forces: tuple) -
     return x, v
 
 
-def case_numbers(law: str, cases: Cases, steps: int) -> np.ndarray:
-    """Return the numbers of cases in the order of their rows in the workspace, and their tables.
+def make_case_numbers(law: str, cases: Cases, steps: int) -> np.ndarray:
+    """Return the parameters of cases in the order of their workspace rows, and their tables.
 
     The first number belongs in row `rows_kernels.FIRST_NUMBER`.
 
@@ -263,7 +277,7 @@ def step_coefficients(cases: Cases, spring, angle: float) -> np.ndarray:
     (n, 10) array
         Its columns are named in `rows_kernels`.
     """
-    quarters = np.arange(N_TERMS) * np.pi / 2
+    quarters = np.arange(N_TAYLOR_TERMS) * np.pi / 2
     sines = np.round(np.sin(quarters)).tolist()
     cosines = np.round(np.cos(quarters)).tolist()
     stiffness = cases.stiffness + spring
@@ -280,17 +294,23 @@ def step_coefficients(cases: Cases, spring, angle: float) -> np.ndarray:
     return np.array([*slide, *speed, *by_force, *by_sine, *by_cosine]).T
 
 
-def drive_table(steps: int) -> np.ndarray:
-    """Return sine and cosine of the drive at the steps of a cycle, and the angle of a step, (3, steps + 1)."""
+def make_drive_table(steps: int) -> np.ndarray:
+    """Return sine and cosine of the drive at the steps of a cycle, and the step angle.
+
+    They are the rows of an array (3, steps + 1).
+    """
     angle = 2 * np.pi * np.arange(steps + 1) / steps
     waves = np.array([np.sin(angle), np.cos(angle)])
-    # The round-off of a zero would make cycles differ in the last bit.
+    # Zeros are set exactly, because the round-off of a zero would make cycles differ in the last bit.
     waves[np.abs(waves) < 1e-15] = 0.0
     return np.concatenate([waves, np.full((1, steps + 1), 2 * np.pi / steps)])
 
 
 def initial_motion(law: str, cases: Cases) -> np.ndarray:
-    """Return the motion (n, N_STATE and the state of the law) of cases at their start."""
+    """Return the motion of cases at their start.
+
+    It has the shape (n, N_STATE and the number of law variables).
+    """
     motion = np.zeros((len(cases.damping), rows.N_STATE + count_law_rows(law)))
     motion[:, Row.SLIDE] = cases.x
     motion[:, Row.SPEED] = cases.v
@@ -300,7 +320,7 @@ def initial_motion(law: str, cases: Cases) -> np.ndarray:
         moving = np.where(cases.v == 0, np.sign(cases.drive), np.sign(cases.v))
         motion[:, Row.SLIP_SIGN] = moving
         motion[:, Row.MEMORY] = 0.0
-    if law in MASING:
+    if law in MASING_LAWS:
         moving = np.select([cases.v != 0, cases.x != 0], [cases.v, -cases.x], cases.drive)
         direction = np.sign(moving)
         direction[direction == 0] = 1.0
@@ -321,7 +341,7 @@ def initial_motion(law: str, cases: Cases) -> np.ndarray:
 
 
 def law_state(law: str, motion, name: str) -> np.ndarray:
-    """Return a row of the state of a law by its name.
+    """Return a law variable (n,) of a motion by its row name.
 
     Parameters
     ----------
@@ -340,7 +360,7 @@ def law_state(law: str, motion, name: str) -> np.ndarray:
 
 
 def continue_march(law: str, cases: Cases, motion, cycles: int, steps: int) -> tuple:
-    """March cases over more cycles, or until they repeat.
+    """March cases over more cycles, or until their motion repeats.
 
     The last cycle then stands for those that follow.
 
@@ -363,23 +383,23 @@ def continue_march(law: str, cases: Cases, motion, cycles: int, steps: int) -> t
     history = np.zeros((n, cycles, 4))
     n_done = np.zeros(n, np.int64)
     motion = motion.copy()
-    numbers = case_numbers(law, cases, steps)
+    numbers = make_case_numbers(law, cases, steps)
     workspace = make_workspace(numbers, motion)
     load_loop(law).march(
-        numbers, np.arange(n), motion, drive_table(steps), cycles, history, n_done, *workspace
+        numbers, np.arange(n), motion, make_drive_table(steps), cycles, history, n_done, *workspace
     )
     repeat_last_cycles(history, n_done)
     return history, motion
 
 
 def repeat_last_cycles(history, n_done) -> None:
-    """Fill the history (n, c, 4) of cases whose motion repeats after so many cycles (n,)."""
+    """Fill the history (n, c, 4) of cases whose motion repeats after given cycles (n,)."""
     for case in np.flatnonzero(n_done < history.shape[1]):
         history[case, n_done[case] :] = history[case, n_done[case] - 1]
 
 
 def output_accelerations(law: str, cases: Cases, motion, cycles: int, steps: int) -> np.ndarray:
-    """Return the absolute acceleration of the output [m s-2] at the start and after every step.
+    """Return the absolute output acceleration [m s-2] at the start and after every step.
 
     Parameters
     ----------
@@ -391,14 +411,14 @@ def output_accelerations(law: str, cases: Cases, motion, cycles: int, steps: int
     (n, cycles * steps + 1) array
     """
     n = len(cases.damping)
-    numbers = case_numbers(law, cases, steps)
+    numbers = make_case_numbers(law, cases, steps)
     motion = motion.copy()
     accelerations = np.empty((n, cycles * steps + 1))
     load_loop(law).observe(
         numbers,
         np.arange(n),
         motion,
-        drive_table(steps),
+        make_drive_table(steps),
         cycles,
         np.zeros((n, cycles, 4)),
         np.zeros(n, np.int64),
@@ -410,15 +430,15 @@ def output_accelerations(law: str, cases: Cases, motion, cycles: int, steps: int
 
 
 def make_workspace(numbers, motion) -> tuple:
-    """Return the workspace of the lanes for cases, and an array for the numbers of lanes."""
+    """Return the workspace of the lanes for cases, and an array for lane indices."""
     n_law_state = motion.shape[1] - rows.N_STATE
     table_size = numbers.shape[1] - rows.N_NUMBERS
     n_rows = rows.LAW_STATE + n_law_state + table_size
     return np.zeros(n_rows * rows.LANES), np.zeros(rows.LANES + 1, np.int64)
 
 
-def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> Marched:
-    """March cases from their start and read their last cycles.
+def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> LaneResults:
+    """March cases from their start and measure their last cycles.
 
     Parameters
     ----------
@@ -432,13 +452,13 @@ def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> March
 
     Returns
     -------
-    Marched
+    LaneResults
         All numbers of a march that ran away are NaN.
     """
     loop = load_loop(law)
     n = len(cases.damping)
-    numbers = case_numbers(law, cases, steps)
-    table = drive_table(steps)
+    numbers = make_case_numbers(law, cases, steps)
+    table = make_drive_table(steps)
     order = np.arange(n)
     start = initial_motion(law, cases)
     motion = start.copy()
@@ -448,7 +468,7 @@ def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> March
     workspace = make_workspace(numbers, motion)
     loop.march(numbers, order, motion, table, cycles - window, history, n_before, *workspace)
     observed_start = motion.copy()
-    n_observed = np.where(n_before < cycles - window, min(N_PERIODIC, window), window)
+    n_observed = np.where(n_before < cycles - window, min(N_REPEATED_CYCLES_READ, window), window)
     for count in np.unique(n_observed).tolist():
         loop.observe(
             numbers,
@@ -467,4 +487,4 @@ def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> March
     for values in (observed_start, motion, history, readings):
         values[runs_away] = np.nan
     step = 2 * np.pi / steps
-    return Marched(start, observed_start, motion, history, readings, n_before, n_observed, step)
+    return LaneResults(start, observed_start, motion, history, readings, n_before, n_observed, step)

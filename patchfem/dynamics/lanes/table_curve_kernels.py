@@ -1,11 +1,11 @@
-"""Force of parallel Jenkins elements in their first loading, linear between yields.
+"""First-loading curve of parallel Jenkins elements, linear between yields.
 
 With the force over the stiffness and YIELD_LENGTH, and the slide over YIELD_LENGTH w,
 
     g(w) = F + S w,
 
 where F = sum k y over the elements that have yielded and S = sum k over the others, with the stiffness k and the yield
-slide y of an element. A case has a table after its numbers (`run.curve_tables`): of each yield its place, F, S and
+slide y of an element. A case has a table after its numbers (`run.make_curve_tables`): of each yield its place, F, S and
 B = sum k y^2. In a step the table is walked through once, from where the last step ended. After an event the walk starts
 at an equal part of the range of the yields, of which the table has the first yield. What is found is written into rows of
 the workspace, because a compiler takes several lanes at once only where it knows the distance of any two numbers. A
@@ -23,25 +23,28 @@ from .rows_kernels import (
     PART_STARTS,
     PARTS_PER_SLIDE,
     TABLE_SIZE,
-    TableAt,
     TableRow,
+    TableRowStart,
     YieldColumn,
 )
 
-# element of the workspace at which the table of the first lane begins
+# Workspace index at which the table of the first lane begins.
 TABLE_START = (CURVE_STATE + len(TableRow)) * LANES
-# Longest step, over YIELD_LENGTH; Newton's method finds the end of a longer one badly
+# Maximum step over YIELD_LENGTH; Newton's method converges badly to the end of a longer step.
 MAX_STEP = 0.25
-LOOKS_AHEAD = True  # whether `prepare_lookup` has something to do
-# Where the numbers of the curve are: in the table, looked up by `prepare_lookup`, or those of the start of the step.
+LOOKS_AHEAD = True  # Whether `prepare_lookup` has an effect.
+# Codes of the place where the numbers of the curve are: in the table, looked up by `prepare_lookup`, or stored at the
+# start of the step.
 IN_TABLE = 0
 PREPARED = 1
 AT_START = 2
 
 
 @njit(**NJIT_INLINE)
-def walk_to(first_guess, w, workspace, lane):
-    """Find the last yield not beyond an abscissa by walking from a guess, and store its index.
+def find_yield_from_guess(first_guess, w, workspace, lane):
+    """Find the last yield before an abscissa by a linear search from a guess.
+
+    Its index is stored.
 
     Parameters
     ----------
@@ -58,12 +61,12 @@ def walk_to(first_guess, w, workspace, lane):
         n += 1
     while w < workspace[table + N_COLUMNS * n]:
         n -= 1
-    workspace[TableAt.YIELD_INDEX + lane] = n
+    workspace[TableRowStart.YIELD_INDEX + lane] = n
 
 
 @njit(**NJIT_INLINE)
 def find_yield(w, workspace, lane):
-    """Return the workspace index of the last yield not beyond an abscissa.
+    """Return the workspace index of the last yield before an abscissa.
 
     The yield of the last search is tried first, then the first yield of the interval of the table that contains w.
 
@@ -78,31 +81,35 @@ def find_yield(w, workspace, lane):
     -------
     int
     """
-    k = int(workspace[TableAt.YIELD_INDEX + lane])
+    k = int(workspace[TableRowStart.YIELD_INDEX + lane])
     table = TABLE_START + TABLE_SIZE * lane
     if w < workspace[table + N_COLUMNS * k] or w >= workspace[table + N_COLUMNS * (k + 1)]:
         part = (w - workspace[table + FIRST_YIELD]) * workspace[table + PARTS_PER_SLIDE]
         k = 0
         if part > 0.0:
             k = int(workspace[table + PART_STARTS + int(min(part, N_PARTS - 1.0))])
-        walk_to(k, w, workspace, lane)
-    return table + N_COLUMNS * int(workspace[TableAt.YIELD_INDEX + lane])
+        find_yield_from_guess(k, w, workspace, lane)
+    return table + N_COLUMNS * int(workspace[TableRowStart.YIELD_INDEX + lane])
 
 
 @njit(**NJIT_INLINE)
 def prepare_lookup(workspace, lane):
-    """Look up the curve of a lane at CURVE_PLACE."""
-    start = int(workspace[TableAt.YIELD_INDEX + lane])
-    walk_to(start, workspace[TableAt.CURVE_PLACE + lane], workspace, lane)
-    place = TABLE_START + TABLE_SIZE * lane + N_COLUMNS * int(workspace[TableAt.YIELD_INDEX + lane])
-    workspace[TableAt.PREPARED_FORCE + lane] = workspace[place + YieldColumn.FORCE]
-    workspace[TableAt.PREPARED_SLOPE + lane] = workspace[place + YieldColumn.SLOPE]
-    workspace[TableAt.PREPARED_MOMENT + lane] = workspace[place + YieldColumn.MOMENT]
+    """Look up the first-loading curve of a lane at the prepared abscissa."""
+    start = int(workspace[TableRowStart.YIELD_INDEX + lane])
+    find_yield_from_guess(start, workspace[TableRowStart.CURVE_PLACE + lane], workspace, lane)
+    place = (
+        TABLE_START
+        + TABLE_SIZE * lane
+        + N_COLUMNS * int(workspace[TableRowStart.YIELD_INDEX + lane])
+    )
+    workspace[TableRowStart.PREPARED_FORCE + lane] = workspace[place + YieldColumn.FORCE]
+    workspace[TableRowStart.PREPARED_SLOPE + lane] = workspace[place + YieldColumn.SLOPE]
+    workspace[TableRowStart.PREPARED_MOMENT + lane] = workspace[place + YieldColumn.MOMENT]
 
 
 @njit(**NJIT_INLINE)
 def finish_step(workspace, lane, event):
-    """Start the next step where this one ended, unless it contains an event.
+    """Copy the curve values at the end of a step to its start, unless it contains an event.
 
     Parameters
     ----------
@@ -111,19 +118,19 @@ def finish_step(workspace, lane, event):
     event : bool
         Whether the step has an event.
     """
-    force = workspace[TableAt.START_FORCE + lane]
-    moment = workspace[TableAt.START_MOMENT + lane]
-    workspace[TableAt.START_FORCE + lane] = (
-        force if event else workspace[TableAt.PREPARED_FORCE + lane]
+    force = workspace[TableRowStart.START_FORCE + lane]
+    moment = workspace[TableRowStart.START_MOMENT + lane]
+    workspace[TableRowStart.START_FORCE + lane] = (
+        force if event else workspace[TableRowStart.PREPARED_FORCE + lane]
     )
-    workspace[TableAt.START_MOMENT + lane] = (
-        moment if event else workspace[TableAt.PREPARED_MOMENT + lane]
+    workspace[TableRowStart.START_MOMENT + lane] = (
+        moment if event else workspace[TableRowStart.PREPARED_MOMENT + lane]
     )
 
 
 @njit(**NJIT_INLINE)
 def start_lookup(w, workspace, lane):
-    """Look up the curve at the start of a step.
+    """Look up the first-loading curve at the start of a step.
 
     Parameters
     ----------
@@ -133,13 +140,13 @@ def start_lookup(w, workspace, lane):
         See `rigid_kernels.friction_force`.
     """
     place = find_yield(w, workspace, lane)
-    workspace[TableAt.START_FORCE + lane] = workspace[place + YieldColumn.FORCE]
-    workspace[TableAt.START_MOMENT + lane] = workspace[place + YieldColumn.MOMENT]
+    workspace[TableRowStart.START_FORCE + lane] = workspace[place + YieldColumn.FORCE]
+    workspace[TableRowStart.START_MOMENT + lane] = workspace[place + YieldColumn.MOMENT]
 
 
 @njit(**NJIT_INLINE)
 def force_and_slope(w, workspace, lane, when):
-    """Return the force at w > 0 and its slope.
+    """Return force and slope of the first-loading curve at an abscissa w > 0.
 
     Parameters
     ----------
@@ -158,8 +165,8 @@ def force_and_slope(w, workspace, lane, when):
         Slope.
     """
     if when == PREPARED:
-        slope = workspace[TableAt.PREPARED_SLOPE + lane]
-        return workspace[TableAt.PREPARED_FORCE + lane] + slope * w, slope
+        slope = workspace[TableRowStart.PREPARED_SLOPE + lane]
+        return workspace[TableRowStart.PREPARED_FORCE + lane] + slope * w, slope
     place = find_yield(w, workspace, lane)
     return workspace[place + YieldColumn.FORCE] + workspace[
         place + YieldColumn.SLOPE
@@ -168,7 +175,9 @@ def force_and_slope(w, workspace, lane, when):
 
 @njit(**NJIT_INLINE)
 def mean_slip(w, force, workspace, lane, when):
-    """Return the slip at w, weighted by the friction of the sliders, over the stiffness and YIELD_LENGTH.
+    """Return the mean slip of the sliders, weighted by friction, in scaled form.
+
+    It is the slip at w over the stiffness and YIELD_LENGTH.
 
     Parameters
     ----------
@@ -184,17 +193,20 @@ def mean_slip(w, force, workspace, lane, when):
     float
     """
     if when == PREPARED:
-        moment = workspace[TableAt.PREPARED_MOMENT + lane]
-        return workspace[TableAt.PREPARED_FORCE + lane] * w - moment
+        moment = workspace[TableRowStart.PREPARED_MOMENT + lane]
+        return workspace[TableRowStart.PREPARED_FORCE + lane] * w - moment
     if when == AT_START:
-        return workspace[TableAt.START_FORCE + lane] * w - workspace[TableAt.START_MOMENT + lane]
+        return (
+            workspace[TableRowStart.START_FORCE + lane] * w
+            - workspace[TableRowStart.START_MOMENT + lane]
+        )
     place = find_yield(w, workspace, lane)
     return workspace[place + YieldColumn.FORCE] * w - workspace[place + YieldColumn.MOMENT]
 
 
 @njit(**NJIT_INLINE)
 def loading_work(w, force, workspace, lane):
-    """Return the integral of the force up to an abscissa.
+    """Return the integral of the first-loading force up to an abscissa.
 
     Parameters
     ----------

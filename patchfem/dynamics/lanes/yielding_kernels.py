@@ -1,4 +1,4 @@
-"""Step of one case behind an elastic-plastic element, exact between yields and stops.
+"""Step of one case with an elastic-plastic element, exact between yields and stops.
 
 Yields and stops are located inside their steps.
 
@@ -12,7 +12,7 @@ from typing import NamedTuple
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
 from .rigid_kernels import (
-    N_KEPT,
+    N_LAW_VARIABLES,
     LaneState,
     Motion,
     StepOutcome,
@@ -29,11 +29,11 @@ from .rigid_kernels import (
     slip_increment,
 )
 from .rigid_kernels import linear_step as linear_slip
-from .rows_kernels import CYCLE_ENDS, LANES, At, CycleEnd
+from .rows_kernels import CYCLE_ENDS, LANES, CycleEnd, RowStart
 
 __all__ = [
     "EVENT_KEEPS_STICK",
-    "N_KEPT",
+    "N_LAW_VARIABLES",
     "PROOF_TOL",
     "STICK_IS_RIGID",
     "can_extrapolate",
@@ -56,15 +56,15 @@ __all__ = [
 STICK_IS_RIGID = False
 EVENT_KEEPS_STICK = False
 PROOF_TOL = 1e-7
-# slip path of a cycle over YIELD_LENGTH, above which earlier cycles do not affect the memory
+# Slip path of a cycle over YIELD_LENGTH, above which earlier cycles do not affect the memory.
 MIN_SLIP = 1e-3
-N_NEWTON = 4  # Newton steps for the time of an event, which is then exact to round-off
-AFTER_EVENT = 2  # instant of a step as in `observation_kernels`
-TINY = 1e-300  # keeps a divisor above 0
+N_NEWTON = 4  # Number of Newton steps for the time of an event, which is then exact to round-off.
+AFTER_EVENT = 2  # Code of the instant after an event, as in `observation_kernels`.
+MIN_DIVISOR = 1e-300  # Smallest divisor; it prevents a division by 0.
 
 
 class SpeedCurve(NamedTuple):
-    """Step without an event: its speed is v + u (m0 + u (c2 + u c3)) for 0 <= u <= 1."""
+    """Speed over a step without an event, v + u (m0 + u (c2 + u c3)) for 0 <= u <= 1."""
 
     x: float
     v: float
@@ -75,7 +75,10 @@ class SpeedCurve(NamedTuple):
 
 
 class CurveEvent(NamedTuple):
-    """Event on a `SpeedCurve`: fraction of the step, speed and its first two rates, and factor of the spring.
+    """Event on the speed curve of a step.
+
+    It holds the fraction of the step, speed and its first two rates, and the factor of the
+    spring.
 
     The factor is that by which the spring of the stick acts on the correction after the event.
     """
@@ -95,14 +98,15 @@ def can_extrapolate(workspace, lane):
     the map of the cycle before gives. Without a slip the error would be kept for ever.
     """
     path = (
-        workspace[At.SLIP_PATH + lane] - workspace[(CYCLE_ENDS + CycleEnd.SLIP_PATH) * LANES + lane]
+        workspace[RowStart.SLIP_PATH + lane]
+        - workspace[(CYCLE_ENDS + CycleEnd.SLIP_PATH) * LANES + lane]
     )
-    return path > MIN_SLIP * workspace[At.YIELD_LENGTH + lane]
+    return path > MIN_SLIP * workspace[RowStart.YIELD_LENGTH + lane]
 
 
 @njit(**NJIT_INLINE)
 def friction_force(state, sine, workspace, lane):
-    """Return the friction over the mass in the angle of the drive [m], positive if it resists positive slip.
+    """Return the friction force over mass [m], positive if it resists positive slip.
 
     Parameters
     ----------
@@ -114,13 +118,13 @@ def friction_force(state, sine, workspace, lane):
     float
     """
     if state.slip_sign == 0.0:
-        return workspace[At.SPRING + lane] * (state.slide - state.memory)
-    return state.slip_sign * workspace[At.KINETIC + lane]
+        return workspace[RowStart.SPRING + lane] * (state.slide - state.memory)
+    return state.slip_sign * workspace[RowStart.KINETIC + lane]
 
 
 @njit(**NJIT_INLINE)
 def friction_rate(state, acceleration, workspace, lane, when):
-    """Return the rate of the friction.
+    """Return the derivative of the friction over mass with respect to the drive angle.
 
     The result is 0 after an event, because a stick that starts there moves with its slip.
 
@@ -133,13 +137,13 @@ def friction_rate(state, acceleration, workspace, lane, when):
     -------
     float
     """
-    rate = workspace[At.SPRING + lane] * state.speed
+    rate = workspace[RowStart.SPRING + lane] * state.speed
     return rate if state.slip_sign == 0.0 and when != AFTER_EVENT else 0.0
 
 
 @njit(**NJIT_INLINE)
 def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
-    """Return the friction at a reversal of the slide, before which the interface may have slipped.
+    """Return the friction over mass at a reversal, before which the interface may have slipped.
 
     Parameters
     ----------
@@ -150,14 +154,14 @@ def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
     -------
     float
     """
-    limit = workspace[At.KINETIC + lane]
+    limit = workspace[RowStart.KINETIC + lane]
     friction = friction_force(LaneState(x, 0.0, slip_sign, memory), 0.0, workspace, lane)
     return min(max(friction, -limit), limit)
 
 
 @njit(**NJIT_INLINE)
 def stick_fractions(start, end, workspace, lane, angle):
-    """Return the `StickReading` of a segment of a step.
+    """Return the stick and slip fractions in a segment of a step.
 
     A stick whose memory moves begins with a slip that reverses, whose speed falls linearly.
 
@@ -180,7 +184,7 @@ def stick_fractions(start, end, workspace, lane, angle):
 
 @njit(**NJIT_INLINE)
 def linear_step(workspace, lane, s0, c0):
-    """Return the `Motion` after a step that stays in the stick or the slip in which it starts.
+    """Return the motion after a step that remains in the stick or slip in which it begins.
 
     Parameters
     ----------
@@ -191,31 +195,31 @@ def linear_step(workspace, lane, s0, c0):
     -------
     Motion
     """
-    x = workspace[At.SLIDE + lane]
-    v = workspace[At.SPEED + lane]
-    is_stuck = workspace[At.SLIP_SIGN + lane] == 0.0
-    spring_force = workspace[At.SPRING + lane] * workspace[At.MEMORY + lane]
+    x = workspace[RowStart.SLIDE + lane]
+    v = workspace[RowStart.SPEED + lane]
+    is_stuck = workspace[RowStart.SLIP_SIGN + lane] == 0.0
+    spring_force = workspace[RowStart.SPRING + lane] * workspace[RowStart.MEMORY + lane]
     slip = linear_slip(workspace, lane, s0, c0)
     stick_slide = (
-        workspace[At.B11 + lane] * x
-        + workspace[At.B12 + lane] * v
-        + workspace[At.TX + lane] * s0
-        + workspace[At.UX + lane] * c0
-        + spring_force * workspace[At.QX + lane]
+        workspace[RowStart.B11 + lane] * x
+        + workspace[RowStart.B12 + lane] * v
+        + workspace[RowStart.TX + lane] * s0
+        + workspace[RowStart.UX + lane] * c0
+        + spring_force * workspace[RowStart.QX + lane]
     )
     stick_speed = (
-        workspace[At.B21 + lane] * x
-        + workspace[At.B22 + lane] * v
-        + workspace[At.TV + lane] * s0
-        + workspace[At.UV + lane] * c0
-        + spring_force * workspace[At.QV + lane]
+        workspace[RowStart.B21 + lane] * x
+        + workspace[RowStart.B22 + lane] * v
+        + workspace[RowStart.TV + lane] * s0
+        + workspace[RowStart.UV + lane] * c0
+        + spring_force * workspace[RowStart.QV + lane]
     )
     return Motion(stick_slide if is_stuck else slip.slide, stick_speed if is_stuck else slip.speed)
 
 
 @njit(**NJIT_INLINE)
 def try_step(workspace, lane, step, is_observed):
-    """Compute a step as if no event lay inside it: no stop, yield or reversal.
+    """Try a step without events: no stop, yield or reversal.
 
     Parameters
     ----------
@@ -226,10 +230,10 @@ def try_step(workspace, lane, step, is_observed):
     -------
     TriedStep
     """
-    v = workspace[At.SPEED + lane]
-    slip_sign = workspace[At.SLIP_SIGN + lane]
-    memory = workspace[At.MEMORY + lane]
-    length = workspace[At.YIELD_LENGTH + lane]
+    v = workspace[RowStart.SPEED + lane]
+    slip_sign = workspace[RowStart.SLIP_SIGN + lane]
+    memory = workspace[RowStart.MEMORY + lane]
+    length = workspace[RowStart.YIELD_LENGTH + lane]
     end = linear_step(workspace, lane, step.s0, step.c0)
     is_stuck = slip_sign == 0.0
     yields = is_stuck and abs(end.slide - memory) > length
@@ -240,7 +244,7 @@ def try_step(workspace, lane, step, is_observed):
 
 @njit(**NJIT_INLINE)
 def slip_correction(angle, damping, stiffness, event):
-    """Return the `Motion` to add at an angle after an event that engages or releases the spring.
+    """Return the correction of the motion after an event that engages or releases the spring.
 
     It solves d'' + damping d' + stiffness d = factor (speed t + rate t^2/2 + second_rate t^3/6) from rest, with the
     fields of the event, by its Taylor series.
@@ -312,7 +316,9 @@ def find_reversal_in_slip(event, spring, angle):
 
 @njit(**NJIT_INLINE)
 def continue_in_stick(start, damping, stiffness, force, angle):
-    """Return the `Motion` an angle after a start, d'' + damping d' + stiffness d = force, by its Taylor series.
+    """Return the motion a drive angle after the start of a stick, by Taylor series.
+
+    The equation is d'' + damping d' + stiffness d = force.
 
     Parameters
     ----------
@@ -337,7 +343,7 @@ def continue_in_stick(start, damping, stiffness, force, angle):
 
 @njit(**NJIT_INLINE)
 def slide_on_curve(curve, u):
-    """Return the slide at a fraction of the step of a `SpeedCurve`."""
+    """Return the relative displacement at a fraction of a step from its speed curve."""
     return curve.x + curve.angle * u * (
         curve.v + u * (curve.m0 / 2 + u * (curve.c2 / 3 + u * curve.c3 / 4))
     )
@@ -345,13 +351,13 @@ def slide_on_curve(curve, u):
 
 @njit(**NJIT_INLINE)
 def speed_on_curve(curve, u):
-    """Return the speed at a fraction of the step of a `SpeedCurve`."""
+    """Return the speed at a fraction of a step from its speed curve."""
     return curve.v + u * (curve.m0 + u * (curve.c2 + u * curve.c3))
 
 
 @njit(**NJIT_INLINE)
 def event_on_curve(curve, u, speed, factor):
-    """Return the event at a fraction of the step of a curve.
+    """Return the event at a fraction of a step on its speed curve.
 
     Parameters
     ----------
@@ -374,7 +380,7 @@ def event_on_curve(curve, u, speed, factor):
 
 @njit(**NJIT_INLINE)
 def find_yield(curve, memory, side, length, top, highest):
-    """Find the fraction of the step of a `SpeedCurve` at which the spring reaches its yield length.
+    """Find the fraction of a step at which the spring reaches its yield length.
 
     Parameters
     ----------
@@ -397,9 +403,9 @@ def find_yield(curve, memory, side, length, top, highest):
     reserve = side * (curve.x - memory) - length
     u = top * min(max(-reserve / (highest - length - reserve), 0.0), 1.0)
     if top < 1.0:
-        # Near a reversal the slide is a parabola, which a secant does not approximate.
+        # Near a reversal the displacement is a parabola, which a secant does not approximate.
         bend = abs(curve.m0 + top * (2 * curve.c2 + 3 * curve.c3 * top))
-        bow = curve.angle * max(bend, TINY)
+        bow = curve.angle * max(bend, MIN_DIVISOR)
         u = max(top - sqrt(2 * (highest - length) / bow), 0.0)
     for _ in range(N_NEWTON):
         miss = side * (slide_on_curve(curve, u) - memory) - length
@@ -410,7 +416,7 @@ def find_yield(curve, memory, side, length, top, highest):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def resolve_step(workspace, lane, step):
-    """Compute a step with the stop, the yield or the reversal inside it.
+    """Compute a step with the stop, yield or reversal inside it.
 
     The speed of the step without an event is taken as a cubic, and the slide as its integral, so an event is found to the
     fourth order. After the event the exact step is corrected by what the change of the spring adds.
@@ -424,13 +430,13 @@ def resolve_step(workspace, lane, step):
     -------
     StepOutcome
     """
-    x = workspace[At.SLIDE + lane]
-    v = workspace[At.SPEED + lane]
-    sign = workspace[At.SLIP_SIGN + lane]
-    memory = workspace[At.MEMORY + lane]
-    damping = workspace[At.DAMPING + lane]
-    stiffness = workspace[At.STIFFNESS + lane]
-    drive = workspace[At.DRIVE + lane]
+    x = workspace[RowStart.SLIDE + lane]
+    v = workspace[RowStart.SPEED + lane]
+    sign = workspace[RowStart.SLIP_SIGN + lane]
+    memory = workspace[RowStart.MEMORY + lane]
+    damping = workspace[RowStart.DAMPING + lane]
+    stiffness = workspace[RowStart.STIFFNESS + lane]
+    drive = workspace[RowStart.DRIVE + lane]
     end = linear_step(workspace, lane, step.s0, step.c0)
     start_state = LaneState(x, v, sign, memory)
     end_state = LaneState(end.slide, end.speed, sign, memory)
@@ -453,7 +459,7 @@ def resolve_step(workspace, lane, step):
 
 @njit(**NJIT_INLINE)
 def resolve_slip(workspace, lane, curve, end, is_reversed, reversal):
-    """Compute a step from a slip, which sticks from its reversal on.
+    """Compute a step that begins in slip and sticks from its reversal on.
 
     Parameters
     ----------
@@ -470,23 +476,23 @@ def resolve_slip(workspace, lane, curve, end, is_reversed, reversal):
     -------
     StepOutcome
     """
-    sign = workspace[At.SLIP_SIGN + lane]
-    length = workspace[At.YIELD_LENGTH + lane]
+    sign = workspace[RowStart.SLIP_SIGN + lane]
+    length = workspace[RowStart.YIELD_LENGTH + lane]
     if not is_reversed:
         memory = end.slide - sign * length
         return StepOutcome(
             end.slide, end.speed, sign, memory, 1.0, end.slide, end.speed, memory, end.slide, 0.0
         )
-    spring = workspace[At.SPRING + lane]
+    spring = workspace[RowStart.SPRING + lane]
     turn = slide_on_curve(curve, reversal)
     memory = turn - sign * length
     x1 = end.slide
     v1 = end.speed
     if reversal < 1.0:
         rest = curve.angle - reversal * curve.angle
-        stiffness = workspace[At.STIFFNESS + lane] + spring
+        stiffness = workspace[RowStart.STIFFNESS + lane] + spring
         event = event_on_curve(curve, reversal, 0.0, -spring)
-        change = slip_correction(rest, workspace[At.DAMPING + lane], stiffness, event)
+        change = slip_correction(rest, workspace[RowStart.DAMPING + lane], stiffness, event)
         x1 += change.slide
         v1 += change.speed
     return StepOutcome(x1, v1, 0.0, memory, reversal, turn, 0.0, memory, turn, 0.0)
@@ -494,7 +500,7 @@ def resolve_slip(workspace, lane, curve, end, is_reversed, reversal):
 
 @njit(**NJIT_INLINE)
 def resolve_stick(workspace, lane, curve, end, is_reversed, reversal):
-    """Compute a step from a stick, in which the element may yield.
+    """Compute a step that begins in stick and may contain a yield.
 
     Parameters
     ----------
@@ -505,11 +511,11 @@ def resolve_stick(workspace, lane, curve, end, is_reversed, reversal):
     -------
     StepOutcome
     """
-    memory = workspace[At.MEMORY + lane]
-    spring = workspace[At.SPRING + lane]
-    length = workspace[At.YIELD_LENGTH + lane]
-    damping = workspace[At.DAMPING + lane]
-    stiffness = workspace[At.STIFFNESS + lane]
+    memory = workspace[RowStart.MEMORY + lane]
+    spring = workspace[RowStart.SPRING + lane]
+    length = workspace[RowStart.YIELD_LENGTH + lane]
+    damping = workspace[RowStart.DAMPING + lane]
+    stiffness = workspace[RowStart.STIFFNESS + lane]
     turn = slide_on_curve(curve, reversal) if is_reversed else end.slide
     side = 1.0 if turn > memory else -1.0
     if not is_reversed or abs(turn - memory) <= abs(end.slide - memory):

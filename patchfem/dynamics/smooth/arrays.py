@@ -1,4 +1,4 @@
-"""Arrays of the compiled steps, and named positions in them."""
+"""Arrays of the compiled steps of the smooth engine, and named indices of them."""
 
 from enum import IntEnum
 from typing import NamedTuple
@@ -7,7 +7,7 @@ import numpy as np
 
 
 class Mode(IntEnum):
-    """Rows of `MotionArrays.modes`: omega [rad/s], 2 zeta omega [1/s], participations [1]."""
+    """Row indices of `MotionArrays.modes`: frequency [rad/s], damping [1/s], participations."""
 
     OMEGA = 0
     DAMPING = 1
@@ -17,7 +17,7 @@ class Mode(IntEnum):
 
 
 class Work(IntEnum):
-    """Rows of `MotionArrays.work` after the slopes of the 16 stages.
+    """Row indices of `MotionArrays.work` after the slopes of the 16 Runge-Kutta stages.
 
     - EXTENSION: first of 8 rows, the extension of the step
     - SIZES: sizes of the states of the law, and smallest sizes of the others
@@ -30,7 +30,7 @@ class Work(IntEnum):
 
 
 class Scalar(IntEnum):
-    """Positions in `MotionArrays.scalars`.
+    """Indices of the entries of `MotionArrays.scalars`, the scalar state of a motion.
 
     - TIME, STEP, FIRST_STEP: time, length of the next step and of the first one after a reversal
       [s]
@@ -64,7 +64,7 @@ class Scalar(IntEnum):
 
 
 class Counter(IntEnum):
-    """Positions in `MotionRecord.counters`.
+    """Indices of the entries of `MotionRecord.counters`: energies, counts and next rows.
 
     - DRIVE_POWER: integral of the magnitude of the power of the drive [J]
     - MAX_STORED: largest stored energy [J]
@@ -89,7 +89,7 @@ class Counter(IntEnum):
 
 
 class Turn(IntEnum):
-    """Positions in `MotionArrays.turn`, which the integrator and the law share.
+    """Indices of the entries of `MotionArrays.turn`, which integrator and friction law share.
 
     - DIRECTION: of the motion, 0 in stick
     - KINK_PATH: path to the next kink of the law [m], infinite without one
@@ -115,7 +115,7 @@ class Turn(IntEnum):
 
 
 class StepEvents(NamedTuple):
-    """Events that end a step.
+    """Codes of the events that end a step of the smooth engine.
 
     - stop: the velocity vanishes
     - kink, knee: the law has a kink along its path, or at a speed
@@ -133,7 +133,7 @@ class StepEvents(NamedTuple):
 
 
 class CallStatus(NamedTuple):
-    """Reasons why a call of the loop ends.
+    """Codes of the reasons for which a call of the step loop ends.
 
     - finished: the time is reached
     - travel: the output has reached its travel
@@ -155,14 +155,16 @@ class CallStatus(NamedTuple):
 
 EVENT = StepEvents()
 STATUS = CallStatus()
-# points of a part of a step at which its samples are taken
+# Number of points of a part of a step at which its samples are taken.
 N_NODES = 9
-# these points as fractions of the part, which are Chebyshev points of the second kind
+# These points as fractions of the part; they are Chebyshev points of the second kind.
 NODE_FRACTIONS = (1 - np.cos(np.pi * np.arange(N_NODES) / (N_NODES - 1))) / 2
 
 
 class MotionArrays(NamedTuple):
-    """Modes, drive, law and state of a motion; N = 2 n + l + 3 for n modes and l states of the law.
+    """Modes, drive, friction law and state of a motion as arrays.
+
+    The state has N = 2 n + l + 3 entries for n modes and l states of the law.
 
     - modes: (5, n) see `Mode`
     - damping: (n, n) damping matrix where it couples the modes, else (0, 0)
@@ -187,7 +189,7 @@ class MotionArrays(NamedTuple):
 
 
 class MotionRecord(NamedTuple):
-    """Records of a motion.
+    """Samples, extremes, phasors and counters recorded during a motion.
 
     A sample (2 n + 7,) has the time, coordinates, rates, relative displacement and velocity, force,
     slip, energy in the interface and friction work [J].

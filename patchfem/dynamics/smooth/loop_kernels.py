@@ -1,4 +1,4 @@
-"""Loop over steps whose length the error chooses, with events (compiled).
+"""Loop over time steps with error control and events (compiled).
 
 A step ends where the velocity vanishes, where the law has a kink along its path or at a speed, and
 where the output reaches its travel. Newton's method on the length of the step finds such an end;
@@ -17,31 +17,31 @@ from . import step_kernels as steps
 from . import watch_kernels as watch
 from .arrays import EVENT, STATUS, Counter, Mode, Scalar, Turn, Work
 
-# bounds of the ratio of a step to the one before
+# Bounds of the ratio of a step to the previous step.
 MIN_STEP_FACTOR = 0.2
 MAX_STEP_FACTOR = 8.0
-# safety factor of the length of the next step
+# Safety factor of the length of the next step.
 STEP_SAFETY = 0.9
-# value of scalars[Scalar.STAGE] where the motion was left at a reversal
+# Value of scalars[Scalar.STAGE] where a call ended at a reversal.
 AT_REVERSAL = 2.0
-# cycles over which a maximum of coordinates and rates fades
+# Number of cycles over which a maximum of coordinates and rates decays.
 FADING_CYCLES = 3.0
-# tried steps of a call; they take a tenth of a second, in which compiled code receives no signal
+# Maximum number of tried steps in a call; they take a tenth of a second, in which compiled code receives no signal.
 MAX_TRIED_STEPS = 50_000
-# progress in time that MAX_TRIED_STEPS steps must make, over the time of the fastest motion
+# Minimum progress in time of MAX_TRIED_STEPS steps, over the time of the fastest motion.
 MIN_PROGRESS = 1e-3
-# fraction of a period within which two events are at the same time
+# Fraction of a period within which two events count as simultaneous.
 INSTANT_FRACTION = 1e-13
-# fraction of a period that a step in stick may take, because no other criterion limits it
+# Maximum step during stick as a fraction of a period, because no other criterion limits it.
 MAX_STUCK_STEP = 0.02
-# states of a motion since a stop: it has moved, it is at the stop, or it is there and its direction was changed
+# States of a motion since a stop: it has moved, it is at the stop, or it is there and its direction was changed.
 NOT_AT_STOP = 0
 AT_STOP = 1
 DIRECTION_CHANGED = 2
 
 
 class EventDistance(NamedTuple):
-    """Distance of a state to an event, greater than 0 before it, its rate [1/s] and its round-off."""
+    """Distance of a state to an event, positive before it, with its rate [1/s] and round-off."""
 
     distance: float
     rate: float
@@ -50,7 +50,7 @@ class EventDistance(NamedTuple):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def distance_to_event(motion, event, y, slopes, travel):
-    """Return the `EventDistance` of a state.
+    """Return the distance of a state to an event.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def distance_to_event(motion, event, y, slopes, travel):
         knee = motion.turn[Turn.KNEE_VELOCITY]
         rate = side * direction * acceleration
         return EventDistance(side * (direction * v - knee), rate, 1e-12 * knee)
-    # the rates of a set-valued law hold, after its loss, the margin of its holding force and its normal force
+    # The rates of a set-valued law hold, after its loss, the margin of its holding force and its normal force.
     if event >= EVENT.release:
         first = 2 * motion.modes.shape[1] + 1
         return EventDistance(slopes[first + event - EVENT.release], 0.0, 0.0)
@@ -93,7 +93,7 @@ def distance_to_event(motion, event, y, slopes, travel):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def can_occur(motion, event, travel):
-    """Return whether this event can occur in the motion.
+    """Return whether an event can occur in the present motion.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def can_occur(motion, event, travel):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_first_event(motion, h, travel, skip):
-    """Find the first event inside a step.
+    """Find the first event inside a step by cubics through its ends.
 
     Cubics through both ends of the step give the guess.
 
@@ -175,7 +175,9 @@ def find_first_event(motion, h, travel, skip):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_cubic_return(p, b, r):
-    """Return the fraction at which a cubic from 0 to b < 0 comes back to 0 from above.
+    """Return the fraction of a step at which a cubic returns to 0 from above.
+
+    The cubic goes from 0 to b < 0.
 
     Without the root at the start the cubic is p + mid s + big s^2; the root at which that decreases
     counts.
@@ -240,7 +242,8 @@ def locate_event(motion, h, event, fraction, travel):
         else:
             longest = length
         new = length - value / rate if rate < 0 else 0.5 * (shortest + longest)
-        # a motion that leaves rest is within round-off of it too; it must not end there, or it would rest for ever
+        # A motion that leaves rest is within round-off of the event too; it must not end there, or it would rest for
+        # ever.
         is_at_event = abs(value) <= noise and rate < 0
         if (
             is_at_event
@@ -254,7 +257,7 @@ def locate_event(motion, h, event, fraction, travel):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def locate_release(motion, h, event, travel):
-    """Return the length of the step that ends just after a law lets go.
+    """Return the length of the step that ends just after a set-valued law releases.
 
     Method: regula falsi with halved ends (Illinois), then bisection.
 
@@ -316,7 +319,7 @@ def locate_release(motion, h, event, travel):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def find_speed_dip(motion, h):
-    """Return the fraction of a step of h [s] at which the speed may dip below zero.
+    """Return the fraction of a step at which the relative speed may fall below zero.
 
     It is 0 where it does not.
 
@@ -333,7 +336,7 @@ def find_speed_dip(motion, h):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_cubic_dip(a, p, b, r):
-    """Return the fraction at which a positive cubic may fall below zero.
+    """Return the fraction of a step at which a positive cubic may fall below zero.
 
     The cubic errs by s^2 (1 - s)^2 of the fourth derivative/24, so a minimum near zero counts.
 
@@ -366,7 +369,7 @@ def find_cubic_dip(a, p, b, r):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def speed_round_off(motion):
-    """Return the round-off of the velocity [m/s], below which the interface is at rest."""
+    """Return the round-off of the relative velocity [m/s], below which the interface rests."""
     return 4e-16 * (
         motion.scalars[Scalar.MAX_RATE]
         + motion.scalars[Scalar.FASTEST_RATE] * motion.scalars[Scalar.MAX_COORDINATE]
@@ -375,7 +378,7 @@ def speed_round_off(motion):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def start_direction(motion, direction):
-    """Start the motion in a direction from the present state: states of the law, and slopes."""
+    """Start the motion in a direction: set the states of the law and the slopes."""
     n = motion.modes.shape[1]
     q, v = steps.find_slide(motion, motion.state)
     motion.scalars[Scalar.ORIGIN] = q
@@ -391,7 +394,7 @@ def start_direction(motion, direction):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def end_direction(motion, record):
-    """End the motion in one direction: update the memory of the law, and add its friction loss."""
+    """End the motion in a direction: update the memory of the law and its friction loss."""
     n = motion.modes.shape[1]
     size = motion.state.size
     interface = watch.read_interface(motion, motion.state)
@@ -412,7 +415,7 @@ def end_direction(motion, record):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def choose_direction(motion):
-    """Return the direction in which a motion starts, by its velocity or else its acceleration."""
+    """Return the initial direction of a motion, from its velocity or else its acceleration."""
     t = motion.scalars[Scalar.TIME]
     v = steps.find_slide(motion, motion.state)[1]
     if v != 0:
@@ -429,7 +432,7 @@ def choose_direction(motion):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_release_direction(motion):
-    """Return the direction in which a law lets go of the interface at rest, or 0."""
+    """Return the direction in which a set-valued law releases the resting interface, or 0."""
     motion.turn[Turn.DIRECTION] = 0.0
     steps.write_slopes(motion, motion.scalars[Scalar.TIME], motion.state, motion.work[0])
     return motion.turn[Turn.RELEASE_DIRECTION]
@@ -437,7 +440,7 @@ def find_release_direction(motion):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def stop_slide(motion):
-    """Remove the round-off of a velocity that has stopped from the rates."""
+    """Remove the round-off of a stopped relative velocity from the modal rates."""
     n = motion.modes.shape[1]
     v = steps.find_slide(motion, motion.state)[1]
     size = 0.0
@@ -451,7 +454,7 @@ def stop_slide(motion):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def reverse_or_continue(motion, period):
-    """Start the motion after a stop.
+    """Start the motion after a stop; return whether its direction is reversed.
 
     Returns whether it reverses, else it goes on in its direction.
 
@@ -490,7 +493,7 @@ def update_sizes(motion):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def accept_step(motion, h, record):
-    """Move the state by the step in work[Work.TRIAL].
+    """Accept a tried step: advance state, time and recent maxima.
 
     Parameters
     ----------
@@ -513,7 +516,7 @@ def accept_step(motion, h, record):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def step_factor(error):
-    """Return the ratio of the next step to one whose error over the tolerance is known."""
+    """Return the ratio of the next step to a step with known error over tolerance."""
     if error == 0:
         return MAX_STEP_FACTOR
     if not np.isfinite(error):
@@ -523,7 +526,7 @@ def step_factor(error):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def try_step(motion, h, tolerance, record):
-    """Take a step whose error meets the tolerance.
+    """Try steps until the error meets the tolerance.
 
     Parameters
     ----------
@@ -560,7 +563,7 @@ def try_step(motion, h, tolerance, record):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def record_reversal(motion, record):
-    """Write the sample of a reversal at the present time."""
+    """Append the sample of a reversal at the present time to the record."""
     row = record.turns[int(record.counters[Counter.N_TURNS])]
     watch.write_sample(motion, motion.scalars[Scalar.TIME], motion.state, row)
     record.counters[Counter.N_TURNS] += 1
@@ -568,7 +571,7 @@ def record_reversal(motion, record):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def pass_event(motion, record, event):
-    """Continue after an event: in the other direction, or with the next branch of the law.
+    """Continue after an event: in the other direction, or on the next branch of the law.
 
     Parameters
     ----------
@@ -587,7 +590,7 @@ def pass_event(motion, record, event):
             record_reversal(motion, record)
     elif event == EVENT.stop:
         if n == 1:
-            motion.state[1] = 0.0  # removes the round-off of the velocity
+            motion.state[1] = 0.0  # This removes the round-off of the velocity.
         end_direction(motion, record)
         if reverse_or_continue(motion, record.counters[Counter.PERIOD]):
             record_reversal(motion, record)
@@ -613,7 +616,7 @@ def start_from_state(motion, record):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def take_samples(motion, record):
-    """Write the samples that are due at the present time."""
+    """Write the samples that are due at the present time into the record."""
     at = int(record.counters[Counter.NEXT_SAMPLE])
     while at < record.samples.shape[0] and record.samples[at, 0] <= motion.scalars[Scalar.TIME]:
         watch.write_sample(motion, motion.scalars[Scalar.TIME], motion.state, record.samples[at])
@@ -623,7 +626,10 @@ def take_samples(motion, record):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_stop_state(motion):
-    """Return AT_STOP where the motion was left at a reversal because no row was free, else NOT_AT_STOP."""
+    """Return whether the motion was interrupted at a reversal.
+
+    It is AT_STOP where no row was free then, else NOT_AT_STOP.
+    """
     stop_state = AT_STOP if motion.scalars[Scalar.STAGE] == AT_REVERSAL else NOT_AT_STOP
     motion.scalars[Scalar.STAGE] = 1.0
     return stop_state
@@ -631,7 +637,7 @@ def find_stop_state(motion):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def locate_first_event(motion, taken, event, fraction, travel):
-    """Return the length of a tried step up to the first event in it, and that event.
+    """Return the length of a tried step up to its first event, and that event.
 
     Parameters
     ----------
@@ -665,7 +671,9 @@ def locate_first_event(motion, taken, event, fraction, travel):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def meets_tolerance(motion, taken, tolerance, record):
-    """Return whether a step that an event has shortened meets the tolerance, else shorten the next one.
+    """Return whether a step that an event has shortened meets the tolerance.
+
+    If not, the next step is shortened.
 
     The stages of the longer tried step may have missed strong curvature near the event.
 
@@ -692,13 +700,13 @@ def meets_tolerance(motion, taken, tolerance, record):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def count_tried_steps(record):
-    """Return the number of steps that were accepted or refused."""
+    """Return the number of accepted and refused steps."""
     return record.counters[Counter.ACCEPTED] + record.counters[Counter.REFUSED]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def has_free_rows(record):
-    """Return whether a step can record its reversal and its parts."""
+    """Return whether the record has free rows for the reversal and the parts of a step."""
     if record.counters[Counter.N_TURNS] >= record.turns.shape[0]:
         return False
     n_rows = record.parts.shape[0]
@@ -707,7 +715,7 @@ def has_free_rows(record):
 
 @njit(error_model="numpy", cache=True, nogil=True, **NJIT_NO_REFCOUNT)
 def advance_motion(motion, record, until, edge, tolerance, travel):
-    """Move on to a time, or to the end of a segment of the drive.
+    """Advance the motion to a time, or to the end of a drive segment.
 
     Parameters
     ----------
@@ -800,7 +808,7 @@ def advance_motion(motion, record, until, edge, tolerance, travel):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def read_state(motion, record, row):
-    """Write the sample of the present state.
+    """Write the sample of the present state into a row and return the stored energy.
 
     The memory of the law moves to this state, so it is called on a copy of the motion.
 

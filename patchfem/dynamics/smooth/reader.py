@@ -15,30 +15,32 @@ from ...core import IntegratedMeasures, InterfaceLoop
 from ...structure.drive_sizes import is_sinusoidal
 from .arrays import N_NODES, NODE_FRACTIONS
 
-# fractions of a step between which slip begins or ends at most once; two are close to the ends, as a stick may be short
+# Fractions of a step between which slip begins or ends at most once; two of them are close to the ends, as a stick may
+# be short.
 FINE_FRACTIONS = np.sort(np.append((1 - np.cos(np.pi * np.arange(25) / 24)) / 2, [1e-3, 1 - 1e-3]))
-# fractions of a step among which a maximum is searched for; a parabola through three is right to 1e-11 of its rise
+# Fractions of a step among which a maximum is searched for; a parabola through three of them is right to 1e-11 of its
+# rise.
 FINEST_FRACTIONS = np.linspace(0.0, 1.0, 257)
-# steps with the largest values at FINE_FRACTIONS, in which a maximum is searched for
+# Maximum number of steps, those with the largest values at FINE_FRACTIONS, in which a maximum is searched for.
 MAX_CANDIDATES = 6
-# rise of a number above its values at the nodes over its range in the step, at most
+# Maximum rise of a quantity above its values at the nodes, over its range in the step.
 MAX_RISE_RATIO = 0.5
-# Gauss rule on [0, 1]
+# Gauss rule with 12 points on [0, 1].
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
 GAUSS_POINTS = (1 + GAUSS_POINTS) / 2
 GAUSS_WEIGHTS = GAUSS_WEIGHTS / 2
-# bisections of the interval in which slip begins or ends
+# Number of bisections of the interval in which slip begins or ends.
 N_BISECTIONS = 30
-# fraction of the velocity; where more of it is irreversible, the interface slips, as in `response.measures`
+# Fraction of the velocity; an interface slips where more of it is irreversible, as in `response.measures`.
 SLIP_FRACTION = 0.5
-# round-off of the change of a relative displacement in a step, over the largest one
+# Round-off of the change of a relative displacement in a step, over the largest displacement.
 SLIDE_TOL = 1e-13
-# velocity over the largest one in the step, below which the interface is at a turning point
+# Relative velocity over the largest one in the step, below which the interface is at a reversal.
 REST_SPEED_RATIO = 1e-7
 
 
 def make_interpolation_matrix(fractions) -> np.ndarray:
-    """Return the matrix (p, N_NODES) from values at NODE_FRACTIONS to those elsewhere.
+    """Return the interpolation matrix (p, N_NODES) from NODE_FRACTIONS to other fractions.
 
     fractions: (p,) of a step.
     """
@@ -46,7 +48,7 @@ def make_interpolation_matrix(fractions) -> np.ndarray:
 
 
 def evaluate_power_series(terms, fraction):
-    """Evaluate k polynomials in powers of 2 fraction - 1 at fractions (k,).
+    """Evaluate k polynomials in powers of (2 fraction - 1) at fractions (k,).
 
     terms: (k, N_NODES) coefficients.
     """
@@ -58,20 +60,20 @@ def evaluate_power_series(terms, fraction):
 
 
 def transform_parts(values, matrix) -> np.ndarray:
-    """Return values (k, p) of k polynomials by a matrix (p, N_NODES).
+    """Apply a matrix (p, N_NODES) to the nodal values of k polynomials.
 
     With so many rows a matrix product would be slower by the threads that it starts.
     """
     return np.einsum("kj,pj->kp", values, matrix)
 
 
-# matrix from values at NODE_FRACTIONS to Chebyshev coefficients
+# Matrix from values at NODE_FRACTIONS to Chebyshev coefficients.
 TO_CHEBYSHEV = np.linalg.inv(chebyshev.chebvander(2 * NODE_FRACTIONS - 1, N_NODES - 1))
-# matrix from values to slopes over a step
+# Matrix from values at NODE_FRACTIONS to slopes over a step.
 TO_SLOPES = chebyshev.chebvander(2 * NODE_FRACTIONS - 1, N_NODES - 2) @ (
     2 * chebyshev.chebder(TO_CHEBYSHEV)
 )
-# matrix from values to coefficients of powers of 2 fraction - 1
+# Matrix from values at NODE_FRACTIONS to coefficients of powers of (2 fraction - 1).
 TO_POWERS = np.linalg.inv(np.vander(2 * NODE_FRACTIONS - 1, N_NODES, increasing=True))
 TO_FINE = make_interpolation_matrix(FINE_FRACTIONS)
 TO_FINEST = make_interpolation_matrix(FINEST_FRACTIONS)
@@ -79,7 +81,7 @@ TO_GAUSS = make_interpolation_matrix(GAUSS_POINTS)
 
 
 class StepParts:
-    """The last cycles of a motion as parts of steps.
+    """Last cycles of a motion as polynomial parts of steps.
 
     response: a Response at all their places in order.
     """
@@ -92,11 +94,11 @@ class StepParts:
         self.length = np.diff(self.time[:, [0, -1]])[:, 0]
 
     def values(self, name: str) -> np.ndarray:
-        """Return a quantity of the response at the nodes of every part (k, N_NODES)."""
+        """Return the values of a history at the nodes of all parts of steps (k, N_NODES)."""
         return getattr(self.response, name).reshape(-1, N_NODES)
 
     def find_maximum(self, values) -> tuple:
-        """Return the maximum between the nodes of values (k, N_NODES), and its error.
+        """Return the maximum of a polynomial history with nodal values (k, N_NODES), and its error.
 
         The error is the size of the last two Chebyshev coefficients.
         """
@@ -122,34 +124,34 @@ class StepParts:
         return float(peaks[best]), float(np.abs(TO_CHEBYSHEV[-2:] @ values[steps[best]]).sum())
 
     def find_magnitude(self, name: str) -> tuple:
-        """Return the largest magnitude of a quantity, and its error as `find_maximum`."""
+        """Return the largest magnitude of a history, and its error."""
         values = self.values(name)
         return max(self.find_maximum(values), self.find_maximum(-values))
 
     def find_half_range(self, name: str) -> float:
-        """Return half the range of a quantity."""
+        """Return half of the range of a history."""
         values = self.values(name)
         return (self.find_maximum(values)[0] + self.find_maximum(-values)[0]) / 2
 
     @cached_property
     def weights(self) -> np.ndarray:
-        """Weights (k, 12) [s] of the points of Gauss's rule."""
+        """Weights (k, 12) [s] of the Gauss points in all parts of steps."""
         return self.length[:, None] * GAUSS_WEIGHTS
 
     @cached_property
     def carrier(self) -> np.ndarray:
-        """exp(-i omega t) at the points of Gauss's rule."""
+        """Factor exp(-i omega t) at the Gauss points of all parts of steps."""
         return np.exp(
             -2j * np.pi / self.period * (self.begin[:, None] + self.length[:, None] * GAUSS_POINTS)
         )
 
     def harmonic(self, name: str, number: int = 1) -> complex:
-        """Return the Fourier coefficient 2/T int x exp(-i n omega t) dt of a number of the response."""
+        """Return the Fourier coefficient 2/T int x exp(-i n omega t) dt of a history."""
         values = self.weights * transform_parts(self.values(name), TO_GAUSS)
         return complex(2 / self.length.sum() * np.sum(values * self.carrier**number))
 
     def mean(self, name: str, begin: float, end: float) -> float:
-        """Return the time mean of a quantity.
+        """Return the time mean of a history between two times.
 
         Parameters
         ----------
@@ -164,7 +166,8 @@ class StepParts:
         -------
         float
         """
-        length = np.maximum(self.length, 1e-300)  # a step at an event has the length 0
+        # The length is bounded from below, because a step at an event has the length 0.
+        length = np.maximum(self.length, 1e-300)
         starts, ends = (np.clip((edge - self.begin) / length, 0.0, 1.0) for edge in (begin, end))
         covered = np.flatnonzero(ends > starts)
         total = 0.0
@@ -192,7 +195,9 @@ class StepParts:
         return total / (end - begin)
 
     def drift(self) -> float | None:
-        """Return the drift per cycle [m], None in fewer than 1.5 cycles.
+        """Return the drift of the relative displacement per cycle [m].
+
+        It is None in fewer than 1.5 cycles.
 
         It is the difference of the mean relative displacements of the last and the first cycle.
         """
@@ -206,7 +211,7 @@ class StepParts:
         return (last - first) / (cycles - 1)
 
     def find_sticks(self) -> tuple:
-        """Return the time [s] in stick and the times [s] at which slip begins.
+        """Return the time in stick [s] and the times [s] at which slip begins.
 
         The interface sticks where less than SLIP_FRACTION of its velocity is irreversible. At a
         turning point both velocities vanish and what is computed of them is round-off; there the
@@ -259,7 +264,7 @@ class StepParts:
 
 
 def measure_parts(response, drive, ends) -> tuple:
-    """Measure the last cycles from the parts of their steps.
+    """Measure the last cycles of a motion from the parts of its steps.
 
     Parameters
     ----------
@@ -305,7 +310,7 @@ def measure_parts(response, drive, ends) -> tuple:
 
 
 def _acceleration_harmonics(parts: StepParts, drive, ends) -> tuple | None:
-    """Return the first and third harmonic [m s-2] of the acceleration of the output.
+    """Return the first and third harmonic [m s-2] of the output acceleration.
 
     That of the output relative to the base is that of the displacement, integrated by parts. None
     where the drive is no sine.

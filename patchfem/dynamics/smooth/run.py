@@ -1,4 +1,4 @@
-"""Run of modes under a smooth law, from its start to its result."""
+"""Run of modes under a smooth friction law, from its start to its result."""
 
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -41,26 +41,26 @@ FIRST_STEP_RATIO = 1e-3
 MAX_REPEAT_CHANGE = 10.0
 # change of the extremes between two cycles over MAX_REPEAT_CHANGE, as their steps lie at other times
 MAX_CYCLE_RATIO = 10.0
-FOLDER = "dynamics.smooth"
+PACKAGE = "dynamics.smooth"
 
 
 @cache
 def load_loop(law: str, say=None):
-    """Return the compiled loop for the law of a module of kernels.
+    """Return the compiled step loop for the friction law of a kernel module.
 
     say: is called before it is compiled.
     """
     law = compiled.load(law, say)
-    steps = compiled.instantiate(f"{FOLDER}.step_kernels", {"law": law})
-    watch = compiled.instantiate(f"{FOLDER}.watch_kernels", {"law": law, "steps": steps})
+    steps = compiled.instantiate(f"{PACKAGE}.step_kernels", {"law": law})
+    watch = compiled.instantiate(f"{PACKAGE}.watch_kernels", {"law": law, "steps": steps})
     return compiled.instantiate(
-        f"{FOLDER}.loop_kernels", {"law": law, "steps": steps, "watch": watch}
+        f"{PACKAGE}.loop_kernels", {"law": law, "steps": steps, "watch": watch}
     )
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SmoothResult(MarchResult):
-    """Result of the smooth engine: that of a march, and statistics of the integrator.
+    """Result of a run of the smooth engine, with statistics of the integrator.
 
     - integrated: measures of the last cycles, integrated over their steps
     - peak_errors: errors of peaks [unit of the measure] by measure
@@ -78,7 +78,7 @@ class SmoothResult(MarchResult):
 
 
 def start_arrays(modes: ModalBasis, drive, element, cycles: float, start=None) -> tuple:
-    """Return the arrays of a motion before it begins.
+    """Return the arrays of a motion at its initial state.
 
     The first step is FIRST_STEP_RATIO over the fastest rate of modes and drive.
 
@@ -143,7 +143,7 @@ def start_arrays(modes: ModalBasis, drive, element, cycles: float, start=None) -
 
 
 def make_response(modes, drive, rows, stored: float) -> Response:
-    """Return histories from sample rows of a motion.
+    """Return histories from the sample rows of a motion.
 
     Parameters
     ----------
@@ -178,13 +178,13 @@ def make_response(modes, drive, rows, stored: float) -> Response:
 
 
 def select_phasor_cycles(count: int, window: int) -> np.ndarray:
-    """Return which of `count` cycles need a phasor: the last one of each of the last windows."""
+    """Return a mask of the cycles whose phasor is needed: the ends of the last windows."""
     cycles_to_end = np.arange(count)[::-1]
     return (cycles_to_end % window == 0) & (cycles_to_end < N_PHASOR_WINDOWS * window)
 
 
 class MotionState(NamedTuple):
-    """Present state of a motion.
+    """Present state of a motion: sample, counters, memory of the law and stored energy.
 
     - sample: (2 n + 7,) see `MotionRecord`
     - counters: see `Counter`
@@ -199,7 +199,7 @@ class MotionState(NamedTuple):
 
 
 class Motion:
-    """A motion in progress: the arrays that its loop moves, and what was read from it.
+    """Motion in progress: its arrays, its record and what was collected from it.
 
     repeat_change: change that it would still make, over its size, where cycles were skipped as it
     repeats.
@@ -235,7 +235,7 @@ class Motion:
         self.begun = float(self.record.counters[Counter.MAX_STORED])
 
     def fork(self, drive):
-        """Return an independent copy of the motion, under another drive."""
+        """Return an independent copy of the motion under another drive."""
         twin = copy(self)
         twin.progress = None
         twin.arrays = type(self.arrays)(*(array.copy() for array in self.arrays))
@@ -250,16 +250,16 @@ class Motion:
         return twin
 
     def request_last_phasors(self, window: int) -> None:
-        """Request only the phasors of the last cycle and of the windows before it."""
+        """Request phasors only for the last cycle and for the ends of the windows before it."""
         self.record.cycles[2:, ~select_phasor_cycles(self.record.cycles.shape[1], window)] = np.nan
 
     def extremes(self, count: int) -> np.ndarray:
-        """Return smallest and largest output (count, 2) [m] of the first cycles."""
+        """Return the smallest and largest output (count, 2) [m] of the first cycles."""
         return self.record.cycles[:2, :count].T.copy()
 
     @property
     def time(self) -> float:
-        """Time that is reached [s]."""
+        """Present time of the motion [s]."""
         return float(self.arrays.scalars[Scalar.TIME])
 
     def _segment_starts(self) -> np.ndarray:
@@ -270,7 +270,7 @@ class Motion:
         self.arrays.scalars[Scalar.SEGMENT] = piece
 
     def run_to(self, time: float, times=(), whole: bool = False) -> np.ndarray:
-        """Run to a time, with samples at times on the way.
+        """March the motion to a time, with samples at given times.
 
         Parameters
         ----------
@@ -311,7 +311,7 @@ class Motion:
         return self.record.samples[: int(self.record.counters[Counter.NEXT_SAMPLE])]
 
     def run_ahead_to(self, time: float) -> None:
-        """Run to a time [s], skipping cycles where the motion repeats under a sine without end.
+        """March the motion to a time [s], skipping cycles where the motion repeats.
 
         `periodicity` says when the motion is looked at and what it would still change by. The
         energies go on as in the last quarter of the cycles between two looks, so their change must
@@ -353,7 +353,7 @@ class Motion:
         self.run_to(time)
 
     def _has_final_sine(self) -> bool:
-        """Return whether the drive ends in a sine of its own period."""
+        """Return whether the drive ends in a sine whose period is that of the drive."""
         last = self.arrays.segments[-1]
         has_period = abs(last[Segment.OMEGA] * self.drive.period / (2 * np.pi) - 1) < 1e-12
         return (
@@ -361,7 +361,7 @@ class Motion:
         )
 
     def _measure_change(self, last) -> float:
-        """Return the largest relative change since the state `last` (N,), at least the tolerance.
+        """Return the largest relative change since an earlier state, at least the tolerance.
 
         Coordinates and rates count relative to their recent maximum, states of the law relative to
         their sizes.
@@ -378,7 +378,7 @@ class Motion:
         )
 
     def _has_equal_cycles(self, count: int) -> bool:
-        """Return whether the last two of `count` cycles have equal extremes.
+        """Return whether the last two cycles have equal extremes within the error of their steps.
 
         They may differ by the error of their steps.
         """
@@ -388,7 +388,7 @@ class Motion:
         ).max() <= MAX_CYCLE_RATIO * MAX_REPEAT_CHANGE * self.tolerance * np.ptp(last)
 
     def _read_sums(self) -> np.ndarray:
-        """Return the energies (5,) [J] that grow with the cycles.
+        """Return the energies (5,) [J] that grow from cycle to cycle.
 
         They are the work of the drive minus the stored energy, viscous loss, friction work, the
         magnitude of the work of the drive, and friction loss.
@@ -399,7 +399,7 @@ class Motion:
         )
 
     def _skip_cycles(self, count: int, sums) -> None:
-        """Skip `count` cycles that equal the last one.
+        """Skip a number of cycles that equal the last cycle.
 
         sums: (5,) growth of `_read_sums` per cycle [J].
         """
@@ -421,7 +421,7 @@ class Motion:
         self.arrays.scalars[Scalar.TIME] = (at + count) * period
 
     def _collect(self, status: int) -> None:
-        """Collect what a call of the loop recorded, and set the outcome that its status means."""
+        """Collect the records of a call of the step loop, and set the outcome from its status."""
         count = int(self.record.counters[Counter.N_TURNS])
         if count and sum(map(len, self.turns)) < MAX_KEPT_REVERSALS:
             self.turns.append(self.record.turns[:count].copy())
@@ -442,7 +442,7 @@ class Motion:
             )
 
     def energy_ledger(self) -> dict:
-        """Return the energies [J] up to the present time, and the steps taken."""
+        """Return the energies [J] up to the present time, and the number of steps."""
         state = self.read_state()
         counters = state.counters
         energies = self.arrays.state[-3:]
@@ -459,7 +459,7 @@ class Motion:
         }
 
     def read_state(self) -> "MotionState":
-        """Return the present MotionState."""
+        """Return the present state of the motion."""
         record = self.record._replace(counters=self.record.counters.copy())
         twin = self.arrays._replace(
             memory=self.arrays.memory.copy(), scalars=self.arrays.scalars.copy()
@@ -469,7 +469,7 @@ class Motion:
         return MotionState(sample, record.counters, twin.memory[0], stored)
 
     def response(self, rows) -> Response:
-        """Return histories of sample rows (k, 2 n + 7), with forces clipped to their limit.
+        """Return histories from sample rows (k, 2 n + 7), with forces clipped to their limit.
 
         The dense output of a step may exceed that limit.
         """
@@ -491,7 +491,7 @@ class Motion:
     def run_last_cycles(
         self, end: float, window: float, shots=(), snapshots: list | None = None
     ) -> tuple:
-        """Run to the time `end` [s] and keep the last `window` [s].
+        """March to the end of the run and keep the samples of its last window.
 
         Parameters
         ----------
@@ -561,7 +561,7 @@ def simulate(
     *,
     even: bool = False,
 ) -> SmoothResult:
-    """Run the drive from rest or from a given state, with steps that meet a relative tolerance.
+    """Run the drive from rest or from a given state with a relative error tolerance.
 
     Parameters
     ----------
@@ -649,7 +649,7 @@ def simulate(
 
 
 def _run_to_window(run: Motion, window: float, n_equidistant: int) -> list:
-    """Run towards the window [s] at the end; return the sample rows from before it.
+    """March to the start of the last window; return the sample rows from before it.
 
     They are `n_equidistant` samples of every cycle where that is not 0, and those of the last two
     cycles before the window.
@@ -670,7 +670,7 @@ def _run_to_window(run: Motion, window: float, n_equidistant: int) -> list:
 
 
 def _work_check(response) -> dict:
-    """Return the friction work [J] by samples and by the ledger, and its magnitude."""
+    """Return friction work [J] by samples and by the energy ledger, and its magnitude."""
     parts = np.diff(response.extra["ledger"][0])
     return {
         "sampled": float(sampled_work(response.slide, response.force).sum()),
@@ -680,7 +680,7 @@ def _work_check(response) -> dict:
 
 
 def _merge_reversals(rows, run, begin: float) -> np.ndarray:
-    """Return sample rows and those at the reversals since a time [s], in order."""
+    """Return the sample rows merged with those at reversals after a given time, in order."""
     turns = np.concatenate(run.turns) if run.turns else rows[:0]
     every = np.concatenate([rows, turns[(turns[:, 0] > begin) & (turns[:, 0] < rows[-1, 0])]])
     every = every[np.argsort(every[:, 0], kind="stable")]
@@ -688,7 +688,7 @@ def _merge_reversals(rows, run, begin: float) -> np.ndarray:
 
 
 def _select_reversal_rows(run, begin: float) -> list:
-    """Return the sample rows at the start and at the reversals before a time [s]."""
+    """Return the sample rows at the start and at the reversals before a given time [s]."""
     if run.first[0] >= begin:
         return []
     turns = np.concatenate(run.turns) if run.turns else np.zeros((0, run.first.size))

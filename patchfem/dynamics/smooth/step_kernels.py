@@ -1,4 +1,4 @@
-"""One Runge-Kutta step of order 8, its error and its dense output (compiled).
+"""One Runge-Kutta step of order 8 with its error estimate and dense output (compiled).
 
 The state (2 n + l + 3,) has coordinates and rates of the modes, the states of the law, and work of
 the drive, viscous loss and friction work [J]. The energies feed nothing and do not take part in
@@ -25,15 +25,15 @@ from ..tableau_kernels import (
 )
 from .arrays import Mode, Scalar, Turn, Work
 
-# smallest size of a number, by which the error of a state at rest is measured
+# Smallest size of a quantity, by which the error of a state at rest is measured.
 MIN_SIZE = 1e-30
-# round-off of an acceleration over the forces per mass of mode and law that balance in it
+# Round-off of an acceleration over the forces per mass of mode and law that balance in it.
 ROUND_OFF_RATIO = 2e-15
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def evaluate_drive(motion, t):
-    """Return the drive [m s-2] at a time [s] by its present segment.
+    """Return the drive acceleration [m s-2] at a time [s] from the present segment.
 
     The segment is continued beyond its ends.
     """
@@ -43,7 +43,7 @@ def evaluate_drive(motion, t):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def find_slide(motion, y):
-    """Return relative displacement [m] and velocity [m/s] of a state."""
+    """Return relative displacement [m] and relative velocity [m/s] of a state."""
     n = motion.modes.shape[1]
     q = motion.modes[Mode.SLIDE, 0] * y[0]
     v = motion.modes[Mode.SLIDE, 0] * y[n]
@@ -55,7 +55,7 @@ def find_slide(motion, y):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def write_mode_slopes(motion, i, y, out, drive, friction_accel):
-    """Write the slopes of a mode.
+    """Write the time derivatives of the coordinate and rate of one mode.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def write_mode_slopes(motion, i, y, out, drive, friction_accel):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def write_free_motion(motion, q, y, drive):
-    """Write free acceleration, inverse mass and slide into motion.turn for a set-valued law.
+    """Write the inputs of a set-valued law: free acceleration, inverse mass and displacement.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def write_free_motion(motion, q, y, drive):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def write_slopes(motion, t, y, out):
-    """Write the slopes of a state: motion, law and energies.
+    """Write the time derivative of a state: motion, law and energies.
 
     The first mode stands before the loop over the others, because the compiler vectorises that
     loop; with one mode this takes 16 ns instead of 53.
@@ -176,7 +176,7 @@ def write_slopes(motion, t, y, out):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_INTERNAL)
 def write_stage(motion, stage, h, size):
-    """Write the state at a stage of a step into work[Work.TRIAL].
+    """Write the state at a Runge-Kutta stage of a step.
 
     Parameters
     ----------
@@ -199,7 +199,9 @@ def write_stage(motion, stage, h, size):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def take_step(motion, h):
-    """Write the state after a step of h [s] into work[Work.TRIAL], with all slopes.
+    """Take a Runge-Kutta step of h [s] and write the state after it.
+
+    The state is written into work[Work.TRIAL], and the slopes of all stages are kept.
 
     work[0] holds the slopes at the start.
     """
@@ -276,10 +278,13 @@ def estimate_error(motion, h, tolerance):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_INTERNAL)
 def extend_step(motion, h):
-    """Write the dense output of a step of h [s], after `take_step`, into work[Work.EXTENSION]."""
+    """Compute the dense output of a step of h [s] after `take_step`.
+
+    It is written into work[Work.EXTENSION].
+    """
     t = motion.scalars[Scalar.TIME]
     size = motion.state.size
-    for c in range(size):  # the stages overwrite it
+    for c in range(size):  # This copy is needed because the stages overwrite the state.
         motion.work[Work.EXTENSION + 7, c] = motion.work[Work.TRIAL, c]
     for stage in range(13, N_STAGES):
         write_stage(motion, stage, h, size - 3)
@@ -303,7 +308,7 @@ def extend_step(motion, h):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_INTERNAL)
 def evaluate_inside(motion, fraction, out, size):
-    """Write the state at a fraction of the step by its dense output.
+    """Write the state at a fraction of the step from its dense output.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What is recorded of a step: samples, extremes, phasors and the step itself (compiled).
+"""Record of a step: samples, extremes, phasors and the step itself (compiled).
 
 The dense output takes three more slopes, so only a step inside which something is read has one.
 """
@@ -14,25 +14,25 @@ from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps
 from .arrays import NODE_FRACTIONS, Counter, Mode, Scalar, Work
 
-# Gauss rule for the part of a step in a cycle, which the phasor of the cycle sums
+# Gauss rule for the part of a step in a cycle, over which the phasor of the cycle is integrated.
 PHASOR_POINTS, PHASOR_WEIGHTS = np.polynomial.legendre.leggauss(4)
-# Chebyshev polynomial of the last but one degree at NODE_FRACTIONS
+# Chebyshev polynomial of the last but one degree at NODE_FRACTIONS.
 PENULTIMATE_TERM = np.cos(
     np.pi
     * (NODE_FRACTIONS.size - 2)
     / (NODE_FRACTIONS.size - 1)
     * np.arange(NODE_FRACTIONS.size)[::-1]
 )
-# last terms of the force in a part over the largest force; a part with more is halved
+# Last Chebyshev terms of the force in a part over the largest force, above which the part is halved.
 MAX_ROUGHNESS_RATIO = 1e-9
-# fraction of a step below which a part is not halved
+# Minimum length of a part that is halved, as a fraction of a step.
 MIN_PART_FRACTION = 2.0**-14
-# parts of a step for which rows must be free
+# Maximum number of parts of a step, for which rows must be free.
 MAX_PARTS = 64
 
 
 class InterfaceState(NamedTuple):
-    """Relative displacement [m] and velocity [m/s], friction force [N], energy [J] and slip [m]."""
+    """State of an interface: displacement and velocity, force [N], energy [J] and slip [m]."""
 
     slide: float
     velocity: float
@@ -43,7 +43,7 @@ class InterfaceState(NamedTuple):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def read_interface(motion, y):
-    """Return the `InterfaceState` of a state."""
+    """Return displacement, velocity, force, energy and slip of the interface in a state."""
     n = motion.modes.shape[1]
     q, v = steps.find_slide(motion, y)
     for k in range(motion.memory.shape[1]):
@@ -62,7 +62,7 @@ def read_interface(motion, y):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def write_sample(motion, t, y, row):
-    """Write the sample of a state, see `MotionRecord`.
+    """Write a state as a sample into a row of the record, see `MotionRecord`.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def write_sample(motion, t, y, row):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_output(motion, y):
-    """Return the output [m] and its rate [m/s] of a state."""
+    """Return the output displacement [m] and its rate [m/s] of a state."""
     x = 0.0
     w = 0.0
     n = motion.modes.shape[1]
@@ -117,7 +117,7 @@ def can_output_turn(motion):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_output_extreme(motion, record, a, b, rate):
-    """Return the output [m] where its rate vanishes inside a step.
+    """Return the output displacement [m] at an extremum inside a step.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def find_output_extreme(motion, record, a, b, rate):
             a = middle
         else:
             b = middle
-        if b - a < 1e-8:  # the output is flat here: its error is the square
+        if b - a < 1e-8:  # The output is flat here, so its error is the square of the interval.
             break
     return out
 
@@ -186,7 +186,7 @@ def widen_by_step(motion, h, record, parts):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def widen_extremes(cycles, period, time, x, y):
-    """Include two values of the output in the extremes of the cycle that contains a time.
+    """Include two output values in the extremes of the cycle that contains a time.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def widen_extremes(cycles, period, time, x, y):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def add_phasor(cycles, period, t, h, begin, end):
-    """Add a step of h [s] from a time t [s] to the phasors of the cycles that request one.
+    """Add a step to the phasors of the cycles that request a phasor.
 
     It integrates 2/T x exp(-i omega t) of the quintic through output, rate and acceleration at
     both ends, whose error is h^6/46080 of the sixth derivative.
@@ -248,7 +248,7 @@ def add_phasor(cycles, period, t, h, begin, end):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def add_step_to_phasors(motion, h, record):
-    """Add a step to the phasors.
+    """Add the present step to the phasors.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ def add_step_to_phasors(motion, h, record):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def write_samples(motion, h, record):
-    """Write the samples inside a step, its end included.
+    """Write the due samples inside a step, its end included, into the record.
 
     Parameters
     ----------
@@ -298,7 +298,7 @@ def write_samples(motion, h, record):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def estimate_roughness(row, force):
-    """Return the last two Chebyshev coefficients [N] of the force in a part.
+    """Return the last two Chebyshev coefficients [N] of the force in a part of a step.
 
     row: samples at NODE_FRACTIONS; force: column.
     """
@@ -314,7 +314,7 @@ def estimate_roughness(row, force):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def write_parts(motion, h, record):
-    """Write a step into record.parts, in parts with a smooth force.
+    """Write a step into the record, divided into parts with a smooth force.
 
     The force in each part is a polynomial to MAX_ROUGHNESS_RATIO.
 
@@ -351,7 +351,7 @@ def write_parts(motion, h, record):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def stored_energy(motion, y):
-    """Return the energy of the modes and of the interface [J]."""
+    """Return the energy stored in the modes and in the interface [J]."""
     n = motion.modes.shape[1]
     out = 0.0
     for i in range(n):
@@ -364,7 +364,7 @@ def stored_energy(motion, y):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def record_step(motion, h, record):
-    """Record a step before the state moves on.
+    """Record samples, extremes, phasors and parts of a step before the state advances.
 
     Parameters
     ----------

@@ -7,9 +7,8 @@ from math import sqrt
 
 FORM_MOMENTS = 0.0  # reading="stretch" with p = 1: three moments of the strips, exact
 FORM_POWER = 1.0  # reading="stretch" with any order p: two Gauss points per strip
-FORM_REPORT = (
-    2.0  # reading="report" with a constant bond length: differences of P(p + 1, R/eps), exact
-)
+# reading="report" with a constant bond length: differences of P(p + 1, R/eps), exact
+FORM_REPORT = 2.0
 FORM_REPORT_GROWING = 3.0  # reading="report" with growing bonds: two Gauss points per strip
 
 # two Gauss points of a strip, as fractions of its length from its end

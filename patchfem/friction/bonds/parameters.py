@@ -8,9 +8,8 @@ import numpy as np
 
 MAX_EXPONENT = 1e100  # exponent of growth beyond which the bond length no longer changes
 MAX_LIST_SECONDS = 600.0  # largest estimated CPU time [s] of a run with a list of bonds
-SAME_SPEED_TOL = (
-    1e-6  # relative difference of two speeds below which their mean is used, to avoid cancellation
-)
+# relative difference of two speeds below which their mean is used, to avoid cancellation
+SAME_SPEED_TOL = 1e-6
 MAX_LINEAR_GROWTH = 1e-9  # growth J of a step up to which the growth along it counts as linear
 
 

@@ -15,9 +15,8 @@ from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 MAX_SHORT_PATH = 0.5  # path in bond lengths up to which the power series are exact to round-off
-MAX_SERIES_PATH = (
-    0.03  # path in bond lengths; below it, half of the terms of the first series suffice
-)
+# path in bond lengths; below it, half of the terms of the first series suffice
+MAX_SERIES_PATH = 0.03
 # coefficients of (exp(-x) - 1 + x)/x^2 and of the integral of y^3 exp(-y) over x^4, both as series in -x
 SHAPE_SERIES = np.array([1 / factorial(k + 2) for k in range(13)])
 MOMENT_SERIES = np.array([1 / (factorial(k) * (k + 4)) for k in range(13)])

@@ -36,9 +36,8 @@ MAX_GROWTH_PIECES = 16  # largest number of pieces of a strip due to growth, one
 FULL_GROWTH = 36.0  # growth J after which the starting length of a bond does not matter
 # relative displacement since a cohort formed / path since then; below it, the cohort counts as unstressed
 UNSTRESSED_TOL = 1e-14
-REVERSAL_TOL = (
-    1e-9  # distance of u = 0 from a cut / length of the strip; below it, u = 0 lies at the cut
-)
+# distance of u = 0 from a cut / length of the strip; below it, u = 0 lies at the cut
+REVERSAL_TOL = 1e-9
 MIN_PIECE_FRACTION = 1e-15  # length of the shortest piece / length of the part that is cut
 MIN_POSITIVE = 1e-300  # smallest argument of a logarithm and smallest divisor
 

@@ -33,9 +33,8 @@ GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)[1]  # weights of these points
 MAX_PIECE_LENGTH = 0.25  # longest interval of the Gauss rule in |y| or w
 FIRST_PIECE_LENGTH = 0.05  # longest interval at zero, where a fractional power is not smooth
 MAX_W = 36.0  # value of w beyond which y rounds to 1
-NEWTON_TOL = (
-    1e-8  # residual / path at which Newton's method stops; the error is then the square of it
-)
+# residual / path at which Newton's method stops; the error is then the square of it
+NEWTON_TOL = 1e-8
 MAX_NEWTON_STEPS = 40  # iterations of Newton's method
 
 

@@ -23,9 +23,8 @@ from ..protocol import Step
 
 # number of positions that are averaged at a time, so that nodes beyond their cut-off can be left out
 N_POSITIONS_PER_BLOCK = 64
-CUTOFF_WEIGHT = (
-    1e-20  # weight in the average that the nodes beyond the cut-off have, below round-off
-)
+# weight in the average that the nodes beyond the cut-off have, below round-off
+CUTOFF_WEIGHT = 1e-20
 
 
 class ConvolutionState(NamedTuple):

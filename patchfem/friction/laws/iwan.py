@@ -19,12 +19,11 @@ from ...core import frozen_array
 from ..protocol import Element, SteadyLoop
 from .elastic_plastic import parallel_element
 
-N_SLIDER_CELLS = (
-    768  # number of cells of the power law, each a Jenkins element; forces are exact to 1e-6 of F_S
-)
-MIN_CELL_RATIO = (
-    1e-5  # yield displacement / phi_max of the smallest slider that has a cell of its own
-)
+# number of cells of the power law, each a Jenkins element; forces are exact to 1e-6 of F_S
+
+N_SLIDER_CELLS = 768
+# yield displacement / phi_max of the smallest slider that has a cell of its own
+MIN_CELL_RATIO = 1e-5
 LOG_CELL_FRACTION = 0.25  # fraction of the cells that is uniform in log(phi), for small cycles
 
 

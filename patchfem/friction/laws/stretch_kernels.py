@@ -34,9 +34,8 @@ from .exponential_kernels import exp_minus
 
 NUMBER_UNITS = "N/m m"  # units of `numbers`, for batches that scale time and force
 IS_RATE_INDEPENDENT = True  # the stretch depends on the path alone if the bond length is constant
-GROWTH_INDEX = (
-    3  # index in `numbers` where the growth begins: a_s, l_k, v_h, eps_0, eps_k, breakaway
-)
+# index in `numbers` where the growth begins: a_s, l_k, v_h, eps_0, eps_k, breakaway
+GROWTH_INDEX = 3
 BREAKAWAY_INDEX = 8  # index of the fraction of the bond length that stretches without damage
 FIRST_POINT_INDEX = 9  # index where the numbers of the points begin
 

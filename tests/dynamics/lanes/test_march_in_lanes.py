@@ -33,7 +33,7 @@ def cases(law: str, count: int, seed: int = 1) -> run.Cases:
     if law == "table":
         sets = [elements(r, one) for one in slip]
         spring, length = (np.array(part) for part in zip(*((k.sum(), y[-1]) for k, y in sets)))
-        numbers = run.curve_tables(sets)
+        numbers = run.make_curve_tables(sets)
     if law in FLOWS:
         speed = slip * r.uniform(0.3, 2, count)
         length = (0 if "tanh" in law else 1) * r.uniform(0.6, 2, count)
@@ -259,10 +259,10 @@ def test_exact_accelerations_are_those_of_the_equation(law):
     some = cases(law, 35)
     steps = 64
     begun = run.initial_motion(law, some)
-    table = run.drive_table(64)
+    table = run.make_drive_table(64)
     found = run.output_accelerations(law, some, begun, 2, steps)
     motion = begun.copy()
-    numbers = run.case_numbers(law, some, steps)
+    numbers = run.make_case_numbers(law, some, steps)
     for k in range(4, 2 * steps + 1, 4):
         first = (k - 4) % steps
         part = table[:, first : first + 5].copy()

@@ -180,7 +180,7 @@ def make_cases(models: Sequence[Model], contacts=None) -> tuple[march.Cases, Sca
     scale = slide**2 / (rig.mass * omega**2)
     numbers = np.array(others).T
     if march.has_one_stretch(law):
-        numbers = numbers * march.number_scales(law, scale, omega)
+        numbers = numbers * march.law_number_scales(law, scale, omega)
     else:
         numbers = numbers.reshape(len(omega), -1)
     cases = march.Cases(

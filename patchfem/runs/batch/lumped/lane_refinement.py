@@ -156,7 +156,7 @@ class _Refinement:
             is_wide[is_wide] = self._evaluate(
                 indices[is_wide], wide_measured, [steps // 2, steps // 4]
             )
-        is_smooth = self.has_one_stretch or self.law in march.MASING
+        is_smooth = self.has_one_stretch or self.law in march.MASING_LAWS
         max_steps = STRETCH_STEPS[-1] if is_smooth else POINT_STEPS[-1][-1]
         is_refined = is_wide & (2 * steps <= max_steps) & (is_smooth | ~self.is_exact[indices])
         self.steps[indices[is_refined]] = 2 * steps

@@ -78,7 +78,7 @@ def find_ringing(law: str, cases, scales: Scales, measured, is_stuck) -> LaneRin
         return ringing._replace(needs_single_run=may_ring & ~is_held)
     # a periodic motion does not ring, but a transient may remain if the interface always sticks
     may_vibrate = may_contain_transient(cases, marched)
-    if law in march.MASING:
+    if law in march.MASING_LAWS:
         has_slipped = march.law_state(law, marched.motion, "EVER_SLIPPED") > 0
         may_ring = (may_ring & is_unsteady & has_slipped) | (may_vibrate & is_stuck)
     else:

@@ -47,7 +47,7 @@ class MeasuredMarch(NamedTuple):
     window: int
     values: dict
     energies: dict
-    marched: march.Marched
+    marched: march.LaneResults
     extremes: np.ndarray
     force_rise: np.ndarray
 
@@ -169,7 +169,7 @@ def collect_runs(
         ratio = np.abs(scales.ratio)
         steady = ratio * settled.value, ratio * settled.error
         is_exact |= settled.is_open
-    if law in march.MASING:
+    if law in march.MASING_LAWS:
         is_exact |= march.law_state(law, marched.motion, "MAX_DROPPED_GAP") > DROPPED_LOOP_RATIO
     phasors = (marched.history[:, :, 2:] @ [1, 1j]) * scales.ratio[:, None]
     ends = np.arange(measured.cycles - 1, -1, -measured.window)[::-1][-N_FINAL_WINDOWS:]

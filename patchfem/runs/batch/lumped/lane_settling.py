@@ -15,7 +15,7 @@ from .lane_numbers import count_evaluated_cycles, select_rows
 
 SETTLING_LAWS = (
     "yielding",
-    *march.MASING,
+    *march.MASING_LAWS,
 )  # laws whose marches are continued until the motion is steady
 MIN_TOLERANCE = 1e-4  # smallest tolerance that lanes can meet
 # largest ratio of the cycles of a continued march to those of the case

@@ -54,7 +54,7 @@ def move_cases(
         for model, elements in zip(models, fine)
     ]
     steps = lane_steps.steps_at_rate(rates, lane_steps.PATCH_STEPS)
-    max_size = load(f"{march.HERE}.rows_kernels").N_YIELDS - 1
+    max_size = load(f"{march.LANES_PACKAGE}.rows_kernels").N_YIELDS - 1
     sizes = [max(a.stiffness.size, b.stiffness.size) for a, b in zip(fine, coarse)]
     fits = (steps > 0) & (np.array(sizes) < max_size)
     results = CaseResults.blank(len(models))
@@ -113,5 +113,7 @@ def _contact_numbers(elements: list, pressed_cases: list) -> np.ndarray:
         )
         for group, case in zip(elements, pressed_cases)
     ]
-    tables = march.curve_tables([(group.stiffness, group.yield_displacement) for group in elements])
+    tables = march.make_curve_tables(
+        [(group.stiffness, group.yield_displacement) for group in elements]
+    )
     return np.column_stack([rows, tables]).T
