@@ -24,7 +24,7 @@ PUBLIC = {
         "measures_with_error",
         "setting_curve",
         "worst_error",
-        "worst_of_run",
+        "worst_run_error",
     ),
     "fits.curve": (
         "DEFAULT_STARTS",

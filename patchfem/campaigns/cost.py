@@ -39,7 +39,7 @@ from .numerical_settings import (
 # Name of the curve over tolerances, which is accepted in addition to NUMERICAL_SETTINGS.
 TOLERANCE = "tolerance"
 # Number of timings of a short run; the shortest one counts, because other work only adds time.
-TIMINGS = 3
+N_TIMINGS = 3
 # CPU time [s] above which a run is timed only once, because its timings differ by a few percent.
 MIN_SECONDS_TIMED_ONCE = 0.3
 # CPU time [s] that runs with proposed settings may take in total, so that `cost` ends within
@@ -178,8 +178,8 @@ def tolerance_curve(model: Model, say=None) -> list:
                 if runs and cost.is_same_run(runs[-1]):
                     # The runs are identical, so that the faster timing holds for both.
                     faster = min(runs[-1], cost, key=lambda run: run.seconds)
-                    runs[-1] = _with_timing(runs[-1], faster)
-                    cost = _with_timing(cost, faster)
+                    runs[-1] = _replace_timing(runs[-1], faster)
+                    cost = _replace_timing(cost, faster)
                 runs.append(cost)
                 if cost.meets_tolerance():
                     break
@@ -193,7 +193,7 @@ def tolerance_curve(model: Model, say=None) -> list:
     return runs
 
 
-def _with_timing(cost: Cost, other: Cost) -> Cost:
+def _replace_timing(cost: Cost, other: Cost) -> Cost:
     """Return the record of a run with its CPU and elapsed times replaced."""
     return replace(cost, seconds=other.seconds, wall_seconds=other.wall_seconds)
 
@@ -284,7 +284,7 @@ def setting_curve(model: Model, knob: str, say=None) -> list:
                 "",
             )
     best = _best_run(runs)
-    others = [replace(run, distances=_distances(run, best)) for run in runs]
+    others = [replace(run, distances=_compute_distances(run, best)) for run in runs]
     return [best if run is best else other for run, other in zip(runs, others)]
 
 
@@ -302,7 +302,7 @@ def _best_run(runs: list) -> Cost:
     return last if 2 * n_smaller >= len(shared) else finest
 
 
-def _distances(cost: Cost, best: Cost) -> dict:
+def _compute_distances(cost: Cost, best: Cost) -> dict:
     """Return the distances of the values of a run from those of the best run, by measure."""
     shared = [name for name in cost.values if name in best.values]
     return {name: abs(cost.values[name] - best.values[name]) for name in shared}
@@ -316,7 +316,7 @@ def _merge_identical_runs(first: Cost, second: Cost) -> Cost:
     """
     faster = min(first, second, key=lambda run: run.seconds)
     return replace(
-        _with_timing(first, faster),
+        _replace_timing(first, faster),
         label=f"{first.label}, {second.label.removeprefix('tolerance ')}",
         words=min(first.words, second.words, key=len),
         timings=first.timings + second.timings,
@@ -326,7 +326,7 @@ def _merge_identical_runs(first: Cost, second: Cost) -> Cost:
 def _time_setting(setting: Setting, say, before=(), *, can_split: bool = True) -> Cost | None:
     """Run a numerical setting several times and return its cost; None if it cannot be run.
 
-    It is timed TIMINGS times, or once if the run is long and nothing was compiled, or if it repeats
+    It is timed N_TIMINGS times, or once if the run is long and nothing was compiled, or if it repeats
     a run in `before`.
 
     Parameters
@@ -342,7 +342,7 @@ def _time_setting(setting: Setting, say, before=(), *, can_split: bool = True) -
     timings = []
     cost = None
     same: list = []
-    while cost is None or (len(timings) < TIMINGS and not same):
+    while cost is None or (len(timings) < N_TIMINGS and not same):
         n_compiled = _count_compiled()
         begin = (_measure_cpu(), perf_counter())
         finished = _run_setting(setting, setting.label, say, can_split=can_split)
@@ -522,7 +522,7 @@ def cost_sentence(runs: list, tolerance: float) -> str:
     if fastest is not None:
         return (
             f"{fastest.words}: {_format_seconds(fastest)} per run, with every measure within the "
-            f"tolerance {tolerance:g}{_effect_sentence(runs, tolerance)}"
+            f"tolerance {tolerance:g}{_no_effect_sentence(runs, tolerance)}"
         )
     known = [run for run in runs if run.errors or run.distances]
     best = min(known, key=lambda run: worst_error(run, names, tolerance))
@@ -543,7 +543,7 @@ def cost_sentence(runs: list, tolerance: float) -> str:
     )
 
 
-def _effect_sentence(runs: list, tolerance: float) -> str:
+def _no_effect_sentence(runs: list, tolerance: float) -> str:
     """Return the text that other settings change no result; "" if they do."""
     names = changed_measures(runs)
     if len(runs) < 2:
@@ -596,7 +596,7 @@ def worst_error(run: Cost, names: Sequence, tolerance: float) -> WorstError:
     return worst
 
 
-def worst_of_run(run: Cost) -> WorstError:
+def worst_run_error(run: Cost) -> WorstError:
     """Return the worst error of a run relative to the tolerance of that run."""
     return worst_error(run, list(run.values), run.tolerance)
 

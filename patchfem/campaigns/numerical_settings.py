@@ -69,10 +69,14 @@ def list_settings(model: Model, knob: str) -> list:
     A value that the tolerance chooses comes last if the others are numbers.
     """
     if knob != "element_size":
-        return _integer_values(model, knob)
+        return _list_integer_values(model, knob)
     if model.patch.mesh.file is not None:
         return _split_meshes(model)
-    return _by_tolerance(model) if model.patch.mesh.is_automatic else _uniform_meshes(model)
+    return (
+        _list_tolerance_meshes(model)
+        if model.patch.mesh.is_automatic
+        else _list_uniform_meshes(model)
+    )
 
 
 def _split_meshes(model: Model) -> list:
@@ -116,7 +120,7 @@ def with_setting(model: Model, key: str, value: float) -> Model:
     return replace(model, accuracy=model.accuracy.model_copy(update={key: value}))
 
 
-def _by_tolerance(model: Model) -> list:
+def _list_tolerance_meshes(model: Model) -> list:
     """Return settings for the meshes that several tolerances choose."""
     scene_tolerance = model.accuracy.tolerance
     settings = []
@@ -129,7 +133,7 @@ def _by_tolerance(model: Model) -> list:
     return settings
 
 
-def _uniform_meshes(model: Model) -> list:
+def _list_uniform_meshes(model: Model) -> list:
     """Return settings for uniform meshes, and for the automatic mesh of a static patch."""
     length = model.patch.pieces.length
     settings = []
@@ -147,7 +151,7 @@ def _uniform_meshes(model: Model) -> list:
     return settings
 
 
-def _integer_values(model: Model, knob: str) -> list:
+def _list_integer_values(model: Model, knob: str) -> list:
     """Return settings for integer values around the value of the scene.
 
     A small value of the scene has fewer coarser values, because a quarter and a half of 1 are no

@@ -13,7 +13,7 @@ from ..campaigns.cost import (
     fastest_by_measure,
     measures_with_error,
     worst_error,
-    worst_of_run,
+    worst_run_error,
 )
 from ..disk.atomic_write import write_rows, write_text
 from ..formatting import format_number
@@ -75,7 +75,7 @@ def format_cost(knob: str, runs: list, tolerance: float) -> list[str]:
         last = [cost_sentence(runs, tolerance)]
     else:
         groups = _by_tolerance(runs)
-        rows = [(group[0], worst_of_run(group[0]), _format_outcome(group)) for group in groups]
+        rows = [(group[0], worst_run_error(group[0]), _format_outcome(group)) for group in groups]
         missed = [group[-1] for group in groups if not group[-1].meets_tolerance()][-1:]
         last = [
             f"tolerance {one.tolerance:g}: {remedy}" for one in missed for remedy in one.remedies
@@ -114,7 +114,7 @@ def _format_outcome(group: list) -> str:
     seconds = f"{tried} ({format_number(last.seconds, 2)} CPU s)"
     if last.meets_tolerance():
         return f"{missed}, but with {seconds}"
-    worst = worst_of_run(last)
+    worst = worst_run_error(last)
     return f"{missed}, nor with {seconds}: {format_number(worst.fraction, 2)} in {worst.name}"
 
 
@@ -295,7 +295,7 @@ def cost_data(knob: str, runs: list, tolerance: float) -> dict:
     )
     out = []
     for run in runs:
-        worst = worst_of_run(run)
+        worst = worst_run_error(run)
         out.append(
             {name: getattr(run, name) for name in parts}
             | {
@@ -328,7 +328,7 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
     """
     names = measures_with_error(runs)
     worst = [
-        worst_of_run(run) if knob == TOLERANCE else worst_error(run, names, tolerance)
+        worst_run_error(run) if knob == TOLERANCE else worst_error(run, names, tolerance)
         for run in runs
     ]
     points = [

@@ -116,7 +116,7 @@ def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path,
     1e-5): there a node at the edge of the contact bears or not by round-off, and with three sets of BLAS kernels the
     error of the contact fraction is 1.8e-6, 2.2e-6 and 2.3e-6, and no other differs by more than 4 %.
     """
-    monkeypatch.setattr("patchfem.campaigns.cost.TIMINGS", 1)
+    monkeypatch.setattr("patchfem.campaigns.cost.N_TIMINGS", 1)
     said = cli(
         "cost",
         STUDIES / "rig/pieces.toml",

@@ -126,10 +126,10 @@ def _beside(kind: str, asked, tolerance: float) -> dict:
     """Measures of a patch by name from cells alone: even ones of traces that are fine everywhere, else graded ones."""
     if kind in FINE:
         return measures(*solve_all(asked.with_mesh(element_size=LENGTH / CELLS), tolerance))
-    takes_points = fine.takes_points
-    fine.takes_points = lambda patch_model: False
+    can_use_points = fine.can_use_points
+    fine.can_use_points = lambda patch_model: False
     try:
         patches = [patch for patch in solve_all(asked, tolerance) if patch is not None]
         return measures(*patches, tolerance=tolerance)
     finally:
-        fine.takes_points = takes_points
+        fine.can_use_points = can_use_points

@@ -20,7 +20,7 @@ from .joint import MIN_AMPLITUDE_FACTOR, Joint
 from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 
 # Numbers of harmonics that are tried in turn, each with four times the samples of the previous one.
-HARMONICS = (9, 19, 39)
+HARMONIC_COUNTS = (9, 19, 39)
 # Largest number of samples per cycle: more take too long, and 39 harmonics need fewer.
 MAX_SAMPLES = 65536
 N_SAMPLES = 4096  # Number of samples of a cycle from which the largest displacement is read.
@@ -48,8 +48,8 @@ def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
         return _compute_rigid_curve(joint, amplitudes)
     laws = joint.steady_laws()
     tolerance = joint.model.accuracy.tolerance
-    values = _read_motions(laws, joint, amplitudes, HARMONICS[0])
-    for harmonics in HARMONICS[1:]:
+    values = _read_motions(laws, joint, amplitudes, HARMONIC_COUNTS[0])
+    for harmonics in HARMONIC_COUNTS[1:]:
         count = 1 + int(np.isfinite(values[0]).nonzero()[0].max(initial=-1))
         if not count:
             raise NotConverged("no free motion of these amplitudes was found")
@@ -59,7 +59,9 @@ def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
         known = np.isfinite(error[0])
         if (error[:2] <= tolerance * np.abs(values[:2]))[:, known].all():
             break
-    error += joint.space_errors(lambda group: _read_motions(group, joint, amplitudes, HARMONICS[0]))
+    error += joint.spatial_discretization_errors(
+        lambda group: _read_motions(group, joint, amplitudes, HARMONIC_COUNTS[0])
+    )
     known = np.isfinite(values + error).all(axis=0)
     if not known.any():
         raise NotConverged("no free motion of these amplitudes was found")
@@ -153,7 +155,7 @@ class _FreeMotionSearch:
         self.reach = abs(float(modes.output @ shape))
         widest = np.abs(group.rows @ shape) * amplitudes[-1] / self.reach
         samples = group.samples or group.samples_for(harmonics, widest)
-        samples = min(samples * (harmonics // HARMONICS[0]) ** 2, MAX_SAMPLES)
+        samples = min(samples * (harmonics // HARMONIC_COUNTS[0]) ** 2, MAX_SAMPLES)
         balance = make_balance(modes, group, samples)
         self.equations = FreeBalance(balance, joint.mode, harmonics, omega)
         balance = self.equations.balance
@@ -162,13 +164,13 @@ class _FreeMotionSearch:
         self.first = np.append(pack_harmonics(faces), [1.0, 0.0])
         self.small = MIN_AMPLITUDE_FACTOR * float(joint.slip_amplitude) / self.reach
 
-    def continue_motion(self, near: FreeMotion | None, amplitude: float) -> FreeMotion | None:
+    def continue_motion(self, neighbour: FreeMotion | None, amplitude: float) -> FreeMotion | None:
         """Solve for the motion at an amplitude [m] from a neighbouring motion; None if it fails."""
-        if near is None:
+        if neighbour is None:
             return None
-        here = amplitude / near.reach
+        here = amplitude / neighbour.reach
         try:
-            x = self.equations.towards(near.unknowns, near.free.amplitude, here)
+            x = self.equations.towards(neighbour.unknowns, neighbour.free.amplitude, here)
             return _reach_amplitude(self.equations, self.joint, x, here, amplitude)
         except NotConverged:
             return None
@@ -190,7 +192,7 @@ class _FreeMotionSearch:
 
 
 def _reach_amplitude(
-    equations: FreeBalance, joint: Joint, x, here: float, amplitude: float
+    equations: FreeBalance, joint: Joint, x, coordinate_amplitude: float, amplitude: float
 ) -> FreeMotion:
     """Find the free motion of a given output amplitude [m] by secant steps.
 
@@ -202,7 +204,7 @@ def _reach_amplitude(
     joint : Joint
     x : (N,) array
         Unknowns at the amplitude `here`.
-    here : float
+    coordinate_amplitude : float
         Amplitude of the coordinate [m].
     amplitude : float
         Requested amplitude at the output [m].
@@ -218,7 +220,7 @@ def _reach_amplitude(
     best_distance = np.inf
     for _ in range(MAX_STEPS):
         try:
-            x, free = equations.solve(x, here)
+            x, free = equations.solve(x, coordinate_amplitude)
         except NotConverged:
             if best is None:
                 raise
@@ -229,15 +231,15 @@ def _reach_amplitude(
             break
         if abs(distance) < AMPLITUDE_TOL:
             best_distance = abs(distance)
-            best = FreeMotion(free, x, amplitude / here)
+            best = FreeMotion(free, x, amplitude / coordinate_amplitude)
         if abs(distance) < ROUND_OFF_ERROR:
             break
         if before is not None:
             last_here, last_distance = before
-            slope = (distance - last_distance) / np.log(here / last_here)
+            slope = (distance - last_distance) / np.log(coordinate_amplitude / last_here)
         slope = slope if slope > MIN_SLOPE else 1.0
-        before = (here, distance)
-        here *= np.exp(-distance / slope)
+        before = (coordinate_amplitude, distance)
+        coordinate_amplitude *= np.exp(-distance / slope)
     if best is not None:
         return best
     raise NotConverged(

@@ -29,7 +29,7 @@ from .records import (
 )
 
 # Smallest amplitude of gross slip over the amplitude at which the complete contact begins to slip.
-GROSS_SLIP_BEGIN = 3.0
+MIN_GROSS_SLIP_RATIO = 3.0
 FLUTTER_TOL = 1e-8  # Relative error of the flutter amplitude, below the digits that are printed.
 
 
@@ -242,8 +242,8 @@ def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
     relative_error = notes.MIN_LOSS_RATIO * 2 * np.pi * curve.damping_error
     known = loss > np.maximum(ROUND_OFF_ERROR, relative_error) * energy
     slip = joint.slip_amplitude
-    micro = np.flatnonzero(known & (amplitude < notes.MICRO_SLIP_END * slip))
-    gross = np.flatnonzero(known & (amplitude > GROSS_SLIP_BEGIN * slip))[-2:]
+    micro = np.flatnonzero(known & (amplitude < notes.MAX_MICRO_SLIP_RATIO * slip))
+    gross = np.flatnonzero(known & (amplitude > MIN_GROSS_SLIP_RATIO * slip))[-2:]
     return LossExponents(_loss_slope(curve, micro), _loss_slope(curve, gross), theory)
 
 

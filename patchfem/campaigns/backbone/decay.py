@@ -75,9 +75,11 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
     )
     error = np.fmax(reading.run_error, mesh_error) + reading.reading_error
     notes = [
-        *decays.slip_sentences({"method decay": reason}, lambda: _coarser_in_space(joint, release)),
-        *_note_mixed(amplitudes[mixed]),
-        *_note_growing(amplitudes[n_decaying:]),
+        *decays.slip_sentences(
+            {"method decay": reason}, lambda: _list_spatial_coarsenings(joint, release)
+        ),
+        *_note_other_modes(amplitudes[mixed]),
+        *_note_growing_motion(amplitudes[n_decaying:]),
         *_note_unknown_modes(joint, known, other_modes),
     ]
     curve = make_curve(
@@ -86,7 +88,7 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
     return curve.at(known)
 
 
-def _coarser_in_space(joint: Joint, release: Release) -> list:
+def _list_spatial_coarsenings(joint: Joint, release: Release) -> list:
     """List the runs of a release on coarser meshes or with fewer elements."""
     engine = ENGINES[release.numerics.engine]
     return engine.coarser_in_space(
@@ -94,7 +96,7 @@ def _coarser_in_space(joint: Joint, release: Release) -> list:
     )
 
 
-def _note_mixed(amplitudes) -> list:
+def _note_other_modes(amplitudes) -> list:
     """Return a note on amplitudes (k,) [m] of a decay at which other modes move too much."""
     count = amplitudes.size
     if not count:
@@ -108,7 +110,7 @@ def _note_mixed(amplitudes) -> list:
     ]
 
 
-def _note_growing(amplitudes) -> list:
+def _note_growing_motion(amplitudes) -> list:
     """Return a note on the amplitudes (k,) [m] from which a released motion grows."""
     if not amplitudes.size:
         return []
@@ -209,7 +211,7 @@ def _read_with_errors(joint: Joint, release: Release, amplitudes) -> DecayReadin
     error = ROUND_OFF_ERROR * np.abs(value)
     in_time = ENGINES[choice.engine].coarser_in_time(model, choice)
     variants = _ReleaseVariants(joint, release, amplitudes)
-    for coarsening in [*in_time, *_coarser_in_space(joint, release)]:
+    for coarsening in [*in_time, *_list_spatial_coarsenings(joint, release)]:
         if coarsening.runs:
             error += variants.change(coarsening, value)
     return DecayReading(value, reading_error, error)

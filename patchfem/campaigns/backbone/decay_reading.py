@@ -13,17 +13,17 @@ from ...response.decay_curve import (
     locate_reversals,
     make_half_cycles,
 )
-from .balance import HARMONICS, find_free_motions
+from .balance import HARMONIC_COUNTS, find_free_motions
 from .joint import Joint
 
 N_SAMPLES = 4096  # Number of samples of a cycle of a free motion.
 # Number of half cycles on either side over which the largest effect of other modes is taken.
-N_BEAT_SWINGS = 8
-EQUAL_SWINGS_TOL = 1e-7  # Relative difference of two half cycles below which nothing slips.
+N_BEAT_HALF_CYCLES = 8
+EQUAL_HALF_CYCLES_TOL = 1e-7  # Relative difference of two half cycles below which nothing slips.
 STUCK_FRACTION = 0.999  # Stiffness over the stiffness without slip above which a contact sticks.
 
 
-def read_decay(joint: Joint, motion: Response, find_turns=locate_reversals) -> DecayCurve:
+def read_decay(joint: Joint, motion: Response, find_reversals=locate_reversals) -> DecayCurve:
     """Identify frequency and damping of a decaying motion from reversal to reversal.
 
     With several modes, the reversals are those of the motion along the shape of the stuck mode, in
@@ -34,7 +34,7 @@ def read_decay(joint: Joint, motion: Response, find_turns=locate_reversals) -> D
     ----------
     joint : Joint
     motion : Response
-    find_turns : callable
+    find_reversals : callable
         Of `response.decay_curve`: finds the reversals between samples.
 
     Returns
@@ -43,15 +43,15 @@ def read_decay(joint: Joint, motion: Response, find_turns=locate_reversals) -> D
     """
     shape = joint.shape
     if shape.size == 1:
-        turns = find_turns(motion.time, motion.output, motion.output_rate)
+        turns = find_reversals(motion.time, motion.output, motion.output_rate)
         return fit_decay_curve(make_half_cycles(*turns))
-    times, components = find_turns(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
+    times, components = find_reversals(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
     if times.size < 3:
         return fit_decay_curve(make_half_cycles(times, components))
     output = CubicHermiteSpline(motion.time, motion.output, motion.output_rate)(times)
     sizes = np.abs(np.diff(output))
     lengths = np.diff(times)
-    are_equal = np.abs(np.diff(lengths)) <= EQUAL_SWINGS_TOL * lengths[1:]
+    are_equal = np.abs(np.diff(lengths)) <= EQUAL_HALF_CYCLES_TOL * lengths[1:]
     sticks = np.append(True, are_equal) & np.append(are_equal, True)
     at_output = fit_decay_curve(make_half_cycles(times, components, sizes))
     mode_sizes = joint.reach / (shape @ shape) * np.abs(np.diff(components))
@@ -59,8 +59,8 @@ def read_decay(joint: Joint, motion: Response, find_turns=locate_reversals) -> D
     curve = fit_decay_curve(make_half_cycles(times, components, sizes))
     change = _mode_coupling(joint) * np.abs(curve.damping - at_output.damping)
     if change.size:
-        padded = np.pad(change, N_BEAT_SWINGS)
-        change = sliding_window_view(padded, 2 * N_BEAT_SWINGS + 1).max(axis=1)
+        padded = np.pad(change, N_BEAT_HALF_CYCLES)
+        change = sliding_window_view(padded, 2 * N_BEAT_HALF_CYCLES + 1).max(axis=1)
     return curve._replace(
         damping_error=curve.damping_error + change,
         frequency_error=curve.frequency_error + change * curve.frequency,
@@ -96,7 +96,7 @@ def measure_other_modes(joint: Joint, motion: Response, amplitudes) -> np.ndarra
     try:
         joint.require_steady_loops("balance")
         group = joint.steady_laws()
-        free_motions = find_free_motions(group, joint, amplitudes[columns], HARMONICS[0])
+        free_motions = find_free_motions(group, joint, amplitudes[columns], HARMONIC_COUNTS[0])
     except (NotConverged, PatchfemError):
         return out
     max_stuck = _max_stuck_displacements(group, free_motions)

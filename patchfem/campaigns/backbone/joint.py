@@ -245,7 +245,7 @@ class Joint(NamedTuple):
         if reason:
             raise PatchfemError(f"{method} cannot be computed {reason}")
 
-    def space_errors(self, read: Callable) -> np.ndarray | float:
+    def spatial_discretization_errors(self, compute: Callable) -> np.ndarray | float:
         """Return the errors of a quantity due to the mesh and to the discrete sliders of a law.
 
         `compute` maps a LawGroup to the quantity.
@@ -259,13 +259,15 @@ class Joint(NamedTuple):
             return error
         group = self.steady_laws()
         if has_partial_slip:
-            error = error + decays.mesh_error(group, decays.coarse_laws(model, self.coarse), read)
+            error = error + decays.mesh_error(
+                group, decays.coarse_laws(model, self.coarse), compute
+            )
         if has_cells:
-            best = read(group)
+            best = compute(group)
             changes = []
             for cells in CELL_MERGES:
                 merged = group.with_elements(partial(join_cells, *cells))
-                changes.append(np.abs(read(merged) - best))
+                changes.append(np.abs(compute(merged) - best))
             error = error + error_of_change(np.max(changes, axis=0), ratio=4.0, order=2.0)
         return error
 

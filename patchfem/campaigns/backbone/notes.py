@@ -9,12 +9,14 @@ from .joint import MIN_AMPLITUDE_FACTOR, Joint
 from .records import Curve
 
 # Largest amplitude of micro-slip over the amplitude at which the complete contact begins to slip.
-MICRO_SLIP_END = 0.3
+MAX_MICRO_SLIP_RATIO = 0.3
 # Smallest ratio of a loss to its error with which the loss counts for an exponent.
 MIN_LOSS_RATIO = 4.0
-MAX_LISTED = 6  # Largest number of amplitudes that a sentence lists individually.
+MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a sentence lists individually.
 REPORT_OTHER_MODES = 1e-3  # Motion of other modes over amplitude above which a sentence states it.
-MIN_RATIO = 2.0  # Ratio of two values above which a sentence gives the ratio and not a percentage.
+MIN_STATED_RATIO = (
+    2.0  # Ratio of two values above which a sentence gives the ratio and not a percentage.
+)
 MISSING_ERRORS = (
     "the errors of the curves do not account for the mesh, because no coarser mesh was computed: "
 )
@@ -62,9 +64,9 @@ def note_missing_mesh(joint: Joint) -> list:
 
 def note_micro_slip(joint: Joint, amplitudes) -> list:
     """Return a note on amplitudes (k,) [m] that do not determine the micro-slip exponent."""
-    edge = MICRO_SLIP_END * joint.slip_amplitude
+    edge = MAX_MICRO_SLIP_RATIO * joint.slip_amplitude
     if amplitudes[0] > edge:
-        begin = format_length(MIN_AMPLITUDE_FACTOR / MICRO_SLIP_END * edge, 2)
+        begin = format_length(MIN_AMPLITUDE_FACTOR / MAX_MICRO_SLIP_RATIO * edge, 2)
         return [
             f"the smallest amplitude, {format_length(amplitudes[0], 3)}, lies above the range of "
             f"micro-slip, which ends at about {format_length(edge, 2)}; to get the exponent of "
@@ -86,7 +88,7 @@ def note_gaps(amplitudes, curves: dict) -> list:
         count = curve.amplitude.size
         if not missing.size or count == amplitudes.size:
             continue
-        if missing.size > MAX_LISTED:
+        if missing.size > MAX_LISTED_AMPLITUDES:
             ends = [format_length(missing[k], 3) for k in (0, -1)]
             places = f"lie from {ends[0]} to {ends[1]}"
         else:
@@ -113,7 +115,7 @@ def note_secant_stiffness(joint: Joint, amplitudes, curves: dict) -> list:
     """
     if joint.is_linear or not joint.friction_limit:
         return []
-    slips = amplitudes[-1] > MICRO_SLIP_END * joint.slip_amplitude
+    slips = amplitudes[-1] > MAX_MICRO_SLIP_RATIO * joint.slip_amplitude
     if not slips or "quasi-static" not in curves or "balance" in curves:
         return []
     return [
@@ -167,7 +169,7 @@ def _note_largest_difference(
     k = int(np.argmax(relative))
     ratio = value[k] / balance_value[k]
     size = f"by {100 * relative[k]:.2g} %"
-    if ratio >= MIN_RATIO:
+    if ratio >= MIN_STATED_RATIO:
         size = f"where the value by {method} is {ratio:.2g} times the value by balance"
     others = ""
     if curve.other_modes is not None and curve.other_modes[k] > REPORT_OTHER_MODES:

@@ -29,7 +29,7 @@ def compute_static_curve(joint: Joint, amplitudes) -> Curve:
             "rigid friction has no finite stiffness, so a static curve cannot be computed for the "
             "mode of the sticking contact"
         )
-    curve = _by_closed_form(joint, amplitudes)
+    curve = _compute_in_closed_form(joint, amplitudes)
     if curve is not None:
         return curve
     try:
@@ -37,7 +37,7 @@ def compute_static_curve(joint: Joint, amplitudes) -> Curve:
     except PatchfemError:
         if len(joint.model.rig.friction.interfaces) > 1 or joint.model.rig.springs.is_nonlinear:
             raise
-        return _by_bench_loops(joint, amplitudes)
+        return _compute_from_bench_loops(joint, amplitudes)
 
     def read(group, samples: int) -> np.ndarray:
         """Return amplitude, frequency, damping and loss (4, k) from the loops of a LawGroup."""
@@ -47,11 +47,11 @@ def compute_static_curve(joint: Joint, amplitudes) -> Curve:
     is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
     best[0] = np.where(is_wanted, amplitudes, best[0])
     error = np.abs(best - read(laws, N_SAMPLES // 2)) + ROUND_OFF_ERROR * np.abs(best)
-    error += joint.space_errors(lambda group: read(group, N_SAMPLES))
-    return _rising_part(best, error)
+    error += joint.spatial_discretization_errors(lambda group: read(group, N_SAMPLES))
+    return _select_rising_part(best, error)
 
 
-def _rising_part(best, error) -> Curve:
+def _select_rising_part(best, error) -> Curve:
     """Select the part of a quasi-static curve on which the force increases.
 
     Beyond this part no equilibrium is stable.
@@ -72,7 +72,7 @@ def _rising_part(best, error) -> Curve:
     return make_curve(best[0], best[1:], error[1:]).at(slice(count))
 
 
-def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
+def _compute_in_closed_form(joint: Joint, amplitudes) -> Curve | None:
     """Compute the curve of a single interface in closed form; None if its law has none."""
     model = joint.model
     modes = joint.modes
@@ -97,7 +97,7 @@ def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
     best = np.where(is_wanted, best, np.nan)
     best[0] = amplitudes
     relative = ROUND_OFF_ERROR + (AMPLITUDE_TOL if modes.omega.size > 1 else 0.0)
-    return _rising_part(best, relative * np.abs(best))
+    return _select_rising_part(best, relative * np.abs(best))
 
 
 def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
@@ -112,7 +112,7 @@ def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
     return decays.decay_rows(modes, statics)
 
 
-def _by_bench_loops(joint: Joint, amplitudes) -> Curve:
+def _compute_from_bench_loops(joint: Joint, amplitudes) -> Curve:
     """Compute the curve from bench loops of the contact at the frequency of the mode."""
     slides = np.abs(joint.modes.interfaces[0] @ joint.shape) * amplitudes / joint.reach
     patches = [joint.patch]
@@ -137,4 +137,4 @@ def _by_bench_loops(joint: Joint, amplitudes) -> Curve:
     error = ROUND_OFF_ERROR * np.abs(best)
     for moved in (moved_tips, moved_areas):
         error += np.abs(_read_loops(joint, slides, moved) - best)
-    return _rising_part(best, error)
+    return _select_rising_part(best, error)

@@ -15,7 +15,7 @@ from ...runs.rig import decays, numerics, solve
 from ...runs.rig.engines import PIECES
 from ...structure import drives
 from ...structure.drive_sizes import find_decay_rate
-from .balance import HARMONICS, find_free_motions
+from .balance import HARMONIC_COUNTS, find_free_motions
 from .decay_reading import read_decay
 from .joint import MIN_AMPLITUDE_FACTOR, RELEASE_FACTOR, Joint
 
@@ -31,9 +31,9 @@ N_START_STEPS = 12
 MAX_RAISED = 3  # Largest number of repeated releases, each from a higher amplitude.
 MAX_RAISE_FACTOR = 8.0  # Largest ratio of the amplitudes of two successive releases.
 # Final amplitude of the decay over the smallest requested one, such that coarser runs reach it too.
-END_FACTOR = 0.8
+FINAL_AMPLITUDE_FACTOR = 0.8
 # Number of periods of the free mode within which the first half cycles of a decay appear.
-N_FREE_SWINGS = 3.0
+N_FREE_CYCLES = 3.0
 ANNOUNCED_SECONDS = 20.0  # CPU time [s] of a decay above which it is announced.
 COARSER_RUNS_FACTOR = 2.0  # CPU time of a decay with its coarser runs over that without them.
 
@@ -113,9 +113,13 @@ def release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> De
 def _is_growing(joint: Joint, motion: Response) -> bool:
     """Return whether the oscillation grows along the shape of the stuck mode."""
     shape = joint.shape
-    _, turns = locate_reversals(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
-    swings = np.abs(np.diff(turns))
-    return find_decay_rate(joint.modes) < 0 and swings.size > 2 and swings[-1] > swings[0]
+    _, reversals = locate_reversals(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
+    half_cycles = np.abs(np.diff(reversals))
+    return (
+        find_decay_rate(joint.modes) < 0
+        and half_cycles.size > 2
+        and half_cycles[-1] > half_cycles[0]
+    )
 
 
 def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
@@ -131,8 +135,8 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
     n_raised = 0
     seconds_per_cycle = 0.0
     free_omega = joint.modes.omega[joint.mode]
-    free_swings = N_FREE_SWINGS * 2 * np.pi / free_omega if free_omega else np.inf
-    lowest = END_FACTOR * amplitudes[0]
+    free_swings = N_FREE_CYCLES * 2 * np.pi / free_omega if free_omega else np.inf
+    lowest = FINAL_AMPLITUDE_FACTOR * amplitudes[0]
     while True:
         model, choice = _choose_numerics(joint, begin, cycles)
         max_cycles = _max_cycles(joint, choice.engine)
@@ -174,9 +178,9 @@ def _max_cycles(joint: Joint, engine: str) -> int:
     return MAX_CYCLES_TURNS if engine == PIECES.name else MAX_CYCLES_ONE_MODE
 
 
-def _choose_numerics(joint: Joint, begin: float, cycles: int) -> tuple:
+def _choose_numerics(joint: Joint, amplitude: float, cycles: int) -> tuple:
     """Return the model of a release at a given amplitude [m], and its numerical settings."""
-    model = release_model(joint, begin)
+    model = release_model(joint, amplitude)
     drive = replace(model.rig.drive, cycles=float(cycles))
     model = replace(model, rig=replace(model.rig, drive=drive))
     choice = numerics.choose(model)
@@ -186,23 +190,27 @@ def _choose_numerics(joint: Joint, begin: float, cycles: int) -> tuple:
     return model, choice
 
 
-def _raise_release(joint: Joint, begin: float, high: float, largest: float) -> float:
+def _raise_release(
+    joint: Joint, release_amplitude: float, first_reading: float, largest: float
+) -> float:
     """Return a higher release amplitude [m] after a first reading below `largest`.
 
     Parameters
     ----------
     joint : Joint
-    begin : float
+    release_amplitude : float
         Amplitude of the release so far [m].
-    high : float
+    first_reading : float
         Its first reading [m].
     largest : float
         Amplitude [m] that the first reading must exceed.
     """
     # Friction reduces the amplitude by two static deflections per half cycle.
     deflection = joint.output_amplitude(joint.deflection) if joint.friction_limit else 0.0
-    limit = max(MAX_RAISE_FACTOR * begin, RELEASE_FACTOR * (begin + 2 * deflection))
-    raised = begin * RELEASE_FACTOR * largest / high
+    limit = max(
+        MAX_RAISE_FACTOR * release_amplitude, RELEASE_FACTOR * (release_amplitude + 2 * deflection)
+    )
+    raised = release_amplitude * RELEASE_FACTOR * largest / first_reading
     return min(raised, limit, joint.model.rig.springs.travel)
 
 
@@ -237,9 +245,9 @@ def _start_release(joint: Joint, amplitude: float) -> InitialState:
             first = float(joint.output_amplitude(MIN_AMPLITUDE_FACTOR * joint.slip_displacement))
             first = min(first or amplitude, amplitude)
             amplitudes = np.unique(np.geomspace(first, amplitude, N_START_STEPS))
-            free = find_free_motions(joint.steady_laws(), joint, amplitudes, HARMONICS[0])[-1]
+            free = find_free_motions(joint.steady_laws(), joint, amplitudes, HARMONIC_COUNTS[0])[-1]
             if free is not None:
-                order = np.arange(HARMONICS[0] + 1)[:, None]
+                order = np.arange(HARMONIC_COUNTS[0] + 1)[:, None]
                 rates = 1j * free.omega * order * free.modal
                 return InitialState(free.modal.real.sum(axis=0), rates.real.sum(axis=0))
         except (NotConverged, PatchfemError):

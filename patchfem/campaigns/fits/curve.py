@@ -47,7 +47,7 @@ DEFAULT_STARTS = 6  # Number of starts of a search by the fast method.
 # Largest number of values tried besides those of the scene until both methods have a curve.
 MAX_TRIALS = 8
 PROGRESS_SECONDS = 10.0  # Time between two lines of progress [s].
-MAX_LISTED = 6  # Largest number of amplitudes that a sentence lists individually.
+MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a sentence lists individually.
 # Number of cached curves, because a step of the search needs the last ones again.
 N_CACHED_CURVES = 8
 NO_MODE_ERROR = "the intervals do not contain the error of the modes left out of the structure"
@@ -436,8 +436,10 @@ def _nearest_rows(amplitudes, others) -> np.ndarray:
 
 
 def _list_amplitudes(amplitudes) -> str:
-    listed = ", ".join(format_length(amplitude, 3) for amplitude in amplitudes[:MAX_LISTED])
-    return listed + (", ..." if len(amplitudes) > MAX_LISTED else "")
+    listed = ", ".join(
+        format_length(amplitude, 3) for amplitude in amplitudes[:MAX_LISTED_AMPLITUDES]
+    )
+    return listed + (", ..." if len(amplitudes) > MAX_LISTED_AMPLITUDES else "")
 
 
 def _compute_curve(model, amplitudes, method: str) -> np.ndarray:

@@ -166,7 +166,7 @@ def fit_loop(
         pieces=bench.pieces,
     )
     has_lead_in = bool(offsets) or options.warm
-    doubts = _doubt_warnings(fitted, scene, has_lead_in=has_lead_in)
+    doubts = _warn_of_doubtful_fit(fitted, scene, has_lead_in=has_lead_in)
     warnings = [*fitted.keys.warnings, *doubts]
     return replace(fitted, keys=replace(fitted.keys, warnings=warnings))
 
@@ -211,7 +211,7 @@ def _add_counts(fit: Fit, before: Fit) -> Fit:
     return replace(fit, counts=counts)
 
 
-def _doubt_warnings(fitted: FittedLoop, scene: Scene, *, has_lead_in: bool) -> list:
+def _warn_of_doubtful_fit(fitted: FittedLoop, scene: Scene, *, has_lead_in: bool) -> list:
     """Return warnings if the rows differ from the model by more than independent noise.
 
     `has_lead_in`: the model does not start without stress in the first row.

@@ -30,7 +30,7 @@ MIN_AMPLITUDE_FACTOR = 1e-2  # Smallest amplitude over slip force/stiffness; bel
 MAX_AMPLITUDE_FACTOR = 2.0  # Largest amplitude over the amplitude at which every element slips.
 MAX_FIRST_FACTOR = 0.2  # Largest start of an amplitude range over slip force/stiffness.
 # Inverse of the fraction of slipping elements below which the mesh dominates the loss.
-MESH_ELEMENTS = 16
+N_RESOLVED_ELEMENTS = 16
 # Root-mean-square change of the loss by a coarser mesh above which the mesh is refined.
 MAX_LOSS_CHANGE = 0.1
 REFINE_FACTOR = 10.0  # Tolerance of the mesh over the tolerance of its refinement.
@@ -110,8 +110,9 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
     Parameters
     ----------
     scene : Scene
-    Increasing displacement amplitudes [m]; by default from the onset of slip to twice the amplitude
-    at which the complete patch slips.
+    slides : (k,) array, optional
+        Increasing displacement amplitudes [m]; by default from the onset of slip to twice the
+        amplitude at which the complete patch slips.
 
     Returns
     -------
@@ -217,7 +218,7 @@ def _default_slides(elements: Elements) -> np.ndarray:
     curves = elements.compute_curves(trials)
     slip_onset = trials[np.argmax(curves.loss > MIN_LOSS * 4 * trials * curves.force)]
     yields = np.sort(elements.yield_displacement)
-    resolved = yields[yields.size // MESH_ELEMENTS]
+    resolved = yields[yields.size // N_RESOLVED_ELEMENTS]
     low = max(slip_onset, min(resolved, MAX_FIRST_FACTOR * stuck_limit))
     count = 1 + int(np.ceil(AMPLITUDES_PER_DECADE * np.log10(high / low)))
     return np.geomspace(low, high, max(MIN_AMPLITUDES, count))

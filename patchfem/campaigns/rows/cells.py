@@ -13,9 +13,9 @@ from ...scene.keys.quantities import parse_quantity
 # Smallest displacement [m] in a ratio: the last printed digit of the displacements, 0.01 mil.
 MIN_DISPLACEMENT = 0.01 * 25.4e-6
 # Largest absolute log ratio; a motion that grows without bound or is zero gets this value.
-MAX_LOG = log(1e3)
+MAX_LOG_RATIO = log(1e3)
 EQUAL_TOL = 1e-9  # Relative difference below which two inputs are the same condition.
-KINDS = {"frequency": "frequency", "input": "acceleration"}
+CONDITION_COLUMNS = {"frequency": "frequency", "input": "acceleration"}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -101,7 +101,7 @@ class Readings:
             selected |= is_equal
         return selected
 
-    def group_readings(self, name: str, among) -> dict:
+    def group_readings(self, name: str, selected) -> dict:
         """Group selected readings by the distinct values of a column.
 
         The result maps the value as text to a mask (n,).
@@ -112,7 +112,7 @@ class Readings:
         column = self.column(name)
         groups = {}
         for value in dict.fromkeys(column):
-            readings = np.array([other == value for other in column]) & among
+            readings = np.array([other == value for other in column]) & selected
             if readings.any():
                 groups[_format_cell(name, value)] = readings
         return groups
@@ -120,7 +120,7 @@ class Readings:
     def logs(self, acceleration, displacement) -> np.ndarray:
         """Return the log ratios ln(computed/measured) (n,) of all readings.
 
-        It is NaN if nothing was computed, and MAX_LOG if a motion is not finite.
+        It is NaN if nothing was computed, and MAX_LOG_RATIO if a motion is not finite.
 
         Parameters
         ----------
@@ -133,15 +133,15 @@ class Readings:
         with np.errstate(invalid="ignore", divide="ignore"):
             ratio = np.log(np.maximum(computed, minimum))
             ratio -= np.log(np.maximum(self.measured, minimum))
-        return np.clip(ratio, -MAX_LOG, MAX_LOG)
+        return np.clip(ratio, -MAX_LOG_RATIO, MAX_LOG_RATIO)
 
 
 def _equals(name: str, value, text: str) -> bool:
     """Return whether a value of a table column equals that of a selector."""
-    if name not in KINDS:
+    if name not in CONDITION_COLUMNS:
         return text in value if name == "flag" else text == value
     try:
-        selected = parse_quantity(text, KINDS[name])
+        selected = parse_quantity(text, CONDITION_COLUMNS[name])
     except ValueError as error:
         raise PatchfemError(f"--hold {name}={text}: {error}") from None
     return abs(value - selected) <= EQUAL_TOL * abs(selected)
@@ -208,7 +208,7 @@ def _distinct_conditions(inputs) -> np.ndarray:
     return np.array(conditions)
 
 
-def scores(cells: Readings, logs, among) -> dict | None:
+def scores(cells: Readings, log_ratios, selected) -> dict | None:
     """Return the root mean square of the log ratios of selected readings, by kind.
 
     It is None if no reading is selected.
@@ -216,9 +216,9 @@ def scores(cells: Readings, logs, among) -> dict | None:
     Parameters
     ----------
     cells : Readings
-    logs : (n,) array
+    log_ratios : (n,) array
         ln(computed/measured).
-    among : (n,) bool
+    selected : (n,) bool
         Readings that count.
 
     Returns
@@ -227,14 +227,14 @@ def scores(cells: Readings, logs, among) -> dict | None:
         By "acceleration", "displacement" and "all"; None if there is no such reading, or if one of
         them is NaN because it was not predicted.
     """
-    if not np.any(among):
+    if not np.any(selected):
         return None
-    logs = np.asarray(logs)
-    every = np.ones(len(logs), bool)
+    log_ratios = np.asarray(log_ratios)
+    every = np.ones(len(log_ratios), bool)
     kinds = {"acceleration": cells.felt, "displacement": ~cells.felt, "all": every}
     out: dict = {}
     for name, of_kind in kinds.items():
-        selected = logs[of_kind & among]
-        is_known = selected.size and not np.isnan(selected).any()
-        out[name] = float(np.sqrt(np.mean(selected**2))) if is_known else None
+        selected_logs = log_ratios[of_kind & selected]
+        is_known = selected_logs.size and not np.isnan(selected_logs).any()
+        out[name] = float(np.sqrt(np.mean(selected_logs**2))) if is_known else None
     return out

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ..fits.problem import FittedKeys, FreeKeys
-from .cells import MAX_LOG, Readings, read_readings, scores
+from .cells import MAX_LOG_RATIO, Readings, read_readings, scores
 from .computed import ModelReadings
 from .condition_models import ConditionModels, FitRequest
 from .null_models import NULL_MODELS, fit_null_model
@@ -231,7 +231,7 @@ def fit_rows(
         refit_prediction = _predict_from_rest(readings, refit.fit.values, every_condition)
         placebos.append(Placebo(text, refit, cells.logs(*refit_prediction)))
     return FittedRows(
-        keys=keys.conclude(best.fit, begin, _doubt_warnings(cells, best, logs, settings)),
+        keys=keys.conclude(best.fit, begin, _warn_of_doubtful_fit(cells, best, logs, settings)),
         models=models,
         cells=cells,
         settings=settings,
@@ -342,7 +342,7 @@ def _predict_null(cells: Readings, name: str, fitted, groups: dict) -> NullPredi
     return NullPrediction(logs, left_out_logs, numbers)
 
 
-def _doubt_warnings(cells: Readings, search: BestFit, logs, settings: SearchSettings) -> list:
+def _warn_of_doubtful_fit(cells: Readings, search: BestFit, logs, settings: SearchSettings) -> list:
     """Return warnings on the measured rows and on the search."""
     warnings = []
     if cells.empty:
@@ -358,12 +358,12 @@ def _doubt_warnings(cells: Readings, search: BestFit, logs, settings: SearchSett
             "scores_stable leaves these readings out"
         )
     unbounded = set()
-    for k in cells.row[np.abs(logs) >= MAX_LOG]:
+    for k in cells.row[np.abs(logs) >= MAX_LOG_RATIO]:
         unbounded.add(f"{cells.rows[k].frequency:.6g} Hz, {cells.rows[k].input:.4g} m/s^2")
     if unbounded:
         warnings.append(
             f"no bounded motion is found at {'; '.join(sorted(unbounded))}: each row at these inputs "
-            f"counts as if the model were wrong by a factor of {np.exp(MAX_LOG):.0f}"
+            f"counts as if the model were wrong by a factor of {np.exp(MAX_LOG_RATIO):.0f}"
         )
     n_best = int((search.rms <= np.nanmin(search.rms) * SAME_SCORE).sum())
     if n_best == 1 and settings.starts > 1:

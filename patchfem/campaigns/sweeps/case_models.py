@@ -73,7 +73,7 @@ class SweepScene:
             With every mistake of the scene, if there is no model.
         """
         try:
-            return self._like(sets, values) or build(self.scene(sets))
+            return self._derive_model(sets, values) or build(self.scene(sets))
         except SceneError as error:
             raise PatchfemError("; ".join(_case_mistakes(error))) from None
         except PatchfemError:
@@ -112,7 +112,7 @@ class SweepScene:
             return None
         return SimilarModels(*models[keys], values, sets, cases)
 
-    def _like(self, sets: Sequence[str], values: Sequence) -> Model | None:
+    def _derive_model(self, sets: Sequence[str], values: Sequence) -> Model | None:
         """Derive the model of a case from the first valid model with the same keys.
 
         It returns None if the rules of a scene must check the case.

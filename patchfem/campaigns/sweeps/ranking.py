@@ -23,7 +23,7 @@ MAX_SURFACE_CASES = (
 N_SOBOL_POINTS = 1024
 N_HALF_SURFACES = 6  # Number of surfaces that are fitted to half of the cases each.
 # Smoothing parameters of a surface, from interpolation to almost a plane.
-SMOOTHINGS = (1e-8, 1e-4, 1e-2, 1.0)
+SMOOTHING_PARAMETERS = (1e-8, 1e-4, 1e-2, 1.0)
 # Smallest number of cases per key; with fewer, half-sample surfaces do not show the error of an
 # index.
 MIN_CASES_PER_KEY = 16
@@ -83,16 +83,16 @@ def compute_sobol_indices(keys: Sequence[tuple], measures: dict, shape: tuple | 
         indices = {}
         for name, values in changing.items():
             if np.isfinite(values).all():
-                grid = _grid_indices(values.reshape(shape))
+                grid = _compute_grid_indices(values.reshape(shape))
                 indices[name] = _sort_by_total(list(levels), [part[axes] for part in grid])
         return indices
-    fractions = np.stack([_rank_fraction(values) for values in levels.values()], axis=1)
+    fractions = np.stack([_compute_rank_fractions(values) for values in levels.values()], axis=1)
     indices = {}
     for names, known in _group_by_known_cases(changing):
         if known.sum() < MIN_CASES_PER_KEY * len(levels):
             continue
         columns = np.stack([changing[name][known] for name in names], axis=1)
-        for name, parts in zip(names, _random_indices(fractions[known], columns)):
+        for name, parts in zip(names, _estimate_random_indices(fractions[known], columns)):
             if parts is not None:
                 indices[name] = _sort_by_total(list(levels), parts)
     return {name: indices[name] for name in changing if name in indices}
@@ -118,7 +118,7 @@ def _is_varying(values: np.ndarray, errors: np.ndarray) -> bool:
     return spread > 1e-9 * np.abs(values[known]).max(initial=0.0) and spread > error
 
 
-def _rank_fraction(values: np.ndarray) -> np.ndarray:
+def _compute_rank_fractions(values: np.ndarray) -> np.ndarray:
     """Return the fraction of the cases below each value, which is uniform between 0 and 1."""
     _, same, counts = np.unique(values, return_inverse=True, return_counts=True)
     return ((np.cumsum(counts) - counts / 2) / values.size)[same]
@@ -133,7 +133,7 @@ class _Indices(NamedTuple):
     high: np.ndarray
 
 
-def _grid_indices(values: np.ndarray) -> _Indices:
+def _compute_grid_indices(values: np.ndarray) -> _Indices:
     """Return the Sobol indices of values on a full grid of cases."""
     first = []
     total = []
@@ -145,7 +145,7 @@ def _grid_indices(values: np.ndarray) -> _Indices:
     return _Indices(np.array(first) / values.var(), total, total, total)
 
 
-def _random_indices(levels: np.ndarray, values: np.ndarray) -> list:
+def _estimate_random_indices(levels: np.ndarray, values: np.ndarray) -> list:
     """Estimate the Sobol indices of measures (columns) from random cases.
 
     The result has one _Indices per column; None if no surface explains it well enough.
@@ -165,16 +165,16 @@ def _random_indices(levels: np.ndarray, values: np.ndarray) -> list:
     orders = [rng.permutation(len(levels)) for _ in range(N_HALF_SURFACES)]
     half = len(levels) // 2
     medians = []
-    for smoothing in SMOOTHINGS:
+    for smoothing in SMOOTHING_PARAMETERS:
         medians.append(np.median(_unexplained_variance(levels, scaled, orders[0], half, smoothing)))
-    smoothing = SMOOTHINGS[int(np.argmin(medians))]
-    first, total = _surface_indices(levels, scaled, smoothing)
+    smoothing = SMOOTHING_PARAMETERS[int(np.argmin(medians))]
+    first, total = _compute_surface_indices(levels, scaled, smoothing)
     unexplained = []
     totals = [total]
     for order in orders:
         unexplained.append(_unexplained_variance(levels, scaled, order, half, smoothing))
         fitted = order[:half]
-        totals.append(_surface_indices(levels[fitted], scaled[fitted], smoothing)[1])
+        totals.append(_compute_surface_indices(levels[fitted], scaled[fitted], smoothing)[1])
     missing = np.mean(unexplained, axis=0)
     low = np.min(totals, axis=0) - missing[:, None] - INDEX_ERROR
     high = np.max(totals, axis=0) + missing[:, None] + INDEX_ERROR
@@ -205,7 +205,7 @@ def _unexplained_variance(levels, values, order, half: int, smoothing: float) ->
     return np.mean(deviation**2, axis=0) / np.maximum(values[others].var(axis=0), 1e-30)
 
 
-def _surface_indices(levels: np.ndarray, values: np.ndarray, smoothing: float) -> tuple:
+def _compute_surface_indices(levels: np.ndarray, values: np.ndarray, smoothing: float) -> tuple:
     """Return first-order and total Sobol indices of a fitted surface, (columns, keys) each."""
     from scipy.stats import sobol_indices, uniform
 

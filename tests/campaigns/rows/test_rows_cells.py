@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.campaigns import NULL_MODELS, scores
-from patchfem.campaigns.rows.cells import MAX_LOG, MIN_DISPLACEMENT, read_readings
+from patchfem.campaigns.rows.cells import MAX_LOG_RATIO, MIN_DISPLACEMENT, read_readings
 from patchfem.campaigns.rows.null_models import fit_null_model
 from patchfem.core import G_N, PatchfemError
 
@@ -36,7 +36,9 @@ def test_exact_repeats_of_a_condition_are_readings_of_their_own(tmp_path):
     assert cells.condition.tolist() == [0, 0, 0, 1] and cells.row.tolist() == [0, 0, 1, 3]
     assert cells.conditions.tolist() == [[143.0, 4 * G_N], [143.0, 5 * G_N]]
     logs = cells.logs([4.5 * G_N, np.inf], [0.2 * MIL, 1.0])
-    assert logs == pytest.approx([np.log(0.9), np.log(2), np.log(4.5 / 4), MAX_LOG], rel=1e-14)
+    assert logs == pytest.approx(
+        [np.log(0.9), np.log(2), np.log(4.5 / 4), MAX_LOG_RATIO], rel=1e-14
+    )
 
 
 def test_exact_displacements_below_the_floor_count_as_the_floor(tmp_path):

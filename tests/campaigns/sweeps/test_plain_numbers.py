@@ -122,7 +122,7 @@ def test_exact_models_made_from_the_first_are_those_built_from_text(name):
         found = told(asked, sets, values)
         built = told(asked, sets, ())
         assert same(found, built), sets
-        alike += asked._like(sets, values) is not None if not isinstance(built, str) else 0
+        alike += asked._derive_model(sets, values) is not None if not isinstance(built, str) else 0
     assert alike == 0 if name == "duration" else alike > 5
 
 
@@ -138,17 +138,17 @@ def test_exact_patches_made_from_the_first_are_those_built_from_text(name):
         sets = written(some, values, 0)
         values = tuple(values[0].tolist())
         made = "friction.static" not in some or "kinetic" not in PATCHES[name]
-        assert (asked._like(sets, values) is not None) == made
+        assert (asked._derive_model(sets, values) is not None) == made
         assert same(told(asked, sets, values), told(asked, sets, ())), sets
     for sets, values in (
         (("contact.load=-1 N",), (-1.0,)),
         (("contact.tilt.angle=-1 mrad",), (-1e-3,)),
     ):
-        assert asked._like(sets, values) is None and same(
+        assert asked._derive_model(sets, values) is None and same(
             told(asked, sets, values), told(asked, sets, ())
         )
     for text in (HELD, PATCHES["rigid"] + '[structure.bonded]\nstiffness = "1e5 N/m"\n'):
-        assert SweepScene(Path("b.toml"), text)._like(("contact.load=3 N",), (3.0,)) is None
+        assert SweepScene(Path("b.toml"), text)._derive_model(("contact.load=3 N",), (3.0,)) is None
 
 
 ONE = POINT + "{}" + MODE + DRIVE
@@ -241,6 +241,6 @@ def test_exact_models_made_from_the_first_see_what_a_new_key_does_to_the_load(mo
     asked = SweepScene(Path("a.toml"), SCENES["coulomb"])
     sets = ("normal.load=3 N",)
     values = (3.0,)
-    assert asked._like(sets, values) is not None
+    assert asked._derive_model(sets, values) is not None
     assert asked.model(sets, values).point.load == 6.0
     assert same(told(asked, sets, values), told(asked, sets, ()))

@@ -28,7 +28,7 @@ MODULE = __name__.rpartition(".")[0] + ".worker"
 # The worker imports this package from its file, and nothing from the current folder. The folder
 # that contains the package comes last in the path: it may be the folder in which all dependencies
 # were installed.
-START = f"""\
+WORKER_SCRIPT = f"""\
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 spec = spec_from_file_location({PACKAGE.name!r}, sys.argv[3])
@@ -57,7 +57,7 @@ class Worker:
             sys.executable,
             "-P",
             "-c",
-            START,
+            WORKER_SCRIPT,
             str(there.fileno()),
             "silent" * silent,
             str(PACKAGE / "__init__.py"),
