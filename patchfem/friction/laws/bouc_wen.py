@@ -25,7 +25,7 @@ NEWTON_TOL = 1e-14  # change of w / (1 + w) at which Newton's method has converg
 
 
 class _HalfLoop(NamedTuple):
-    """Half of a steady loop, from -y to y.
+    """Half of a steady Bouc-Wen loop, from -y to y.
 
     - displacement: displacement [eps] of the stroke, and its derivative with respect to w
     - area: area [mu N eps] between loading and unloading
@@ -95,7 +95,10 @@ class BoucWen:
 
 @cache
 def _gauss_rule() -> tuple:
-    """Return points and weights on (0, 1), in the fourth root, where fractional powers are smooth."""
+    """Return Gauss points and weights on (0, 1) after a substitution by the fourth root.
+
+    Fractional powers are smooth in that variable.
+    """
     points, weights = np.polynomial.legendre.leggauss(N_GAUSS_POINTS)
     edges = np.linspace(0.0, 1.0, N_INTEGRATION_PIECES + 1)
     half = np.diff(edges)[:, None] / 2

@@ -28,7 +28,7 @@ CUTOFF_WEIGHT = 1e-20
 
 
 class ConvolutionState(NamedTuple):
-    """State of the law.
+    """State of the friction law with averaged pressure.
 
     - traction (m,): traction [Pa] of the last motion
     - displacement: relative displacement [m] since the start
@@ -149,7 +149,7 @@ def sliding_limits(nodes, sigma, weight, length: float, order: float) -> Sliding
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Convolution:
-    """Law of the averaged pressure, in the protocol of `friction.protocol`.
+    """Friction law whose traction follows from a weighted average of the pressure.
 
     - static, length, order: mu_s [1], eps [m] and p
     - nodes (m,): positions [m] of the points of the upper piece; None for a uniform pressure, whose average is the
@@ -184,7 +184,7 @@ class Convolution:
         return self.static * self._average(0.0, sigma, direction)
 
     def step(self, state: ConvolutionState, dq: float, s0, s1, dt: float) -> Step:
-        """Advance by an increment; all work is dissipated.
+        """Advance the law by an increment; all friction work is dissipated.
 
         The mean traction is that of the two ends of the increment. Without motion the traction stays.
 

@@ -10,7 +10,7 @@ from ..protocol import Element, LastTraction, Step
 
 @dataclass(frozen=True, slots=True)
 class Coulomb(LastTraction):
-    """Set-valued kinetic friction; at rest the last traction stays.
+    """Coulomb's law of kinetic friction; at rest the last traction persists.
 
     - kinetic: coefficient mu_k of the motion
     - static: coefficient mu_s of the traction at the instant at which a rest ends, which does no work; None for mu_k
@@ -41,7 +41,7 @@ class Coulomb(LastTraction):
         return self.kinetic * sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """Advance by an increment with the mean traction mu_k (s0 + s1)/2 sgn dq.
+        """Advance Coulomb's law by an increment, with mean traction mu_k (s0 + s1)/2 sgn dq.
 
         All work is dissipated. Without motion the last traction stays.
 

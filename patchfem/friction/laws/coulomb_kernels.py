@@ -50,7 +50,7 @@ def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
-    """Keep the force of the step; all its work is dissipated.
+    """Store the friction force of the step, whose work is all dissipated.
 
     Returns
     -------

@@ -12,7 +12,7 @@ from ..protocol import Element, SteadyLoop, Step
 
 @dataclass(frozen=True, slots=True)
 class ElasticPlastic:
-    """Eq. 3.12 per point: springs of stiffness mu sigma/length that slip at mu sigma.
+    """Law of eq. 3.12: springs of stiffness mu sigma/length that slip at mu sigma.
 
     An increase of the pressure adds unstretched springs. A decrease only lowers the limit; the springs beyond it break
     within one length of slip. So a change of the pressure creates no energy, and a force below the limit stays.
@@ -37,7 +37,7 @@ class ElasticPlastic:
         return np.stack([np.zeros_like(sigma), sigma])
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """Advance by an increment under the mean of the pressures at its ends.
+        """Advance the elastic-plastic law by an increment under the mean pressure of the step.
 
         The traction is a ramp that is cut at mu sigma, whose path mean is exact.
 

@@ -49,7 +49,7 @@ def stretch_spring(start, increment, limit):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
-    """Return the path-mean force of all elements over an increment; 0.4 ns per element.
+    """Return the path-mean force of all parallel elements over an increment.
 
     Returns
     -------

@@ -36,7 +36,7 @@ class Sliders(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Iwan:
-    """Parallel elements of a contact per newton of normal load.
+    """Iwan model of a contact as parallel sliders, per newton of normal load.
 
     - stiffness (t,): [1/m]
     - yield_displacement (t,): [m]

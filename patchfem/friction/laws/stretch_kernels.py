@@ -55,7 +55,7 @@ def step_bond_length(numbers, memory, velocity, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
-    """Return the path-mean force over an increment; 10 ns.
+    """Return the path-mean force of the bonds over an increment.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _move_bonds(numbers, memory, increment, bond_length):
-    """Advance m, z, s2 and play by an increment; return the dissipated energy [J]."""
+    """Advance the state of growing bonds by an increment; return the dissipated energy [J]."""
     if numbers[BREAKAWAY_INDEX] > 0:
         half = numbers[BREAKAWAY_INDEX] * bond_length
         moved, memory[5] = elastic_bond_step(
@@ -170,7 +170,7 @@ def read_memory(numbers, memory, rel_disp, velocity):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_motion(numbers, memory, direction, states):
-    """Set the states, and return where the rates have kinks.
+    """Set the states of the bonds, and return where their rates have kinks.
 
     A law with breakaway has a kink at the end of its elastic range, and growth has one at v_h.
 
@@ -227,7 +227,7 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def end_motion(numbers, memory, motion, increment, velocity, states):
-    """Advance the memory by the increment of a motion.
+    """Advance the memory of the bonds by the increment of a motion.
 
     Returns
     -------

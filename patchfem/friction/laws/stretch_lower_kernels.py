@@ -170,7 +170,7 @@ def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_memory(numbers, memory, rel_disp, velocity):
-    """Return the force, the energy of the bonds and the slip.
+    """Return the force and the energy of the bonds, and the slip of the contact.
 
     The slip is the relative displacement less the mean stretch, averaged with the friction limits of the points.
 

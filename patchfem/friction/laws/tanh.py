@@ -47,7 +47,7 @@ class TanhLaw(LastTraction):
         return self.static * sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """Advance by an increment at its mean velocity and mean pressure; all work is dissipated.
+        """Advance the rate law by an increment at mean velocity and pressure; all work dissipates.
 
         Parameters
         ----------
