@@ -12,7 +12,9 @@ import numpy as np
 from ... import __version__
 from ...disk.atomic_write import write_bytes, write_text
 
-MAX_TEXT_ROWS = 1_000_000  # heights; a longer text takes seconds to write and to read
+MAX_TEXT_ROWS = (
+    1_000_000  # largest number of heights of a text file; more take seconds to write and to read
+)
 _MAIN_XML = """<?xml version="1.0" encoding="UTF-8"?>
 <p:ISO5436_2 xmlns:p="http://www.opengps.eu/2008/ISO5436_2" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance">
 <Record1><Revision>ISO5436 - 2000</Revision><FeatureType>SUR</FeatureType><Axes>
@@ -31,7 +33,7 @@ _MAIN_XML = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def write_x3p(path: Path, x, y, z, text: str) -> None:
-    """Write a scan as X3P.
+    """Write the heights of an areal scan as an X3P file.
 
     Parameters
     ----------
@@ -65,7 +67,9 @@ def write_x3p(path: Path, x, y, z, text: str) -> None:
 
 
 def write_columns(path: Path, x, y, z) -> None:
-    """Write the known heights of a scan as columns x, y, z [um] unless they are too many.
+    """Write the known heights of an areal scan as text in columns x, y, z [um].
+
+    Nothing is written if there are more than MAX_TEXT_ROWS heights.
 
     Parameters
     ----------
@@ -79,7 +83,7 @@ def write_columns(path: Path, x, y, z) -> None:
 
 
 def write_profile(path: Path, x, z) -> None:
-    """Write the known heights of a trace as columns x, z [um].
+    """Write the known heights of a trace as text in columns x, z [um].
 
     Parameters
     ----------
@@ -91,7 +95,7 @@ def write_profile(path: Path, x, z) -> None:
 
 
 def _write_table(path: Path, names: str, columns: tuple) -> None:
-    """Write columns of lengths as text [um]."""
+    """Write columns of lengths [m] as a text file in micrometres."""
     table = np.column_stack(columns) * 1e6
     head = ",".join(f"{name} [um]" for name in names)
     row = ",".join(["%.10g"] * len(names))

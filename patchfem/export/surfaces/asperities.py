@@ -18,7 +18,9 @@ PRESSURE_FRACTION = 1e-5
 
 
 def asperity_data(moments: TraceMoments | None, cutoff: float | None) -> dict | None:
-    """Return the moments of a trace and its peaks as plain data in SI; None for a flat trace.
+    """Return the spectral moments of a trace and its asperities as a dict, in SI units.
+
+    The result is None for a flat trace.
 
     `stiffness` is the ratio of stiffness to pressure [1/m], and `stiffness_half_sampled` the same
     from every second sample. If no surface has such moments, `reason` replaces them.
@@ -45,12 +47,12 @@ def asperity_data(moments: TraceMoments | None, cutoff: float | None) -> dict | 
         try:
             out["stiffness_half_sampled"] = _stiffness_ratio(gaussian_peaks(moments.coarse))
         except PatchfemError:
-            pass  # No surface fits every second sample, which None states.
+            pass  # None states that no surface fits every second sample
     return out
 
 
 def format_asperities(moments: TraceMoments | None, cutoff: float | None) -> list:
-    """Return `asperity_data` as lines of text, ready to paste."""
+    """Return the asperities of a trace as lines of text, with a table to paste into a scene."""
     data = asperity_data(moments, cutoff)
     if data is None:
         return []
@@ -96,7 +98,7 @@ def format_asperities(moments: TraceMoments | None, cutoff: float | None) -> lis
 
 
 def _describe_split(cutoff: float | None) -> str:
-    """State which waves of a trace the table describes, and which are left to [contact.profile]."""
+    """Describe which waves of a trace its table of asperities contains."""
     if cutoff is None:
         return (
             "This table describes all waves of the trace. If [contact.profile] takes the same "
@@ -109,7 +111,10 @@ def _describe_split(cutoff: float | None) -> str:
 
 
 def _stiffness_ratio(peaks: Peaks) -> float:
-    """Compute stiffness over pressure [1/m] of peaks at PRESSURE_FRACTION."""
+    """Compute the contact stiffness of asperities divided by the pressure [1/m].
+
+    The pressure is PRESSURE_FRACTION of the combined modulus.
+    """
     law = HertzAsperities(*peaks, 1.0)
     separation = law.separation(np.array([PRESSURE_FRACTION]))
     return float(law.stiffness(separation)[0] / PRESSURE_FRACTION)

@@ -31,7 +31,7 @@ from .areal import write_columns, write_x3p
 from .pictures import Picture
 from .quantities import MISSING, QuantityTable, Row, format_quantity, quantity_data
 
-WORDS = {
+QUANTITY_LABELS = {
     "shift": "shift",
     "tilt": "tilt",
     "scale": "scale of x",
@@ -69,7 +69,9 @@ WORDS = {
 }
 TABLE_HEADS = ("quantity", "value", "95 %", "unit")
 SIDES = ("before", "after")
-MAX_DRAWN = 1_000_000  # heights of a histogram or Abbott curve; larger scans are thinned
+MAX_DRAWN_HEIGHTS = (
+    1_000_000  # largest number of heights of a histogram or Abbott curve; larger scans are thinned
+)
 PAGE_NOTE = (
     "All intervals are 95 % intervals. The intervals of shift, depth and area hold for the "
     "measured place and come from the noise of the unworn heights. A track or worn part begins "
@@ -84,7 +86,7 @@ PAGE_NOTE = (
 
 
 def _averaged_part(comparison: Comparison) -> str | None:
-    """Return the part over which the mean worn depth of traces is taken.
+    """Name the part of two traces over which their mean worn depth is taken.
 
     None for scans, and if there is no mean.
     """
@@ -94,10 +96,10 @@ def _averaged_part(comparison: Comparison) -> str | None:
 
 
 def _quantities_table(comparison: Comparison) -> QuantityTable:
-    """Return the table of quantities of one direction."""
+    """Return the table of the quantities of a comparison of two surfaces."""
     rows = []
     for name, quantity in comparison.values.items():
-        words = WORDS[name]
+        words = QUANTITY_LABELS[name]
         part = _averaged_part(comparison)
         if name == "worn_depth_mean" and part is not None:
             words = f"{words} over the {part}"
@@ -107,7 +109,7 @@ def _quantities_table(comparison: Comparison) -> QuantityTable:
 
 
 def format_comparison(parts: list, verdict: tuple, pressed: SurfaceRuns | None = None) -> list:
-    """Return the comparison as lines of text.
+    """Return the comparison of two surfaces as lines of text.
 
     Parameters
     ----------
@@ -139,7 +141,10 @@ def format_comparison(parts: list, verdict: tuple, pressed: SurfaceRuns | None =
 
 
 def sides_lines(rows: list) -> list:
-    """Return (words, text before, text after) of several measures as lines of a table."""
+    """Return measures before and after wear as the lines of a table.
+
+    `rows` holds the name, the text before and the text after of each measure.
+    """
     out = []
     for words, first, second in [("", *SIDES), *rows]:
         out.append(f"  {words:<38} {first:>24} {second:>24}")
@@ -147,7 +152,7 @@ def sides_lines(rows: list) -> list:
 
 
 def _format_measure(name: str, measure) -> str:
-    """Format a measure with its error."""
+    """Format a measure with its error; a dash if it has no value."""
     if measure is None or measure.value is None:
         return MISSING
     return format_with_error(
@@ -158,7 +163,9 @@ def _format_measure(name: str, measure) -> str:
 def comparison_data(
     parts: list, verdict: tuple, directions: list, pressed: SurfaceRuns | None = None
 ) -> dict:
-    """Return the comparison as plain data in SI; the first direction is at the top level.
+    """Return the comparison of two surfaces as a dict, in SI units.
+
+    The first direction is at the top level.
 
     Parameters
     ----------
@@ -200,7 +207,7 @@ def comparison_data(
 
 
 def _part_data(part: Comparison) -> dict:
-    """Return one direction as plain data: sources, quantities, alignment."""
+    """Return the sources, quantities and alignment of one direction as a dict."""
     out = {"before": part.before.source, "after": part.after.source}
     out |= {"direction": part.direction or None, "reference": part.basis or None}
     out |= _values_data(part.values)
@@ -223,7 +230,7 @@ def _part_data(part: Comparison) -> dict:
 
 
 def _values_data(values: dict) -> dict:
-    """Return quantities by name as plain data."""
+    """Return quantities by name as a dict of plain data."""
     return {name: quantity_data(quantity) for name, quantity in values.items()}
 
 
@@ -251,7 +258,9 @@ def _scans_data(change: Change) -> dict:
 
 
 def pressed_traces(comparison: Comparison) -> tuple:
-    """Return the traces (before, after) that a scene presses: their common part if there is one.
+    """Return the traces before and after that a scene presses, cut to their common part.
+
+    Without a common part they are returned completely.
 
     x is measured from the middle, and heights are levelled by least squares, as the scene does.
     """
@@ -286,15 +295,15 @@ def write_difference(folder: Path, comparison: Comparison) -> None:
     write_columns(folder / "difference.csv", *scan)
 
 
-class Article(NamedTuple):
-    """Title, verdict (headline and sentences) and notes of a page on two surfaces."""
+class SurfacePage(NamedTuple):
+    """Page on two surfaces: title, verdict (headline and sentences) and notes."""
 
     title: str
     verdict: tuple
     notes: list
 
     def html(self, sections: list) -> str:
-        """Return the self-contained page with these sections."""
+        """Return the self-contained HTML page on two surfaces with given sections."""
         headline, sentences = self.verdict
         lead = f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict>"
         lead += f"<b>{sentence_html(headline[0].upper() + headline[1:])}.</b>"
@@ -310,7 +319,7 @@ def write_page(
     directions: list = (),
     pressed: SurfaceRuns | None = None,
 ) -> None:
-    """Write the page of a comparison.
+    """Write the HTML page of a comparison of two surfaces.
 
     Parameters
     ----------
@@ -324,7 +333,7 @@ def write_page(
 def page_html(
     parts: list, verdict: tuple, directions: list = (), pressed: SurfaceRuns | None = None
 ) -> str:
-    """Return the page of a comparison, the verdict first.
+    """Return the HTML page of a comparison of two surfaces, with the verdict first.
 
     Parameters
     ----------
@@ -371,11 +380,11 @@ def page_html(
             )
         )
     notes = [f"{text}." for part in parts for text in part.notes]
-    return Article(f"{names[0]} and {names[1]}", verdict, notes).html(sections)
+    return SurfacePage(f"{names[0]} and {names[1]}", verdict, notes).html(sections)
 
 
 def _draw_pictures(part: Comparison) -> list:
-    """Draw the pictures of one direction."""
+    """Draw the pictures of a comparison in one direction."""
     out = []
     if part.alignment is not None:
         out += _aligned_pictures(part)
@@ -462,7 +471,7 @@ def _scan_pictures(change: Change) -> list:
         )
     ]
     known = np.flatnonzero(np.isfinite(depth) & np.isfinite(first))
-    known = known[:: -(-known.size // MAX_DRAWN)]
+    known = known[:: -(-known.size // MAX_DRAWN_HEIGHTS)]
     heights = (first.ravel()[known], second.ravel()[known])
     out.append(
         Picture(
@@ -491,7 +500,7 @@ def _levelled_heights(surface) -> np.ndarray:
     """Return the heights (k,) [m] of a surface about its least-squares line or plane."""
     if isinstance(surface, Profile):
         return level(resample_evenly(surface)).z
-    every = max(int(np.sqrt(surface.z.size / MAX_DRAWN)), 1)
+    every = max(int(np.sqrt(surface.z.size / MAX_DRAWN_HEIGHTS)), 1)
     thinned = replace(
         surface, x=surface.x[::every], y=surface.y[::every], z=surface.z[::every, ::every]
     )
@@ -500,7 +509,7 @@ def _levelled_heights(surface) -> np.ndarray:
 
 
 def _pressed_html(pressed: SurfaceRuns) -> str:
-    """Return the measures and pressures of a scene with each surface as HTML."""
+    """Return the measures and pressures of a scene, pressed with each surface, as HTML."""
     runs = zip(SIDES, (pressed.before, pressed.after))
     runs = [(name, run) for name, run in runs if run is not None]
     warnings = [f"{name}: {text}" for name, run in runs for text in run.warnings]
@@ -537,7 +546,7 @@ def _pressed_html(pressed: SurfaceRuns) -> str:
 
 
 def _format_ratio(first, second) -> str:
-    """Format the ratio of two measures, "" if it is not known."""
+    """Format the ratio of two measures, second over first; "" if it is unknown."""
     values = [None if measure is None else measure.value for measure in (first, second)]
     if None in values or values[0] == 0:
         return ""

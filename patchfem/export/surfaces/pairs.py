@@ -22,9 +22,9 @@ from .pictures import PairsPanel, draw_pairs
 from .quantities import UNITS, QuantityTable, Row, csv_columns, format_quantity
 from .worn_runs import compare_runs
 
-TRACE_NUMBERS = ("worn_depth_mean", "amplitude_ratio")  # main quantities of two traces
-SCAN_NUMBERS = ("worn_volume", "worn_depth_mean")  # main quantities of two scans or runs
-MEANING = (
+TRACE_QUANTITIES = ("worn_depth_mean", "amplitude_ratio")  # main quantities of two traces
+SCAN_QUANTITIES = ("worn_volume", "worn_depth_mean")  # main quantities of two scans or runs
+MEANS_NOTE = (
     "The mean is taken over the pairs that have a value, each with equal weight. The interval is "
     "the 95 % interval of the mean, by Student's t from the scatter of the pairs, or from the "
     "intervals of the pairs if these give a wider interval. The interval does not include an error "
@@ -36,7 +36,7 @@ MEANING = (
 def compare_pairs(
     asked: list, direction: str = "", done: Callable | None = None, **settings
 ) -> list[dict]:
-    """Compare each pair, of files or of results folders.
+    """Compare the surfaces of each pair of a table, from files or results folders.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def compare_pairs(
 
 
 def pairs_data(rows: list) -> dict:
-    """Return the pairs and the means over them as plain data in SI."""
+    """Return the comparisons of all pairs, and the means over them, as a dict in SI units."""
     means = []
     for (group, direction, kind), count, averages in pairs.average_pairs(rows):
         entry = {"group": group, "direction": direction or None, "kind": kind, "pairs": count}
@@ -82,7 +82,7 @@ def pairs_data(rows: list) -> dict:
 
 
 def mean_notes(rows: list) -> list:
-    """State the limits of the means as sentences."""
+    """Write sentences on the limits of the means over pairs."""
     out = []
     firsts = [(pairs.find_group(row), row["before"]) for row in rows if row["outcome"] == "done"]
     if len(set(firsts)) < len(firsts):
@@ -110,9 +110,9 @@ def _quantity_name(name: str) -> str:
 
     `amplitude_ratio_y` is the one of the other direction of a scan.
     """
-    if name in compare.WORDS:
-        return compare.WORDS[name]
-    return f"{compare.WORDS[name.removesuffix('_x').removesuffix('_y')]} along {name[-1]}"
+    if name in compare.QUANTITY_LABELS:
+        return compare.QUANTITY_LABELS[name]
+    return f"{compare.QUANTITY_LABELS[name.removesuffix('_x').removesuffix('_y')]} along {name[-1]}"
 
 
 def _group_title(group: str, direction: str, kind: str) -> str:
@@ -122,7 +122,7 @@ def _group_title(group: str, direction: str, kind: str) -> str:
 
 
 def write_csv(rows: list, path: Path) -> None:
-    """Write a line for each pair: cells, outcome, verdict, message, quantities in SI."""
+    """Write the comparisons of all pairs as CSV, with quantities in SI units."""
     quantities = [pairs.collect_quantities(row) for row in rows]
     columns = csv_columns(quantities)
     before = ("before", "after", "direction")
@@ -143,7 +143,7 @@ def write_csv(rows: list, path: Path) -> None:
 
 
 def format_pairs(rows: list) -> list:
-    """Return each pair, then the means of each group, as lines of text."""
+    """Return the comparisons of all pairs and the means of each group as lines of text."""
     out = [_count_sentence(rows), ""]
     for row in rows:
         out.append(f"{row['before']} -> {row['after']}{_direction_text(row)}")
@@ -155,7 +155,7 @@ def format_pairs(rows: list) -> list:
 
 
 def _count_sentence(rows: list) -> str:
-    """Count the pairs, those that show wear, and those that failed."""
+    """Write a sentence with the numbers of pairs, of pairs with wear and of failed pairs."""
     failed = sum(row["outcome"] == "failed" for row in rows)
     with_wear = sum(
         (row[_main_names(row)[0]]["low"] or 0.0) > 0 for row in rows if row["outcome"] == "done"
@@ -166,14 +166,14 @@ def _count_sentence(rows: list) -> str:
 
 def _main_names(row: dict) -> tuple:
     """Return the names of the main quantities of a pair."""
-    return SCAN_NUMBERS if "worn_volume" in row else TRACE_NUMBERS
+    return SCAN_QUANTITIES if "worn_volume" in row else TRACE_QUANTITIES
 
 
 def _direction_text(row: dict) -> str:
     """Return the direction of a pair of traces as text."""
     return (
         f", along {row['direction']}"
-        if row["direction"] and _main_names(row) == TRACE_NUMBERS
+        if row["direction"] and _main_names(row) == TRACE_QUANTITIES
         else ""
     )
 
@@ -192,7 +192,7 @@ def _main_texts(row: dict) -> list:
 
 
 def _means_table(averages: dict) -> QuantityTable:
-    """Return the means of a group, with the scatter in the unit of each."""
+    """Return the table of the means of a group of pairs, with their scatter."""
     rows = []
     for name, average in averages.items():
         unit = format_quantity(average.mean).unit
@@ -265,7 +265,7 @@ def _means_html(number: int, rows: list, averages: dict) -> str:
         texts = [f"{panel.title}: mean {format_quantity(panel.mean).short}" for panel in panels]
         parts.append(figure_html(f"m{number}", draw_pairs(panels), caption, "; ".join(texts)))
     return "\n".join(
-        [*parts, _means_table(averages).html(), f"<p class=soft>{sentence_html(MEANING)}</p>"]
+        [*parts, _means_table(averages).html(), f"<p class=soft>{sentence_html(MEANS_NOTE)}</p>"]
     )
 
 

@@ -19,13 +19,13 @@ MAX_PIXELS = 400  # heights of a drawn map along each axis, which the width of a
 MIN_DETAIL_SAMPLES = 400  # samples of the enlarged part of two traces
 MAX_SECTION_RULES = 60  # sections of a roughness profile; lines between more of them cover it
 COLOUR_QUANTILES = (0.002, 0.998)  # quantiles of the heights at the ends of the colour scale
-UM3_PER_M3 = 1e18  # cubic micrometres in a cubic metre
+UM3_PER_M3 = 1e18  # number of cubic micrometres in a cubic metre
 GREY = "#4d4d4d"
 SIDES = (("soft", "before"), ("accent", "after"))
 
 
 class Picture(NamedTuple):
-    """Drawn picture of a page with its caption and its alternative text."""
+    """Picture of a page as SVG, with its caption and its alternative text."""
 
     svg: str
     caption: str
@@ -173,7 +173,7 @@ def draw_statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: f
 
 
 def _full_axis(label: str, unit: str, x) -> dict:
-    """Return an axis from the first to the last of the positions x."""
+    """Return a chart axis that extends from the first to the last of given positions."""
     return make_axis(label, unit) | {"range": [x[0], x[-1]]}
 
 
@@ -202,7 +202,7 @@ def _wavelength_unit(spectrum: Spectrum) -> tuple:
 def _density_marks(
     spectrum: Spectrum, scale: float, colour: str, name: str = "", band: str = ""
 ) -> list:
-    """Return the marks of a spectrum over the wavelength and of its 95 % band."""
+    """Return the chart marks of a spectrum over wavelength, and of its 95 % band."""
     low, high = spectrum.band()
     pick = np.geomspace(1, spectrum.frequency.size, MAX_SPECTRUM_POINTS)
     pick = np.unique(np.round(pick).astype(int)) - 1
@@ -269,7 +269,10 @@ def draw_maps(x, y, heights: tuple):
 
 
 def _draw_map(figure, panel, scan: tuple, ends: tuple, colours: str, name: str = "height") -> None:
-    """Draw a scan (x, y, z) [m] on matplotlib Axes in colours that span `ends` [m]."""
+    """Draw the heights of a scan as a coloured map on matplotlib Axes.
+
+    `scan` is (x, y, z) [m], and `ends` [m] are the heights at the ends of the colour scale.
+    """
     x, y, z = scan
     along, mm = choose_axis_unit(np.concatenate([x, y]), "m")
     up, um = choose_axis_unit(ends, "m")

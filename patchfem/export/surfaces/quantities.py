@@ -11,16 +11,16 @@ from ...surface.compare.reference import NO_LIMIT
 from ...surface.quantity import Quantity
 from ..pages.document import sentence_html, table_html
 
-MAX_PLAIN = 1e6  # larger numbers are written with a power of ten
+MAX_PLAIN_NUMBER = 1e6  # numbers above it are written with a power of ten
 MIN_DIGITS = 3  # digits of a value with a wide interval
 MAX_DIGITS = 6  # digits of a value with a narrow interval
-DIGITS_ALONE = 5  # digits of a value without an interval
+DIGITS_WITHOUT_INTERVAL = 5  # digits of a value without an interval
 MISSING = "-"  # shown for a quantity without a value
 UNITS = {**UNIT_LADDERS, "m2": (("um^2", 1e12),), "1": (("", 1.0),)}
 
 
 class QuantityText(NamedTuple):
-    """Value, interval ("" if there is none) and unit of a quantity as strings."""
+    """Value, interval and unit of a quantity as strings; "" for a missing interval."""
 
     value: str
     interval: str
@@ -38,7 +38,7 @@ class QuantityText(NamedTuple):
 
 
 def format_quantity(quantity: Quantity, unit: tuple | None = None) -> QuantityText:
-    """Format a quantity with as many digits as show two digits of the width of its interval.
+    """Format a quantity and its interval to two digits of the width of the interval.
 
     unit: (name, scale) such as ("um", 1e6); by default the unit that suits the largest of value and
     bounds.
@@ -53,7 +53,7 @@ def format_quantity(quantity: Quantity, unit: tuple | None = None) -> QuantityTe
         )
     name, scale = unit
     if low is None:
-        return QuantityText(format_number(value * scale, DIGITS_ALONE), "", name)
+        return QuantityText(format_number(value * scale, DIGITS_WITHOUT_INTERVAL), "", name)
     if high is None:
         interval = f"{_format_below_million(low * scale, MIN_DIGITS)} .. {NO_LIMIT}"
         return QuantityText(_format_below_million(value * scale, MIN_DIGITS), interval, name)
@@ -64,7 +64,7 @@ def format_quantity(quantity: Quantity, unit: tuple | None = None) -> QuantityTe
 
 def _format_below_million(value: float, digits: int) -> str:
     """Write a number with `digits` digits, without a power of ten below a million."""
-    if value == 0 or not 1 <= abs(value) < MAX_PLAIN:
+    if value == 0 or not 1 <= abs(value) < MAX_PLAIN_NUMBER:
         return format_number(value, digits)
     return f"{value:.{max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)}f}"
 
@@ -79,7 +79,7 @@ def _count_digits(low: float, high: float) -> int:
 
 
 def quantity_data(quantity: Quantity) -> dict:
-    """Return a quantity as plain data in SI, with the reason if it has no value."""
+    """Return a quantity as a dict in SI units, with the reason if it has no value."""
     data = {
         "value": quantity.value,
         "low": quantity.low,
@@ -152,7 +152,7 @@ class QuantityTable(NamedTuple):
         ]
 
     def lines(self) -> list:
-        """Return the table as lines of text, indented by two."""
+        """Return the table of quantities as lines of text, indented by two spaces."""
         cells = [("", *self.heads[1:]), *self._cells()]
         widths = [max(map(len, column)) for column in zip(*cells)]
         remarks = ["", *(row.remark for row in self.rows)]
@@ -164,7 +164,7 @@ class QuantityTable(NamedTuple):
         return lines
 
     def html(self) -> str:
-        """Return the table as HTML, with a column of meanings if the rows have any."""
+        """Return the table of quantities as HTML, with a column of meanings if there are any."""
         has_meaning = any(row.meaning for row in self.rows)
         rows = []
         for row, cells in zip(self.rows, self._cells()):

@@ -27,20 +27,20 @@ from .pictures import Picture
 from .quantities import QuantityTable, Row, csv_columns, format_quantity
 
 # Lengths along the surface; all other parameters are heights.
-LATERAL = (
+LATERAL_PARAMETERS = (
     "PSm",
     "RSm",
     "dominant_wavelength",
     "Sal",
 )
-INTERVAL = (
+INTERVAL_NOTE = (
     "Interval: 90 % interval (from 5 % to 95 %) of the mean over all {} of this {}, for a surface with Gaussian "
     "heights and the spectrum of this {}. A kurtosis above 3 makes the interval wider. The interval does not hold for "
     "a surface that differs from place to place."
 )
-SCAN_INTERVAL = INTERVAL.format("scans", "size", "scan")
-TRACE_INTERVAL = INTERVAL.format("traces", "length", "trace")
-MEANS = (
+SCAN_INTERVAL_NOTE = INTERVAL_NOTE.format("scans", "size", "scan")
+TRACE_INTERVAL_NOTE = INTERVAL_NOTE.format("traces", "length", "trace")
+MEANS_NOTE = (
     "Interval: 95 % interval of the mean, by Student's t from the scatter of the files, each with "
     "equal weight. The interval does not include an error common to all files, such as "
     "calibration. Scatter: standard deviation of the values of single files."
@@ -48,23 +48,28 @@ MEANS = (
 
 
 def _parameter_units(report: RoughnessReport) -> dict:
-    """Return the unit (name, scale) of each parameter: one for all heights, one for all lengths."""
+    """Return the unit (name, scale) of each roughness parameter.
+
+    All heights have the same unit, and so have all lengths along the surface.
+    """
     rms = report["Sq" if report.kind == "areal" else "Pq"].value
     lengths = [
-        value.value for value in report.values if value.name in LATERAL and value.value is not None
+        value.value
+        for value in report.values
+        if value.name in LATERAL_PARAMETERS and value.value is not None
     ]
     lateral = choose_unit(UNIT_LADDERS["m"], max(lengths, default=1e-3))
     vertical = choose_unit(UNIT_LADDERS["m"], 3 * rms)
     units = {}
     for value in report.values:
-        units[value.name] = lateral if value.name in LATERAL else vertical
+        units[value.name] = lateral if value.name in LATERAL_PARAMETERS else vertical
         if value.unit == "1":
             units[value.name] = ("", 1.0)
     return units
 
 
 def _parameters_table(report: RoughnessReport) -> QuantityTable:
-    """Return the table of the parameters."""
+    """Return the table of the roughness parameters of a surface."""
     units = _parameter_units(report)
     rows = []
     for value in report.values:
@@ -74,7 +79,7 @@ def _parameters_table(report: RoughnessReport) -> QuantityTable:
 
 
 def describe_surface(report: RoughnessReport) -> str:
-    """Describe the surface and its treatment in one line."""
+    """Describe the size, window and filters of a measured surface in one line."""
     size = report.sampling
     treatment = report.treatment
     shape = " x ".join(map(str, size.shape))
@@ -158,14 +163,14 @@ def _profile_moments(report: RoughnessReport) -> TraceMoments | None:
 
 
 def _asperity_lines(report: RoughnessReport) -> list:
-    """Return the asperities of a trace as lines."""
+    """Return the asperities of a trace as lines of text."""
     if report.kind == "areal":
         return []
     return asperities.format_asperities(_profile_moments(report), report.treatment.cutoff)
 
 
 def means_lines(reports: list) -> list:
-    """Return the means over several files as lines.
+    """Return the means of the parameters over several files as lines of text.
 
     For two traces they include the asperities of both faces combined.
     """
@@ -199,7 +204,7 @@ def _means_table(means: Means) -> QuantityTable:
 
 
 def means_data(reports: list) -> list:
-    """Return the means over several files as plain data in SI."""
+    """Return the means of the parameters over several files as plain data in SI units."""
     out = []
     for means in average_reports(reports):
         measures = {}
@@ -260,7 +265,7 @@ def write_surfaces(folder: Path, reports: list) -> None:
 
 
 def _names_by_reason(report: RoughnessReport) -> dict:
-    """Group the parameters without an interval by the reason."""
+    """Group the roughness parameters without an interval by the reason."""
     out: dict = {}
     for value in report.values:
         if value.value is not None and value.low is None and value.reason:
@@ -269,7 +274,7 @@ def _names_by_reason(report: RoughnessReport) -> dict:
 
 
 def roughness_data(report: RoughnessReport) -> dict:
-    """Return the report as plain data in SI."""
+    """Return the roughness of a surface as a dict in SI units."""
     measures = {}
     for value in report.values:
         measures[value.name] = {
@@ -319,7 +324,7 @@ def _means_section(means: Means) -> Section:
     caution = (
         warning_box([f"{means.caution[0].upper()}{means.caution[1:]}."]) if means.caution else ""
     )
-    body = f"{caution}{_means_table(means).html()}<p class=soft>{sentence_html(MEANS)}</p>"
+    body = f"{caution}{_means_table(means).html()}<p class=soft>{sentence_html(MEANS_NOTE)}</p>"
     return Section(f"mean-{means.kind}", _means_heading(means), body)
 
 
@@ -335,7 +340,7 @@ def _surface_section(number: int, report: RoughnessReport) -> Section:
     parts.append(f"<h3>Parameters</h3>{_parameters_table(report).html()}")
     if any(value.low is not None for value in report.values):
         parts.append(
-            f"<p class=soft>{SCAN_INTERVAL if report.kind == 'areal' else TRACE_INTERVAL}</p>"
+            f"<p class=soft>{SCAN_INTERVAL_NOTE if report.kind == 'areal' else TRACE_INTERVAL_NOTE}</p>"
         )
     for reason, names in _names_by_reason(report).items():
         parts.append(
@@ -349,7 +354,7 @@ def _surface_section(number: int, report: RoughnessReport) -> Section:
 
 
 def _verdict_sentence(report: RoughnessReport) -> str:
-    """Return the main parameters as one sentence of HTML."""
+    """Return the main roughness parameters of a surface as a sentence of HTML."""
     if report.kind == "areal":
         names = ("Sa", "Sq", "Sz", "Ssk")
     else:
@@ -365,7 +370,7 @@ def _verdict_sentence(report: RoughnessReport) -> str:
 
 
 def _format_parameter(report: RoughnessReport, name: str) -> str:
-    """Format a parameter with its interval."""
+    """Format a roughness parameter with its interval."""
     return format_quantity(report[name]).long
 
 

@@ -14,7 +14,7 @@ from ..drawing.pictures import draw_charts
 from ..pages.document import Section, figure_html, table_html
 from ..pages.sentences import format_with_error
 from ..written import measure_label
-from .compare import SIDES, TABLE_HEADS, WORDS, Article, sides_lines
+from .compare import QUANTITY_LABELS, SIDES, TABLE_HEADS, SurfacePage, sides_lines
 from .pictures import GREY, Picture, PressedSide, depth_axis, draw_maps, draw_pressures
 from .pictures import SIDES as SIDE_COLOURS
 from .quantities import MISSING, QuantityTable, Row, format_quantity, quantity_data
@@ -34,11 +34,11 @@ MEASURES = (
     "friction_force_peak",
 )
 HEADLINE_MEASURES = ("contact_fraction", "pressure_peak", "loop_area")
-WHOLE_PATCH = 0.999  # worn fraction of the area above which the headline names no part
-MIN_HIDDEN = 0.01  # hidden wear / mean depth above which the headline states it
+MAX_PARTIAL_WEAR = 0.999  # worn fraction of the area; above it the headline names no worn part
+MIN_HIDDEN_RATIO = 0.01  # hidden wear / mean depth above which the headline states the hidden wear
 EVEN_RATIO = 0.8  # smallest / largest hidden depth above which the wear is called uniform
 WEDGE_RATIO = 0.2  # smallest / largest hidden depth below which the wear is called a wedge
-RUN_WORDS = WORDS | {
+RUN_LABELS = QUANTITY_LABELS | {
     "from": "worn part from",
     "to": "worn part to",
     "depth_mean": "worn part, mean",
@@ -58,7 +58,7 @@ def wear_verdict(wear: Wear) -> tuple:
     hidden = wear.values["hidden_wear"]
     ends = hidden_depths(after.surface, wear.depth)
     seen = "trace" if after.surface.y is None else "scan"
-    if wear.track and wear.values["worn_share"].value < WHOLE_PATCH:
+    if wear.track and wear.values["worn_share"].value < MAX_PARTIAL_WEAR:
         start, end, hidden, mean = (
             wear.track[name] for name in ("from", "to", "hidden_wear", "depth_mean")
         )
@@ -68,7 +68,7 @@ def wear_verdict(wear: Wear) -> tuple:
         seen = "trace within this part"
         extent = f"from x = {format_length(start.value, 3)} to {format_length(end.value, 3)}"
         headline += f", and by {format_length(mean.value, 3)} on average {extent}"
-    if hidden.value > MIN_HIDDEN * mean.value:
+    if hidden.value > MIN_HIDDEN_RATIO * mean.value:
         headline += (
             f"; of the {format_length(mean.value, 3)}, {format_length(hidden.value, 3)} is "
             f"{describe_hidden_wear(ends)} that a {seen} alone could not show"
@@ -94,7 +94,7 @@ def wear_verdict(wear: Wear) -> tuple:
 
 
 def describe_hidden_wear(ends: tuple) -> str:
-    """Name the shape of wear along a line or plane with these depths [m] at its ends or corners."""
+    """Name the shape of wear from the depths [m] at the ends or corners of a patch."""
     low = min(ends)
     high = max(ends)
     if low < WEDGE_RATIO * high:
@@ -103,9 +103,9 @@ def describe_hidden_wear(ends: tuple) -> str:
 
 
 def wear_data(wear: Wear, found: tuple) -> dict:
-    """Return the comparison as plain data in SI, with the names of a comparison of traces.
+    """Return the comparison of two runs as a dict, in SI units.
 
-    found: result of `wear_verdict`.
+    The names are those of a comparison of traces. found: result of `wear_verdict`.
     """
     zero = Quantity(
         0.0, 0.0, 0.0, "m", "positions are known, because both runs are of the same patch"
@@ -143,13 +143,13 @@ def wear_data(wear: Wear, found: tuple) -> dict:
 
 def _wear_table(wear: Wear) -> QuantityTable:
     """Return the table of quantities of a comparison of two runs."""
-    quantities = [(RUN_WORDS[name], quantity) for name, quantity in wear.values.items()]
+    quantities = [(RUN_LABELS[name], quantity) for name, quantity in wear.values.items()]
     for name in ("from", "to", "depth_mean", "depth_floor", "hidden_wear"):
         if name in wear.track:
             words = (
                 "uniform and wedge-shaped wear, in the worn part"
                 if name == "hidden_wear"
-                else RUN_WORDS[name]
+                else RUN_LABELS[name]
             )
             quantities.append((words, wear.track[name]))
     rows = []
@@ -160,7 +160,7 @@ def _wear_table(wear: Wear) -> QuantityTable:
 
 
 def _measure_rows(wear: Wear) -> list:
-    """Return (name, text before, text after) of the measures that at least one run has."""
+    """Return the measures of two runs as rows: name, text before and text after."""
     rows = []
     for name in MEASURES:
         measures = [run.measure(name) for run in (wear.before, wear.after)]
@@ -178,7 +178,10 @@ def _measure_rows(wear: Wear) -> list:
 
 
 def format_wear(wear: Wear, found: tuple) -> list:
-    """Return the comparison as lines of text; found: result of `wear_verdict`."""
+    """Return the comparison of two runs as lines of text.
+
+    found: result of `wear_verdict`.
+    """
     out = [
         found[0],
         *(f"  {text}" for text in found[1]),
@@ -189,7 +192,7 @@ def format_wear(wear: Wear, found: tuple) -> list:
 
 
 def write_page(path: Path, wear: Wear, found: tuple) -> None:
-    """Write the page of a comparison of two runs.
+    """Write the HTML page of a comparison of two runs.
 
     Parameters
     ----------
@@ -229,11 +232,11 @@ def write_page(path: Path, wear: Wear, found: tuple) -> None:
         Section("runs", "Pressure, contact and loop", "\n".join(runs)),
     ]
     names = [Path(run.path).resolve().name for run in both]
-    write_text(path, Article(f"{names[0]} and {names[1]}", found, wear.notes).html(sections))
+    write_text(path, SurfacePage(f"{names[0]} and {names[1]}", found, wear.notes).html(sections))
 
 
 def _draw_pictures(wear: Wear) -> list:
-    """Draw the surfaces with their wear, and the worn depth."""
+    """Draw the gaps before and after wear, and the worn depth."""
     surface = wear.after.surface
     mean = f"mean {format_length(wear.values['worn_depth_mean'].value, 3)}"
     if surface.y is not None:
@@ -260,15 +263,15 @@ def _draw_pictures(wear: Wear) -> list:
     return [gaps, depth]
 
 
-def _place_axis(x) -> tuple[dict, float]:
-    """Return the axis of positions x (m,) [m] and the scale of its unit."""
+def _position_axis(x) -> tuple[dict, float]:
+    """Return the axis of positions along the patch, and the scale of its unit."""
     unit, scale = choose_axis_unit(x, "m")
     return make_axis("x", unit) | {"range": [x[0] * scale, x[-1] * scale]}, scale
 
 
 def _draw_gaps(x, gaps: tuple) -> str:
     """Draw the gaps of the unloaded surfaces before and after."""
-    place, mm = _place_axis(x)
+    place, mm = _position_axis(x)
     up, um = choose_axis_unit(np.concatenate(gaps), "m")
     marks = [
         make_line(x * mm, gap * um, colour, name) for gap, (colour, name) in zip(gaps, SIDE_COLOURS)
@@ -283,7 +286,7 @@ def _draw_gaps(x, gaps: tuple) -> str:
 
 def _draw_worn_depth(x, depth) -> str:
     """Draw the worn depth, with the wear that a single trace could not show."""
-    place, mm = _place_axis(x)
+    place, mm = _position_axis(x)
     hidden = np.array(hidden_line(x, depth))
     unit, scale = choose_axis_unit(depth, "m")
     marks = [

@@ -30,7 +30,9 @@ OPTIONAL_VARIABLES = (
     "friction_force",
     "wear_cycle",
 )
-FLOOR_PARTS = 5  # worn part / its floor, the deepest fifth, as for measured tracks
+FLOOR_PARTS = (
+    5  # width of the worn part / width of its floor, the deepest fifth, as for measured tracks
+)
 FLOOR_POINTS = 100  # points of the floor; more change it by less than the error of the run
 MIN_WORN_FRACTION = 1e-3  # depth / largest depth below which a node counts as unworn
 MIN_ROUGHNESS = 1e-12  # [m] standard deviation below which an unworn surface counts as flat
@@ -53,7 +55,7 @@ HIDDEN_UNDER_PLANE = (
 
 
 class PatchSurface(NamedTuple):
-    """Fields of a patch (m,), or (s, m) with strips.
+    """Surface of a patch: nodes, gap and worn depth, (m,) or (s, m) with strips.
 
     Attributes
     ----------
@@ -77,13 +79,13 @@ class PatchSurface(NamedTuple):
 
 
 class PatchRun(NamedTuple):
-    """Run of a patch.
+    """Run of a patch, read from its results folder.
 
     Attributes
     ----------
     run : FinishedRun
     path : str
-        Folder as it was named.
+        Name of the folder as the user gave it.
     surface : PatchSurface
     pressure : (m,) array
         Normal stress [Pa]; the mean over strips.
@@ -106,7 +108,7 @@ class PatchRun(NamedTuple):
         return "wear" in self.run.resolved
 
     def measure(self, name: str) -> dict | None:
-        """Return a measure that has a value; None if the run has none."""
+        """Return a measure of the run; None if it has no value."""
         measure = self.run.summary["measures"].get(name)
         return measure if measure is not None and measure["value"] is not None else None
 
@@ -121,7 +123,7 @@ class PatchRun(NamedTuple):
 
 
 class Wear(NamedTuple):
-    """Wear between two runs.
+    """Wear of a patch between two runs.
 
     Attributes
     ----------
@@ -146,7 +148,7 @@ class Wear(NamedTuple):
 
 
 def compare_runs(before: Path, after: Path) -> Wear:
-    """Compute the wear between the runs in two results folders, over the whole patch.
+    """Compute the wear of a patch between the runs in two results folders.
 
     The later run has [wear]; the earlier one may be new. Raises PatchfemError if a folder is no run
     of a patch, and if the two are not states of one patch in this order.
@@ -222,7 +224,10 @@ def _check_fields(fields: dict) -> PatchSurface:
 
 
 def _last_loop(run, fields: dict) -> tuple | None:
-    """Return displacement [m] and friction force [N] of the last cycle, or of the run."""
+    """Return relative displacement [m] and friction force [N] of the last cycle.
+
+    Without a drive period they are those of the whole run; None if the run has no friction loop.
+    """
     slide = fields.get("slide", fields.get("relative_displacement"))
     if slide is None or "friction_force" not in fields or fields["friction_force"].ndim != 1:
         return None
@@ -262,7 +267,10 @@ def _require_same_patch(first: PatchRun, second: PatchRun) -> None:
 
 
 def _interpolate_columns(x, own, values) -> np.ndarray:
-    """Interpolate values (k,) or (s, k) at positions `own` (k,) to x (m,)."""
+    """Interpolate values (k,) or (s, k) from the positions of one mesh to those of another.
+
+    The values are given at `own` (k,), and returned at x (m,).
+    """
     return np.apply_along_axis(lambda row: np.interp(x, own, row), -1, values)
 
 
@@ -340,13 +348,13 @@ def _measure_change(first: PatchRun, second: PatchRun, name: str) -> tuple[float
 
 
 def _make_quantity(name: str, value: float, error: float | None) -> Quantity:
-    """Return a quantity of TEXTS with its numerical error or None."""
+    """Return a quantity of TEXTS with the interval of its numerical error."""
     unit, text = TEXTS[name]
     return _make_nonnegative_quantity(value, error, unit, text)
 
 
 def _make_nonnegative_quantity(value: float, error: float | None, unit: str, text: str) -> Quantity:
-    """Return a quantity that cannot be below zero, with its numerical error or None."""
+    """Return a non-negative quantity with the interval of its numerical error."""
     if error is None:
         return Quantity(value, value, None, unit, text, "no error is estimated")
     return Quantity(value, max(value - error, 0.0), value + error, unit, text)
@@ -435,7 +443,7 @@ def _profile_ratios(before: Profile, after: Profile, texts: dict) -> dict:
 
 
 def _measure_track(x, depth, error: float, area: float) -> dict:
-    """Measure the part that wore by more than the error [m] of its depth.
+    """Measure the part of a patch that wore by more than the error [m] of the depth.
 
     area: lost area [m2] of the section.
     """
