@@ -43,7 +43,7 @@ MAX_MERGE_WIDTH = 0.02  # largest width of a merged strip in bond lengths
 
 @dataclass(frozen=True, slots=True)
 class EngineChoice:
-    """Engine and its settings.
+    """Engine that sums the bonds of eq. 2.17, with its settings, cost and error bound.
 
     - engine: name of the engine
     - tail: fraction of the friction limit that the cut-off may lose

@@ -128,7 +128,7 @@ class StripMoments(NamedTuple):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _advance_clocks(increment, clocks, growth, v0, v1, dt):
-    """Return the clocks after an increment at velocities from v0 to v1."""
+    """Return the clocks of a bond list after an increment at velocities from v0 to v1."""
     path = abs(increment)
     before = clocks[CLOCK.length]
     length, exponent = grow(before, v0, v1, path, dt, growth)
@@ -502,7 +502,9 @@ def list_slope(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_step(increment, bond_list, v0, v1, dt):
-    """Advance a list by an increment: append strips, drop the oldest, and merge now and then.
+    """Advance a list of bond strips by an increment: append new strips and drop the oldest.
+
+    The strips are merged now and then.
 
     Force and energy after the step are written into the status.
 

@@ -61,7 +61,7 @@ class _StepIntegrals(NamedTuple):
 
 
 class _Release(NamedTuple):
-    """Change of the bonds at rest.
+    """Change of the bonds of all points under a change of the pressure at rest.
 
     - kept: factor on the bonds of the strips, (k, m) or (m,)
     - formed: density (m,) [Pa] of an unstretched cohort that is added
@@ -73,7 +73,7 @@ class _Release(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Quadrature:
-    """Law that evaluates eq. 2.17 directly, in the protocol of `friction.protocol`.
+    """Friction law that evaluates the sum over bonds (eq. 2.17) directly by quadrature.
 
     - law: parameters of the bonds
     - tail: largest fraction of the friction limit that the cut-off may leave out; 0 keeps every bond
@@ -124,7 +124,7 @@ class Quadrature:
         )
 
     def step(self, state: Strips, dq, s0, s1, dt: float) -> Step:
-        """Advance by a straight increment, with its mean traction and dissipated energy.
+        """Advance the bonds by a straight increment; return mean traction and dissipated energy.
 
         The mean traction is exact for reading="stretch" and p = 1, and else comes from Gauss points. For
         reading="stretch" its component along the increment comes from the energy balance, so no step creates energy.
@@ -217,7 +217,7 @@ class Quadrature:
         return _StepIntegrals(mean, dissipated)
 
     def press(self, state: Strips, s0, s1) -> Step:
-        """Change the pressure at rest linearly.
+        """Change the pressure on the bonds linearly at rest.
 
         For reading="report" a bond keeps the pressure at which it formed, and none forms at rest. For reading="stretch"
         and p = 1 the rule is that of `recursion.press_bonds`; with another order, the last-formed bonds are lost first.

@@ -280,7 +280,7 @@ class FirstOrderBonds:
         return BondState(bonds, self.law.length)
 
     def step(self, state: BondState, dq, s0, s1, dt: float) -> Step:
-        """Advance by a step; new bonds form at its mean pressure.
+        """Advance the bonds by a step; new bonds form at the mean pressure of the step.
 
         All bonds are lost where the step ends without pressure.
 
@@ -314,7 +314,7 @@ class FirstOrderBonds:
         return Step(scale * moved.mean, dissipated, BondState(bonds, end, moved.play))
 
     def press(self, state: BondState, s0, s1) -> Step:
-        """Change the pressure at rest linearly by the rule of `press_bonds`.
+        """Change the pressure on the bonds linearly at rest, by the rule of `press_bonds`.
 
         Energy that is no longer stored is lost.
 
