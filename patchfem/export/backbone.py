@@ -184,34 +184,37 @@ def _has_small_error(curve: Curve) -> np.ndarray:
 
 def page_html(backbone: Backbone, title: str) -> str:
     """Return the HTML page of a backbone."""
-    made = []
+    page_charts = []
     if backbone.curves:
-        made = [
-            one | {"anchor": f"chart{k}"} for k, one in enumerate(backbone_charts(backbone.curves))
+        page_charts = [
+            chart | {"anchor": f"chart{k}"}
+            for k, chart in enumerate(backbone_charts(backbone.curves))
         ]
     first, *more = summarise_backbone(backbone)
     paragraphs = "".join(f"<p>{sentence_html(text)}</p>" for text in more)
     lead = f"<div class=verdict><b>{sentence_html(first)}</b>{paragraphs}</div>"
     sections = [
-        Section("curves", "Frequency and damping against amplitude", _charts_html(backbone, made)),
+        Section(
+            "curves", "Frequency and damping against amplitude", _charts_html(backbone, page_charts)
+        ),
         Section("ways", "How the curves were computed", _methods_html(backbone)),
         Section("values", "Values", _values_table(backbone)),
     ]
     heading = f"Mode {backbone.mode}: frequency and damping against amplitude"
     if title:
         heading = f"{heading}: {title}"
-    data = {"charts": made} if made else None
-    scripts = ("figures.js", "curves.js") if made else ()
+    data = {"charts": page_charts} if page_charts else None
+    scripts = ("figures.js", "curves.js") if page_charts else ()
     return document_html(heading, lead, sections, data, scripts)
 
 
-def _charts_html(backbone: Backbone, made: list) -> str:
+def _charts_html(backbone: Backbone, page_charts: list) -> str:
     """Return the HTML elements of the charts of a backbone, with a caption."""
-    if not made:
+    if not page_charts:
         return "<p>No curve was found.</p>"
     cells = "".join(
-        f'<div id="{one["anchor"]}" class=chart role=img aria-label="{escape(one["title"])}"></div>'
-        for one in made
+        f'<div id="{chart["anchor"]}" class=chart role=img aria-label="{escape(chart["title"])}"></div>'
+        for chart in page_charts
     )
     caption = "The bars show the numerical errors."
     if not all(_has_small_error(curve).all() for curve in backbone.curves.values()):
@@ -303,7 +306,9 @@ def summarise_backbone(backbone: Backbone) -> list:
 def _describe_ends(mode: str, curve: Curve) -> str:
     """Describe frequency and damping ratio at the smallest and the largest amplitude."""
     ends = [_format_point(curve, k) for k in sorted({0, curve.amplitude.size - 1})]
-    parts = [f"{one.amplitude}: {one.frequency}, damping ratio {one.damping}" for one in ends]
+    parts = [
+        f"{point.amplitude}: {point.frequency}, damping ratio {point.damping}" for point in ends
+    ]
     return f"Mode {mode} at {'; at '.join(parts)}."
 
 

@@ -38,7 +38,7 @@ def describe_curve_fit(fitted: FittedCurve, folder: Path) -> FitFiles:
         f"{fit_data['outcome']}: {fit_data['rows']} amplitudes of {fit_data['measured']} by "
         f"{fit_data['method']}, {fit_data['evaluations']} evaluations"
     )
-    rest = [
+    details = [
         f"  rms of the residual   {100 * rms['frequency']:.2g} % of the frequency, "
         f"{100 * rms['damping']:.2g} % of the damping ratio",
         *(f"  note: {text}" for text in fit_data["notes"]),
@@ -46,8 +46,8 @@ def describe_curve_fit(fitted: FittedCurve, folder: Path) -> FitFiles:
     scene = fitted_scene_text(fitted.keys, fitted.path.name, folder)
     return FitFiles(
         answer=fit_data,
-        lines=[head, *format_values(fit_data), *rest],
-        summary=[head, *rest],
+        lines=[head, *format_values(fit_data), *details],
+        summary=[head, *details],
         scenes={FITTED_SCENE: scene},
         rows=_csv_rows(fitted),
         charts=_draw_charts(fitted),

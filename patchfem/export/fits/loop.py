@@ -35,16 +35,16 @@ def describe_loop_fit(fitted: FittedLoop, folder: Path) -> FitFiles:
         f"{fit_data['evaluations']} evaluations"
     )
     rms = format_quantity(fit_data["rms"], fit_data["unit"], 4)
-    rest = [f"  rms of the residual   {rms}, {format_number(rms_fraction, 2)} of the peak"]
+    details = [f"  rms of the residual   {rms}, {format_number(rms_fraction, 2)} of the peak"]
     if fit_data["held"] is not None:
-        held = fit_data["held"]
-        rms = format_quantity(held["rms"], fit_data["unit"], 4)
-        rest.append(f"  rms of held-out rows   {rms} ({held['rows']} rows)")
+        held_out_score = fit_data["held"]
+        rms = format_quantity(held_out_score["rms"], fit_data["unit"], 4)
+        details.append(f"  rms of held-out rows   {rms} ({held_out_score['rows']} rows)")
     scene = fitted_scene_text(fitted.keys, fitted.loop.path.name, folder)
     return FitFiles(
         answer=fit_data,
-        lines=[head, *format_values(fit_data), *rest],
-        summary=[head, *rest],
+        lines=[head, *format_values(fit_data), *details],
+        summary=[head, *details],
         scenes={FITTED_SCENE: scene},
         rows=_csv_rows(fitted),
         charts=_draw_charts(fitted),
@@ -63,9 +63,9 @@ def _collect_fit_data(fitted: FittedLoop) -> dict:
         for k, offset in enumerate(fitted.offsets)
     }
     bounds = [*keys.ranges, *(offset.range for offset in fitted.offsets)]
-    held = None
+    held_out_score = None
     if fitted.held_rms is not None:
-        held = {"rows": int(fitted.held_out.sum()), "rms": fitted.held_rms}
+        held_out_score = {"rows": int(fitted.held_out.sum()), "rms": fitted.held_rms}
     measured = loop.path.name
     return describe_measurement(keys.scene.title, measured, loop.quantity, keys.outcome) | {
         "values": describe_values(keys),
@@ -76,7 +76,7 @@ def _collect_fit_data(fitted: FittedLoop) -> dict:
         "rows": int((~fitted.held_out).sum()),
         "effective_rows": None if np.isnan(fit.intervals.rows) else fit.intervals.rows,
         "rms": fitted.rms,
-        "held": held,
+        "held": held_out_score,
         "peak": float(np.abs(loop.reading).max()),
         "step_error": fitted.step_error,
         "steps_between_rows": fitted.pieces,
@@ -101,8 +101,8 @@ def _csv_rows(fitted: FittedLoop) -> list:
         head.insert(0, "time [s]")
         columns.insert(0, loop.time)
     rows = zip(*(column.tolist() for column in columns))
-    held = fitted.held_out.tolist()
-    return [head, *([*map(repr, row), int(out)] for row, out in zip(rows, held))]
+    is_held_out = fitted.held_out.tolist()
+    return [head, *([*map(repr, row), int(out)] for row, out in zip(rows, is_held_out))]
 
 
 def _draw_charts(fitted: FittedLoop) -> list:

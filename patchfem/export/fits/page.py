@@ -50,13 +50,13 @@ def page_html(
     values = named_values(fit_data)
     sections = [Section("values", "Fitted values", _values_table(values))]
     if picture:
-        shown = figure_html(0, picture, f"{caption}.", caption)
-        sections.append(Section("picture", "Measured and fitted", shown))
+        figure = figure_html(0, picture, f"{caption}.", caption)
+        sections.append(Section("picture", "Measured and fitted", figure))
     if len(fit_data.get("correlation", ())) > 1:
         rows = _correlation_table(fit_data["correlation"], list(values))
         sections.append(Section("correlation", "Correlation of the values", rows))
-    whole = escape("\n".join(lines))
-    text = f"<pre style='white-space:pre-wrap'>{whole}</pre>"
+    full_text = escape("\n".join(lines))
+    text = f"<pre style='white-space:pre-wrap'>{full_text}</pre>"
     sections.append(Section("text", "The answer in full", text))
     names = [name for name in FILES if picture or name != "fit.csv"]
     items = "".join(f"<li><a href={name}>{name}</a>: {FILES[name]}</li>" for name in names)
@@ -71,13 +71,15 @@ def page_html(
 
 def _verdict_html(fit_data: dict, values: dict, summary: Sequence) -> str:
     """Return the top of the page of a fit: values with intervals, summary and warnings."""
-    short = "; ".join(f"{escape(key)} = {_value_with_ends(one)}" for key, one in values.items())
+    values_text = "; ".join(
+        f"{escape(key)} = {_value_with_ends(described)}" for key, described in values.items()
+    )
     law = f"{fit_data['law']}: " if "law" in fit_data else ""
     sentence = "; ".join(" ".join(line.split()) for line in summary)
     has_intervals = any(value.get("interval") for value in values.values())
     brackets = " Brackets enclose 95 % intervals." if has_intervals else ""
     return (
-        f"<div class=verdict><b>{law}{short}</b><p>{sentence_html(sentence)}.{brackets}</p></div>"
+        f"<div class=verdict><b>{law}{values_text}</b><p>{sentence_html(sentence)}.{brackets}</p></div>"
         f"{warning_box(fit_data['warnings'])}"
     )
 

@@ -52,7 +52,7 @@ def describe_patch_fit(fitted: FittedPatch, folder: Path) -> FitFiles:
 def _collect_fit_data(fitted: FittedPatch) -> dict:
     """Return the contents of fit.json of laws that are fitted to a patch."""
     patch = fitted.patch
-    laws = {law: _describe_law(law, one, fitted) for law, one in fitted.laws.items()}
+    laws = {law: _describe_law(law, fitted_law, fitted) for law, fitted_law in fitted.laws.items()}
     best = laws[fitted.best]
     mesh = None
     if patch.mesh_change is not None:
@@ -74,18 +74,18 @@ def _collect_fit_data(fitted: FittedPatch) -> dict:
     }
 
 
-def _describe_law(law: str, one: FittedLaw, fitted: FittedPatch) -> dict:
+def _describe_law(law: str, fitted_law: FittedLaw, fitted: FittedPatch) -> dict:
     """Return the values and errors of a fitted law, as written in fit.json."""
     units = FITTED_LAWS[law].units
-    sizes = _difference_sizes(one.deviations, fitted.patch.slides)
+    sizes = _difference_sizes(fitted_law.deviations, fitted.patch.slides)
     return {
         "values": {
             f"friction.{key}": {"value": value, "unit": units.get(key, "1")}
-            for key, value in one.values.items()
+            for key, value in fitted_law.values.items()
         },
-        "outcome": str(one.fit.outcome),
+        "outcome": str(fitted_law.fit.outcome),
         **sizes,
-        "dissipation": sizes["dissipation"] | _relative_loss(one, fitted),
+        "dissipation": sizes["dissipation"] | _relative_loss(fitted_law, fitted),
     }
 
 
@@ -105,17 +105,21 @@ def _difference_sizes(deviations, slides) -> dict:
     return out
 
 
-def _relative_loss(one: FittedLaw, fitted: FittedPatch) -> dict:
+def _relative_loss(fitted_law: FittedLaw, fitted: FittedPatch) -> dict:
     """Return the largest difference of the loss of a law from that of the patch.
 
     It is relative to the loss of the patch, also where this loss is tiny. If the patch
-    dissipates nothing, the difference is that of `one.deviations`.
+    dissipates nothing, the difference is that of `fitted_law.deviations`.
     """
-    own = fitted.patch.curves.loss
-    loss = one.curves.loss
-    share = np.where(own > 0, loss / np.where(own > 0, own, 1.0) - 1, one.deviations[1])
-    k = np.abs(share).argmax()
-    return {"relative": float(share[k]), "relative_at": float(fitted.patch.slides[k])}
+    patch_loss = fitted.patch.curves.loss
+    loss = fitted_law.curves.loss
+    relative_difference = np.where(
+        patch_loss > 0,
+        loss / np.where(patch_loss > 0, patch_loss, 1.0) - 1,
+        fitted_law.deviations[1],
+    )
+    k = np.abs(relative_difference).argmax()
+    return {"relative": float(relative_difference[k]), "relative_at": float(fitted.patch.slides[k])}
 
 
 def _scene_text(fitted: FittedPatch, law: str, fit_data: dict, path: Path) -> str:
@@ -127,13 +131,13 @@ def _scene_text(fitted: FittedPatch, law: str, fit_data: dict, path: Path) -> st
     values = fitted.laws[law].values
     tables["friction"] = {"law": law, "static": scene.friction.static, **values}
     tables["accuracy"] = {"tolerance": scene.accuracy.tolerance}
-    whole = loads(format_scene(tables), scene.path)
+    lumped_scene = loads(format_scene(tables), scene.path)
     comments = [
         f"law '{law}' in place of the patch of {scene.path.name}",
         *_error_sentences(law, fit_data),
     ]
     head = "\n".join(f"# {line}" for line in comments)
-    return f"{head}\n\n{write_resolved(move_scene(whole, path), build(whole))}"
+    return f"{head}\n\n{write_resolved(move_scene(lumped_scene, path), build(lumped_scene))}"
 
 
 def _csv_rows(fitted: FittedPatch) -> list:
@@ -153,15 +157,19 @@ def _draw_charts(fitted: FittedPatch) -> list:
     unit, scale = choose_axis_unit(slides, "m")
     along = charts.make_axis("amplitude of the slide", unit, True)
     x = slides * scale
-    own = fitted.patch.curves
-    stiffness = [charts.make_dots(x, own.force / slides, PATCH_COLOUR, "patch", size=4)]
-    loss = [charts.make_dots(x, _mask_nonpositive(own.loss), PATCH_COLOUR, "patch", size=4)]
-    peak = float((own.force / slides).max())
-    for law, one in fitted.laws.items():
-        values = one.curves.force / slides
+    patch_curves = fitted.patch.curves
+    stiffness = [charts.make_dots(x, patch_curves.force / slides, PATCH_COLOUR, "patch", size=4)]
+    loss = [
+        charts.make_dots(x, _mask_nonpositive(patch_curves.loss), PATCH_COLOUR, "patch", size=4)
+    ]
+    peak = float((patch_curves.force / slides).max())
+    for law, fitted_law in fitted.laws.items():
+        values = fitted_law.curves.force / slides
         peak = max(peak, float(values.max()))
         stiffness.append(charts.make_line(x, values, COLOURS[law], law))
-        loss.append(charts.make_line(x, _mask_nonpositive(one.curves.loss), COLOURS[law], law))
+        loss.append(
+            charts.make_line(x, _mask_nonpositive(fitted_law.curves.loss), COLOURS[law], law)
+        )
     from_zero = charts.make_axis("stiffness", "N/m") | {"range": [0.0, Y_MARGIN * peak]}
     return [
         charts.make_chart("Stiffness", along, from_zero, stiffness),
@@ -187,14 +195,14 @@ def _format_fit_data(fit_data: dict) -> list:
         f"{_best_law_sentence(fit_data)}",
         f"  {'law':<16}{'error of stiffness':>22}{'error of loss':>22}   values",
     ]
-    for law, one in fit_data["laws"].items():
+    for law, described_law in fit_data["laws"].items():
         cells = [
-            f"{_format_percent(one[part]['largest'])} (rms {_format_percent(one[part]['rms'])})"
+            f"{_format_percent(described_law[part]['largest'])} (rms {_format_percent(described_law[part]['rms'])})"
             for part in COMPARED_QUANTITIES
         ]
         values = ", ".join(
             f"{key.partition('.')[2]} {_format_in_unit(value['value'], value['unit'])}"
-            for key, value in one["values"].items()
+            for key, value in described_law["values"].items()
         )
         out.append(f"  {law:<16}{cells[0]:>22}{cells[1]:>22}   {values}")
     out += [f"  {line}" for line in _error_sentences(fit_data["law"], fit_data)]

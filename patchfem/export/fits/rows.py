@@ -93,7 +93,7 @@ def rows_fit_data(fitted: FittedRows) -> dict:
     """
     keys = fitted.keys
     cells = fitted.cells
-    found = keys.fit
+    best_fit = keys.fit
     nulls = {}
     nulls_stable = {}
     for name in NULL_MODELS:
@@ -108,18 +108,18 @@ def rows_fit_data(fitted: FittedRows) -> dict:
         "nulls_stable": nulls_stable,
         "unstable": fitted.settings.unstable,
         "reading": _instrument_settings(fitted),
-        "unknown": describe_unknown(keys.ranges, found),
-        "correlation": describe_correlation(found),
+        "unknown": describe_unknown(keys.ranges, best_fit),
+        "correlation": describe_correlation(best_fit),
         "readings": int((~fitted.held_out).sum()),
         "held": int(fitted.held_out.sum()),
-        "rms": found.rms,
+        "rms": best_fit.rms,
         "seed": fitted.settings.seed,
         "starts": _search_starts(fitted),
         "folds": _fold_scores(fitted),
         "placebos": _placebo_scores(fitted),
         "rows": _row_entries(fitted),
-        "evaluations": found.counts.evaluations,
-        "failures": found.counts.failures,
+        "evaluations": best_fit.counts.evaluations,
+        "failures": best_fit.counts.failures,
         "motions": fitted.n_motions,
         "warnings": keys.warnings,
         "seconds": round(keys.seconds, 6),
@@ -144,13 +144,15 @@ def _instrument_settings(fitted: FittedRows) -> dict:
 def _search_starts(fitted: FittedRows) -> list:
     """Return the first and last values of each search, and its training score."""
     names = [bound.key for bound in fitted.keys.ranges]
-    found = fitted.search
+    search = fitted.search
     out = []
-    for begin, end, rms in zip(found.starts.tolist(), found.ends.tolist(), found.rms.tolist()):
+    for first_values, end, rms in zip(
+        search.starts.tolist(), search.ends.tolist(), search.rms.tolist()
+    ):
         settled = math.isfinite(rms)
         out.append(
             {
-                "from": dict(zip(names, begin)),
+                "from": dict(zip(names, first_values)),
                 "to": dict(zip(names, end)) if settled else None,
                 "training": rms if settled else None,
             }
@@ -277,11 +279,11 @@ def _draw_chart(fit_data: dict, name: str, unit: str, scale: float) -> dict:
 
 def _format_fit_data(fit_data: dict) -> list:
     """Return the fitted values and the scores of all models as lines of text."""
-    good = [one["training"] for one in fit_data["starts"] if one["training"] is not None]
-    alike = sum(rms <= min(good) * SAME_SCORE for rms in good)
+    finished_scores = [one["training"] for one in fit_data["starts"] if one["training"] is not None]
+    n_best = sum(rms <= min(finished_scores) * SAME_SCORE for rms in finished_scores)
     out = [
         f"{fit_data['outcome']}: {fit_data['readings']} readings of {fit_data['measured']} fitted, "
-        f"{fit_data['held']} held out; {alike} of {len(fit_data['starts'])} starts led to within 1 % of "
+        f"{fit_data['held']} held out; {n_best} of {len(fit_data['starts'])} starts led to within 1 % of "
         "the best training score"
     ]
     out += format_values(fit_data, KEY_WIDTH)

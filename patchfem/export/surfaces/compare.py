@@ -264,14 +264,14 @@ def pressed_traces(comparison: Comparison) -> tuple:
 
     x is measured from the middle, and heights are levelled by least squares, as the scene does.
     """
-    found = comparison.alignment
-    if found is None:
+    alignment = comparison.alignment
+    if alignment is None:
         traces = (comparison.before, comparison.after)
     else:
-        second = found.first - found.worn_depth
+        second = alignment.first - alignment.worn_depth
         traces = (
-            Profile(found.x, found.first, comparison.before.source),
-            Profile(found.x, second, comparison.after.source),
+            Profile(alignment.x, alignment.first, comparison.before.source),
+            Profile(alignment.x, second, comparison.after.source),
         )
     return tuple(level(resample_evenly(trace)) for trace in traces)
 
@@ -428,28 +428,28 @@ def _draw_pictures(part: Comparison) -> list:
 
 def _aligned_heights(part: Comparison) -> tuple:
     """Return both aligned traces (n,) [m] about the least-squares line of the first."""
-    found = part.alignment
-    line = np.polyval(np.polyfit(found.x, found.first, 1), found.x)
-    return found.first - line, found.first - found.worn_depth - line
+    alignment = part.alignment
+    line = np.polyval(np.polyfit(alignment.x, alignment.first, 1), alignment.x)
+    return alignment.first - line, alignment.first - alignment.worn_depth - line
 
 
 def _aligned_pictures(part: Comparison) -> list:
     """Draw two aligned traces and the depth between them."""
-    found = part.alignment
-    worn = np.where(found.worn_depth > 3 * found.noise, found.worn_depth, 0.0)
-    both = Picture(
-        pictures.draw_aligned(found.x, *_aligned_heights(part), worn),
+    alignment = part.alignment
+    worn = np.where(alignment.worn_depth > 3 * alignment.noise, alignment.worn_depth, 0.0)
+    traces_picture = Picture(
+        pictures.draw_aligned(alignment.x, *_aligned_heights(part), worn),
         "The trace measured after wear, moved by shift, tilt and offset, is drawn over the trace "
         "measured before.",
         f"Both traces after alignment: mean worn depth {format_quantity(part.worn.mean).short}",
     )
     depth = Picture(
-        pictures.draw_depth(found.x, found.worn_depth, used=found.unworn),
+        pictures.draw_depth(alignment.x, alignment.worn_depth, used=alignment.unworn),
         "The curve is the depth of the second trace (after wear) below the first trace (before "
         "wear). Blue: the unworn heights to which shift, tilt and offset were fitted.",
         f"Worn depth along the trace: largest {format_quantity(part.worn.largest).short}",
     )
-    return [both, depth]
+    return [traces_picture, depth]
 
 
 def _scan_pictures(change: Change) -> list:

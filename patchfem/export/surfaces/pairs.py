@@ -34,16 +34,16 @@ MEANS_NOTE = (
 
 
 def compare_pairs(
-    asked: list, direction: str = "", done: Callable | None = None, **settings
+    table_lines: list, direction: str = "", report_fraction: Callable | None = None, **settings
 ) -> list[dict]:
     """Compare the surfaces of each pair of a table, from files or results folders.
 
     Parameters
     ----------
-    asked : list of TableLine
+    table_lines : list of TableLine
     direction : str
         Axis of the traces whose line in the table states none.
-    done : callable, optional
+    report_fraction : callable, optional
         Receives the fraction of the pairs that are done.
     **settings
         units, shift, keep_spikes and datum of all files (`verdict.judge_files`).
@@ -54,18 +54,18 @@ def compare_pairs(
         Plain data of each pair (`pairs.compare_pairs`).
     """
 
-    def answer(paths: tuple, own: str) -> dict:
+    def answer(paths: tuple, pair_direction: str) -> dict:
         if not any(path.is_dir() for path in paths):
             return compare.comparison_data(
-                *verdict.judge_files(paths, own or direction, **settings)
+                *verdict.judge_files(paths, pair_direction or direction, **settings)
             )
-        if own or settings.get("shift") is not None:
-            what = "a direction" if own else "a shift"
+        if pair_direction or settings.get("shift") is not None:
+            what = "a direction" if pair_direction else "a shift"
             raise PatchfemError(f"{what} can be given only for traces, not for results folders")
         wear = compare_runs(*paths)
         return worn.wear_data(wear, worn.wear_verdict(wear))
 
-    return pairs.compare_pairs(asked, answer, done)
+    return pairs.compare_pairs(table_lines, answer, report_fraction)
 
 
 def pairs_data(rows: list) -> dict:

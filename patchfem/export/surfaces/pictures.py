@@ -261,8 +261,8 @@ def draw_maps(x, y, heights: tuple):
     ends = np.quantile(before[~np.isnan(before)], COLOUR_QUANTILES)
     _draw_map(figure, panels[0], (x, y, before), ends, "viridis")
     _draw_map(figure, panels[1], (x, y, after), ends, "viridis")
-    reach = np.nanquantile(np.abs(depth), COLOUR_QUANTILES[1])
-    _draw_map(figure, panels[2], (x, y, depth), (-reach, reach), "RdBu_r", name="depth")
+    max_depth = np.nanquantile(np.abs(depth), COLOUR_QUANTILES[1])
+    _draw_map(figure, panels[2], (x, y, depth), (-max_depth, max_depth), "RdBu_r", name="depth")
     for panel, title in zip(panels, ("before", "after", "worn depth")):
         panel.set(title=title)
     return figure
@@ -391,9 +391,11 @@ def draw_aligned(x, first, second, worn) -> str:
     label = "x of the second trace"
     height = make_axis("height", up)
     detail_height = height | {"range": [detail.min() - 0.1 * room, detail.max() + 0.15 * room]}
-    whole = make_chart("Both traces", _full_axis(label, along, x * mm), height, marks)
-    part = make_chart("A part of them", _full_axis(label, along, ends * mm), detail_height, marks)
-    return draw_charts([whole, part], height=3.4)
+    traces_chart = make_chart("Both traces", _full_axis(label, along, x * mm), height, marks)
+    detail_chart = make_chart(
+        "A part of them", _full_axis(label, along, ends * mm), detail_height, marks
+    )
+    return draw_charts([traces_chart, detail_chart], height=3.4)
 
 
 def _detail_ends(x, worn) -> np.ndarray:
@@ -578,7 +580,7 @@ def draw_pressures(sides: list) -> str:
     """Draw the normal stress of the patch with each surface; sides: list of PressedSide."""
     along, mm = choose_axis_unit(sides[0].x, "m")
     unit, scale = choose_axis_unit(np.concatenate([side.stress for side in sides]), "Pa")
-    top = 1.05 * max(float(side.stress.max()) for side in sides) * scale
+    max_stress = 1.05 * max(float(side.stress.max()) for side in sides) * scale
     colours = {name: colour for colour, name in SIDES}
     charts = []
     for side in sides:
@@ -589,7 +591,7 @@ def draw_pressures(sides: list) -> str:
             make_mark("band", colour, x=x, low=0 * x, high=stress),
             make_line(x, stress, colour, width=0.9),
         ]
-        up = make_axis("normal stress", unit) | {"range": [0.0, top]}
+        up = make_axis("normal stress", unit) | {"range": [0.0, max_stress]}
         charts.append(
             make_chart(
                 f"Pressure with the surface {side.name}", _full_axis("x", along, x), up, marks

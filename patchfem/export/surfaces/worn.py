@@ -57,7 +57,7 @@ def wear_verdict(wear: Wear) -> tuple:
     headline = f"worn by {format_length(mean.value, 3)} on average over the patch"
     hidden = wear.values["hidden_wear"]
     ends = hidden_depths(after.surface, wear.depth)
-    seen = "trace" if after.surface.y is None else "scan"
+    measurement = "trace" if after.surface.y is None else "scan"
     if wear.track and wear.values["worn_share"].value < MAX_PARTIAL_WEAR:
         start, end, hidden, mean = (
             wear.track[name] for name in ("from", "to", "hidden_wear", "depth_mean")
@@ -65,13 +65,13 @@ def wear_verdict(wear: Wear) -> tuple:
         x = after.surface.x
         inside = (x >= start.value) & (x <= end.value)
         ends = hidden_line(x[inside], wear.depth[inside])
-        seen = "trace within this part"
+        measurement = "trace within this part"
         extent = f"from x = {format_length(start.value, 3)} to {format_length(end.value, 3)}"
         headline += f", and by {format_length(mean.value, 3)} on average {extent}"
     if hidden.value > MIN_HIDDEN_RATIO * mean.value:
         headline += (
             f"; of the {format_length(mean.value, 3)}, {format_length(hidden.value, 3)} is "
-            f"{describe_hidden_wear(ends)} that a {seen} alone could not show"
+            f"{describe_hidden_wear(ends)} that a {measurement} alone could not show"
         )
     volume = format_quantity(wear.values["worn_volume"]).short
     place = after.describe_position(np.argmax(wear.depth))
@@ -102,10 +102,10 @@ def describe_hidden_wear(ends: tuple) -> str:
     return "uniform wear" if low > EVEN_RATIO * high else "uniform wear with a wedge"
 
 
-def wear_data(wear: Wear, found: tuple) -> dict:
+def wear_data(wear: Wear, verdict: tuple) -> dict:
     """Return the comparison of two runs as a dict, in SI units.
 
-    The names are those of a comparison of traces. found: result of `wear_verdict`.
+    The names are those of a comparison of traces. verdict: result of `wear_verdict`.
     """
     zero = Quantity(
         0.0, 0.0, 0.0, "m", "positions are known, because both runs are of the same patch"
@@ -124,8 +124,8 @@ def wear_data(wear: Wear, found: tuple) -> dict:
         }
     return {
         "patchfem": __version__,
-        "verdict": found[0],
-        "sentences": found[1],
+        "verdict": verdict[0],
+        "sentences": verdict[1],
         "confidence": LEVEL,
         "before": wear.before.path,
         "after": wear.after.path,
@@ -177,31 +177,31 @@ def _measure_rows(wear: Wear) -> list:
     return rows
 
 
-def format_wear(wear: Wear, found: tuple) -> list:
+def format_wear(wear: Wear, verdict: tuple) -> list:
     """Return the comparison of two runs as lines of text.
 
-    found: result of `wear_verdict`.
+    verdict: result of `wear_verdict`.
     """
     out = [
-        found[0],
-        *(f"  {text}" for text in found[1]),
+        verdict[0],
+        *(f"  {text}" for text in verdict[1]),
         "",
         f"{wear.before.path} -> {wear.after.path}",
     ]
     return [*out, *_wear_table(wear).lines(), "", *sides_lines(_measure_rows(wear))]
 
 
-def write_page(path: Path, wear: Wear, found: tuple) -> None:
+def write_page(path: Path, wear: Wear, verdict: tuple) -> None:
     """Write the HTML page of a comparison of two runs.
 
     Parameters
     ----------
     path : Path
     wear : Wear
-    found : tuple
+    verdict : tuple
         Result of `wear_verdict`.
     """
-    both = (wear.before, wear.after)
+    both_runs = (wear.before, wear.after)
     body = [figure_html(number, *picture) for number, picture in enumerate(_draw_pictures(wear))]
     body.append(_wear_table(wear).html())
     body.append(
@@ -212,12 +212,12 @@ def write_page(path: Path, wear: Wear, found: tuple) -> None:
     if wear.after.surface.y is not None:
         caption += ", mean over the width"
     drawn = draw_pressures(
-        [PressedSide(run.surface.x, run.pressure, name) for run, name in zip(both, SIDES)]
+        [PressedSide(run.surface.x, run.pressure, name) for run, name in zip(both_runs, SIDES)]
     )
     runs = [figure_html("p", drawn, f"{caption}.", "Pressure along the patch before and after")]
-    if all(run.loop is not None for run in both):
+    if all(run.loop is not None for run in both_runs):
         loops = []
-        for run, name in zip(both, SIDES):
+        for run, name in zip(both_runs, SIDES):
             loops += loop_chart(*run.loop, f"Friction loop {name}")
         caption = "Friction force over the slide in the last cycle."
         runs.append(
@@ -231,8 +231,8 @@ def write_page(path: Path, wear: Wear, found: tuple) -> None:
         Section("changes", "What wore off", "\n".join(body)),
         Section("runs", "Pressure, contact and loop", "\n".join(runs)),
     ]
-    names = [Path(run.path).resolve().name for run in both]
-    write_text(path, SurfacePage(f"{names[0]} and {names[1]}", found, wear.notes).html(sections))
+    names = [Path(run.path).resolve().name for run in both_runs]
+    write_text(path, SurfacePage(f"{names[0]} and {names[1]}", verdict, wear.notes).html(sections))
 
 
 def _draw_pictures(wear: Wear) -> list:

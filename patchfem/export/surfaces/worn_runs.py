@@ -266,12 +266,12 @@ def _require_same_patch(first: PatchRun, second: PatchRun) -> None:
         )
 
 
-def _interpolate_columns(x, own, values) -> np.ndarray:
+def _interpolate_columns(x, given_x, values) -> np.ndarray:
     """Interpolate values (k,) or (s, k) from the positions of one mesh to those of another.
 
-    The values are given at `own` (k,), and returned at x (m,).
+    The values are given at `given_x` (k,), and returned at x (m,).
     """
-    return np.apply_along_axis(lambda row: np.interp(x, own, row), -1, values)
+    return np.apply_along_axis(lambda row: np.interp(x, given_x, row), -1, values)
 
 
 def _measure_wear(first: PatchRun, second: PatchRun) -> Wear:
@@ -317,9 +317,9 @@ def _measure_wear(first: PatchRun, second: PatchRun) -> Wear:
         notes += [f"{name}: {text}" for text in run.run.summary.get("warnings", ())]
     if float(depth.min()) < -error:
         place = second.describe_position(np.argmin(depth))
-        less = format_length(-float(depth.min()), 3)
+        missing_depth = format_length(-float(depth.min()), 3)
         notes.append(
-            f"at {place} the later run is worn by {less} less, so it does not continue the earlier "
+            f"at {place} the later run is worn by {missing_depth} less, so it does not continue the earlier "
             "one"
         )
     return Wear(first, second, gaps, depth, values, track, notes)
@@ -332,8 +332,10 @@ def _mesh_error(surface: PatchSurface, x) -> float:
     """
     if np.array_equal(surface.x, x) or not surface.depth.any():
         return 0.0
-    every = np.unique([*range(0, surface.x.size, 2), surface.x.size - 1])
-    coarse = _interpolate_columns(surface.x, surface.x[every], surface.depth[..., every])
+    coarse_nodes = np.unique([*range(0, surface.x.size, 2), surface.x.size - 1])
+    coarse = _interpolate_columns(
+        surface.x, surface.x[coarse_nodes], surface.depth[..., coarse_nodes]
+    )
     return float(np.abs(surface.depth - coarse).max()) / 4
 
 
