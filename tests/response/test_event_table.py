@@ -50,7 +50,10 @@ def test_exact_reversals_without_a_stop():
 
 def test_exact_a_slip_below_the_bound_is_no_event():
     time, slip = stick_slip()
-    assert detect_events(time, 1e-9 * slip[:, None], slip[:, None], 1.0, held=1e-8).time.size == 0
+    assert (
+        detect_events(time, 1e-9 * slip[:, None], slip[:, None], 1.0, max_stick_slip=1e-8).time.size
+        == 0
+    )
     assert detect_events(time, 0 * slip[:, None], slip[:, None], 1.0).time.size == 0
 
 

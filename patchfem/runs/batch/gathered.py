@@ -353,7 +353,7 @@ def _evaluate(
         window = samples.response(case, accelerations[:, case])
         with np.errstate(all="ignore"):
             rings, errors = run_events.measure_ringing_in_sticks(
-                window, modes, drive, held=MAX_STICKING_SLIP * points[case].length
+                window, modes, drive, max_stick_slip=MAX_STICKING_SLIP * points[case].length
             )
         for name, value in rings.items():
             values[name][case] = value
