@@ -188,7 +188,7 @@ def _middle_value(model: Model, knob: str) -> int:
         return _scene_value(model, knob) or DEFAULT_MIDDLES[knob]
     if model.kind == "bench":
         return engine.steps_per_cycle(model)
-    return numerics.choose(model).steps
+    return numerics.choose_numerics(model).steps
 
 
 def _with_integer(model: Model, knob: str, value: int) -> Model:

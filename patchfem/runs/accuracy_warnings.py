@@ -364,7 +364,7 @@ def _remedy_without_order(model, steps: int, excess: dict, exact: str) -> str:
     if exact:
         return f", so more steps may not help; {exact}"
     is_pinned = model.kind == "rig" and model.accuracy.steps_per_cycle is not None
-    may_double = is_pinned and 2 * steps <= costs.MOST_STEPS
+    may_double = is_pinned and 2 * steps <= costs.MAX_MARCH_STEPS
     if may_double and "relative_displacement_amplitude" in excess:
         return (
             "; leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps "

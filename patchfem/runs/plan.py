@@ -200,8 +200,8 @@ def _make_plan(model: Model) -> Plan:
     on_law = []
     if model.rig is not None:
         chain = of_rig.chain(model.rig) | chain
-        groups |= of_rig.groups(model) if model.kind == "rig" else {}
-        on_motion += engines.unused_settings(model, engines.choose_engine(model).name)
+        groups |= of_rig.compute_groups(model) if model.kind == "rig" else {}
+        on_motion += engines.describe_unused_settings(model, engines.choose_engine(model).name)
     if model.patch is not None:
         chain |= patch_plan.chain(model.patch)
         groups |= patch_plan.groups(model)
@@ -222,7 +222,7 @@ def _make_plan(model: Model) -> Plan:
         groups |= _law_groups(model)
         on_law += _groove_words(model)
     if model.rig is not None:
-        on_motion += of_rig.first_words(model.rig, groups, chain)
+        on_motion += of_rig.describe_stick(model.rig, groups, chain)
     if (
         cost.engine in SKIPPING_ENGINES
         and drive_sizes.is_sinusoidal(model.rig.drive.signal)
@@ -259,7 +259,7 @@ def _cost(model: Model) -> Cost:
     points = pressing.sizes.get("interface_points", 1)
     motion = Cost()
     if model.rig is not None:
-        motion = of_rig.cost(model, points)
+        motion = of_rig.predict_cost(model, points)
     elif model.kind == "bench":
         motion = of_bench.cost(model, points)
     total = (

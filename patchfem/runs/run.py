@@ -114,7 +114,7 @@ def _run(
     notes = list(model.source.notes)
     meshes = PatchMeshes()
     if model.rig is not None:
-        warnings += engines.unused_settings(model, what.engine)
+        warnings += engines.describe_unused_settings(model, what.engine)
     if model.patch is not None:
         meshes = _press(model, estimate=estimate, fresh=fresh)
         seconds["contact"] = perf_counter() - begin

@@ -159,10 +159,13 @@ def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
 def _rig_steps_cause(model: Model) -> Cause | None:
     """Return the Cause if a rig has too few time steps."""
     engine = engines.choose_engine(model)
-    if not engine.coarser_in_time(model, numerics.choose(model)) or engine is engines.SMOOTH:
+    if (
+        not engine.coarser_in_time(model, numerics.choose_numerics(model))
+        or engine is engines.SMOOTH
+    ):
         return None
-    steps = numerics.choose(model).steps
-    wanted = costs.steps_wanted(model)
+    steps = numerics.choose_numerics(model).steps
+    wanted = costs.required_steps_per_cycle(model)
     if steps > FEWER_STEPS * wanted:
         return None
     words = f"with the {steps} steps per cycle of this run"
@@ -181,8 +184,8 @@ def _steps_cure(model: Model) -> dict:
     if free.name in STEPLESS:
         dropped = {"accuracy.steps_per_cycle": None} if accuracy.steps_per_cycle is not None else {}
         return dropped | ({"accuracy.method": None} if accuracy.method != "auto" else {})
-    steps = numerics.choose(model).steps
-    enough = ENOUGH_STEPS * costs.steps_wanted(model)
+    steps = numerics.choose_numerics(model).steps
+    enough = ENOUGH_STEPS * costs.required_steps_per_cycle(model)
     if steps >= enough:
         return {}
     return {"accuracy.steps_per_cycle": _rounded_steps(enough)}
@@ -224,7 +227,7 @@ def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
         or engines.choose_engine(model).name != engines.MARCH.name
     ):
         return None
-    if lists.choose_quadrature(model, numerics.choose(model)).error <= tolerance:
+    if lists.choose_bond_sum(model, numerics.choose_numerics(model)).error <= tolerance:
         return None
     return Cause(f"with {' and '.join(pinned)} as given", dict.fromkeys(pinned))
 

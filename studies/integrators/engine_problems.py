@@ -15,8 +15,8 @@ from patchfem.core import InitialState, ModalBasis
 from patchfem.dynamics.march import march as marching
 from patchfem.dynamics.march import models
 from patchfem.model import build
-from patchfem.runs import choose, solve_all
-from patchfem.runs.rig.interface import contact_model
+from patchfem.runs import choose_numerics, solve_all
+from patchfem.runs.rig.interface import make_single_contact
 from patchfem.scene import scene
 from patchfem.structure import make_release
 
@@ -113,8 +113,8 @@ def problem(name: str) -> Problem:
     )
     modes = model.rig.modes
     drive = model.rig.drive.signal
-    contact = contact_model(
-        model, choose(model), solve_all(model.patch, model.accuracy.tolerance, False)[0]
+    contact = make_single_contact(
+        model, choose_numerics(model), solve_all(model.patch, model.accuracy.tolerance, False)[0]
     )
     k, y = contact.element.numbers[2:].reshape(2, -1)
     numbers = {

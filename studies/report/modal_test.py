@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 import patchfem as pf
 from patchfem.dynamics import warm_up
 from patchfem.dynamics.march.march import march
-from patchfem.runs import choose, solve_all
+from patchfem.runs import choose_numerics, solve_all
 from patchfem.runs.rig.interface import make_contact
 from patchfem.structure.drives import RecordedDrive
 
@@ -79,7 +79,7 @@ def march_samples(scene, drive=None, steps: int = STEPS, seconds: float | None =
     patch = (
         None if model.patch is None else solve_all(model.patch, model.accuracy.tolerance, False)[0]
     )
-    contact = make_contact(model, choose(model), patch)
+    contact = make_contact(model, choose_numerics(model), patch)
     # 1e-6: a whole number stays one
     cycles = int((seconds or drive.duration) / drive.period + 1e-6)
     warm_up(modes, drive, contact)

@@ -25,9 +25,9 @@ from rig_texts import ONE_MODE, TEXTS
 
 from patchfem.dynamics.harmonic.branch import find_backbone
 from patchfem.model import build
-from patchfem.runs import choose, solve_all
+from patchfem.runs import choose_numerics, solve_all
 from patchfem.runs import run as runner
-from patchfem.runs.rig.interface import contact_model
+from patchfem.runs.rig.interface import make_single_contact
 from patchfem.scene import scene
 
 FOLDER = Path(__file__).parent
@@ -91,7 +91,7 @@ def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
         if model.patch is not None
         else None
     )
-    contact = contact_model(model, choose(model), patch)
+    contact = make_single_contact(model, choose_numerics(model), patch)
     amplitude = size * np.asarray(shares)
     free = [find_backbone(modes, contact, amplitude, harmonics=h) for h in (1, 9)]
     w = modes.omega[0]

@@ -28,7 +28,7 @@ from drawing import drawing
 from patchfem.core import G_N
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.model import build
-from patchfem.runs import choose
+from patchfem.runs import choose_numerics
 from patchfem.runs import run as runner
 from patchfem.runs.patch.press import press_patch
 from patchfem.runs.rig import levels, solve
@@ -77,8 +77,8 @@ def onset(worn, cycles: int, pair=None) -> float:
     )
     model = build(scene.loads(text, SCENE))
     patch = press_patch(model.patch, pair, worn)
-    found = solve.solve(model, choose(model), patch)
-    return levels.onset(found.levels, found.probe, 3e-3)[0] / G_N
+    found = solve.solve(model, choose_numerics(model), patch)
+    return levels.find_onset(found.levels, found.probe, 3e-3)[0] / G_N
 
 
 def _worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> Row:

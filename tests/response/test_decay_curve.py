@@ -14,7 +14,7 @@ from patchfem.response import (
     locate_reversals,
     make_half_cycles,
 )
-from patchfem.runs import mesh_errors_of_decay
+from patchfem.runs import estimate_decay_mesh_errors
 
 RELEASED = DRIVE[: DRIVE.index("kind")] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 
@@ -343,7 +343,9 @@ def test_without_a_static_loop_the_error_of_the_mesh_has_a_reason(old, new, why)
     scene = CROWNED.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"').replace(
         old, new, 1
     )
-    error, said = mesh_errors_of_decay(pf.build(scene), None, None, np.array([1e-7, 1e-6]), int)
+    error, said = estimate_decay_mesh_errors(
+        pf.build(scene), None, None, np.array([1e-7, 1e-6]), int
+    )
     assert said == why and not error.any()
 
 

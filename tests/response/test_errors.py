@@ -17,7 +17,7 @@ from patchfem.response import (
     step_errors,
 )
 from patchfem.response.errors import SAFETY_FACTOR, observed_orders
-from patchfem.runs import choose
+from patchfem.runs import choose_numerics
 from patchfem.runs.rig import march as rig_march
 from patchfem.scene import scene
 
@@ -73,7 +73,7 @@ def coverage(count, seed, finest=12800):
     held = []
     for _ in range(count):
         model = build(random_scene(rng))
-        numerics = choose(model)
+        numerics = choose_numerics(model)
         runs = {
             n: rig_march.run_march(model, replace(numerics, steps=n), None).values
             for n in (400, 200, 100, finest)

@@ -8,7 +8,7 @@ import pytest
 from patchfem import build
 from patchfem.core import Response, SineDrive
 from patchfem.response import spectrum
-from patchfem.runs import choose, solve
+from patchfem.runs import choose_numerics, solve
 
 OMEGA, PERIOD = 2.0, pi
 
@@ -108,7 +108,7 @@ def test_exact_friction_harmonic_is_that_of_the_force(kind, size, kinetic):
     """Two modes, sticking and sliding, by the event engine: from the motion alone and from the force's own series."""
     text = SCENE.format(kinetic=kinetic, kind=kind, size=size)
     model = build(text)
-    found = solve(model, choose(model), None)
+    found = solve(model, choose_numerics(model), None)
     w = found.window
     drive = model.rig.drive.signal
     slide = spectrum.motion_harmonic(w.time, w.slide, w.slide_rate, drive.omega)

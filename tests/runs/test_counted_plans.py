@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem import load, plan
-from patchfem.runs import choose
-from patchfem.runs.rig.lists import list_cost
+from patchfem.runs import choose_numerics
+from patchfem.runs.rig.lists import estimate_list_cost
 from patchfem.runs.run import run
 
 TURNED = """[contact]
@@ -141,7 +141,7 @@ def test_always_the_plan_estimates_the_work_of_a_stuck_block():
     model = plan(scene).model
     book = run(scene, estimate=False).extra["book"]
     counted = 2.5e-7 * book["iterations"] * book["strips"] / 2
-    assert counted / 12 <= list_cost(model, choose(model))[1] <= 12 * counted
+    assert counted / 12 <= estimate_list_cost(model, choose_numerics(model))[1] <= 12 * counted
 
 
 JUST_HELD = """[normal]

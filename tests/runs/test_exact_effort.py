@@ -81,7 +81,7 @@ def pieces(model) -> int:
 )
 def test_always_pieces_are_foreseen_within_a_factor_of_four(text):
     model = pf.plan(text).model
-    expected = costs.pieces_per_cycle(model) * model.rig.drive.cycles
+    expected = costs.intervals_per_cycle(model) * model.rig.drive.cycles
     took = pieces(model)
     assert took / 4 < expected < 4 * took
 
@@ -91,7 +91,7 @@ def test_exact_a_linear_rig_under_a_drive_far_below_its_modes():
     text = MODES + YAW + SLOW.replace(FREQUENCY, "0.01 Hz")
     result = pf.run(text)
     assert result.plan.engine == "exact"
-    assert costs.seconds_of_pieces(result.plan.model) < 20
+    assert costs.max_exact_seconds(result.plan.model) < 20
     w = 2 * np.pi * np.array([143.0, 129.0])
     wanted = 5 * 9.80665 / w[0] ** 2  # the output is the first mode's alone
     assert result.measures["relative_displacement_amplitude"].value == pytest.approx(
@@ -105,7 +105,7 @@ def test_exact_one_mode_under_a_drive_far_below_it(kinetic):
     """Stick-slip of a spring: the slide lags by the limit; the energy closes."""
     text = MODES + RUBS + SLOW.replace(FREQUENCY, "0.01 Hz").replace("5 g", "18 g")
     result = pf.run(text, **({"friction.kinetic": str(kinetic)} if kinetic else {}))
-    assert costs.seconds_of_pieces(result.plan.model) < 20
+    assert costs.max_exact_seconds(result.plan.model) < 20
     limit = 0.3 * 26 * 4.4482216152605
     k = 0.884 * (2 * np.pi * 143) ** 2
     wanted = 0.884 * 18 * 9.80665 / k - limit / k
@@ -122,7 +122,7 @@ def test_always_a_motion_that_rings_for_ever_is_left_to_the_march():
     plan = pf.plan(text)
     assert (
         plan.engine == "march"
-        and costs.seconds_of_pieces(plan.model) > costs.MAX_EXACT_SECONDS_UNRESOLVED
+        and costs.max_exact_seconds(plan.model) > costs.MAX_EXACT_SECONDS_UNRESOLVED
     )
 
 

@@ -14,7 +14,7 @@ from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
 
 from patchfem import plan
 from patchfem.core import Missing
-from patchfem.runs import choose, memory, run
+from patchfem.runs import choose_numerics, memory, run
 from patchfem.runs.plan import UPPER_LIMIT_NOTE, refuse_size
 from patchfem.runs.rig import costs
 from patchfem.scene import loads
@@ -227,6 +227,6 @@ duration = "{} s"
 def test_always_a_random_run_keeps_as_many_samples_as_are_foreseen():
     """Of every cycle as many as the engine keeps, whatever the band asks of a march: 60 s took 1.5 GB, not 11."""
     found = planned(SHAKEN.format(2))
-    kept = costs.kept_samples(choose(found.model))
+    kept = costs.count_kept_samples(choose_numerics(found.model))
     assert run.run(found).window.time.size == pytest.approx(kept, rel=0.01)
     assert 1e9 < planned(SHAKEN.format(60)).bytes < 2e9

@@ -8,7 +8,7 @@ import patchfem as pf
 from patchfem import build
 from patchfem.core import Outcome
 from patchfem.dynamics.march.march import march
-from patchfem.runs import choose
+from patchfem.runs import choose_numerics
 from patchfem.runs.rig import interface
 from patchfem.scene import loads
 
@@ -49,7 +49,7 @@ def scene(law, *sets):
 
 def contact_of(text):
     model = build(text)
-    return model, interface.make_contact(model, choose(model), None)
+    return model, interface.make_contact(model, choose_numerics(model), None)
 
 
 def marched(text, cycles=40, steps=400):

@@ -8,7 +8,7 @@ from scene_texts import COULOMB, DRIVE, MODE, NONLOCAL, PLASTIC, POINT
 
 from patchfem import build
 from patchfem.core import G_N, Outcome
-from patchfem.runs import choose
+from patchfem.runs import choose_numerics
 from patchfem.runs.rig.march import run_march
 from patchfem.runs.run import run
 from patchfem.scene import loads
@@ -166,7 +166,7 @@ def test_exact_a_run_that_keeps_only_its_last_cycles_has_the_same_measures(text)
     Sums over the whole run are taken in other pieces, so these have another last digit.
     """
     model = build(loads(text))
-    numerics = replace(choose(model), engine="march", steps=100)
+    numerics = replace(choose_numerics(model), engine="march", steps=100)
     full, bare = (run_march(model, replace(numerics, whole=whole), None) for whole in (True, False))
     sums = {
         name: full.values[name]

@@ -19,7 +19,7 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from patchfem.core import G_N, Outcome
 from patchfem.effects import EFFECTS
-from patchfem.runs import choose
+from patchfem.runs import choose_numerics
 from patchfem.runs.plan import plan
 from patchfem.runs.rig import rig
 from patchfem.runs.run import run
@@ -320,7 +320,9 @@ def test_exact_pressure_on_the_upper_piece_is_one_point(monkeypatch):
     lumped = run(loads(text), estimate=False)
     point = run(loads(POINT + NONLOCAL + STRUCTURE + STEPS), estimate=False)
     with monkeypatch.context() as changed:
-        changed.setattr(rig, "choose", lambda model: replace(choose(model), per_point=True))
+        changed.setattr(
+            rig, "choose_numerics", lambda model: replace(choose_numerics(model), per_point=True)
+        )
         each = run(loads(text), estimate=False)
     assert not any("the shape of the patch does not affect" in text for text in each.warnings)
     for name in (

@@ -5,7 +5,7 @@ import pytest
 from scene_texts import DRIVE, MODE, NONLOCAL, POINT
 
 import patchfem as pf
-from patchfem.runs import choose
+from patchfem.runs import choose_numerics
 
 SCENE = (
     POINT
@@ -44,7 +44,7 @@ def test_exact_smooth_laws_are_integrated_at_high_order_and_others_marched(name,
     text = SCENE.replace(old, new)
     text = text.replace(LENGTH, "") if old == NAME else text
     text = text.replace('acceleration = "5 g"\n', "") if "levels" in new else text
-    assert choose(pf.build(text)).engine == name
+    assert choose_numerics(pf.build(text)).engine == name
 
 
 @pytest.mark.parametrize("law", [LENGTH, GROWTH])

@@ -31,7 +31,7 @@ def linear(frequency, rows=(1.0,), own=(143.0,), zeta=(0.003,), base=(1.0,), lev
 @pytest.fixture
 def few(monkeypatch):
     """Curves of 13 points, but where they bend."""
-    monkeypatch.setattr(curves, "POINTS", 13)
+    monkeypatch.setattr(curves, "N_SWEEP_POINTS", 13)
 
 
 @pytest.mark.usefixtures("few")

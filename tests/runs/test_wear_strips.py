@@ -8,7 +8,7 @@ from command_line import cli
 from scene_texts import COATED, COULOMB, MODE, PIECE, mistakes
 
 import patchfem as pf
-from patchfem.runs.rig.strips import lateral_motion
+from patchfem.runs.rig.strips import estimate_lateral_motion
 from patchfem.scene import loads
 
 STRIPS = "[contact.strips]\ncount = 4\n"
@@ -104,7 +104,7 @@ def test_exact_a_rig_wears_its_strips_by_their_own_slides(yaw):
     said = [note for note in found.extra["notes"] if "across x" in note]
     assert len(said) == (yaw != "0")
     if said:  # x is pressed evenly but for its ends: the mean of (20 x)^2/2 is (20 l)^2/24
-        swing, share = lateral_motion(found.patch, found.window, 1 / 143)
+        swing, share = estimate_lateral_motion(found.patch, found.window, 1 / 143)
         assert swing == pytest.approx(
             20 * 6.35e-3 * found.measures["relative_displacement_amplitude"].value, rel=0.05
         )

@@ -70,12 +70,12 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
             "at these amplitudes the free decay is no longer a motion of this mode alone: the "
             f"motion of other modes is more than {100 * MAX_OTHER_MODES:.0f} % of its amplitude"
         )
-    mesh_error, reason = decays.mesh_errors_of_decay(
+    mesh_error, reason = decays.estimate_decay_mesh_errors(
         joint.model, joint.patch, joint.coarse, amplitudes, lambda laws: joint.mode
     )
     error = np.fmax(reading.run_error, mesh_error) + reading.reading_error
     notes = [
-        *decays.slip_sentences(
+        *decays.describe_unknown_mesh_errors(
             {"method decay": reason}, lambda: _list_spatial_coarsenings(joint, release)
         ),
         *_note_other_modes(amplitudes[mixed]),

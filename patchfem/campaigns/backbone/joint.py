@@ -15,7 +15,7 @@ from ...response.errors import error_of_change
 from ...runs.patch import result as patch_result
 from ...runs.plan import plan
 from ...runs.rig import decays
-from ...runs.rig.plan import stuck_stiffness
+from ...runs.rig.plan import stuck_stiffnesses
 from .bench_loops import settle_loop
 
 AMPLITUDES_PER_DECADE = 8  # Number of default amplitudes per decade.
@@ -223,7 +223,7 @@ class Joint(NamedTuple):
         Raises PatchfemError if a law has no steady loop in closed form.
         """
         try:
-            return decays.laws_on(self.model, self.patch)
+            return decays.make_laws_on_mesh(self.model, self.patch)
         except PatchfemError:
             rig = self.model.rig
             has_bench = not rig.springs.is_nonlinear and len(rig.friction.interfaces) < 2
@@ -259,8 +259,8 @@ class Joint(NamedTuple):
             return error
         group = self.steady_laws()
         if has_partial_slip:
-            error = error + decays.mesh_error(
-                group, decays.coarse_laws(model, self.coarse), compute
+            error = error + decays.estimate_mesh_error(
+                group, decays.make_laws_on_coarse_meshes(model, self.coarse), compute
             )
         if has_cells:
             best = compute(group)
@@ -306,7 +306,7 @@ def build_joint(model: Model, name: str) -> Joint:
     free_mode = StuckMode(None, np.eye(modes.omega.size)[number])
     joint = Joint(model, patch, coarser, number, free_mode, np.zeros(len(modes.interfaces)))
     if not joint.is_linear:
-        planned = joint._replace(stiffness=stuck_stiffness(model.rig, plan(model).chain))
+        planned = joint._replace(stiffness=stuck_stiffnesses(model.rig, plan(model).chain))
         stiffness = _stuck_stiffness(planned)
         stuck_mode = modes.compute_stuck_mode(modes.interfaces, stiffness, number)
         joint = joint._replace(stuck_mode=StuckMode(*stuck_mode), stiffness=stiffness)

@@ -41,7 +41,7 @@ def compute_static_curve(joint: Joint, amplitudes) -> Curve:
 
     def read(group, samples: int) -> np.ndarray:
         """Return amplitude, frequency, damping and loss (4, k) from the loops of a LawGroup."""
-        return decays.static_rows(joint.modes, group, joint.mode, amplitudes, samples)
+        return decays.compute_static_curve(joint.modes, group, joint.mode, amplitudes, samples)
 
     best = read(laws, N_SAMPLES)
     is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
@@ -109,7 +109,7 @@ def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
     statics = quasi_static.find_static_motions_from_loops(
         modes, modes.interfaces[0], joint.stuck_mode, slides, loops
     )
-    return decays.decay_rows(modes, statics)
+    return decays.tabulate_static_motions(modes, statics)
 
 
 def _compute_from_bench_loops(joint: Joint, amplitudes) -> Curve:

@@ -183,7 +183,7 @@ def _choose_numerics(joint: Joint, amplitude: float, cycles: int) -> tuple:
     model = release_model(joint, amplitude)
     drive = replace(model.rig.drive, cycles=float(cycles))
     model = replace(model, rig=replace(model.rig, drive=drive))
-    choice = numerics.choose(model)
+    choice = numerics.choose_numerics(model)
     stores_reversals = joint.is_rigid or choice.engine == PIECES.name
     if joint.modes.omega.size > 1 or not stores_reversals:
         choice = replace(choice, window=int(cycles))

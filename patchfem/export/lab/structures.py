@@ -178,7 +178,7 @@ def _is_speed_only(rig) -> bool:
 def _refuse_unsupported(model: Model) -> None:
     """Raise PatchfemError for features that neither matrices nor friction elements have."""
     rig = model.rig
-    motion = engines.motion_properties(model, steady=True)
+    motion = engines.find_motion_properties(model, steady=True)
     if _is_speed_only(rig):
         reason = methods.find_first_unsupported(SPEED_LAW_SUPPORT, motion)
     else:
@@ -221,7 +221,7 @@ def friction_elements(model: Model) -> Elements:
         patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
         if patch.pressure.outcome is Outcome.NO_CONTACT:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
-    chosen = replace(numerics.choose(model), pairs=costs.count_merges(model))
+    chosen = replace(numerics.choose_numerics(model), pairs=costs.count_merges(model))
     groups = pieces.YieldingElements(model, chosen, patch).groups
     stiffness = np.concatenate([group.stiffness for group in groups])
     limit = np.concatenate([group.stiffness * group.yield_displacement for group in groups])

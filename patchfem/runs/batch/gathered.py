@@ -8,7 +8,7 @@ tolerance; this error is part of the stated errors. Their coarse runs are those 
 quarter of the steps, and the coarser mesh. A case that sticks, may ring during stick, or needs
 more modes runs by itself, and its earlier cycles are evaluated during the run
 (`dynamics.march.passing_kernels`); there, points and modes each have an error of a thousandth
-of the tolerance (`rig.interface.FEWER`), so that no further run estimates the error of the
+of the tolerance (`rig.interface.REDUCTION_TOL_FRACTION`), so that no further run estimates the error of the
 modes.
 """
 
@@ -29,10 +29,10 @@ from ...response.errors import FrictionScale, coarser_errors, friction_errors, s
 from ...response.measures import energy_balance
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
-from ..rig.costs import MOST_STEPS
+from ..rig.costs import MAX_MARCH_STEPS
 from ..rig.engines import MARCH, choose_engine
-from ..rig.interface import few_points
-from ..rig.lists import choose_quadrature
+from ..rig.interface import reduce_to_few_points
+from ..rig.lists import choose_bond_sum
 from . import pressed
 from .case_results import CaseResults, has_unreadable_table
 from .lumped.columns import MAIN_MEASURE, Runs, assemble_results
@@ -155,10 +155,10 @@ def _gather_points(model: Model, numerics, patch) -> _GatheredPoints | None:
     """Reduce a pressed patch to a few contact points; None if the case is run by itself."""
     if no_lanes(model) or numerics.steps % 4:
         return None
-    if choose_quadrature(model, numerics).engine != "recursion":
+    if choose_bond_sum(model, numerics).engine != "recursion":
         return None
     tolerance = REDUCTION_TOL_FRACTION * model.accuracy.tolerance
-    points = few_points(patch, model.bonds, tolerance, N_POINTS, N_PIECE_MODES)
+    points = reduce_to_few_points(patch, model.bonds, tolerance, N_POINTS, N_PIECE_MODES)
     if points is None:
         return None
     pieces, limit, error = points
@@ -260,7 +260,7 @@ def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
     )
     needs_more_steps = ~runs_singly & (results.errors[MAIN_MEASURE] > allowed)
     if (
-        2 * steps > MOST_STEPS
+        2 * steps > MAX_MARCH_STEPS
         or 2 * steps * cycles > MAX_TOTAL_STEPS
         or "steps_per_cycle" in numerics.pinned
     ):

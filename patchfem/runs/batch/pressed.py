@@ -18,9 +18,9 @@ from ..accuracy_warnings import Finding, tolerance_warnings
 from ..patch import result as patch_result
 from ..results.result import shorten_file_names
 from ..results.travel import outcome_on_piece, warn_of_large_slide
-from ..rig.engines import unused_settings
+from ..rig.engines import describe_unused_settings
 from ..rig.motion_warnings import law_warnings
-from ..rig.numerics import choose
+from ..rig.numerics import choose_numerics
 from . import one_by_one, patches
 from .case_results import CaseResults
 
@@ -103,7 +103,7 @@ def _press_case(model: Model, batch: PatchBatch) -> PressedCase | None:
             patch, *coarse = patch_result.solve_all(model.patch, model.accuracy.tolerance)
             if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT:
                 return None
-            numerics = choose(model)
+            numerics = choose_numerics(model)
             contacts = []
             for mesh in (patch, coarse[0]):
                 contacts.append(batch.make_contact(model, numerics, mesh))
@@ -111,7 +111,7 @@ def _press_case(model: Model, batch: PatchBatch) -> PressedCase | None:
                     return None
             warnings = [
                 *model.source.remarks,
-                *unused_settings(model, batch.engine),
+                *describe_unused_settings(model, batch.engine),
                 *patch_result.warn_of_strains(model.patch, patch),
             ]
             return PressedCase(

@@ -21,7 +21,7 @@ from ...response import measures
 from ...response.measures import measure_half_range
 from ..rig import march, pieces, solve
 from ..rig.engines import ENGINES, MARCH, choose_steady_method
-from ..rig.numerics import choose
+from ..rig.numerics import choose_numerics
 from ..rig.steady import balance as rig_balance
 from ..rig.steady import maps
 
@@ -79,7 +79,7 @@ class MotionObserver:
         self.patch = patch
         self.say = say
         self.windowed = windowed
-        self.numerics = choose(model)
+        self.numerics = choose_numerics(model)
         steady = ENGINES[self.numerics.engine].finds_periodic_motion
         self.by = ""
         if steady and model.kind == "linear" and not model.rig.springs.is_nonlinear:
@@ -188,7 +188,9 @@ class MotionObserver:
         found = point.find_point(
             one.modes, drive, one.group, one.harmonics, one.tolerance, start=near
         )
-        window = point_balance.make_cycle_response(found, one.modes, drive, rig_balance.SAMPLES)
+        window = point_balance.make_cycle_response(
+            found, one.modes, drive, rig_balance.SAMPLES_PER_CYCLE
+        )
         return ObservedMotion(
             window,
             measures.compute_acceleration_peak(window),

@@ -44,7 +44,7 @@ MAX_EXACT_SECONDS_UNRESOLVED = (
     60.0  # CPU seconds of an exact solution if no march resolves the modes
 )
 MAX_EXACT_SECONDS = 600.0  # CPU seconds of an exact solution above which it is refused
-MOST_STEPS = 6400  # largest number of steps per cycle that a march chooses by itself
+MAX_MARCH_STEPS = 6400  # largest number of steps per cycle that a march chooses by itself
 # Exponent of (friction limit / drive force), which gives the expected fraction of the time in stick: a
 # limit of half the force was measured to stick for 0.01 of the time.
 STICKING_EXPONENT = 6
@@ -52,7 +52,7 @@ STICKING_EXPONENT = 6
 # the motion of a slipping joint.
 MAX_MERGES = 4
 MERGE_TOLERANCE = 1e-3  # cells are merged MAX_MERGES times at this or a larger tolerance
-REACH = 2.0  # phase [rad] of the fastest vibration in a time interval, as in `dynamics.events.series_kernels`
+MAX_INTERVAL_PHASE = 2.0  # phase [rad] of the fastest vibration in a time interval, as in `dynamics.events.series_kernels`
 MARCH_SETTINGS = (
     "steps_per_cycle",
     "tail",
@@ -60,22 +60,26 @@ MARCH_SETTINGS = (
     "shear_modes",
 )  # keys of [accuracy] that ask for a march instead of the smooth engine
 # number of decay times of the slowest mode after which a motion repeats to round-off (e^-30)
-REPEATS = 30.0
+N_DECAY_TIMES_TO_REPEAT = 30.0
 # Largest ratio of the steps of the smooth engine to those of a march: with a larger ratio a march is
 # preferred although each of its steps costs more.
 MAX_STEP_RATIO = 3.5
-# A speed-dependent law is stiff for the fraction exp(EASES (1 - r)) of the time, where r is the drive
+# A speed-dependent law is stiff for the fraction exp(STIFF_TIME_EXPONENT (1 - r)) of the time, where r is the drive
 # force over the friction limit: measured 0.5 at r = 1.07 and 0.1 at r = 1.26.
-EASES = 9.0
-STABLE = 3.0  # largest stable step, in relaxation lengths of a state of the friction law
+STIFF_TIME_EXPONENT = 9.0
+MAX_STEP_RELAXATION_LENGTHS = (
+    3.0  # largest stable step, in relaxation lengths of a state of the friction law
+)
 # engines that keep a fixed number of samples of each of the last cycles, independent of their steps
 RESAMPLING_ENGINES = (
     "exact",
     "piecewise",
     "smooth",
 )
-SAMPLES = 400  # number of samples of a kept cycle, as in `dynamics.events.histories` and `dynamics.smooth`
-TURNS = 4.0  # expected reversals per cycle, which are kept from before the last cycles
+SAMPLES_PER_CYCLE = 400  # number of samples of a kept cycle, as in `dynamics.events.histories` and `dynamics.smooth`
+REVERSALS_PER_CYCLE = (
+    4.0  # expected reversals per cycle, which are kept from before the last cycles
+)
 
 
 class HistoryBytes(NamedTuple):
@@ -104,7 +108,7 @@ SMOOTH_HISTORY = HistoryBytes(80.0, 140.0, 16.0)
 MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
 
 
-def steps_wanted(model: Model) -> int:
+def required_steps_per_cycle(model: Model) -> int:
     """Return the steps per cycle with which a march meets the tolerance, without upper bound."""
     accuracy = model.accuracy
     rig = model.rig
@@ -121,9 +125,11 @@ def steps_wanted(model: Model) -> int:
 def steps_per_cycle(model: Model) -> int:
     """Return the steps per cycle of a march, as set in the scene or as the tolerance requires.
 
-    The tolerance chooses between 100 and MOST_STEPS steps.
+    The tolerance chooses between 100 and MAX_MARCH_STEPS steps.
     """
-    return model.accuracy.steps_per_cycle or min(max(steps_wanted(model), 100), MOST_STEPS)
+    return model.accuracy.steps_per_cycle or min(
+        max(required_steps_per_cycle(model), 100), MAX_MARCH_STEPS
+    )
 
 
 def count_merges(model: Model) -> int:
@@ -176,12 +182,12 @@ def expected_elements(model: Model) -> tuple:
     return count, stiff
 
 
-def pieces_per_cycle(model: Model) -> float:
+def intervals_per_cycle(model: Model) -> float:
     """Return the largest number of time intervals of the exact solution per drive cycle."""
-    return sum(ringing_and_events(model))
+    return sum(count_intervals_by_cause(model))
 
 
-def ringing_and_events(model: Model) -> tuple:
+def count_intervals_by_cause(model: Model) -> tuple:
     """Return the intervals of the exact solution per cycle due to ringing and due to events.
 
     The intervals due to events include the rows of a recorded drive.
@@ -196,25 +202,27 @@ def ringing_and_events(model: Model) -> tuple:
         damping**2 / 4 + made.max_omega_squared + stiff * max(made.inverse_mass, default=0.0)
     )
     rows = 0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
-    ringing = max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / REACH
+    ringing = (
+        max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / MAX_INTERVAL_PHASE
+    )
     quick = find_max_frequency_ratio(drive)
     events = 2 * max(count, faces) * quick + 2 + rows
     return ringing, events
 
 
-def seconds_of_pieces(model: Model) -> float:
+def max_exact_seconds(model: Model) -> float:
     """Estimate the maximum CPU time [s] of an event-driven run.
 
     The elements are assumed to stick all the time. The choice of an engine is based on this time.
     """
     cycles = model.rig.drive.cycles
-    each = cost_model.MAX_PIECE_SECONDS + _size_seconds(model)
-    return (each * cycles + cost_model.READ_PIECE_SECONDS * min(cycles, 10.0)) * pieces_per_cycle(
-        model
-    )
+    each = cost_model.MAX_PIECE_SECONDS + _extra_interval_seconds(model)
+    return (
+        each * cycles + cost_model.READ_PIECE_SECONDS * min(cycles, 10.0)
+    ) * intervals_per_cycle(model)
 
 
-def _size_seconds(model: Model) -> float:
+def _extra_interval_seconds(model: Model) -> float:
     """Return the CPU time [s] per interval that further modes and interfaces add."""
     modes = model.rig.modes
     return cost_model.PIECE_MODE_SECONDS * (
@@ -222,7 +230,7 @@ def _size_seconds(model: Model) -> float:
     ) + cost_model.PIECE_INTERFACE_SECONDS * max(0, len(modes.interfaces) - 1)
 
 
-def expected_seconds(model: Model) -> float:
+def expected_exact_seconds(model: Model) -> float:
     """Estimate the CPU time [s] of an event-driven run.
 
     Intervals due to ringing count only for the expected fraction of the time in stick.
@@ -232,16 +240,20 @@ def expected_seconds(model: Model) -> float:
     laws = rig.friction.interfaces
     limit = sum(law.numbers.static * interface_load(model, law) for law in laws)
     push = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
-    ringing, events = ringing_and_events(model)
+    ringing, events = count_intervals_by_cause(model)
     share = min(1.0, limit / push) ** STICKING_EXPONENT if stiff and push else 1.0
     return (
-        (cost_model.PIECE_SECONDS + _size_seconds(model) + cost_model.PIECE_ELEMENT_SECONDS * count)
+        (
+            cost_model.PIECE_SECONDS
+            + _extra_interval_seconds(model)
+            + cost_model.PIECE_ELEMENT_SECONDS * count
+        )
         * (ringing * share + events)
         * rig.drive.cycles
     )
 
 
-def seconds_of_steps(model: Model) -> float:
+def expected_march_seconds(model: Model) -> float:
     """Estimate the CPU time [s] of a march with the coarse runs of its error estimate."""
     count = expected_elements(model)[0]
     many = len(model.rig.friction.interfaces)
@@ -259,11 +271,11 @@ def reason_to_march_events(model: Model) -> str:
     The events cost more than time steps, and more than an exact solution is worth. The reason is ""
     if the model is better solved from event to event.
     """
-    if steps_wanted(model) > MOST_STEPS:
+    if required_steps_per_cycle(model) > MAX_MARCH_STEPS:
         max_seconds = MAX_EXACT_SECONDS_UNRESOLVED
     else:
-        max_seconds = max(MAX_EXACT_SECONDS_OVER_MARCH, seconds_of_steps(model))
-    if seconds_of_pieces(model) <= max_seconds:
+        max_seconds = max(MAX_EXACT_SECONDS_OVER_MARCH, expected_march_seconds(model))
+    if max_exact_seconds(model) <= max_seconds:
         return ""
     return "time steps are faster than the exact solution"
 
@@ -278,13 +290,13 @@ def reason_to_march_elements(model: Model) -> str:
     return reason_to_march_events(model)
 
 
-def refuse_endless(model: Model, numerics=None) -> None:
+def refuse_long_exact_run(model: Model, numerics=None) -> None:
     """Raise Missing if an event-driven run would take more CPU time than is allowed."""
-    seconds = seconds_of_pieces(model)
+    seconds = max_exact_seconds(model)
     if seconds > MAX_EXACT_SECONDS:
-        march = ', or use accuracy.method = "march"' * (seconds_of_steps(model) < seconds)
+        march = ', or use accuracy.method = "march"' * (expected_march_seconds(model) < seconds)
         raise Missing(
-            f"the exact solution (about {pieces_per_cycle(model):.2g} time intervals per cycle, set by "
+            f"the exact solution (about {intervals_per_cycle(model):.2g} time intervals per cycle, set by "
             "events, rows of the drive and the fastest free vibration) would need a computing time of about "
             f"{seconds:.0f} s, more than the limit of {MAX_EXACT_SECONDS:.0f} s; lower drive.cycles or the stiffness "
             f"of modes and elements{march}",
@@ -292,7 +304,7 @@ def refuse_endless(model: Model, numerics=None) -> None:
         )
 
 
-def exact_cost(model: Model, numerics, points: int) -> Cost:
+def predict_exact_cost(model: Model, numerics, points: int) -> Cost:
     """Return the predicted cost of an event-driven run.
 
     Parameters
@@ -302,24 +314,24 @@ def exact_cost(model: Model, numerics, points: int) -> Cost:
     points : int
         Nodes of the interface; not used.
     """
-    steps = int(pieces_per_cycle(model) * numerics.cycles)
+    steps = int(intervals_per_cycle(model) * numerics.cycles)
     times = {
-        "motion": expected_seconds(model),
-        "histories": cost_model.KEPT_EVENT_SAMPLE_SECONDS * kept_samples(numerics),
+        "motion": expected_exact_seconds(model),
+        "histories": cost_model.KEPT_EVENT_SAMPLE_SECONDS * count_kept_samples(numerics),
     }
     code = EVENT_CODE if model.rig.friction.interfaces else LINEAR_CODE
-    if _python_seconds(model) <= compiled.MAX_PYTHON_SECONDS:
+    if _interpreted_seconds(model) <= compiled.MAX_PYTHON_SECONDS:
         # a run in interpreted Python takes 86 MB without machine code, and 152 MB with it, because
         # machine code loads the LLVM library
-        if not _is_loop_kept(model):
+        if not _is_event_loop_cached(model):
             code = code._replace(bytes=0.0)
         loading = replace(code.cost(), compile_seconds=0.0)
     else:
         loading = code.cost()
-    return Cost(times, history_parts(model, numerics, EVENT_HISTORY), (), steps) + loading
+    return Cost(times, history_memory_parts(model, numerics, EVENT_HISTORY), (), steps) + loading
 
 
-def _python_seconds(model: Model) -> float:
+def _interpreted_seconds(model: Model) -> float:
     """Estimate the CPU time [s] of an event-driven run in interpreted Python.
 
     Cells of a slider density are not merged.
@@ -331,7 +343,7 @@ def _python_seconds(model: Model) -> float:
     return model.rig.drive.cycles * each * 2 ** count_merges(model)
 
 
-def _is_loop_kept(model: Model) -> bool:
+def _is_event_loop_cached(model: Model) -> bool:
     """Return whether machine code of the event loop is cached for the modes of a rig."""
     from ...dynamics.events.histories import (
         is_loop_cached,  # imported here because a plan does not need the engine otherwise
@@ -340,13 +352,13 @@ def _is_loop_kept(model: Model) -> bool:
     return is_loop_cached(model.rig.modes, model.rig.drive.signal)
 
 
-def kept_samples(numerics) -> float:
+def count_kept_samples(numerics) -> float:
     """Return the number of samples of the last cycles that a run keeps."""
-    each = SAMPLES if numerics.engine in RESAMPLING_ENGINES else numerics.steps
+    each = SAMPLES_PER_CYCLE if numerics.engine in RESAMPLING_ENGINES else numerics.steps
     return float(max(2, numerics.window) * each)
 
 
-def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
+def history_memory_parts(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
     """Return the memory of the histories that a run keeps.
 
     Parameters
@@ -356,11 +368,11 @@ def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[Memory
     history : HistoryBytes
     """
     rig = model.rig
-    samples = kept_samples(numerics)
+    samples = count_kept_samples(numerics)
     width = 2.0 * len(rig.structure.frequencies) + 12 + 6 * len(rig.friction.interfaces)
     length_key = "drive.duration" if rig.drive.waveform.is_random else "drive.cycles"
     key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else length_key
-    turns = min(TURNS * rig.drive.cycles, checkpoint.MAX_EARLY_SAMPLES)
+    turns = min(REVERSALS_PER_CYCLE * rig.drive.cycles, checkpoint.MAX_EARLY_SAMPLES)
     early = history.cycle * rig.drive.cycles + history.turn * width * turns
     return (
         MemoryPart(
@@ -370,11 +382,11 @@ def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[Memory
     )
 
 
-def exact_words(model: Model, engine: str) -> list:
+def describe_element_engine(model: Model, engine: str) -> list:
     """Return the sentence of a plan on an engine for friction elements and its CPU time."""
     count = expected_elements(model)[0]
-    exact = expected_seconds(model)
-    march = seconds_of_steps(model)
+    exact = expected_exact_seconds(model)
+    march = expected_march_seconds(model)
     return [
         f"{count} element{'s' * (count > 1)} by engine {engine}; computing time: about {exact:.2g} s with the "
         f"exact solution between yield events, about {march:.2g} s with time steps at this tolerance"
@@ -394,15 +406,15 @@ def reason_to_march_smooth_law(model: Model) -> str:
         return "with other forces"
     if model.side == "lower" and law_has_trait(model.friction.law, "bonds"):
         return "under a pressure that stays"
-    element = smooth_element(model)
+    element = make_smooth_element(model)
     if element is None or element.state_scales is None:
         return f"for law '{model.friction.law}'"
-    if smooth_steps(model, element) > MAX_STEP_RATIO * max(steps_per_cycle(model), 400):
+    if smooth_steps_per_cycle(model, element) > MAX_STEP_RATIO * max(steps_per_cycle(model), 400):
         return "in so many steps"
     return ""
 
 
-def smooth_element(model: Model) -> "Element | None":
+def make_smooth_element(model: Model) -> "Element | None":
     """Return the friction law of the interface as an Element for the smooth engine.
 
     The result is None if the bonds are summed in a list, or if the law averages the friction over
@@ -419,7 +431,7 @@ def smooth_element(model: Model) -> "Element | None":
     return stretch.points_element(model.bonds, [1.0], [load])
 
 
-def smooth_steps(model: Model, element: "Element") -> float:
+def smooth_steps_per_cycle(model: Model, element: "Element") -> float:
     """Estimate the steps per cycle of the smooth engine.
 
     It is proportional to the phase of the fastest motion, plus steps at every reversal, plus the
@@ -439,16 +451,16 @@ def smooth_steps(model: Model, element: "Element") -> float:
     rigid = 0.0
     if not element.length:
         slope = element.limit / model.friction.reference_speed
-        rigid = slope * ease * stiff_fraction(model, element)
+        rigid = slope * ease * stiff_time_fraction(model, element)
     path = 4 * model.speed_scale / omega
     states = path / element.length if element.state_scales and element.length else 0.0
     grown = model.friction.slip_growth if law_has_trait(model.friction.law, "bonds") else None
     if grown:
         states = max(states, path / grown)
-    return 24 + 1.2 * pace * period + (states + rigid * period) / STABLE
+    return 24 + 1.2 * pace * period + (states + rigid * period) / MAX_STEP_RELAXATION_LENGTHS
 
 
-def stiff_fraction(model: Model, element: "Element") -> float:
+def stiff_time_fraction(model: Model, element: "Element") -> float:
     """Return the fraction [1] of the time in which a speed-dependent law is stiff.
 
     With a single mode it is 1 up to a ratio 1 of the drive force to the friction limit, and less
@@ -466,10 +478,10 @@ def stiff_fraction(model: Model, element: "Element") -> float:
         * abs(modes.base[0] / modes.slide[0])
         / element.limit
     )
-    return min(1.0, float(np.exp(EASES * (1 - r))))
+    return min(1.0, float(np.exp(STIFF_TIME_EXPONENT * (1 - r))))
 
 
-def smooth_cost(model: Model, numerics, points: int) -> Cost:
+def predict_smooth_cost(model: Model, numerics, points: int) -> Cost:
     """Return the predicted cost of a run of the smooth engine and of its coarse run.
 
     Parameters
@@ -486,13 +498,13 @@ def smooth_cost(model: Model, numerics, points: int) -> Cost:
         is_sinusoidal(rig.drive.signal)
         and (decay := find_min_decay_rate(rig.modes) * rig.drive.signal.period) > 0
     ):
-        cycles = min(cycles, 20 + REPEATS / decay)
-    steps = 2 * cycles * smooth_steps(model, smooth_element(model))
+        cycles = min(cycles, 20 + N_DECAY_TIMES_TO_REPEAT / decay)
+    steps = 2 * cycles * smooth_steps_per_cycle(model, make_smooth_element(model))
     times = {
         "motion": cost_model.SMOOTH_RUN_SECONDS + cost_model.SMOOTH_STEP_SECONDS * steps,
-        "histories": cost_model.KEPT_SAMPLE_SECONDS * kept_samples(numerics),
+        "histories": cost_model.KEPT_SAMPLE_SECONDS * count_kept_samples(numerics),
     }
     return (
-        Cost(times, history_parts(model, numerics, SMOOTH_HISTORY), (), int(steps))
+        Cost(times, history_memory_parts(model, numerics, SMOOTH_HISTORY), (), int(steps))
         + SMOOTH_CODE.cost()
     )

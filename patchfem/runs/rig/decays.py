@@ -28,13 +28,15 @@ from . import interface, numerics
 from .solution import Solution
 from .steady import balance
 
-MOVING = (
+UNSUPPORTED_CONTACTS = (
     "the contact slides on grooves",
     "the normal load changes",
     "the strips of the patch slide independently of one another",
 )
-NO_LOOP = "the hysteresis loop of this friction law is not known without a computation in time"
-NOT_STATIC = "no static curve of the mode was found at these amplitudes"
+NO_LOOP_REASON = (
+    "the hysteresis loop of this friction law is not known without a computation in time"
+)
+NO_STATIC_CURVE_REASON = "no static curve of the mode was found at these amplitudes"
 MAX_POINT_ERROR = 0.5  # largest relative error [1] with which a point of a decay curve is kept
 AMPLITUDES_PER_DECADE = 16  # number of amplitudes at which the error due to the mesh is computed
 
@@ -47,7 +49,7 @@ def compute_decay(raw: Solution) -> DecayCurve | None:
     evaluation plus the changes in the coarse runs at the same amplitudes; they are infinite outside
     the range of a coarse run.
     """
-    curve = _read(raw)
+    curve = _measure_decay_curve(raw)
     if not curve.time.size:
         return None
     curve = _add_coarse_changes(curve, raw)
@@ -60,13 +62,15 @@ def compute_decay(raw: Solution) -> DecayCurve | None:
 def _add_coarse_changes(curve: DecayCurve, raw: Solution) -> DecayCurve:
     """Add the differences between coarse runs to the errors of a decay curve."""
     for run, beside in raw.coarser:
-        coarse = _read(run).interpolate(curve.amplitude)
-        reference = curve if beside is None else _read(beside).interpolate(curve.amplitude)
+        coarse = _measure_decay_curve(run).interpolate(curve.amplitude)
+        reference = (
+            curve if beside is None else _measure_decay_curve(beside).interpolate(curve.amplitude)
+        )
         curve = curve.add_difference(coarse, reference)
     return curve
 
 
-def _read(run: Solution) -> DecayCurve:
+def _measure_decay_curve(run: Solution) -> DecayCurve:
     """Measure the decay curve of a run from its half cycles, as long as they decrease.
 
     After the last slip, the curve is that of the strongest ringing mode, at each of its half
@@ -89,7 +93,7 @@ def _read(run: Solution) -> DecayCurve:
     return DecayCurve(*map(np.concatenate, zip(slipping, ringing)))
 
 
-def laws_on(model, patch, meshed: tuple = ()):
+def make_laws_on_mesh(model, patch, meshed: tuple = ()):
     """Return the friction laws of a rig on one of its meshes.
 
     Parameters
@@ -108,22 +112,30 @@ def laws_on(model, patch, meshed: tuple = ()):
     rig = model.rig
     if len(rig.friction.interfaces) < 2:
         return balance.BalanceFinder(
-            model, replace(numerics.choose(with_automatic_method(model)), meshed=meshed), patch
+            model,
+            replace(numerics.choose_numerics(with_automatic_method(model)), meshed=meshed),
+            patch,
         ).group
     load("dynamics.harmonic.cycle_kernels", None)
     return forces.LawGroup(
-        rig.modes, list(enumerate(map(models.element_model, interface.own_elements(model, meshed))))
+        rig.modes,
+        list(
+            enumerate(map(models.element_model, interface.make_interface_elements(model, meshed)))
+        ),
     )
 
 
-def coarse_laws(model, coarse) -> list:
+def make_laws_on_coarse_meshes(model, coarse) -> list:
     """Return the friction laws of a rig with a coarser mesh of one patch at a time.
 
     coarse: Patch of its [contact] on a coarser mesh, or None.
     """
     return [
-        *([] if coarse is None else [laws_on(model, coarse)]),
-        *(laws_on(model, None, numbers) for numbers in faces.interfaces_with_coarse_mesh(model)),
+        *([] if coarse is None else [make_laws_on_mesh(model, coarse)]),
+        *(
+            make_laws_on_mesh(model, None, numbers)
+            for numbers in faces.interfaces_with_coarse_mesh(model)
+        ),
     ]
 
 
@@ -132,7 +144,7 @@ def with_automatic_method(model):
     return replace(model, accuracy=model.accuracy.model_copy(update={"method": "auto"}))
 
 
-def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarray:
+def compute_static_curve(modes, laws, number: int, amplitudes, samples: int) -> np.ndarray:
     """Compute amplitude, frequency, damping ratio and loss of a mode under static loading.
 
     Parameters
@@ -154,7 +166,7 @@ def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarra
     """
     held = modes.compute_stuck_mode(laws.rows, laws.stiffness(), number)
     moved = float(modes.output @ held[1])
-    return decay_rows(
+    return tabulate_static_motions(
         modes,
         quasi_static.find_static_motions(
             modes, laws, amplitudes / abs(moved), held, samples, modes.output / moved
@@ -162,7 +174,7 @@ def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarra
     )
 
 
-def decay_rows(modes, motions: list) -> np.ndarray:
+def tabulate_static_motions(modes, motions: list) -> np.ndarray:
     """Return output amplitude, frequency, damping ratio and loss (4, k) of static motions."""
     amplitude = [abs(float(modes.output @ motion.z)) for motion in motions]
     frequency = [motion.omega / (2 * np.pi) for motion in motions]
@@ -171,7 +183,7 @@ def decay_rows(modes, motions: list) -> np.ndarray:
     return np.array([amplitude, frequency, damping, loss])
 
 
-def mesh_error(fine, rough, read) -> np.ndarray:
+def estimate_mesh_error(fine, rough, read) -> np.ndarray:
     """Estimate the error of values computed from friction laws due to the mesh of patches.
 
     It follows from the change on a coarser mesh at second order. It is not less than the change if
@@ -190,16 +202,18 @@ def mesh_error(fine, rough, read) -> np.ndarray:
     best = read(fine)
     changes = (read(other) - best for other in rough)
     by_meshes = sum(error_of_change(change, order=MAX_ORDER) for change in changes)
-    return np.fmax(SPREAD_FACTOR * np.abs(read(fine.with_elements(_spread)) - best), by_meshes)
+    return np.fmax(
+        SPREAD_FACTOR * np.abs(read(fine.with_elements(_spread_elements)) - best), by_meshes
+    )
 
 
-def _spread(stiffness, slide) -> tuple:
+def _spread_elements(stiffness, slide) -> tuple:
     """Spread friction elements over the yield displacements between the nodes of a mesh."""
     order = np.argsort(slide, kind="stable")
     return spread_elements(stiffness[order], slide[order])
 
 
-def mesh_errors_of_decay(model, patch, coarse, amplitudes, mode) -> tuple:
+def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, mode) -> tuple:
     """Estimate the errors of modal frequency and damping ratio due to the mesh of patches.
 
     Parameters
@@ -225,22 +239,24 @@ def mesh_errors_of_decay(model, patch, coarse, amplitudes, mode) -> tuple:
         return none, ""
     moves = (model.grooves is not None, rig.friction.load_varies, rig.friction.strips_slide_apart)
     if any(moves):
-        return none, MOVING[moves.index(True)]
+        return none, UNSUPPORTED_CONTACTS[moves.index(True)]
     try:
-        fine = laws_on(model, patch)
+        fine = make_laws_on_mesh(model, patch)
         number = mode(fine)
-        error = mesh_error(
+        error = estimate_mesh_error(
             fine,
-            coarse_laws(model, coarse),
-            lambda laws: static_rows(rig.modes, laws, number, amplitudes, balance.SAMPLES)[1:3],
+            make_laws_on_coarse_meshes(model, coarse),
+            lambda laws: compute_static_curve(
+                rig.modes, laws, number, amplitudes, balance.SAMPLES_PER_CYCLE
+            )[1:3],
         )
     except NotConverged as reason:
         return none, str(reason)
     except PatchfemError:
-        return none, NO_LOOP
+        return none, NO_LOOP_REASON
     known = np.isfinite(error).all(axis=0)
     if not known.any():
-        return none, NOT_STATIC
+        return none, NO_STATIC_CURVE_REASON
     return _interpolate_rows(amplitudes, amplitudes[known], error[:, known]), ""
 
 
@@ -251,7 +267,7 @@ def _interpolate_rows(amplitudes, known_amplitudes, rows) -> np.ndarray:
     return np.array([np.interp(at, known, row) for row in rows])
 
 
-def mesh_errors_of_stuck_mode(amplitude, frequency: float, model, patch, coarse) -> tuple:
+def estimate_stuck_mode_mesh_errors(amplitude, frequency: float, model, patch, coarse) -> tuple:
     """Estimate the mesh errors of frequency and damping of a mode with stuck interfaces.
 
     Parameters
@@ -262,17 +278,17 @@ def mesh_errors_of_stuck_mode(amplitude, frequency: float, model, patch, coarse)
         [Hz].
     model : Model
     patch, coarse : Patch or None
-        See `mesh_errors_of_decay`.
+        See `estimate_decay_mesh_errors`.
     """
     low, high = np.log10([amplitude.min(), amplitude.max()])
     at = np.logspace(low, high, 2 + int(AMPLITUDES_PER_DECADE * (high - low)))
-    errors, reason = mesh_errors_of_decay(
+    errors, reason = estimate_decay_mesh_errors(
         model, patch, coarse, at, lambda laws: _find_mode(model.rig.modes, laws, frequency)
     )
     return _interpolate_rows(amplitude, at, errors), reason
 
 
-def slip_sentences(reasons: dict, coarser_runs) -> list:
+def describe_unknown_mesh_errors(reasons: dict, coarser_runs) -> list:
     """Return the sentences on results whose error due to the mesh is unknown.
 
     Parameters

@@ -30,19 +30,21 @@ from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ...slip import shear_modes
 from ..patch import faces
 from .costs import (
-    pieces_per_cycle,
+    intervals_per_cycle,
     reason_to_march_elements,
     reason_to_march_events,
     reason_to_march_smooth_law,
 )
 
-FINER = 0.5  # factor on the merge width of bonds in the run that shows the error of merging
+MERGE_WIDTH_FACTOR = (
+    0.5  # factor on the merge width of bonds in the run that shows the error of merging
+)
 # Ratio of the neglected tail of a sum over bonds to the tolerance, above which a run with a smaller tail
 # checks its error; the automatic tail is a tenth of this.
-LOOSE = 1e-2
-LESS = 0.1  # factor on the neglected tail in the run that checks its error
+MAX_UNCHECKED_TAIL_RATIO = 1e-2
+TAIL_FACTOR = 0.1  # factor on the neglected tail in the run that checks its error
 # largest number of time intervals per period with which the map of yields finds a steady motion
-MOST_PIECES = 1e5
+MAX_MAPPED_INTERVALS = 1e5
 
 
 # largest relative error of an energy balance with round-off only; a billion steps have less
@@ -91,7 +93,7 @@ class Engine(NamedTuple):
             return []
         beside = None
         few = numerics
-        if self.coarser_in_time is _march_in_time:
+        if self.coarser_in_time is _list_march_time_runs:
             few = _divide_steps(numerics, 4)
             beside = few
         richer = replace(few, richer=True)
@@ -102,7 +104,9 @@ class Engine(NamedTuple):
 
         steady: whether the drive is a sine of a curve of steady motions instead of its own waveform.
         """
-        return methods.find_unsupported_feature(self.name, motion_properties(model, steady=steady))
+        return methods.find_unsupported_feature(
+            self.name, find_motion_properties(model, steady=steady)
+        )
 
 
 def reason_not_exact(model: Model, *, steady: bool = False) -> str:
@@ -115,7 +119,7 @@ def reason_not_exact(model: Model, *, steady: bool = False) -> str:
     return reasons[-1] if all(reasons) else ""
 
 
-def motion_properties(model: Model, *, steady: bool = False) -> methods.MotionFeatures:
+def find_motion_properties(model: Model, *, steady: bool = False) -> methods.MotionFeatures:
     """Return the properties of a model that decide which engines can compute it."""
     rig = model.rig
     spring = ""
@@ -176,12 +180,12 @@ def choose_steady_method(model: Model) -> Finder:
     if model.grooves is not None:
         return FINDERS["march"]
     has_harmonics = model.accuracy.harmonics is not None
-    if has_harmonics or PIECES.lacks(model) or pieces_per_cycle(model) > MOST_PIECES:
+    if has_harmonics or PIECES.lacks(model) or intervals_per_cycle(model) > MAX_MAPPED_INTERVALS:
         return FINDERS["balance"]
     return FINDERS["yields"]
 
 
-def _none(*_) -> list:
+def _list_no_runs(*_) -> list:
     """Return an empty list of coarse runs."""
     return []
 
@@ -214,7 +218,7 @@ def sampling_errors(values: dict) -> dict:
     return errors
 
 
-def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
+def _list_exact_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
     """Return the comparison runs on coarser meshes for the event-driven Coulomb engine.
 
     The mesh matters if the loads of strips or the limit of an averaged law depend on it.
@@ -229,9 +233,9 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     return [*samples, make_spatial_coarsening(replace(numerics, coarse_patch=True))]
 
 
-def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
+def _list_element_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
     """Return the comparison runs of elastic-plastic elements on coarser meshes and cells."""
-    meshes = _numerics_of_meshes(model, numerics)
+    meshes = _list_coarse_mesh_numerics(model, numerics)
     if coarse is not None and model.partial_slip:
         meshes = [replace(numerics, coarse_patch=True), *meshes]
     coarser_runs = [CoarserRuns((mesh,), coarser_errors, of="mesh") for mesh in meshes]
@@ -242,7 +246,7 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     return coarser_runs
 
 
-def _numerics_of_meshes(model: Model, numerics) -> list:
+def _list_coarse_mesh_numerics(model: Model, numerics) -> list:
     """Return settings in each of which one interface patch has a coarser mesh."""
     if not model.rig.friction.has_partial_slip:
         return []
@@ -255,13 +259,13 @@ def _divide_steps(numerics, share: int):
     return replace(numerics, steps=max(1, numerics.steps // share))
 
 
-def _march_in_time(model: Model, numerics) -> list:
+def _list_march_time_runs(model: Model, numerics) -> list:
     """Return the comparison runs of a march with half and a quarter of its steps."""
     runs = (_divide_steps(numerics, 2), _divide_steps(numerics, 4))
     return [CoarserRuns(runs, partial(step_errors, steps=numerics.steps), of="steps")]
 
 
-def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
+def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
     """Return the comparison runs of a march with a coarser discretization in space.
 
     These have a coarser mesh, another number of shear modes or another sum over bonds, and a quarter
@@ -277,7 +281,7 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
         if shape is not None:
             coarser = replace(coarser, shear_modes=shape.size)
         coarser_runs.append(make_spatial_coarsening(coarser, quarter))
-    for coarser in _numerics_of_meshes(model, quarter):
+    for coarser in _list_coarse_mesh_numerics(model, quarter):
         coarser_runs.append(make_spatial_coarsening(coarser, quarter))
     climbs = model.grooves is not None
     gathers = model.patch is not None and model.patch.mesh.can_gather_points
@@ -290,10 +294,10 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
         coarser_runs.append(
             make_spatial_coarsening(replace(quarter, shear_modes=n_modes), quarter, "modes")
         )
-    return [*coarser_runs, *_coarse_sums(model, quarter, patch, solution)]
+    return [*coarser_runs, *_list_bond_sum_runs(model, quarter, patch, solution)]
 
 
-def _coarse_sums(model: Model, quarter, patch, solution) -> list:
+def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> list:
     """Return the comparison runs for the error of the sum over a list of bonds.
 
     The first entry is the bound of the sum on forces and energies. If the sum merges bonds or neglects
@@ -305,18 +309,22 @@ def _coarse_sums(model: Model, quarter, patch, solution) -> list:
         return []
     coarser_runs = [
         CoarserRuns(
-            (), lambda fine: _sum_errors(model, patch, choice.error, fine, solution), of="bonds"
+            (),
+            lambda fine: _estimate_bond_sum_errors(model, patch, choice.error, fine, solution),
+            of="bonds",
         )
     ]
-    if choice.merge > 0 or choice.tail > LOOSE * model.accuracy.tolerance:
-        finer = replace(choice, merge=FINER * choice.merge, tail=LESS * choice.tail)
+    if choice.merge > 0 or choice.tail > MAX_UNCHECKED_TAIL_RATIO * model.accuracy.tolerance:
+        finer = replace(
+            choice, merge=MERGE_WIDTH_FACTOR * choice.merge, tail=TAIL_FACTOR * choice.tail
+        )
         same = replace(quarter, choice=choice)
         narrow = replace(quarter, choice=finer)
         coarser_runs.append(CoarserRuns((narrow,), finer_errors, same, "bonds"))
     return coarser_runs
 
 
-def _sum_errors(model: Model, patch, fraction: float, values: dict, solution) -> dict:
+def _estimate_bond_sum_errors(model: Model, patch, fraction: float, values: dict, solution) -> dict:
     """Estimate the errors of the measures due to the relative error of a sum over bonds."""
     friction = model.friction
     load = patch.pressure.load if patch is not None else model.point.load
@@ -333,7 +341,7 @@ def _sum_errors(model: Model, patch, fraction: float, values: dict, solution) ->
     return friction_errors(values, fraction, scale)
 
 
-def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
+def _list_stated_errors(model: Model, numerics, patch, coarse, solution) -> list:
     """Return the errors that a run itself states, as `CoarserRuns` without runs.
 
     For harmonic balance these are the residual and the change with twice the harmonics, for the
@@ -342,46 +350,46 @@ def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
     return [CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})]
 
 
-def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
+def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
     """Return the comparison runs of a steady motion on coarser meshes and its stated errors."""
-    coarser_runs = _own_errors(model, numerics, patch, coarse, solution)
+    coarser_runs = _list_stated_errors(model, numerics, patch, coarse, solution)
     if choose_steady_method(model).engine == PIECES.name:
-        coarser_runs += _pieces_in_space(model, numerics, patch, coarse, solution)
+        coarser_runs += _list_element_space_runs(model, numerics, patch, coarse, solution)
     return coarser_runs
 
 
-COARSER = 30.0  # factor on the tolerance of a smooth step in the coarse run
-WIDER_TOLERANCE = partial(coarser_errors, ratio=COARSER)
+STEP_TOLERANCE_FACTOR = 30.0  # factor on the tolerance of a smooth step in the coarse run
+estimate_smooth_errors = partial(coarser_errors, ratio=STEP_TOLERANCE_FACTOR)
 
 
-def _smooth_in_time(model: Model, numerics) -> list:
+def _list_smooth_time_runs(model: Model, numerics) -> list:
     """Return the comparison run of the smooth engine with a larger tolerance of its steps.
 
-    A step may have COARSER times the error; the error of a run is proportional to that of its steps.
+    A step may have STEP_TOLERANCE_FACTOR times the error; the error of a run is proportional to that of its steps.
     """
-    wider = replace(numerics, local=numerics.local * COARSER)
-    return [CoarserRuns((wider,), WIDER_TOLERANCE)]
+    wider = replace(numerics, local=numerics.local * STEP_TOLERANCE_FACTOR)
+    return [CoarserRuns((wider,), estimate_smooth_errors)]
 
 
 EXACT = Engine(
     "exact",
     "exact",
-    _none,
-    _exact_in_space,
+    _list_no_runs,
+    _list_exact_space_runs,
     why_not_cheapest=reason_to_march_events,
 )
 PIECES = Engine(
     "piecewise",
     "exact",
-    _none,
-    _pieces_in_space,
+    _list_no_runs,
+    _list_element_space_runs,
     why_not_cheapest=reason_to_march_elements,
 )
 SMOOTH = Engine(
     "smooth",
     "",
-    _smooth_in_time,
-    _own_errors,
+    _list_smooth_time_runs,
+    _list_stated_errors,
     why_not_cheapest=reason_to_march_smooth_law,
     min_relative_error=3e-8,
     max_balance_error=None,
@@ -390,21 +398,21 @@ SMOOTH = Engine(
 MARCH = Engine(
     "march",
     "march",
-    _march_in_time,
-    _march_in_space,
+    _list_march_time_runs,
+    _list_march_space_runs,
     summary_numbers=("steps_per_cycle", "iterations"),
     saves_state=True,
 )
 HARMONIC = Engine(
     "harmonic",
     "harmonic",
-    _none,
-    _steady_in_space,
+    _list_no_runs,
+    _list_steady_space_runs,
     max_balance_error=None,
     finds_periodic_motion=True,
 )
 ENGINES = {engine.name: engine for engine in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC)}
-AUTOMATIC = (
+AUTOMATIC_ENGINES = (
     EXACT,
     PIECES,
     SMOOTH,
@@ -436,7 +444,7 @@ def choose_engine(model: Model) -> Engine:
     """Choose the engine that computes a model.
 
     A method named in the scene selects its engine (of several, the first that can compute the model).
-    Otherwise the engine is the first of AUTOMATIC that can compute the model and is not more expensive
+    Otherwise the engine is the first of AUTOMATIC_ENGINES that can compute the model and is not more expensive
     than the next.
     """
     named = [engine for engine in ENGINES.values() if engine.method == model.accuracy.method]
@@ -445,13 +453,13 @@ def choose_engine(model: Model) -> Engine:
             return engine
     if named:
         return named[-1]
-    for engine in AUTOMATIC[:-1]:
+    for engine in AUTOMATIC_ENGINES[:-1]:
         if not engine.lacks(model) and not engine.why_not_cheapest(model):
             return engine
-    return AUTOMATIC[-1]
+    return AUTOMATIC_ENGINES[-1]
 
 
-def unused_settings(model: Model, engine: str) -> list:
+def describe_unused_settings(model: Model, engine: str) -> list:
     """Return sentences on the settings in [accuracy] that the engine of a rig does not use."""
     used = engine
     if ENGINES[engine].finds_periodic_motion:

@@ -31,7 +31,7 @@ def collect_frames(model, numerics, patch, raw) -> dict:
     if model.patch.mesh.can_gather_points or (model.partial_slip and patch.strips is not None):
         return at_rest(patch)
     if model.rig.friction.load_varies:
-        return _frames_under_changing_load(patch, raw)
+        return _collect_varying_load_frames(patch, raw)
     if not raw.snapshots:
         at = (
             np.linspace(
@@ -76,7 +76,7 @@ def collect_frames(model, numerics, patch, raw) -> dict:
     return interface_frames(patch, time, tau, local, np.array([s["slide"] for s in shots]))
 
 
-def _frames_under_changing_load(patch, raw) -> dict:
+def _collect_varying_load_frames(patch, raw) -> dict:
     """Return the interface fields of a run with a varying normal load, frame by frame.
 
     The first frame is the pressed state. The status is 0 for open, 1 for stick and 2 for slip.
@@ -95,7 +95,7 @@ def _frames_under_changing_load(patch, raw) -> dict:
     tau = np.zeros_like(nodal)
     local = np.zeros_like(nodal)
     for k, shot in enumerate(shots, 1):
-        tau[k], stretch = _shear(law, shot, nodal[k])
+        tau[k], stretch = _compute_nodal_friction(law, shot, nodal[k])
         local[k] = slide[k] - stretch - shot["bend"]
     moved = np.abs(np.diff(local, axis=0, prepend=local[:1]))
     moved[:2] = (
@@ -115,7 +115,7 @@ def _frames_under_changing_load(patch, raw) -> dict:
     }
 
 
-def _shear(law, shot, nodal) -> tuple:
+def _compute_nodal_friction(law, shot, nodal) -> tuple:
     """Return friction forces (m,) [N] and elastic stretches (m,) [m] at the interface nodes."""
     top, bottom, _ = shot["memory"]
     if law.kind == varying_load.PLASTIC:

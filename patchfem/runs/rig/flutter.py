@@ -1,6 +1,6 @@
 """Amplitude above which friction does not limit a mode that gains energy.
 
-In: a `passes.Coupled` with a mode of negative damping. Out: `flutter_amplitude`, the amplitude of
+In: a `passes.CoupledRun` with a mode of negative damping. Out: `flutter_amplitude`, the amplitude of
 the largest unstable limit cycle (`dynamics.limit_cycles`), and notes.
 """
 
@@ -13,10 +13,10 @@ from ...formatting import format_length
 from ...model.rig import MAX_TRAVEL
 from ...response.rows import TABLE
 from .engines import ENGINES
-from .interface import contact_model
+from .interface import make_single_contact
 from .steady.balance import BalanceFinder
 
-NAME = "flutter_amplitude"
+FLUTTER_MEASURE = "flutter_amplitude"
 NO_INTERFACE_NOTE = (
     "no mode with negative damping moves an interface, so friction cannot dissipate the energy "
     "of such a mode"
@@ -30,7 +30,7 @@ NO_SMALLER_CYCLE_NOTE = (
     f"no unstable limit cycle was found at amplitudes between {limit_cycles.MIN_SLIDING_RATIO:g} and "
     f"{limit_cycles.MAX_AMPLITUDE_RATIO:g} times 4 F/(pi |c| omega), and smaller free motions could not be followed"
 )
-UNBALANCED_LAW = (
+UNSUPPORTED_LAW_REASON = (
     'with bonds limit cycles can be computed only for friction.reading = "stretch", order = 1, a constant '
     "bond length, breakaway = 0 and pieces that are rigid in shear"
 )
@@ -38,7 +38,7 @@ NO_SLIDING_NOTE = (
     "no motion was found in which the interface always slides and friction dissipates the energy that the mode "
     "gains"
 )
-RIGID_LIMIT = "with rigid friction limit cycles cannot be computed if the rig has"
+RIGID_LAW_REASON = "with rigid friction limit cycles cannot be computed if the rig has"
 
 
 def find_limit_cycles(run) -> tuple:
@@ -48,8 +48,8 @@ def find_limit_cycles(run) -> tuple:
     it is not known, and notes.
     """
     model = run.model
-    unit = TABLE[NAME].unit
-    floor = TABLE[NAME].floor
+    unit = TABLE[FLUTTER_MEASURE].unit
+    floor = TABLE[FLUTTER_MEASURE].floor
     cycles, reason, smallest_amplitude = _find_cycles(model, run.numerics, run.patch)
     end_notes = []
     outcome = run.solution.outcome
@@ -60,7 +60,7 @@ def find_limit_cycles(run) -> tuple:
         )
     unstable = [cycle for cycle in cycles if not cycle.is_stable]
     if not unstable:
-        return {NAME: Measure(None, unit, None, floor, reason=reason)}, end_notes
+        return {FLUTTER_MEASURE: Measure(None, unit, None, floor, reason=reason)}, end_notes
     edge = unstable[-1]
     inner = [cycle for cycle in cycles if cycle.is_stable and cycle.amplitude < edge.amplitude]
     falls = "smaller amplitude"
@@ -78,7 +78,7 @@ def find_limit_cycles(run) -> tuple:
         falls += f" decays, at least to {lowest} (smaller motions could not be followed)"
     else:
         falls += " decays"
-    return {NAME: Measure(edge.amplitude, unit, edge.error, floor)}, [
+    return {FLUTTER_MEASURE: Measure(edge.amplitude, unit, edge.error, floor)}, [
         "a mode of negative damping gains energy: without a drive this mode has an unstable steady oscillation of "
         f"{format_length(edge.amplitude, 4)} at the output, at {edge.omega / 6.283185307179586:.4g} "
         "Hz; a free oscillation of "
@@ -113,13 +113,13 @@ def _find_cycles(model, numerics, patch) -> LimitCycles:
     load = patch.pressure.load if patch is not None else model.point.load
     if reason := ENGINES["harmonic"].lacks(model, steady=True):
         return LimitCycles([], f"limit cycles cannot be computed {reason}")
-    contact = contact_model(model, numerics, patch)
+    contact = make_single_contact(model, numerics, patch)
     try:
         if contact.set_valued:
             if rig.springs.is_nonlinear:
-                return LimitCycles([], f"{RIGID_LIMIT} a nonlinear spring")
+                return LimitCycles([], f"{RIGID_LAW_REASON} a nonlinear spring")
             if not modes.omega.all():
-                return LimitCycles([], f"{RIGID_LIMIT} a mode of 0 Hz")
+                return LimitCycles([], f"{RIGID_LAW_REASON} a mode of 0 Hz")
             static, kinetic = contact.element.numbers[1:3]
             cycles = limit_cycles.find_relay_cycles(modes, row, kinetic, static)
             return LimitCycles(cycles, NO_SLIDING_NOTE)
@@ -132,4 +132,4 @@ def _find_cycles(model, numerics, patch) -> LimitCycles:
     except NotConverged as missing:
         return LimitCycles([], str(missing))
     except PatchfemError:
-        return LimitCycles([], UNBALANCED_LAW)
+        return LimitCycles([], UNSUPPORTED_LAW_REASON)

@@ -22,12 +22,12 @@ from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged, rigid, shear
 from ..patch import faces, jenkins_elements
 from . import strips, varying_load
-from .lists import choose_quadrature
+from .lists import choose_bond_sum
 from .numerics import Numerics
 
 # largest error of the backbone curve over the tolerance, for the reduction to few modes and for that to
 # few points
-FEWER = 1e-3
+REDUCTION_TOL_FRACTION = 1e-3
 
 
 def make_contact(model: Model, numerics: Numerics, patch):
@@ -52,15 +52,15 @@ def make_contact(model: Model, numerics: Numerics, patch):
     second = model.rig.modes.lateral_faces
     many = len(rig.modes.interfaces) > 1 or second is not None
     if model.grooves is not None:
-        return _climbing(model, patch, numerics.shear_modes)
-    alone = None if many else contact_model(model, numerics, patch)
+        return _make_groove_contact(model, patch, numerics.shear_modes)
+    alone = None if many else make_single_contact(model, numerics, patch)
     if not many and not rig.springs.is_nonlinear:
         return alone
 
     rows = [*rig.modes.interfaces]
     all_joints = []
     if many:
-        elements = _elements_side_by_side(model, numerics, patch)
+        elements = _make_independent_elements(model, numerics, patch)
         all_joints = [joints.Joint(k, element) for k, element in enumerate(elements)]
     if second is not None:
         is_lateral = [bool(interface.lateral) for interface in rig.friction.interfaces]
@@ -76,10 +76,10 @@ def make_contact(model: Model, numerics: Numerics, patch):
     return joints.JointsModel(beside, tuple(all_joints), np.array(rows), size)
 
 
-def _elements_side_by_side(model: Model, numerics: Numerics, patch) -> list:
+def _make_independent_elements(model: Model, numerics: Numerics, patch) -> list:
     """Return the friction elements of interfaces or strips that slide independently."""
     if patch is None:
-        return own_elements(model, numerics.meshed)
+        return make_interface_elements(model, numerics.meshed)
     f = model.friction
     if model.partial_slip:
         length = make_law(f, patch.pressure.load).element(patch.pressure.load).length
@@ -90,7 +90,7 @@ def _elements_side_by_side(model: Model, numerics: Numerics, patch) -> list:
     return [make_element(law, load, speed) for load in strips.strip_loads(patch)]
 
 
-def own_elements(model: Model, meshed: tuple) -> list:
+def make_interface_elements(model: Model, meshed: tuple) -> list:
     """Return the friction elements of every interface under its own load.
 
     meshed: indices of interfaces whose patches are those on the coarser mesh.
@@ -105,7 +105,7 @@ def own_elements(model: Model, meshed: tuple) -> list:
     return elements
 
 
-def _climbing(model: Model, patch, count: int | None = None):
+def _make_groove_contact(model: Model, patch, count: int | None = None):
     """Return the contact model of a load that climbs grooves."""
     f = model.friction
     load = patch.pressure.load if patch is not None else model.point.load
@@ -134,7 +134,7 @@ def make_element(interface: InterfaceLaw, load: float, speed: float) -> Element:
     return make_law(f, load).element(load)
 
 
-def contact_model(model: Model, numerics: Numerics, patch):
+def make_single_contact(model: Model, numerics: Numerics, patch):
     """Return the contact model of a rig with a single interface.
 
     Parameters
@@ -149,7 +149,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
     if f is None:
         return models.frictionless_model()
     if model.rig.friction.load_varies:
-        return varying_load.varying_load_model(model, numerics, patch)
+        return varying_load.make_varying_load_model(model, numerics, patch)
     if model.rig.friction.has_partial_slip:
         return models.jenkins_model(
             *faces.make_elements(
@@ -158,7 +158,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
         )
     load = patch.pressure.load if patch is not None else model.point.load
     if law_has_trait(f.law, "bonds"):
-        return _bonds(model, numerics, patch, load)
+        return _make_bond_contact(model, numerics, patch, load)
     if law_has_trait(f.law, "averaged"):
         return models.coulomb_model(
             *(f.static * load * averaged.rigid_limit_ratio(model, patch),) * 2
@@ -174,13 +174,13 @@ def contact_model(model: Model, numerics: Numerics, patch):
     return models.jenkins_model(elements.stiffness, elements.yield_displacement, elements)
 
 
-def _bonds(model: Model, numerics: Numerics, patch, load: float):
+def _make_bond_contact(model: Model, numerics: Numerics, patch, load: float):
     """Return the contact model of a law of bonds.
 
     The bonds are summed in a list, or at the points of shear modes, of a field or of a single point.
     """
     law = model.bonds
-    choice = choose_quadrature(model, numerics)
+    choice = choose_bond_sum(model, numerics)
     is_list = choice.engine != "recursion"
     limit = model.friction.static * load
     if model.side == "lower" and (model.partial_slip or is_list):
@@ -191,7 +191,7 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
     if is_list and not model.partial_slip:
         return models.bond_list_model(law, limit, choice.reach(law.order), choice.merge)
     if model.partial_slip:
-        reduced, force = _shear_modes(patch, law, numerics.shear_modes, model)
+        reduced, force = _compute_shear_modes(patch, law, numerics.shear_modes, model)
         if is_list:
             return shear.make_sheared_lists(patch, law, reduced, choice, force)
         if force is not None:
@@ -208,29 +208,29 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
     return models.points_model(law, [1.0], [load])
 
 
-def _shear_modes(patch, law, count: int | None, model) -> tuple:
+def _compute_shear_modes(patch, law, count: int | None, model) -> tuple:
     """Return the shear modes of a pressed patch and, for few points, their friction forces.
 
     The forces (k,) [N] are None if the modes have all points of the patch. Both are computed once for
     all marches of a pressed patch.
     """
-    made = _SHEAR_MODES.setdefault(patch, {})
+    made = _SHEAR_MODE_CACHE.setdefault(patch, {})
     tolerance = model.accuracy.tolerance
     few = model.patch.mesh.can_gather_points
     if (law, count, tolerance, few) not in made:
-        mode_tolerance = (FEWER if few else 0.1) * tolerance
+        mode_tolerance = (REDUCTION_TOL_FRACTION if few else 0.1) * tolerance
         reduced = fields.bond_shear_modes(patch, law, count, mode_tolerance, fewest=few)
         force = None
         if few:
             reduced, force, _ = shear_modes.fewest_gauss_points(
-                reduced, patch.x[reduced.points], FEWER * tolerance
+                reduced, patch.x[reduced.points], REDUCTION_TOL_FRACTION * tolerance
             )
             force = force / law.static
         made[law, count, tolerance, few] = reduced, force
     return made[law, count, tolerance, few]
 
 
-def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple | None:
+def reduce_to_few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple | None:
     """Reduce a patch to a few contact points with the fewest shear modes.
 
     Parameters
@@ -249,7 +249,7 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
         ShearModes of the points, their limits [N], and the error of the backbone as a fraction of
         the friction limit; None if more modes are needed.
     """
-    made = _SHEAR_MODES.setdefault(patch, {})
+    made = _SHEAR_MODE_CACHE.setdefault(patch, {})
     key = (law.static, law.length, law.ratio, tolerance, points, modes)
     if key not in made:
         all_modes = fields.bond_shear_modes(patch, law, None, tolerance, fewest=True)
@@ -267,4 +267,4 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
 
 
 # cache of shear modes by their parameters, which lasts as long as the Patch
-_SHEAR_MODES = WeakKeyDictionary()
+_SHEAR_MODE_CACHE = WeakKeyDictionary()

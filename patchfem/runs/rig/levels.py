@@ -23,13 +23,13 @@ from ...response.levels import (
 from ...response.rows import TABLE
 from ...structure.drive_sizes import find_drive_omega
 
-EXACT = (
+EXACT_RELATIVE_ERROR = (
     1e-9  # relative error of the measures of an event-driven run, whose motion has round-off only
 )
 MAX_BISECTIONS = 40  # largest number of bisections of an onset, to 1e-12 of its bracket
 
 
-def level_ends(rig) -> tuple:
+def list_level_ends(rig) -> tuple:
     """Return the cycles (l,) after which the levels of a drive end."""
     return tuple(rig.drive.levels.cycles * (k + 1) for k in range(len(rig.drive.levels.amplitudes)))
 
@@ -69,7 +69,7 @@ def _values_at_level(solution, number: int) -> dict:
     return solution.levels[number].values if number < len(solution.levels) else {}
 
 
-def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
+def find_onset(levels, probe, tolerance: float, past=None) -> tuple | None:
     """Find the onset [m s-2] between two drive levels by bisection, with half its bracket.
 
     The bracket is the last level below the onset and the first level above it. The bisection ends when
@@ -111,7 +111,7 @@ def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
     return (low + high) / 2, (high - low) / 2
 
 
-def drive_at_level(drive, number: int, level: float):
+def replace_level(drive, number: int, level: float):
     """Return a drive in levels that ends with another amplitude at one level.
 
     Parameters
@@ -127,7 +127,9 @@ def drive_at_level(drive, number: int, level: float):
     return replace(drive, segments=(*drive.segments[:number], segment))
 
 
-def level_measures(rig, levels, probe, tolerance: float, *, has_friction: bool, coarser=()) -> dict:
+def compute_level_measures(
+    rig, levels, probe, tolerance: float, *, has_friction: bool, coarser=()
+) -> dict:
     """Compute onset, jump and hysteresis over all levels of a drive.
 
     These are onset_level, jump_level and level_hysteresis, with a reason if there is no value.
@@ -138,26 +140,26 @@ def level_measures(rig, levels, probe, tolerance: float, *, has_friction: bool, 
         Has the kind of onset.
     levels : sequence of Level
     probe : callable
-        See `onset`.
+        See `find_onset`.
     tolerance : float
     has_friction : bool
         Whether friction acts.
     coarser : sequence
         See `Solution`; the distance between the onsets of each pair is added to the error.
     """
-    unit = _unit(rig)
-    size = _size(rig)
+    unit = _level_unit(rig)
+    size = _level_factor(rig)
     measures = {}
     past = make_onset_test(*rig.drive.levels.onset)
-    lowest = onset(levels, probe, tolerance, past) if has_friction else None
+    lowest = find_onset(levels, probe, tolerance, past) if has_friction else None
     if lowest is not None:
         level, half_width = lowest
         change = 0.0
         for run, beside in coarser:
-            coarse_onset = onset(run.levels, run.probe, tolerance, past)
+            coarse_onset = find_onset(run.levels, run.probe, tolerance, past)
             reference = lowest
             if beside is not None:
-                reference = onset(beside.levels, beside.probe, tolerance, past)
+                reference = find_onset(beside.levels, beside.probe, tolerance, past)
             is_missing = coarse_onset is None or reference is None
             change += level if is_missing else abs(coarse_onset[0] - reference[0])
         measures["onset_level"] = Measure(size * level, unit, size * (half_width + change), 1e-9)
@@ -186,19 +188,19 @@ def level_measures(rig, levels, probe, tolerance: float, *, has_friction: bool, 
     return measures
 
 
-def in_scene_units(rig, levels) -> tuple:
+def convert_to_scene_units(rig, levels) -> tuple:
     """Convert drive levels to the unit of the scene, [m s-2] or [N]."""
-    size = _size(rig)
-    unit = _unit(rig)
+    size = _level_factor(rig)
+    unit = _level_unit(rig)
     return tuple(replace(level, drive=size * level.drive, unit=unit) for level in levels)
 
 
-def _unit(rig) -> str:
+def _level_unit(rig) -> str:
     """Return the unit of the drive levels in the scene."""
     return "N" if rig.drive.kind == "force" else "m s-2"
 
 
-def _size(rig) -> float:
+def _level_factor(rig) -> float:
     """Return the factor from a drive level [m s-2] to its unit in the scene."""
     return rig.modes.mass if rig.drive.kind == "force" else 1.0
 
@@ -233,7 +235,7 @@ def run_levels(reader, integrate, state, end, progress=None) -> tuple:
         """Run another level from the end of an earlier one; number -1 starts at rest."""
         sine = SineDrive(level, omega, moving)
         run = integrate(sine, states[number + 1], None, False)
-        return reader.level(level, run, sine, EXACT)
+        return reader.level(level, run, sine, EXACT_RELATIVE_ERROR)
 
     amplitudes = rig.drive.levels.amplitudes
     n_levels = len(amplitudes)
@@ -244,7 +246,7 @@ def run_levels(reader, integrate, state, end, progress=None) -> tuple:
         sine = SineDrive(amplitude, omega, moving)
         run = integrate(sine, states[-1], watch, k + 1 == n_levels)
         runs.append(run)
-        level_results.append(reader.level(amplitude, run, sine, EXACT))
+        level_results.append(reader.level(amplitude, run, sine, EXACT_RELATIVE_ERROR))
         states.append(end(run))
         if run.outcome is not None:
             break

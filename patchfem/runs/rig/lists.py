@@ -1,6 +1,6 @@
 """Sum over the bonds of a rig, and the cost of a list of them.
 
-In: a Model and its Numerics. Out: the Choice of a method for the sum (`choose_quadrature`), and the
+In: a Model and its Numerics. Out: the Choice of a method for the sum (`choose_bond_sum`), and the
 predicted length and CPU seconds of a list. A law without stiffness, the printed one and that of
 order 0, keeps a block from sliding by a reversal in almost every step. Each reversal adds a
 strip to the list, so that its cost grows with the square of the steps.
@@ -34,26 +34,26 @@ DECAYED_FRACTION = 1e-2
 # to 1e-4)
 STICKING_STROKE_RATIO = 1e-4
 # CPU seconds per step and strip of a list of bonds that grows every step (measured: 8e-8 to 4e-6)
-GROWING_STEP = 1e-6
+GROWING_STEP_SECONDS = 1e-6
 # Ratio of friction limit to drive force (D) from which a block is stuck: then 0.6 and more strips are
 # left per step, against 0.06 at D = 1.06 and 0.28 at D = 1.4.
 MIN_STUCK_RATIO = 2.0
 # Strips per step above which the motion reverses in every few steps, so that shorter steps would only
 # make the list of bonds longer.
-TURNING = 0.1
+MAX_STRIPS_PER_STEP = 0.1
 # Strips of a list of bonds with about one strip per step, above which steps are not halved again,
 # because each halving costs four times as much.
-MOST_CROWDED = 500
+MIN_LONG_LIST = 500
 MIN_SLIP_LENGTHS = 1e-3  # slip in bond lengths, below which the motion of a block is elastic
 MAX_HALVINGS = 2  # largest number of halvings of the step (0 to 3 were observed)
 # cost of a patch with shear compliance over that of one list: its lists, times the larger number of
 # iterations of Newton's method
 SHEAR_COST_FACTOR = 256.0
-MOST_SWING = 2.0  # largest phase [rad] in a step of the vibration of the block on its bonds
+MAX_BOND_PHASE = 2.0  # largest phase [rad] in a step of the vibration of the block on its bonds
 
 
 @lru_cache(maxsize=8)
-def choose_quadrature(model: Model, numerics: Numerics):
+def choose_bond_sum(model: Model, numerics: Numerics):
     """Choose how the forces of the bonds of a nonlocal law are summed.
 
     The stroke is taken as four times the amplitude that follows from speed over frequency of the
@@ -63,7 +63,7 @@ def choose_quadrature(model: Model, numerics: Numerics):
     from sliding is STICKING_STROKE_RATIO times that of the drive.
     """
     return numerics.choice or _choose_for_engine(
-        model, numerics, _stretch(model), bench_engine.requested_engine(model)
+        model, numerics, _relative_stretch(model), bench_engine.requested_engine(model)
     )
 
 
@@ -73,7 +73,7 @@ def has_list(model: Model, numerics: Numerics) -> bool:
     return (
         f is not None
         and law_has_trait(f.law, "bonds")
-        and choose_quadrature(model, numerics).engine != "recursion"
+        and choose_bond_sum(model, numerics).engine != "recursion"
     )
 
 
@@ -86,7 +86,7 @@ def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine:
     accuracy = model.accuracy
     drive = model.rig.drive
     ratio = 1.0
-    if chatters(model):
+    if is_stuck_by_printed_law(model):
         ratio = STICKING_STROKE_RATIO
     elif drive.kind == "free" or drive.waveform.is_step:
         ratio = DECAYED_FRACTION
@@ -97,7 +97,7 @@ def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine:
     return engines.choose_engine(law, accuracy.tolerance, stroke, numerics.steps / 2, requested)
 
 
-def _stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
+def _relative_stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
     """Return the displacement of a stuck, driven block over the bond length.
 
     The stiffness is mu_s N/eps_0. The result is inf if the bonds do not stop the block, i.e. if their
@@ -107,12 +107,12 @@ def _stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
     rig = model.rig
     if f.reading == "report" or rig.drive.kind == "free":
         return inf
-    needed = force_that_holds(rig)
+    needed = compute_holding_force(rig)
     limit = f.static * model.nominal_load
     return needed / limit if limit >= least * needed else inf
 
 
-def halvings(model: Model) -> int:
+def count_step_halvings(model: Model) -> int:
     """Return how often the automatic time step is halved for a block stuck on its bonds.
 
     A stuck block vibrates on its bonds faster than its modes and its drive. The steps are halved until
@@ -124,18 +124,18 @@ def halvings(model: Model) -> int:
     f = model.friction
     if f is None or not law_has_trait(f.law, "bonds") or model.accuracy.steps_per_cycle is not None:
         return 0
-    stretch = _stretch(model)
+    stretch = _relative_stretch(model)
     if stretch == inf or stretch**2 / 2 < MIN_SLIP_LENGTHS:
         return 0
     quickest = max(
         find_max_frequency_ratio(rig.drive.signal) / rig.drive.signal.period,
         float(rig.structure.frequencies.max()),
     )
-    doublings = ceil(log2(_bond_swing(model) / (2 * pi * quickest)))
+    doublings = ceil(log2(_bond_omega(model) / (2 * pi * quickest)))
     return min(max(0, doublings), MAX_HALVINGS)
 
 
-def _bond_swing(model: Model) -> float:
+def _bond_omega(model: Model) -> float:
     """Return the angular frequency [rad/s] of the block on its bonds, sqrt(k_t/m)."""
     f = model.friction
     modes = model.rig.modes
@@ -144,7 +144,7 @@ def _bond_swing(model: Model) -> float:
     )
 
 
-def held_by_bonds(model: Model, push: float | None = None) -> float:
+def stuck_force_ratio(model: Model, push: float | None = None) -> float:
     """Return the ratio of friction limit to holding force for bonds without stiffness.
 
     It is 0 for other bonds. The printed law reaches its limit at any stroke, so that its stiffness
@@ -167,13 +167,13 @@ def held_by_bonds(model: Model, push: float | None = None) -> float:
         if rig.start is None or sum_form(model.bonds) != FORM_REPORT_GROWING:
             return 0.0
         slides = rig.modes.interfaces @ rig.start.z
-        needed = _held_with(rig, 0.0, np.zeros(rig.modes.omega.size), slides)
+        needed = _force_for_prescribed_slides(rig, 0.0, np.zeros(rig.modes.omega.size), slides)
     else:
-        needed = force_that_holds(rig, push)
+        needed = compute_holding_force(rig, push)
     return f.static * model.nominal_load / needed if needed else inf
 
 
-def least_held(model: Model) -> float:
+def min_growing_force_ratio(model: Model) -> float:
     """Return the ratio of limit to holding force from which a list of bonds grows every step.
 
     It is 1 for a driven block if each step leaves a strip that no path erases, i.e. for bonds that
@@ -183,7 +183,7 @@ def least_held(model: Model) -> float:
     return 1.0 if leaves and model.rig.drive.kind != "free" else MIN_STUCK_RATIO
 
 
-def chatters(model: Model) -> bool:
+def is_stuck_by_printed_law(model: Model) -> bool:
     """Return whether the printed law prevents a driven block from sliding.
 
     The block then reverses in almost every step, and each reversal adds a strip to its list.
@@ -192,31 +192,31 @@ def chatters(model: Model) -> bool:
         model.rig.drive.kind != "free"
         and model.friction is not None
         and model.friction.reading == "report"
-        and held_by_bonds(model) >= MIN_STUCK_RATIO
+        and stuck_force_ratio(model) >= MIN_STUCK_RATIO
     )
 
 
 def is_stuck_after_release(model: Model) -> bool:
     """Return whether growing bonds of the printed law stop a released block from the start."""
-    return model.rig.drive.kind == "free" and held_by_bonds(model) >= MIN_STUCK_RATIO
+    return model.rig.drive.kind == "free" and stuck_force_ratio(model) >= MIN_STUCK_RATIO
 
 
-def is_held_without_stiffness(model: Model) -> bool:
+def is_stuck_without_stiffness(model: Model) -> bool:
     """Return whether bonds of order 0, which have no stiffness, stop the block."""
-    return lists_grow(model) and model.friction.reading != "report"
+    return is_list_growing(model) and model.friction.reading != "report"
 
 
-def lists_grow(model: Model) -> bool:
+def is_list_growing(model: Model) -> bool:
     """Return whether the list of bonds gains an entry in almost every step of the run.
 
-    It does if, at some time of the run, the friction of a law without stiffness at rest (see `held_by_bonds`) holds the
+    It does if, at some time of the run, the friction of a law without stiffness at rest (see `stuck_force_ratio`) holds the
     sliding block. Pieces with shear compliance have a
     stiffness, and the lists of their points are merged.
     """
     if model.partial_slip:
         return False
-    most = held_by_bonds(model, find_min_drive(model.rig))
-    return most > 0 and most >= least_held(model)
+    most = stuck_force_ratio(model, find_min_drive(model.rig))
+    return most > 0 and most >= min_growing_force_ratio(model)
 
 
 def find_min_drive(rig) -> float:
@@ -229,7 +229,7 @@ def find_min_drive(rig) -> float:
     return min(levels[0] / 2, *levels) if levels else find_max_acceleration(rig.drive.signal)
 
 
-def force_that_holds(rig, push: float | None = None) -> float:
+def compute_holding_force(rig, push: float | None = None) -> float:
     """Return the peak force [N] on the first interface that keeps all interfaces at rest.
 
     For a single mode it is mass times acceleration times base/slide at any frequency; several modes
@@ -240,12 +240,12 @@ def force_that_holds(rig, push: float | None = None) -> float:
     """
     modes = rig.modes
     size = find_max_acceleration(rig.drive.signal) if push is None else push
-    return _held_with(
+    return _force_for_prescribed_slides(
         rig, find_drive_omega(rig.drive.signal), modes.base * size, np.zeros(len(modes.interfaces))
     )
 
 
-def _held_with(rig, omega: float, push, slides) -> float:
+def _force_for_prescribed_slides(rig, omega: float, push, slides) -> float:
     """Return the force amplitude [N] on the first interface for prescribed displacements.
 
     Parameters
@@ -288,14 +288,14 @@ def is_list_too_long(model: Model, numerics: Numerics, book: dict) -> bool:
         Counters of the run, with "strips".
     """
     strips = book.get("strips", 0.0)
-    if strips <= MOST_CROWDED or model.bonds.reading != "report":
+    if strips <= MIN_LONG_LIST or model.bonds.reading != "report":
         return False
     if sum_form(model.bonds) == FORM_REPORT_GROWING:
-        return lists_grow(model)
-    return strips > TURNING * numerics.cycles * numerics.steps
+        return is_list_growing(model)
+    return strips > MAX_STRIPS_PER_STEP * numerics.cycles * numerics.steps
 
 
-def doubling_does_not_help(book: dict, errors: list) -> bool:
+def has_doubling_failed(book: dict, errors: list) -> bool:
     """Return whether two doublings of the steps have not reduced the error of a bond list.
 
     The list of a released block that reverses in almost every step is different for any step
@@ -319,7 +319,7 @@ class ListCost(NamedTuple):
     seconds: float
 
 
-def list_cost(model: Model, numerics: Numerics) -> ListCost:
+def estimate_list_cost(model: Model, numerics: Numerics) -> ListCost:
     """Estimate the strips of a list of bonds and the CPU time [s] of a run with it.
 
     A list that grows with every step is expected to contain all strips; its seconds are known
@@ -327,11 +327,11 @@ def list_cost(model: Model, numerics: Numerics) -> ListCost:
     `ListGuard` stops a run that takes too long.
     """
     steps = numerics.cycles * numerics.steps
-    if lists_grow(model):
-        return ListCost(steps, GROWING_STEP * steps**2 / 2)
-    choice = choose_quadrature(model, numerics)
+    if is_list_growing(model):
+        return ListCost(steps, GROWING_STEP_SECONDS * steps**2 / 2)
+    choice = choose_bond_sum(model, numerics)
     if choice.engine != "recursion" and numerics.choice is None:
-        choice = _choose_for_engine(model, numerics, _stretch(model, 1.0), choice.engine)
+        choice = _choose_for_engine(model, numerics, _relative_stretch(model, 1.0), choice.engine)
     max_strips = 8 * steps
     if choice.tail:
         max_strips = 2 * steps * max(1.0, choice.strips)
@@ -367,12 +367,12 @@ class ListGuard:
         spent = now - self.start[0]
         done = fraction - self.start[1]
         if done > 0 and spent > MAX_LIST_SECONDS / 60 and spent > MAX_LIST_SECONDS * done:
-            raise Missing(_too_long(spent / done), "")
+            raise Missing(_long_list_message(spent / done), "")
         if self.progress is not None:
             self.progress(fraction)
 
 
-def _too_long(seconds: float, entries: float | None = None) -> str:
+def _long_list_message(seconds: float, entries: float | None = None) -> str:
     """Return the message that refuses a run whose list of bonds takes too long."""
     length = "" if entries is None else f" (about {entries:.0f} entries)"
     return (
@@ -382,17 +382,17 @@ def _too_long(seconds: float, entries: float | None = None) -> str:
     )
 
 
-def refuse_unresolved(model: Model, numerics: Numerics) -> None:
+def refuse_unresolved_bond_vibration(model: Model, numerics: Numerics) -> None:
     """Raise Missing if the time step does not resolve the vibration of the block on its bonds.
 
-    The step is too long if sqrt(k_t/m) dt > MOST_SWING. The computed motion would be meaningless then,
+    The step is too long if sqrt(k_t/m) dt > MAX_BOND_PHASE. The computed motion would be meaningless then,
     and every step would leave permanent bonds: the list would grow, and the run time with its
     square.
     """
     drive = model.rig.drive.signal
-    pace = _bond_swing(model)
+    pace = _bond_omega(model)
     swing = pace * drive.period / numerics.steps
-    if swing > MOST_SWING:
+    if swing > MAX_BOND_PHASE:
         wanted = ceil(pace * drive.period)
         raise Missing(
             f"a time step of {drive.period / numerics.steps:.2g} s is too long for the vibration of the "
@@ -411,7 +411,7 @@ def refuse_long_list(model: Model, numerics: Numerics) -> None:
     if not has_list(model, numerics):
         return
     if not model.partial_slip:
-        refuse_unresolved(model, numerics)
-    entries, seconds = list_cost(model, numerics)
-    if seconds > MAX_LIST_SECONDS and not lists_grow(model):
-        raise Missing(_too_long(seconds, entries), "")
+        refuse_unresolved_bond_vibration(model, numerics)
+    entries, seconds = estimate_list_cost(model, numerics)
+    if seconds > MAX_LIST_SECONDS and not is_list_growing(model):
+        raise Missing(_long_list_message(seconds, entries), "")

@@ -27,9 +27,9 @@ from ...structure.drive_sizes import (
 from . import levels as rig_levels
 from . import strips
 from .interface import make_contact
-from .lists import ListGuard, choose_quadrature, has_list
+from .lists import ListGuard, choose_bond_sum, has_list
 from .reading import Reader
-from .solution import CycleLoop, Solution, normal_load, sampled_loop
+from .solution import CycleLoop, Solution, compute_sampled_loop, normal_load
 
 END_ERROR_FACTOR = (
     1.5  # safety factor on the first-order error of a run that ends beside its requested end
@@ -101,13 +101,13 @@ def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None
         say,
         progress,
         rig.start,
-        rig_levels.level_ends(rig),
+        rig_levels.list_level_ends(rig),
         keeps_samples=numerics.whole and not keeps_extremes,
         keeps_extremes=keeps_extremes,
         even=bool(NEEDS_RUN),
     )
     seconds = perf_counter() - begin
-    done = strips.run_of_strips(done, patch) if rig.friction.strips_slide_apart else done
+    done = strips.average_march(done, patch) if rig.friction.strips_slide_apart else done
     return March(contact, done, seconds, {"reduce": reduced, "compiled_code": loaded})
 
 
@@ -158,7 +158,7 @@ class MarchReader(Reader):
         friction = self.model.friction
         if friction is None or not law_has_trait(friction.law, "bonds"):
             return None
-        return choose_quadrature(self.model, self.numerics)
+        return choose_bond_sum(self.model, self.numerics)
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
         """Return the friction work of a run from its samples and from its energy balance."""
@@ -248,7 +248,7 @@ class MarchReader(Reader):
         force = 0j
         if span > 0:
             force = compute_step_harmonic(window.time, part.step_force, omega)
-        return sampled_loop(window, drive, work, force)
+        return compute_sampled_loop(window, drive, work, force)
 
     def _levels(self, done) -> tuple:
         """Return the drive levels of a run, and the function that runs another level."""
@@ -257,7 +257,7 @@ class MarchReader(Reader):
 
         def probe(number, level):
             """Run another level from the end of an earlier one; number -1 starts at rest."""
-            other = rig_levels.drive_at_level(rig.drive.signal, number + 1, level)
+            other = rig_levels.replace_level(rig.drive.signal, number + 1, level)
             if number >= 0:
                 run = done.marks[number].after.fork(other)
             else:
@@ -266,7 +266,7 @@ class MarchReader(Reader):
                 )
             mark = run.march_to_mark(round(rig.drive.levels.cycles), numerics.window)
             if rig.friction.strips_slide_apart:
-                mark = strips.mark_as_one(mark, self.patch)
+                mark = strips.average_mark(mark, self.patch)
             return self.level(level, mark, other)
 
         amplitudes = rig.drive.levels.amplitudes

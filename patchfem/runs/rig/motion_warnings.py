@@ -1,6 +1,6 @@
 """Warnings of a coupled run on its law, load and engine, and notes on their meaning.
 
-In: a `passes.Coupled`. Out: lists of sentences.
+In: a `passes.CoupledRun`. Out: lists of sentences.
 """
 
 import numpy as np
@@ -28,9 +28,9 @@ from .solution import normal_load
 
 # a release still decays if its largest motion in the last cycles exceeds the amplitude of its last cycle by
 # this fraction
-DECAYS = 1e-3
-AT = 1e-9  # relative difference up to which two frequencies are equal
-AS_ONE_POINT = (
+MIN_DECAY_EXCESS = 1e-3
+EQUAL_FREQUENCY_TOL = 1e-9  # relative difference up to which two frequencies are equal
+ONE_POINT_WARNING = (
     "the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
     "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
     "same load; add [contact.shear] to let the patch slip part by part"
@@ -50,25 +50,25 @@ def collect_warnings(run) -> list:
         steps = run.numerics.steps
     warnings = [
         *model.rig.structure.notes,
-        *_as_one_point(model, patch, run.numerics),
+        *_warn_of_one_point(model, patch, run.numerics),
         *note_on_heating(model, patch, solution.response, book["friction"]),
     ]
     if run.has_friction:
         warnings += law_warnings(
             model, run.outcome, measures, float(np.abs(solution.window.slide_rate).max())
         )
-    warnings += created_warning(model, book, model.rig.drive.cycles)
+    warnings += warn_of_created_energy(model, book, model.rig.drive.cycles)
     if (
         patch is not None
         and model.rig.friction.load_varies
         and solution.contact is not None
         and solution.contact.reduction is not None
     ):
-        warnings += modes_note(
+        warnings += note_on_shear_modes(
             model, solution.contact.reduction.stiffness.size, solution.contact.sets.x.size
         )
     if model.grooves is not None and model.partial_slip:
-        warnings += modes_note(
+        warnings += note_on_shear_modes(
             model, solution.contact.shear.stiffness.size, solution.contact.shear.points.size
         )
     warnings += [
@@ -89,23 +89,23 @@ def collect_warnings(run) -> list:
     warnings += warn_of_large_slide(patch, solution.response.slide) if patch is not None else ()
     if model.has_interface_patches:
         warnings += faces.merge_sentences(
-            model, lambda face: _face_warnings(face, solution.response)
+            model, lambda face: _warn_of_face(face, solution.response)
         )
     return warnings
 
 
-def _face_warnings(face, response) -> list:
+def _warn_of_face(face, response) -> list:
     """Return the warnings on the patch of one interface."""
-    warnings = [] if face.partial_slip else [AS_ONE_POINT]
+    warnings = [] if face.partial_slip else [ONE_POINT_WARNING]
     return [*warnings, *warn_of_large_slide(face.patch, face.slide(response))]
 
 
-def peak_at_an_end(run, modes) -> list:
+def warn_of_peak_at_sweep_end(run, modes) -> list:
     """Return the warning on a sweep whose largest response is at one of its ends.
 
     Parameters
     ----------
-    run : passes.Coupled
+    run : passes.CoupledRun
     modes : callable
         Returns the modes, as `plan.mode_frequencies` does.
     """
@@ -113,13 +113,13 @@ def peak_at_an_end(run, modes) -> list:
     drive = run.model.rig.drive.signal
     at = None
     if peak is not None and peak.value is not None:
-        at = nearest_sweep_end(peak.value, drive.low, drive.high)
+        at = find_sweep_end(peak.value, drive.low, drive.high)
     if at is None or not run.measures["relative_displacement_amplitude"].value > 0:
         return []
     upper = at == max(drive.low, drive.high)
     key = "drive.from" if at == drive.low else "drive.to"
     side, move = ("above", "raise") if upper else ("below", "lower")
-    resonance = _nearest_resonance(modes(), at, upper=upper)
+    resonance = _describe_nearest_resonance(modes(), at, upper=upper)
     beyond = f"no mode of the scene has its resonance {side} this frequency"
     if resonance:
         beyond = (
@@ -131,12 +131,12 @@ def peak_at_an_end(run, modes) -> list:
     ]
 
 
-def nearest_sweep_end(frequency: float, *ends: float) -> float | None:
+def find_sweep_end(frequency: float, *ends: float) -> float | None:
     """Return the end [Hz] of a sweep that equals a frequency [Hz], or None."""
-    return next((end for end in ends if abs(frequency - end) <= AT * end), None)
+    return next((end for end in ends if abs(frequency - end) <= EQUAL_FREQUENCY_TOL * end), None)
 
 
-def _nearest_resonance(modes: list, at: float, *, upper: bool) -> str:
+def _describe_nearest_resonance(modes: list, at: float, *, upper: bool) -> str:
     """Describe the mode whose resonance is nearest to a frequency on one side, or return "".
 
     Parameters
@@ -154,7 +154,11 @@ def _nearest_resonance(modes: list, at: float, *, upper: bool) -> str:
         stuck = mode["stuck_frequency"]
         low = free
         high = free if stuck is None else max(free, stuck)
-        is_beyond = high > at * (1 + AT) if upper else 0 < low < at * (1 - AT)
+        is_beyond = (
+            high > at * (1 + EQUAL_FREQUENCY_TOL)
+            if upper
+            else 0 < low < at * (1 - EQUAL_FREQUENCY_TOL)
+        )
         if is_beyond:
             phrase = f"{mode['name']} has its resonance at {format_number(low, 4)} Hz"
             if high > low:
@@ -170,7 +174,7 @@ def collect_notes(run) -> list:
     model = run.model
     solution = run.solution
     rig = run.model.rig
-    ended = _lateral_motion_sentence(run)
+    ended = _note_on_lateral_motion(run)
     if solution.message and solution.outcome is Outcome.LEAVES_GROOVES:
         ended.append(solution.message)
     if run.patch is not None and run.patch.strips is not None and model.partial_slip:
@@ -178,10 +182,10 @@ def collect_notes(run) -> list:
             "strips that slip part by part have no common shear stress, so the fields contain only the pressure",
             *ended,
         ]
-    notes = [*_bond_notes(model, run.patch, solution), *climbing_as_one(model, run.patch)]
+    notes = [*_note_on_bond_growth(model, run.patch, solution), *climbing_as_one(model, run.patch)]
     f = model.friction
     if len(rig.friction.interfaces):
-        notes += _engine_notes(run)
+        notes += _note_on_elements(run)
     if solution.levels and rig.drive.levels.onset[0] == "slip" and solution.held > 0:
         notes.append(
             f"onset_level: slip counts only if its amplitude is above {format_length(solution.held)}, a thousandth of the "
@@ -190,13 +194,13 @@ def collect_notes(run) -> list:
     return [
         *rig.structure.reduction_notes,
         *notes,
-        *creeping_note(f),
-        *_release_sentence(run),
+        *note_on_creep(f),
+        *_note_on_release(run),
         *ended,
     ]
 
 
-def _release_sentence(run) -> list:
+def _note_on_release(run) -> list:
     """Return the note on the time span of the measures of a decaying release."""
     rig = run.model.rig
     window = run.solution.window
@@ -204,7 +208,7 @@ def _release_sentence(run) -> list:
     if (
         rig.drive.kind != "free"
         or main.value is None
-        or np.ptp(window.output) / 2 <= main.value * (1 + DECAYS) + main.floor
+        or np.ptp(window.output) / 2 <= main.value * (1 + MIN_DECAY_EXCESS) + main.floor
     ):
         return []
     span = format_quantity(float(window.time[-1] - window.time[0]), "s", 3)
@@ -215,7 +219,7 @@ def _release_sentence(run) -> list:
     ]
 
 
-def _lateral_motion_sentence(run) -> list:
+def _note_on_lateral_motion(run) -> list:
     """Return the note on the neglected lateral motion of strips that yaw."""
     if (
         not run.model.rig.friction.strips_slide_apart
@@ -223,7 +227,7 @@ def _lateral_motion_sentence(run) -> list:
         or not run.patch.strips.load
     ):
         return []
-    swing, share = strips.lateral_motion(run.patch, run.solution.window, run.drive.period)
+    swing, share = strips.estimate_lateral_motion(run.patch, run.solution.window, run.drive.period)
     if not swing > 0:
         return []
     computed = "friction is" if run.model.wear is None else "friction and the wear are"
@@ -234,7 +238,7 @@ def _lateral_motion_sentence(run) -> list:
     ]
 
 
-def creeping_note(friction) -> list:
+def note_on_creep(friction) -> list:
     """Return the note on a friction law that never sticks."""
     if friction is None or not law_has_trait(friction.law, "creeps"):
         return []
@@ -245,7 +249,7 @@ def creeping_note(friction) -> list:
     ]
 
 
-def _as_one_point(model, patch, numerics) -> list:
+def _warn_of_one_point(model, patch, numerics) -> list:
     """Return the warning on a patch that moves exactly like a single point."""
     f = model.friction
     moves = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart
@@ -258,10 +262,10 @@ def _as_one_point(model, patch, numerics) -> list:
         or moves
     ):
         return []
-    return [AS_ONE_POINT]
+    return [ONE_POINT_WARNING]
 
 
-def _bond_notes(model, patch, solution) -> list:
+def _note_on_bond_growth(model, patch, solution) -> list:
     """Return the notes on bonds that grow."""
     f = model.friction
     if f is None or not law_has_trait(f.law, "bonds"):
@@ -273,7 +277,7 @@ def _bond_notes(model, patch, solution) -> list:
     )
 
 
-def _engine_notes(run) -> list:
+def _note_on_elements(run) -> list:
     """Return the note on how the motion of elements that stick or slip is computed."""
     if PIECES.lacks(run.model):
         return []
@@ -337,7 +341,7 @@ def law_warnings(model, outcome, measures, peak: float) -> list:
     ]
 
 
-def created_warning(model, book: dict, cycles: float) -> list:
+def warn_of_created_energy(model, book: dict, cycles: float) -> list:
     """Return the warning on energy that the printed law created.
 
     The law creates energy in steps in which it returns more than it had stored.
@@ -363,7 +367,7 @@ def created_warning(model, book: dict, cycles: float) -> list:
     ]
 
 
-def modes_note(model, kept: int, nodes: int) -> list:
+def note_on_shear_modes(model, kept: int, nodes: int) -> list:
     """Return the note on the shear modes of a patch whose normal force changes.
 
     Parameters

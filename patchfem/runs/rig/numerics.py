@@ -1,6 +1,6 @@
 """Numerical settings of a coupled run: engine, steps per cycle, window, shear modes.
 
-In: a Model. Out: `Numerics` by its scene, else by its tolerance (`choose`).
+In: a Model. Out: `Numerics` by its scene, else by its tolerance (`choose_numerics`).
 """
 
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ from .engines import MARCH, PIECES, SMOOTH, choose_engine
 # periods has 30 cycles
 WHOLE_CYCLE_TOL = 1e-6
 N_DECAY_TIMES = 3.0  # decay times of a transient, which reduce its mean square to e^-6
-LEAST_KEPT = 100  # smallest number of samples of a run whose drive is not sinusoidal
+MIN_SAMPLES = 100  # smallest number of samples of a run whose drive is not sinusoidal
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class Numerics:
         return replace(self, steps=2 * self.steps)
 
 
-def choose(model: Model) -> Numerics:
+def choose_numerics(model: Model) -> Numerics:
     """Choose the engine and the numerical settings of a coupled run.
 
     Parameters
@@ -99,7 +99,7 @@ def choose(model: Model) -> Numerics:
         window = min(window, int(rig.drive.levels.cycles + WHOLE_CYCLE_TOL))
     steps = steps_per_cycle(model)
     if not is_sinusoidal(rig.drive.signal) and accuracy.steps_per_cycle is None:
-        steps = max(steps, int(np.ceil(LEAST_KEPT / rig.drive.cycles)))
+        steps = max(steps, int(np.ceil(MIN_SAMPLES / rig.drive.cycles)))
     pinned = {key for key in MARCH_SETTINGS if getattr(accuracy, key) is not None}
     numerics = Numerics(
         engine.name,
@@ -116,7 +116,7 @@ def choose(model: Model) -> Numerics:
         return replace(numerics, pairs=count_merges(model))
     if engine is MARCH and accuracy.steps_per_cycle is None:
         # the steps are short enough for a unique solution, and the last step ends where the run ends
-        steps = ending(max(steps, unique_steps(model)), rig.drive.cycles)
+        steps = round_steps_to_run_end(max(steps, min_unique_steps(model)), rig.drive.cycles)
         return replace(numerics, steps=steps)
     return numerics
 
@@ -129,7 +129,7 @@ def step_tolerance(tolerance: float) -> float:
     return float(np.clip(1e-3 * tolerance, 1e-12, 1e-9))
 
 
-def ending(steps: int, cycles: float) -> int:
+def round_steps_to_run_end(steps: int, cycles: float) -> int:
     """Return steps per cycle >= `steps` with which a run ends nearest to the requested time.
 
     The steps are a multiple of 4, because runs with a half and a quarter of them show the order. A run
@@ -145,7 +145,7 @@ def ending(steps: int, cycles: float) -> int:
     )
 
 
-def unique_steps(model: Model) -> int:
+def min_unique_steps(model: Model) -> int:
     """Return the smallest even number of steps per cycle for which each step has one solution.
 
     It is 0 except for bonds that weaken, which need dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, with k_t = mu_s

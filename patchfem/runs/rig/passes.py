@@ -1,6 +1,6 @@
 """Passes that complete a coupled run after its solution is known, in the order of `rig.run_coupled`.
 
-In: `Coupled`, a run between two of its passes. Out: the same with further measures, its outcome and
+In: `CoupledRun`, a run between two of its passes. Out: the same with further measures, its outcome and
 its notes; at the end its warnings and the other data of its Result.
 """
 
@@ -25,7 +25,7 @@ from .solution import Solution
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Coupled:
+class CoupledRun:
     """Coupled run between two of the passes that complete its result.
 
     - inputs: plan and pressed patch.
@@ -76,11 +76,11 @@ class Coupled:
         )
 
 
-def add_level_measures(run: Coupled) -> Coupled:
+def add_level_measures(run: CoupledRun) -> CoupledRun:
     """Add the measures over all drive levels to a run."""
     solution = run.solution
     model = run.model
-    measures = levels.level_measures(
+    measures = levels.compute_level_measures(
         model.rig,
         solution.levels,
         solution.probe,
@@ -91,7 +91,7 @@ def add_level_measures(run: Coupled) -> Coupled:
     return replace(run, measures=run.measures | measures)
 
 
-def add_outcome(run: Coupled) -> Coupled:
+def add_outcome(run: CoupledRun) -> CoupledRun:
     """Add the outcome and the stated errors to a run.
 
     A run whose energy balance has too large an error gets the outcome NOT_CONVERGED.
@@ -120,7 +120,7 @@ def add_outcome(run: Coupled) -> Coupled:
     return replace(run, outcome=outcome, measures=measures)
 
 
-def add_reasons(run: Coupled) -> Coupled:
+def add_reasons(run: CoupledRun) -> CoupledRun:
     """Add to a run the reason for each measure that lacks a value."""
     measures = run.measures
     window = run.solution.window
@@ -140,7 +140,7 @@ def add_reasons(run: Coupled) -> Coupled:
     return replace(run, measures=measures | missing)
 
 
-def add_decay(run: Coupled) -> Coupled:
+def add_decay(run: CoupledRun) -> CoupledRun:
     """Add the decay curve of a release to its run, with the errors due to the mesh.
 
     The ringing has the mesh error at its amplitude in the last stick interval. Notes name the results
@@ -153,9 +153,9 @@ def add_decay(run: Coupled) -> Coupled:
         return run
     coarse = run.inputs.coarse[0]
     causes = {}
-    half_swing = _half_swing_of_ringing(run)
+    half_swing = _ringing_amplitude(run)
     if half_swing > 0:
-        errors, causes["ring_frequency and ring_damping"] = decays.mesh_errors_of_stuck_mode(
+        errors, causes["ring_frequency and ring_damping"] = decays.estimate_stuck_mode_mesh_errors(
             np.array([half_swing]),
             run.measures["ring_frequency"].value,
             model,
@@ -168,7 +168,7 @@ def add_decay(run: Coupled) -> Coupled:
             measures[name] = replace(measure, error=max(measure.error, float(error)))
         run = replace(run, measures=measures)
     if run.decay is not None:
-        errors, causes["the decay curve"] = decays.mesh_errors_of_stuck_mode(
+        errors, causes["the decay curve"] = decays.estimate_stuck_mode_mesh_errors(
             run.decay.amplitude, run.decay.frequency[-1], model, run.patch, coarse
         )
         decay = run.decay._replace(
@@ -177,14 +177,14 @@ def add_decay(run: Coupled) -> Coupled:
         )
         run = replace(run, decay=decay)
     engine = ENGINES[run.numerics.engine]
-    notes = decays.slip_sentences(
+    notes = decays.describe_unknown_mesh_errors(
         causes,
         lambda: engine.coarser_in_space(model, run.numerics, run.patch, coarse, solution),
     )
     return replace(run, notes=tuple(notes))
 
 
-def _half_swing_of_ringing(run: Coupled) -> float:
+def _ringing_amplitude(run: CoupledRun) -> float:
     """Return half the range of the output [m] in the last stick interval with ringing."""
     solution = run.solution
     window = solution.window
@@ -197,22 +197,22 @@ def _half_swing_of_ringing(run: Coupled) -> float:
     return np.ptp(window.output[window.time >= sticks[-1][0]]) / 2
 
 
-def add_limit_cycles(run: Coupled) -> Coupled:
+def add_limit_cycles(run: CoupledRun) -> CoupledRun:
     """Add the unstable limit cycle of a self-excited mode to a run."""
     measures, notes = flutter.find_limit_cycles(run)
     return replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
 
 
-def collect_warnings(run: Coupled) -> list:
+def collect_warnings(run: CoupledRun) -> list:
     """Return the warnings of a coupled run."""
     plan = run.inputs.plan
     return [
         *motion_warnings.collect_warnings(run),
-        *motion_warnings.peak_at_an_end(run, lambda: plan.modes(plan.chain)),
+        *motion_warnings.warn_of_peak_at_sweep_end(run, lambda: plan.modes(plan.chain)),
     ]
 
 
-def outcome_on_pieces(run: Coupled) -> Outcome:
+def judge_outcome_on_pieces(run: CoupledRun) -> Outcome:
     """Return the outcome of a run, or LEAVES_CONTACT if a piece slides off the other."""
     model = run.model
     response = run.solution.response
@@ -223,12 +223,12 @@ def outcome_on_pieces(run: Coupled) -> Outcome:
     return outcome
 
 
-def collect_extra(run: Coupled, measures: dict, notes: list) -> dict:
+def collect_extra(run: CoupledRun, measures: dict, notes: list) -> dict:
     """Collect settings, levels, events, energies and notes of a run for its Result.
 
     Parameters
     ----------
-    run : Coupled
+    run : CoupledRun
     measures : dict
         Final measures by name.
     notes : list
@@ -244,7 +244,7 @@ def collect_extra(run: Coupled, measures: dict, notes: list) -> dict:
     for name in ("at", "at_error", "tail"):
         extra.pop(name, None)
     if solution.levels:
-        extra["levels"] = levels.in_scene_units(rig, solution.levels)
+        extra["levels"] = levels.convert_to_scene_units(rig, solution.levels)
     snapshots = solution.snapshots
     if rig.friction.has_partial_slip and snapshots and "faces" in snapshots[0]:
         extra["shots"] = snapshots

@@ -36,7 +36,7 @@ from .reading import Reader
 from .solution import Solution, mode_stiffness, normal_load
 
 # measures of the motion, which exist without an interface
-OF_MOTION = (
+MOTION_MEASURES = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
     "absolute_acceleration_fundamental",
@@ -68,7 +68,7 @@ def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     Solution
     """
     elements_of_model = RigidElements(model, numerics, patch)
-    return _run(PieceReader(model, numerics, patch, elements_of_model), 0, say, progress)
+    return _run_drive(PieceReader(model, numerics, patch, elements_of_model), 0, say, progress)
 
 
 def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -89,10 +89,10 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
     Solution
     """
     elements_of_model = YieldingElements(model, numerics, patch)
-    return _run(PieceReader(model, numerics, patch, elements_of_model), frames, say, progress)
+    return _run_drive(PieceReader(model, numerics, patch, elements_of_model), frames, say, progress)
 
 
-def _run(reader, frames: int, say, progress) -> Solution:
+def _run_drive(reader, frames: int, say, progress) -> Solution:
     """Run the drive of a rig from event to event, one level after the other."""
     rig = reader.model.rig
     numerics = reader.numerics
@@ -178,7 +178,9 @@ class PieceReader(Reader):
         Strips that slide independently have a single loop, that of their mean, from samples. `more`
         returns all other measures.
         """
-        return IntegratedMeasures(loops=(_strips_loop(run, drive),) if self.apart else run.loops)
+        return IntegratedMeasures(
+            loops=(_compute_strips_loop(run, drive),) if self.apart else run.loops
+        )
 
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
         """Return the measures that the engine computes between events, for the evaluation.
@@ -190,7 +192,7 @@ class PieceReader(Reader):
         run, drive, stuck
             See `Reader.further_fields`.
         """
-        values = measures_from_reading(
+        values = evaluate_reading(
             run.reading,
             run.ledger,
             sine=is_sinusoidal(drive),
@@ -200,11 +202,11 @@ class PieceReader(Reader):
         )
         known = {name: None if np.isnan(value) else float(value) for name, value in values.items()}
         if not self.has_friction:
-            return {"known": {name: known[name] for name in (*OF_MOTION, "drift_per_cycle")}}
+            return {"known": {name: known[name] for name in (*MOTION_MEASURES, "drift_per_cycle")}}
         if not self.rigid:
             return {"known": known}
         if self.apart:
-            known = {name: known[name] for name in (*OF_MOTION, "slip_start_phase")}
+            known = {name: known[name] for name in (*MOTION_MEASURES, "slip_start_phase")}
         lost = run.ledger["friction"]
         return {
             "known": known,
@@ -303,7 +305,7 @@ class PieceReader(Reader):
             fields["extra"] = tail
         numerics = self.numerics
         modes = self.model.rig.modes
-        unsettled = still_changes(
+        unsettled = may_still_change(
             run.amplitudes,
             numerics.window,
             self.model.accuracy.tolerance,
@@ -317,7 +319,7 @@ class PieceReader(Reader):
         return fields
 
 
-def _strips_loop(run, drive) -> InterfaceLoop:
+def _compute_strips_loop(run, drive) -> InterfaceLoop:
     """Compute the friction loop of a patch from the samples of its independent strips.
 
     The samples are those on both sides of every event; the yaw does work in addition to the mean
@@ -340,7 +342,7 @@ def _strips_loop(run, drive) -> InterfaceLoop:
     )
 
 
-def still_changes(extremes, window: int, tolerance: float, decay: float) -> bool:
+def may_still_change(extremes, window: int, tolerance: float, decay: float) -> bool:
     """Return whether a motion may still change by more than a fraction of the tolerance.
 
     It may if the run is too short, or if the extremes of its cycles have moved too much in the last
@@ -437,13 +439,13 @@ class YieldingElements:
         self.contact = None
         begin = perf_counter()
         if len(rig.modes.interfaces) > 1:
-            parts = interface.own_elements(model, numerics.meshed)
+            parts = interface.make_interface_elements(model, numerics.meshed)
         else:
-            self.contact = interface.contact_model(model, numerics, patch)
+            self.contact = interface.make_single_contact(model, numerics, patch)
             parts = [self.contact.element]
         lengths = [element.length for element in parts if element.limit > 0]
         self.held = 1e-3 * min(lengths, default=0.0)
-        self.groups = tuple(elements_of_law(element) for element in parts)
+        self.groups = tuple(make_elements_of_law(element) for element in parts)
         for _ in range(numerics.pairs):
             self.groups = tuple(map(elements.merge_elements, self.groups))
         if numerics.joined:
@@ -491,7 +493,7 @@ def coulomb_limits(model, patch) -> list:
     return [(float(static), float(kinetic))]
 
 
-def elements_of_law(element) -> elements.Elements:
+def make_elements_of_law(element) -> elements.Elements:
     """Return the elastic-plastic elements of a law of parallel springs and sliders."""
     count = int(element.numbers[1])
     return elements.make_elements(
@@ -499,7 +501,7 @@ def elements_of_law(element) -> elements.Elements:
     )
 
 
-def measures_from_reading(
+def evaluate_reading(
     reading: Reading, book: dict, *, sine: bool, whole: bool, stiffness, size
 ) -> dict:
     """Return measures of the motion and the first interface of one or many event-driven runs.
@@ -534,7 +536,7 @@ def measures_from_reading(
         "acceleration_distortion": distortion_ratio(first, third, size) if has_waves else none,
         "drift_per_cycle": reading.drift,
         "slip_start_phase": reading.start if sine else none,
-        "work_check": _work_check(reading, book),
+        "work_check": _compute_work_check(reading, book),
         "slip_amplitude": loop.slip_range / 2,
         "friction_force_peak": loop.max_force,
         "stick_fraction": stick_fraction(loop.stuck_time, reading.span),
@@ -559,7 +561,7 @@ def _loop_measures(reading: Reading, stiffness, *, sine: bool) -> dict:
     return measures | {"secant_stiffness": secant}
 
 
-def _work_check(reading: Reading, book: dict):
+def _compute_work_check(reading: Reading, book: dict):
     """Return the relative difference [1] of friction work from samples and energy balance.
 
     The samples are the ends of the time intervals; their work follows from the trapezoidal rule.

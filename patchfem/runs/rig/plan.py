@@ -30,24 +30,24 @@ from ..cost import (
 from . import lists
 from .costs import (
     MARCH_HISTORY,
-    exact_cost,
-    exact_words,
-    history_parts,
+    count_intervals_by_cause,
+    count_kept_samples,
+    describe_element_engine,
+    history_memory_parts,
     interface_load,
-    kept_samples,
-    ringing_and_events,
-    smooth_cost,
+    predict_exact_cost,
+    predict_smooth_cost,
     steps_per_cycle,
 )
 from .engines import ENGINES, PIECES, choose_steady_method
-from .numerics import choose
+from .numerics import choose_numerics
 
 # memory [bytes] per pair of modes: matrices, shapes and workspace of the eigenvalue solver
-MODE_PAIR = 125.0
+MODE_PAIR_BYTES = 125.0
 # memory [bytes] per pair of unknown harmonics: Jacobian of the balance, and the factors for its error
-HARMONIC_PAIR = 94.0
-MODE_NODE = 24.0  # memory per shear mode and node of the interface [bytes]
-DRIVE_ROW = 400.0  # memory per row of a recorded drive [bytes]
+HARMONIC_PAIR_BYTES = 94.0
+MODE_NODE_BYTES = 24.0  # memory per shear mode and node of the interface [bytes]
+DRIVE_ROW_BYTES = 400.0  # memory per row of a recorded drive [bytes]
 STEADY_CODES = {
     "exact": EVENT_CODE,
     "piecewise": EVENT_CODE,
@@ -55,12 +55,16 @@ STEADY_CODES = {
     "march": None,
 }
 # expected points of a curve over frequency, including those at its bends and peak
-N_MAPPED_POINTS = 160  # by maps of events or yields, or by marches
-N_BALANCE_POINTS = 250  # by harmonic balance, which follows the folds of the curve
+N_MAPPED_POINTS = 160  # points of a curve by maps of events or yields, or by marches
+N_BALANCE_POINTS = (
+    250  # points of a curve by harmonic balance, which follows the folds of the curve
+)
 N_MARCHED_CYCLES = 400.0  # expected cycles of all marches until a motion repeats
 # relative distance from the frequency of a mode within which a sine excites a resonance
-RESONANT = 0.02
-STIFF = 10.0  # ratio of link to modal stiffness, from which a link holds the block nearly at rest
+RESONANCE_TOL = 0.02
+MIN_STIFF_LINK_RATIO = (
+    10.0  # ratio of link to modal stiffness, from which a link holds the block nearly at rest
+)
 
 
 def chain(rig) -> dict:
@@ -70,7 +74,7 @@ def chain(rig) -> dict:
     )
 
 
-def held_stiffness(chain: dict, number: int = 0) -> float:
+def stuck_interface_stiffness(chain: dict, number: int = 0) -> float:
     """Return the tangential stiffness [N/m] of an interface while it sticks.
 
     The links of the interface act in series. The result is inf if all are rigid, and 0 for a law that
@@ -95,7 +99,7 @@ def held_stiffness(chain: dict, number: int = 0) -> float:
     return 1 / soft if soft else inf
 
 
-def stuck_stiffness(rig, chain: dict) -> np.ndarray:
+def stuck_stiffnesses(rig, chain: dict) -> np.ndarray:
     """Return the tangential stiffness (i,) [N/m] of all interfaces of a rig while they stick.
 
     Strips have the stiffness of their patch; without friction the stiffness is inf.
@@ -104,7 +108,7 @@ def stuck_stiffness(rig, chain: dict) -> np.ndarray:
     stiffness = np.full(len(rig.modes.interfaces), inf)
     if n_interfaces:
         for k in range(stiffness.size):
-            stiffness[k] = held_stiffness(chain, k if k < n_interfaces else 0)
+            stiffness[k] = stuck_interface_stiffness(chain, k if k < n_interfaces else 0)
     return stiffness
 
 
@@ -115,7 +119,7 @@ def remove_expected_joint(rig, links: dict):
     of a chain. If these are stiffer than the modes allow, the Rig is unchanged.
     """
     try:
-        bare_rig = rig.structure.without_joint(held_stiffness(links))
+        bare_rig = rig.structure.without_joint(stuck_interface_stiffness(links))
         structure = replace(bare_rig.structure, without_joint=rig.structure.without_joint)
         return replace(bare_rig, structure=structure)
     except PatchfemError:
@@ -130,7 +134,7 @@ def mode_frequencies(rig, chain: dict) -> list:
     """
     modes = rig.modes
     rows = rig.modes.interfaces
-    stiffness = stuck_stiffness(rig, chain)
+    stiffness = stuck_stiffnesses(rig, chain)
     if modes.lateral_faces is not None:
         rows = np.concatenate([rows, modes.lateral_faces])
         stiffness = np.tile(stiffness, 2)
@@ -148,7 +152,7 @@ def mode_frequencies(rig, chain: dict) -> list:
     return frequencies
 
 
-def cost(model: Model, points: int) -> Cost:
+def predict_cost(model: Model, points: int) -> Cost:
     """Return the predicted cost of a coupled run.
 
     Parameters
@@ -158,12 +162,12 @@ def cost(model: Model, points: int) -> Cost:
         Nodes of the interface; 1 without a patch.
     """
     rig = model.rig
-    numerics = choose(model)
+    numerics = choose_numerics(model)
     count = len(rig.structure.frequencies)
     rows = len(getattr(rig.drive.signal, "breaks", ())) if not rig.drive.signal.segments else 0
     rows_key = "drive.file" if "file" in rig.drive.waveform.required_keys else "drive.duration"
-    structure = MemoryPart(MODE_PAIR * count**2, f"{count} modes", "structure")
-    drive = MemoryPart(DRIVE_ROW * rows, f"{rows} rows of the drive", rows_key)
+    structure = MemoryPart(MODE_PAIR_BYTES * count**2, f"{count} modes", "structure")
+    drive = MemoryPart(DRIVE_ROW_BYTES * rows, f"{rows} rows of the drive", rows_key)
     words = ()
     if model.friction is not None:
         words = tuple(_motion_sentences(model, numerics))
@@ -180,7 +184,7 @@ def _motion_sentences(model: Model, numerics) -> list:
     return bond_sum_sentences(model, numerics)
 
 
-def march_cost(model: Model, numerics, points: int) -> Cost:
+def predict_march_cost(model: Model, numerics, points: int) -> Cost:
     """Return the predicted cost of a march with its coarse runs.
 
     Parameters
@@ -199,7 +203,7 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
     parts = []
     modes = 0
     if is_bonds and lists.has_list(model, numerics):
-        entries, seconds = lists.list_cost(model, numerics)
+        entries, seconds = lists.estimate_list_cost(model, numerics)
         each = seconds / steps
         sizes["bond_list_about"] = int(entries)
         parts.append(
@@ -210,31 +214,35 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
         each = cost_model.predict_shear_mode_step(
             points, modes, load_varies=rig.friction.load_varies or model.grooves is not None
         )
-        each += _step(rig, f) if is_bonds else 0.0
+        each += _point_step_seconds(rig, f) if is_bonds else 0.0
         parts.append(
-            MemoryPart(MODE_NODE * modes * points, f"{modes} shear modes", "accuracy.shear_modes")
+            MemoryPart(
+                MODE_NODE_BYTES * modes * points, f"{modes} shear modes", "accuracy.shear_modes"
+            )
         )
     else:
-        each = _step_without_modes(model, numerics, points, is_bonds=is_bonds)
+        each = _step_seconds_without_modes(model, numerics, points, is_bonds=is_bonds)
     # the cost includes runs with a half and a quarter of the steps, and each halving of the step
-    passes = 0.75 + 2 ** (lists.halvings(model) + 1) - 1
+    passes = 0.75 + 2 ** (lists.count_step_halvings(model) + 1) - 1
     times = {
         "motion": steps * passes * each,
-        "histories": cost_model.KEPT_SAMPLE_SECONDS * kept_samples(numerics),
+        "histories": cost_model.KEPT_SAMPLE_SECONDS * count_kept_samples(numerics),
     }
-    parts += history_parts(model, numerics, MARCH_HISTORY)
-    return Cost(times, tuple(parts), (), int(steps * passes), sizes) + march_code(model).cost()
+    parts += history_memory_parts(model, numerics, MARCH_HISTORY)
+    return (
+        Cost(times, tuple(parts), (), int(steps * passes), sizes) + choose_march_code(model).cost()
+    )
 
 
-def march_code(model: Model) -> EngineCode:
+def choose_march_code(model: Model) -> EngineCode:
     """Return the cost of the compiled code of a march."""
     return SHEAR_MARCH_CODE if model.partial_slip else MARCH_CODE
 
 
-def _step_without_modes(model: Model, numerics, points: int, *, is_bonds: bool) -> float:
+def _step_seconds_without_modes(model: Model, numerics, points: int, *, is_bonds: bool) -> float:
     """Return the CPU time [s] of a march step without shear modes and list of bonds."""
     rig = model.rig
-    step = _step(model.rig, model.friction)
+    step = _point_step_seconds(model.rig, model.friction)
     if model.grooves is not None:
         return cost_model.GROOVE_STEP_SECONDS
     if is_bonds:
@@ -248,7 +256,7 @@ def _step_without_modes(model: Model, numerics, points: int, *, is_bonds: bool) 
     return step
 
 
-def _step(rig, friction) -> float:
+def _point_step_seconds(rig, friction) -> float:
     """Return the CPU time [s] of a march step of interfaces without mesh.
 
     Growing bonds and several interfaces take longer than a single mode and interface.
@@ -269,7 +277,7 @@ def _step(rig, friction) -> float:
     )
 
 
-def groups(model: Model) -> dict:
+def compute_groups(model: Model) -> dict:
     """Return the dimensionless groups of a motion that have a meaning, by name.
 
     - D: static friction limit over largest force of the drive, D of (2.3) at resonance.
@@ -290,7 +298,7 @@ def groups(model: Model) -> dict:
             sizes["D_kinetic"] = kinetic / push
     ratio = rig.first_mode.frequency * rig.drive.signal.period if rig.drive.frequency else inf
     if abs(ratio - 1) < 0.2:
-        bound = 4 / pi * kinetic * _lever(rig)
+        bound = 4 / pi * kinetic * _participation_ratio(rig)
         sizes |= {"knee_force": bound} if rig.drive.force else {"knee": bound / rig.first_mode.mass}
     if f is not None and f.bond_length and f.stiffness is None and rig.drive.signal.moving:
         sizes["drive_amplitude_over_bond_length"] = (
@@ -314,16 +322,16 @@ def drive_and_knee(model: Model) -> dict:
         or rig.drive.force
         or rig.modes.omega.size != 1
         or not rig.structure.lists_modes
-        or abs(rig.first_mode.frequency * rig.drive.signal.period - 1) > RESONANT
+        or abs(rig.first_mode.frequency * rig.drive.signal.period - 1) > RESONANCE_TOL
     ):
         return {}
-    knee = groups(model).get("knee")
+    knee = compute_groups(model).get("knee")
     if not knee:
         return {}
     return {"drive": float(find_max_acceleration(rig.drive.signal)), "knee": float(knee)}
 
 
-def _lever(rig) -> float:
+def _participation_ratio(rig) -> float:
     """Return the ratio of slide to base participation of the first mode that is not rigid.
 
     This is the effect of friction over that of the drive. It is 1 if the scene lists no modes, or if
@@ -335,7 +343,7 @@ def _lever(rig) -> float:
     return slide / base if rig.structure.lists_modes and base > 0 else 1.0
 
 
-def first_words(rig, sizes: dict, chain: dict) -> list:
+def describe_stick(rig, sizes: dict, chain: dict) -> list:
     """Return the sentence of a plan on whether friction stops a driven block.
 
     The sentence on D of a single mode says whether the block sticks, and whether friction bounds its
@@ -345,9 +353,9 @@ def first_words(rig, sizes: dict, chain: dict) -> list:
     ----------
     rig : Rig
     sizes : dict
-        `groups`.
+        `compute_groups`.
     chain : dict
-        Links of the stiffness chain by name; a link that is not STIFF compared with the mode lets a
+        Links of the stiffness chain by name; a link that is not MIN_STIFF_LINK_RATIO compared with the mode lets a
         stuck block move.
     """
     d = sizes.get("D")
@@ -358,8 +366,8 @@ def first_words(rig, sizes: dict, chain: dict) -> list:
         or rig.drive.kind == "free"
     ):
         return []
-    d *= _lever(rig)
-    limit = STIFF * rig.first_mode.stiffness
+    d *= _participation_ratio(rig)
+    limit = MIN_STIFF_LINK_RATIO * rig.first_mode.stiffness
     links = {name: link for name, link in chain.items() if not isinstance(link, str)}
     soft = [name for name, link in links.items() if name != "mode" and link < limit]
     if d >= 1 and soft:
@@ -370,7 +378,7 @@ def first_words(rig, sizes: dict, chain: dict) -> list:
     if d >= 1:
         return [f"D = {d:.3g} >= 1: friction should hold the block, so that it sticks"]
     if "D_kinetic" in sizes:  # the kinetic friction limit acts while the block slides
-        sliding = sizes["D_kinetic"] * _lever(rig)
+        sliding = sizes["D_kinetic"] * _participation_ratio(rig)
         return [
             f"D = {d:.3g} is below 1, so that the block slips; with the kinetic coefficient {_describe_sliding(sliding)}"
         ]
@@ -390,20 +398,20 @@ def _describe_sliding(d: float) -> str:
 def bond_sum_sentences(model: Model, numerics) -> list:
     """Return the sentences of a plan on the sum over bonds or the engine of elements."""
     if not law_has_trait(model.friction.law, "bonds"):
-        return [] if PIECES.lacks(model) else exact_words(model, numerics.engine)
-    choice = lists.choose_quadrature(model, numerics)
+        return [] if PIECES.lacks(model) else describe_element_engine(model, numerics.engine)
+    choice = lists.choose_bond_sum(model, numerics)
     sentences = ["method of the sum over bonds: " + choice.describe()]
     if choice.engine == "recursion":
         return sentences
-    if lists.lists_grow(model):
+    if lists.is_list_growing(model):
         remedy = 'set friction.reading = "stretch" to give the block a finite stiffness'
-        if lists.is_held_without_stiffness(model):
+        if lists.is_stuck_without_stiffness(model):
             remedy = "set friction.order above 0 to give the block a stiffness"
         sentences.append(
-            f"{_held_words(model)}, so that the computing time is known within a factor of about 12 only; "
+            f"{_describe_stuck_block(model)}, so that the computing time is known within a factor of about 12 only; "
             f"{remedy}"
         )
-    elif (seconds := lists.list_cost(model, numerics)[1]) > parameters.MAX_LIST_SECONDS:
+    elif (seconds := lists.estimate_list_cost(model, numerics)[1]) > parameters.MAX_LIST_SECONDS:
         sentences.append(
             "`run` will refuse this scene: the sum over the list of bonds would need a computing time of about "
             f"{seconds:.0f} s, more than the limit of {parameters.MAX_LIST_SECONDS:.0f} s"
@@ -411,9 +419,9 @@ def bond_sum_sentences(model: Model, numerics) -> list:
     return sentences
 
 
-def _held_words(model: Model) -> str:
+def _describe_stuck_block(model: Model) -> str:
     """Describe how bonds stop a block whose list of bonds grows."""
-    if lists.is_held_without_stiffness(model):
+    if lists.is_stuck_without_stiffness(model):
         held = "bonds of order 0 keep the block from sliding, but they have no stiffness"
     elif lists.is_stuck_after_release(model):
         held = "with the law as printed in the report the block does not slide after its release"
@@ -427,7 +435,7 @@ def _held_words(model: Model) -> str:
     )
 
 
-def steady_cost(model: Model, numerics, points: int) -> Cost:
+def predict_steady_cost(model: Model, numerics, points: int) -> Cost:
     """Return the predicted cost of a curve of steady motions with its coarse runs.
 
     Parameters
@@ -449,17 +457,19 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
     passes = (
         1.0 + 0.5 * n_soft
     )  # each interface adds a run on a coarser mesh with half the elements
-    seconds = places * passes * _steady_point(model, finder.name)
+    seconds = places * passes * _steady_point_seconds(model, finder.name)
     if rig.structure.richer_rig is not None:
-        seconds += places * _steady_point(replace(model, rig=rig.structure.richer_rig), finder.name)
+        seconds += places * _steady_point_seconds(
+            replace(model, rig=rig.structure.richer_rig), finder.name
+        )
     harmonics = model.accuracy.harmonics or 0
-    balance = HARMONIC_PAIR * (2.0 * harmonics * max(1, len(rig.friction.interfaces))) ** 2
+    balance = HARMONIC_PAIR_BYTES * (2.0 * harmonics * max(1, len(rig.friction.interfaces))) ** 2
     parts = (MemoryPart(balance, f"{harmonics} harmonics", "accuracy.harmonics"),)
-    code = STEADY_CODES[finder.engine] or march_code(model)
+    code = STEADY_CODES[finder.engine] or choose_march_code(model)
     return Cost({"motion": seconds}, parts, (), places) + code.cost()
 
 
-def _steady_point(model: Model, by: str) -> float:
+def _steady_point_seconds(model: Model, by: str) -> float:
     """Estimate the CPU time [s] per point of a curve of steady motions.
 
     by: name of the method that finds the motion.
@@ -476,7 +486,7 @@ def _steady_point(model: Model, by: str) -> float:
         return N_MARCHED_CYCLES * steps_per_cycle(model) * cost_model.GROOVE_STEP_SECONDS
     if not rig.friction.interfaces:
         return cost_model.CLOSED_POINT_SECONDS
-    ringing, events = ringing_and_events(model)
+    ringing, events = count_intervals_by_cause(model)
     return (
         cost_model.MAPPED_POINT_SECONDS
         + cost_model.EVENT_SECONDS * len(rig.structure.frequencies) * events
@@ -509,9 +519,9 @@ def _smooth_law_seconds(rig) -> float:
 
 # function of each engine: (model, numerics, points) -> Cost
 COSTS = {
-    "exact": exact_cost,
-    "piecewise": exact_cost,
-    "smooth": smooth_cost,
-    "march": march_cost,
-    "harmonic": steady_cost,
+    "exact": predict_exact_cost,
+    "piecewise": predict_exact_cost,
+    "smooth": predict_smooth_cost,
+    "march": predict_march_cost,
+    "harmonic": predict_steady_cost,
 }

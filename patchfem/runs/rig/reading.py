@@ -20,7 +20,7 @@ from ...response.measures import slip_round_off, window_amplitudes, window_end_v
 from ...response.outcome import estimate_steady
 from ...response.rows import NEEDS_RUN, LastCycles, compute_measures, find_definition
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
-from .solution import Solution, last_cycle_amplitude, mode_stiffness, normal_load
+from .solution import Solution, find_release_amplitude, mode_stiffness, normal_load
 
 
 class Reader:
@@ -110,7 +110,7 @@ class Reader:
         values = compute_measures(last_cycles)
         if model.rig.drive.kind == "free":
             name = "relative_displacement_amplitude"
-            values[name] = last_cycle_amplitude(window, drive.period, values[name])
+            values[name] = find_release_amplitude(window, drive.period, values[name])
         return values
 
     def sticks(self, run) -> bool:
@@ -209,7 +209,7 @@ class Reader:
             return {}
         errors = dict.fromkeys([row.name for row in rows], 0.0)
         for parity in (0, 1):
-            thinned = replace(run, response=_between_reversals(run.response, parity))
+            thinned = replace(run, response=_thin_between_reversals(run.response, parity))
             coarse_values = self.values(thinned, drive)
             for row in rows:
                 change = values[row.name] - coarse_values[row.name]
@@ -286,7 +286,7 @@ class Reader:
         return Level(size, self.sticks(run), values, errors)
 
 
-def _between_reversals(histories, parity: int):
+def _thin_between_reversals(histories, parity: int):
     """Remove every second sample of histories, except the ends and all reversals.
 
     parity: 0 or 1, remainder of the index of the samples that are kept on division by 2.
@@ -323,7 +323,7 @@ class FrictionWorks(NamedTuple):
     exchanged: float
 
 
-def friction_works(response, work: float) -> FrictionWorks:
+def compute_friction_works(response, work: float) -> FrictionWorks:
     """Return the friction work of a run from samples and from its energy balance.
 
     Parameters

@@ -20,14 +20,14 @@ from ...response.settling import slip_period
 from ...structure.drive_sizes import find_decay_rate, is_periodic
 from ..results.result import Result, RunInputs
 from . import levels, lists, passes
-from .costs import MOST_STEPS
+from .costs import MAX_MARCH_STEPS
 from .engines import ENGINES
 from .fields import collect_frames
 from .motion_warnings import collect_notes
-from .numerics import Numerics, choose
-from .passes import Coupled
+from .numerics import Numerics, choose_numerics
+from .passes import CoupledRun
 from .runner import Runner
-from .solution import Solution, curve_measures
+from .solution import Solution, compute_curve_measures
 from .solve import refuse_long_run
 
 # outcomes of runs that ended early, whose outcome more steps do not change
@@ -69,9 +69,9 @@ def run_coupled(inputs: RunInputs) -> Result:
             "the drive excites no mode, so nothing moves; give a mode the key `base` or `output`",
             "drive.kind",
         )
-    numerics = choose(model)
+    numerics = choose_numerics(model)
     refuse_long_run(model, numerics)
-    run = Coupled(inputs, *run_refined(inputs, numerics))
+    run = CoupledRun(inputs, *run_refined(inputs, numerics))
     if run.solution.levels:
         run = passes.add_level_measures(run)
     run = passes.add_outcome(run)
@@ -91,7 +91,7 @@ def run_coupled(inputs: RunInputs) -> Result:
         fields = collect_frames(model, run.numerics, inputs.patch, solution)
     return Result(
         plan=inputs.plan,
-        outcome=passes.outcome_on_pieces(run),
+        outcome=passes.judge_outcome_on_pieces(run),
         measures=measures,
         response=solution.response,
         window=solution.window,
@@ -122,12 +122,12 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
     runner = Runner(inputs, numerics)
     solution = runner.solve(numerics)
     inputs.seconds.update({"march": solution.seconds} | (solution.prepare or {}))
-    n_cycles = _cycles_of_slip_period(model, numerics, solution)
+    n_cycles = _count_slip_period_cycles(model, numerics, solution)
     if n_cycles > numerics.window:
         numerics = replace(numerics, window=n_cycles)
         solution = runner.solve(numerics)
     if not inputs.estimate or solution.outcome is Outcome.NOT_CONVERGED:
-        measures = add_errors(solution.values, size=size) | curve_measures(solution.extra)
+        measures = add_errors(solution.values, size=size) | compute_curve_measures(solution.extra)
         return RefinedRun(numerics, solution, measures)
     space_runs = [
         *engine.coarser_in_space(model, numerics, inputs.patch, inputs.coarse[0], solution),
@@ -141,14 +141,14 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         measures = add_errors(
             solution.values, *errors, min_relative_error=engine.min_relative_error, size=size
         )
-        if numerics.pairs and not errors_met(measures, model.accuracy.tolerance):
+        if numerics.pairs and not are_errors_met(measures, model.accuracy.tolerance):
             return run_refined(inputs, numerics.finer())
         coarser_runs = [*time_runs, *space_runs]
         if solution.levels or model.rig.drive.kind == "free":
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)
         displacement_errors.append(measures["relative_displacement_amplitude"].error or 0.0)
         run = RefinedRun(numerics, solution, measures)
-        if not time_runs or _cannot_refine(model, run, displacement_errors):
+        if not time_runs or _is_refinement_finished(model, run, displacement_errors):
             break
         runner.solutions[numerics] = solution
         runner.error_seconds += solution.seconds
@@ -158,13 +158,13 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
     if runner.error_seconds:
         inputs.seconds["error"] = runner.error_seconds
     extra = solution.extra
-    left_open = _error_parts(solution, coarser_runs, errors, runner.solutions)
+    left_open = _split_errors_by_cause(solution, coarser_runs, errors, runner.solutions)
     solution = replace(solution, extra=extra | {"left_open": left_open})
-    measures |= curve_measures(extra, runner.solutions.values())
+    measures |= compute_curve_measures(extra, runner.solutions.values())
     return RefinedRun(numerics, solution, measures)
 
 
-def _cycles_of_slip_period(model, numerics, solution) -> int:
+def _count_slip_period_cycles(model, numerics, solution) -> int:
     """Return the number of cycles that contain a whole stick-slip period on a belt.
 
     No periodic drive sets the period of such a run. It is 0 if there is no period, or if the run is
@@ -178,12 +178,12 @@ def _cycles_of_slip_period(model, numerics, solution) -> int:
     return n_cycles if 2 * n_cycles <= numerics.cycles else 0
 
 
-def errors_met(measures: dict, tolerance: float) -> bool:
+def are_errors_met(measures: dict, tolerance: float) -> bool:
     """Return whether the errors of all measures are within the tolerance or their floors."""
     return all(measure.error_ratio(tolerance) <= 1 for measure in measures.values())
 
 
-def _cannot_refine(model, run: RefinedRun, displacement_errors: list) -> bool:
+def _is_refinement_finished(model, run: RefinedRun, displacement_errors: list) -> bool:
     """Return whether the displacement is accurate enough, or no finer run is possible.
 
     Parameters
@@ -203,10 +203,10 @@ def _cannot_refine(model, run: RefinedRun, displacement_errors: list) -> bool:
     book = run.solution.book
     return (
         "steps_per_cycle" in numerics.pinned
-        or steps > MOST_STEPS
+        or steps > MAX_MARCH_STEPS
         or steps * numerics.cycles > MAX_RUN_STEPS
         or lists.is_list_too_long(model, numerics, book)
-        or lists.doubling_does_not_help(book, displacement_errors)
+        or lists.has_doubling_failed(book, displacement_errors)
         or run.solution.outcome in EARLY_OUTCOMES
     )
 
@@ -234,7 +234,9 @@ def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -
     return replace(solution, levels=level_results, coarser=tuple(pairs))
 
 
-def _error_parts(solution: Solution, coarser_runs: list, errors: list, solutions: dict) -> dict:
+def _split_errors_by_cause(
+    solution: Solution, coarser_runs: list, errors: list, solutions: dict
+) -> dict:
     """Return the contributions to the errors by cause, and the observed orders of convergence.
 
     Parameters

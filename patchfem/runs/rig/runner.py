@@ -116,7 +116,7 @@ class Runner:
         if "at" not in solution.extra or name not in solution.values:
             return None
         peak_frequency = solution.extra["at"].omega / (2 * np.pi)
-        if motion_warnings.nearest_sweep_end(peak_frequency, drive.low, drive.high) is not None:
+        if motion_warnings.find_sweep_end(peak_frequency, drive.low, drive.high) is not None:
             return None
         change = abs(solution.values[name] / fine.values[name] - 1)
         return solution if change <= OTHER_PEAK_RATIO else None

@@ -14,7 +14,7 @@ from ...response.measures import compute_harmonic, measure_half_range
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...structure.drive_sizes import find_drive_omega, has_full_cycle
 
-NO_PEAK = "the output does not move at any of the swept frequencies, so there is no peak"
+NO_PEAK_REASON = "the output does not move at any of the swept frequencies, so there is no peak"
 PEAK_SHIFT_FACTOR = (
     3.0  # safety factor on the frequency shift of a peak by a coarser mesh or fewer modes
 )
@@ -35,7 +35,7 @@ class Solution:
     - contact: contact model of the run.
     - prepare: CPU seconds of the preparation by name.
     - message: reason of an early end.
-    - levels, probe: levels of the drive, and the function that `levels.onset` calls.
+    - levels, probe: levels of the drive, and the function that `levels.find_onset` calls.
     - log: events of the exact engine.
     - notes: warnings of the method.
     - held: slip in a cycle [m] below which the interface sticks in it.
@@ -87,7 +87,7 @@ class CycleLoop(NamedTuple):
     work: float
 
 
-def seen_by_gauge(model, raw: Solution) -> Solution:
+def replace_output_by_gauge(model, raw: Solution) -> Solution:
     """Return a Solution with the motion of a gauge instead of the accelerometer.
 
     Displacement and histories are those of the gauge. How the motion settles is judged at the
@@ -100,7 +100,7 @@ def seen_by_gauge(model, raw: Solution) -> Solution:
     window = _histories_at_gauge(raw.window, gauge)
     amplitude = measure_half_range(window.time, window.output, window.output_rate)
     if model.rig.drive.kind == "free":
-        amplitude = last_cycle_amplitude(window, model.rig.drive.signal.period, amplitude)
+        amplitude = find_release_amplitude(window, model.rig.drive.signal.period, amplitude)
     ratio = max(1.0, amplitude / max(raw.values[name], 1e-300))
     errors = raw.errors and raw.errors | {name: ratio * raw.errors.get(name, 0.0)}
     values = {key: value for key, value in raw.values.items() if key != f"{name}_steady"}
@@ -128,7 +128,7 @@ def _histories_at_gauge(histories: Response, gauge) -> Response:
     )
 
 
-def last_cycle_amplitude(window, period: float, window_amplitude: float) -> float:
+def find_release_amplitude(window, period: float, window_amplitude: float) -> float:
     """Return the amplitude [m] of a release in its last whole cycle.
 
     Parameters
@@ -161,7 +161,9 @@ def mode_stiffness(model, window) -> float:
     return first_mode.stiffness
 
 
-def sampled_loop(window, drive, work: float, force: complex | None = None) -> CycleLoop | None:
+def compute_sampled_loop(
+    window, drive, work: float, force: complex | None = None
+) -> CycleLoop | None:
     """Compute the friction loop of equally spaced samples by the trapezoidal rule.
 
     Parameters
@@ -189,7 +191,7 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> Cy
     return CycleLoop(slide, force, work)
 
 
-def curve_measures(extra: dict, coarser=()) -> dict:
+def compute_curve_measures(extra: dict, coarser=()) -> dict:
     """Return the frequency [Hz] of the largest amplitude of a curve, with its error.
 
     It has no value if the amplitude is 0.
@@ -209,7 +211,7 @@ def curve_measures(extra: dict, coarser=()) -> dict:
     if "at_error" not in extra:
         return {}
     if extra["at_error"] is None:
-        return {"peak_frequency": Measure(None, "Hz", None, 0.0, reason=NO_PEAK)}
+        return {"peak_frequency": Measure(None, "Hz", None, 0.0, reason=NO_PEAK_REASON)}
     peak_frequency = float(extra["at"].omega / (2 * np.pi))
     peaks = [run.extra["at"].omega / (2 * np.pi) for run in coarser if "at" in run.extra]
     shift = float(np.abs(np.array(peaks) - peak_frequency).max(initial=0.0))

@@ -5,7 +5,7 @@ can compute; the module of an engine is loaded when it solves.
 """
 
 from . import costs, lists, march, pieces, smooth
-from .solution import Solution, seen_by_gauge
+from .solution import Solution, replace_output_by_gauge
 from .steady import steady
 
 
@@ -40,12 +40,12 @@ def solve(model, numerics, patch, frames: int = 0, say=None, progress=None) -> S
     solution = run(model, numerics, patch, frames, say, progress)
     if model.rig.modes.gauge is None:
         return solution
-    return seen_by_gauge(model, solution)
+    return replace_output_by_gauge(model, solution)
 
 
 def refuse_long_run(model, numerics) -> None:
     """Raise Missing if the engine of a run would take too much CPU time."""
     if numerics.engine in ("exact", "piecewise"):
-        costs.refuse_endless(model)
+        costs.refuse_long_exact_run(model)
     elif numerics.engine == "march":
         lists.refuse_long_list(model, numerics)

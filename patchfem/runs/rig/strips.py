@@ -14,7 +14,7 @@ def strip_loads(patch) -> np.ndarray:
     return patch.strips.force.sum(axis=1)
 
 
-def run_of_strips(done, patch):
+def average_march(done, patch):
     """Average a march of independent strips over the patch."""
     loads = strip_loads(patch)
     offsets = patch.strips.offsets
@@ -23,12 +23,12 @@ def run_of_strips(done, patch):
         done,
         response=average_strips(done.response, loads, offsets),
         window=window,
-        marks=tuple(mark_as_one(mark, patch) for mark in done.marks),
+        marks=tuple(average_mark(mark, patch) for mark in done.marks),
         step_force=(window.force[1:] + window.force[:-1]) / 2,
     )
 
 
-def mark_as_one(mark, patch):
+def average_mark(mark, patch):
     """Average one stored cycle of independent strips over the patch."""
     window = average_strips(mark.window, strip_loads(patch), patch.strips.offsets)
     return replace(mark, window=window, step_force=(window.force[1:] + window.force[:-1]) / 2)
@@ -63,7 +63,7 @@ def average_strips(response, loads, offsets):
     )
 
 
-def lateral_motion(patch, window, period: float) -> tuple:
+def estimate_lateral_motion(patch, window, period: float) -> tuple:
     """Return the lateral amplitude and the lengthened slide path of a patch that yaws.
 
     The yaw rotates the patch about its middle: a point slides by s_j along x, and by the rotation

@@ -7,11 +7,11 @@ In: a Model, its Numerics and its pressed patch. Out: a VaryingLoadModel of
 from ...dynamics.march import varying_load as march
 from ...effects import is_bond_list
 from ...model.model import Model
-from .lists import choose_quadrature
+from .lists import choose_bond_sum
 from .numerics import Numerics
 
 
-def make_rubbing(model: Model, numerics: Numerics):
+def make_varying_load_law(model: Model, numerics: Numerics):
     """Return the friction law of a model for a contact with varying normal load."""
     f = model.friction
     if f.law == "coulomb":
@@ -22,11 +22,11 @@ def make_rubbing(model: Model, numerics: Numerics):
         return march.make_elastic_plastic_law(f.static, f.bond_length)
     if not is_bond_list(f):
         return march.make_bonds_law(model.bonds)
-    choice = choose_quadrature(model, numerics)
+    choice = choose_bond_sum(model, numerics)
     return march.make_bond_lists_law(model.bonds, choice.reach(f.order), choice.merge)
 
 
-def varying_load_model(model: Model, numerics: Numerics, patch):
+def make_varying_load_model(model: Model, numerics: Numerics, patch):
     """Return the contact model of a rig whose normal load changes.
 
     Parameters
@@ -42,7 +42,7 @@ def varying_load_model(model: Model, numerics: Numerics, patch):
         load = model.point.evaluate
     else:
         sets = march.make_contact_sets(patch, model.patch.loading.rotational_stiffness)
-    law = make_rubbing(model, numerics)
+    law = make_varying_load_law(model, numerics)
     shear = None
     if model.partial_slip:
         weight = patch.pieces.interface.weight

@@ -111,7 +111,9 @@ class _Motion:
             model.grooves is None
             and model.wear.friction is None
             and not strips_slide_independently(model)
-            and slips_uniformly(model, model.rig is not None and numerics.choose(model).per_point)
+            and slips_uniformly(
+                model, model.rig is not None and numerics.choose_numerics(model).per_point
+            )
         )
         self.last: CycleSlip | None = None
 

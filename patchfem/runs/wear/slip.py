@@ -138,7 +138,7 @@ def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
 
 def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
     """Return the slip path of the nodes in the last cycle of a rig."""
-    chosen = numerics.choose(model)
+    chosen = numerics.choose_numerics(model)
     is_uniform = slips_uniformly(model, chosen.per_point and model.grooves is None)
     solution = solve.solve(model, chosen, patch, 0 if is_uniform else frames)
     amplitude = Measure(solution.values["relative_displacement_amplitude"], "m", 0.0)

@@ -14,10 +14,10 @@ from patchfem.dynamics import bond_list_model, points_model
 from patchfem.dynamics.march.march import march
 from patchfem.friction import Bonds, Quadrature, RequestedEngine, choose_engine, unsupported_reason
 from patchfem.friction.bonds.engines import ENGINES
-from patchfem.runs import choose as settings_of
-from patchfem.runs.rig.interface import contact_model
-from patchfem.runs.rig.lists import choose_quadrature
-from patchfem.runs.rig.motion_warnings import created_warning
+from patchfem.runs import choose_numerics as settings_of
+from patchfem.runs.rig.interface import make_single_contact
+from patchfem.runs.rig.lists import choose_bond_sum
+from patchfem.runs.rig.motion_warnings import warn_of_created_energy
 from patchfem.scene import scene
 from patchfem.scene.keys.tables import Accuracy
 
@@ -209,8 +209,11 @@ def test_exact_engine_of_a_scene(tmp_path):
     ):
         found = build(rig(tmp_path, engine, reading, order))
         numerics = settings_of(found)
-        assert contact_model(found, numerics, None).contact == f"dynamics.interfaces.{kind}_kernels"
-        used = choose_quadrature(found, numerics).engine
+        assert (
+            make_single_contact(found, numerics, None).contact
+            == f"dynamics.interfaces.{kind}_kernels"
+        )
+        used = choose_bond_sum(found, numerics).engine
         assert used == engine or engine == "auto"
         assert any(f"method of the sum over bonds: {used}" in line for line in plan(found).verdict)
 
@@ -222,13 +225,13 @@ def test_refuses_engines_that_cannot_sum_the_law(tmp_path):
 
 def test_exact_warning_of_energy_created(tmp_path):
     found = build(rig(tmp_path))
-    assert created_warning(found, {"created": 2e-6, "dissipated": 1e-3}, 4) == [
+    assert warn_of_created_energy(found, {"created": 2e-6, "dissipated": 1e-3}, 4) == [
         "the law as printed in the report created 5e-07 J per cycle, 0.2 % of the energy that it dissipated; "
         'with friction.reading = "stretch" no energy is created'
     ]
-    assert created_warning(found, {"created": 0.0, "dissipated": 1e-3}, 4) == []
+    assert warn_of_created_energy(found, {"created": 0.0, "dissipated": 1e-3}, 4) == []
     assert (
-        created_warning(
+        warn_of_created_energy(
             build(rig(tmp_path, reading="stretch")), {"created": 1.0, "dissipated": 1.0}, 4
         )
         == []

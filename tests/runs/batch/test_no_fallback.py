@@ -99,7 +99,7 @@ def test_always_a_batch_computes_its_cases_together(name, single_runs):
         ("lumped.lanes", lane_runs, "collect_runs"),
         ("lumped.lumped", lumped, "assemble_results"),
         ("lumped.sheared", sheared, "YieldingElements"),
-        ("gathered", gathered, "few_points"),
+        ("gathered", gathered, "reduce_to_few_points"),
     ],
 )
 def test_always_a_fault_of_a_batch_stands_in_the_notes_of_its_cases(

@@ -33,7 +33,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "surface.files.raw.MAX_BYTES": "bytes of the file of a scan, also after decompression",
     "surface.samples.MAX_LENGTH": "length of a trace [m]",
     "model.slide.MAX_STEPS_PER_CYCLE": "steps per cycle of a prescribed slide",
-    "runs.rig.costs.MOST_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
+    "runs.rig.costs.MAX_MARCH_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
     "dynamics.march.capacity.MAX_ENTRIES": "number of entries in a list of bonds",
     "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",
     "runs.rig.costs.MAX_EXACT_SECONDS": "estimated time to compute a whole motion by the event-to-event method [s]",

@@ -43,7 +43,7 @@ from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
 from ...accuracy_warnings import Finding, tolerance_warnings
 from ...results.notes import MAX_WORK_CHECK
 from ...results.result import shorten_file_names
-from ...rig.engines import unused_settings
+from ...rig.engines import describe_unused_settings
 from ...rig.motion_warnings import law_warnings
 from ..case_results import CaseResults
 
@@ -301,7 +301,11 @@ def _insert_warnings(
 
 def _model_warnings(model, engine: str) -> list:
     """Return the warnings on a model that do not depend on its run."""
-    return [*model.source.remarks, *unused_settings(model, engine), *model.rig.structure.notes]
+    return [
+        *model.source.remarks,
+        *describe_unused_settings(model, engine),
+        *model.rig.structure.notes,
+    ]
 
 
 class _SteadyOutcomes(NamedTuple):

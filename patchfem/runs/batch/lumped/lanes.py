@@ -27,7 +27,7 @@ from ....effects import is_bond_list, law_has_trait
 from ....model.model import Model
 from ....model.similar_models import SimilarModels, collect_columns, select_models
 from ....scene.rules.accuracy import list_fixed_settings
-from ...rig.motion_warnings import creeping_note
+from ...rig.motion_warnings import note_on_creep
 from .. import one_by_one
 from ..case_results import CaseResults
 from . import lumped
@@ -127,7 +127,7 @@ def _solve_cases(models: Sequence[Model], say) -> CaseResults:
             speed = float(speeds[case])
             if speed not in notes:
                 changed = friction.model_copy(update={"reference_speed": speed})
-                notes[speed] = creeping_note(changed)
+                notes[speed] = note_on_creep(changed)
             results.notes[case] = [*notes[speed]]
     return results
 

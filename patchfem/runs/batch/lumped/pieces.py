@@ -24,10 +24,10 @@ from ...rig.costs import count_merges
 from ...rig.engines import EXACT, PIECES, choose_engine
 from ...rig.pieces import (
     RigidElements,
-    elements_of_law,
+    evaluate_reading,
     find_steady_motion,
-    measures_from_reading,
-    still_changes,
+    make_elements_of_law,
+    may_still_change,
 )
 from .columns import MAIN_MEASURE, N_FINAL_WINDOWS, Runs
 from .threads import in_threads
@@ -91,7 +91,7 @@ def make_case(model, n_merges: int = 0) -> Case:
     if is_rigid_law(model):
         return Case(model, RigidElements(model, None, None).groups, 0.0, model.point.load)
     element = make_law(model.friction, model.point.load).element(model.point.load)
-    group = elements_of_law(element)
+    group = make_elements_of_law(element)
     for _ in range(n_merges):
         group = merge_elements(group)
     return Case(model, (group,), 1e-3 * element.length, model.point.load)
@@ -193,7 +193,7 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
             steady
             and not is_rigid
             and not is_stuck[k]
-            and still_changes(run.amplitudes, window, tolerance[k], decay)
+            and may_still_change(run.amplitudes, window, tolerance[k], decay)
         ):
             motion = find_steady_motion(rig.modes, rig.drive.signal, case.groups, run)
             is_lost[k] |= motion is None
@@ -202,7 +202,7 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
     stiffness = np.array([model.rig.first_mode.stiffness for model in models])
     acceleration = np.array([find_max_acceleration(model.rig.drive.signal) for model in models])
     with np.errstate(all="ignore"):
-        values = measures_from_reading(
+        values = evaluate_reading(
             reading, energies, sine=True, whole=True, stiffness=stiffness, size=acceleration
         )
     work, loss = energies["friction"], energies["friction"]

@@ -25,17 +25,17 @@ from ....formatting import format_length
 from ....response.errors import finer_errors
 from ....response.measures import compute_acceleration_peak
 from ....response.spectrum import harmonic_measures, odd_harmonics
-from ..interface import contact_model
-from ..reading import Reader, friction_works
-from ..solution import Solution, sampled_loop
+from ..interface import make_single_contact
+from ..reading import Reader, compute_friction_works
+from ..solution import Solution, compute_sampled_loop
 from .curves import COLUMN_MEASURES, HARMONIC_ROUND_OFF, CurvePoint, describe_instability
 
-SAMPLES = (
+SAMPLES_PER_CYCLE = (
     4096  # number of samples of a cycle from which the measures of a steady motion are computed
 )
 
 
-class Balanced(Reader):
+class BalanceReader(Reader):
     """Evaluator of one cycle of a motion found by harmonic balance.
 
     turns: reversals of this cycle, see `SteadyMotion.turns`.
@@ -50,7 +50,7 @@ class Balanced(Reader):
         """
         return IntegratedMeasures(
             drift=0.0,
-            friction_works=friction_works(run.response, run.ledger["friction"]),
+            friction_works=compute_friction_works(run.response, run.ledger["friction"]),
             reversals=(tuple(turn[:2] for turn in self.turns),) if self.turns else (),
         )
 
@@ -62,7 +62,7 @@ class Balanced(Reader):
         run, drive, stuck
             See `Reader.further_fields`.
         """
-        loop = sampled_loop(run.window, drive, run.ledger["friction"])
+        loop = compute_sampled_loop(run.window, drive, run.ledger["friction"])
         if not self.has_friction or not self.turns:
             return {"loop": loop}
         _, turn_forces, turn_slips = zip(*self.turns)
@@ -114,7 +114,7 @@ class BalanceFinder:
         rig = model.rig
         parts = []
         if model.friction is not None:
-            parts.append((0, contact_model(model, numerics, patch)))
+            parts.append((0, make_single_contact(model, numerics, patch)))
         if rig.springs.interlock is not None:
             parts.append((0, Interlock(*rig.springs.interlock)))
         if rig.springs.cubic is not None:
@@ -148,13 +148,13 @@ class BalanceFinder:
             values,
             motion,
             drive,
-            lambda motion, sine: self._compute_measures(motion, sine, 2 * SAMPLES).values,
+            lambda motion, sine: self._compute_measures(motion, sine, 2 * SAMPLES_PER_CYCLE).values,
         )
         if "slip_start_phase" in errors:
             errors["slip_start_phase"] = max(
-                min(errors["slip_start_phase"], np.pi / 2), 2 * np.pi / SAMPLES
+                min(errors["slip_start_phase"], np.pi / 2), 2 * np.pi / SAMPLES_PER_CYCLE
             )
-            errors["stick_fraction"] = max(errors.get("stick_fraction", 0.0), 4 / SAMPLES)
+            errors["stick_fraction"] = max(errors.get("stick_fraction", 0.0), 4 / SAMPLES_PER_CYCLE)
         name, _ = balanced_regime(motion)
         held = name == "stuck"
         extra = {
@@ -263,7 +263,7 @@ class BalanceFinder:
 
     def _read(self, motion, drive) -> dict:
         """Return the measures of a point of a curve of steady motions."""
-        response = make_cycle_response(motion, self.modes, drive, SAMPLES)
+        response = make_cycle_response(motion, self.modes, drive, SAMPLES_PER_CYCLE)
         row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {
             COLUMN_MEASURES["amplitude"]: motion.amplitude(row),
@@ -272,7 +272,7 @@ class BalanceFinder:
         }
         return {name: value for name, value in values.items() if value is not None}
 
-    def _compute_measures(self, motion, drive, samples: int = SAMPLES) -> CycleMeasures:
+    def _compute_measures(self, motion, drive, samples: int = SAMPLES_PER_CYCLE) -> CycleMeasures:
         """Compute the measures of a steady motion from samples of its cycle."""
         response = make_cycle_response(motion, self.modes, drive, samples)
         book = find_cycle_energies(motion, self.modes) | {
@@ -288,7 +288,7 @@ class BalanceFinder:
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
         run = EngineResult(response, response, extremes, np.zeros(1), book)
-        reader = Balanced(self.model, self.numerics, self.patch, steps=samples)
+        reader = BalanceReader(self.model, self.numerics, self.patch, steps=samples)
         reader.turns = motion.turns()
         return CycleMeasures(reader.values(run, drive), response, book)
 

@@ -12,7 +12,7 @@ import numpy as np
 from ....core import NotConverged, Outcome, SineDrive
 from ....dynamics.curve_points import sample_adaptively
 from ....response.levels import LEVEL_MEASURES, Level
-from ..solution import seen_by_gauge
+from ..solution import replace_output_by_gauge
 
 # name of the measure in each column of a curve of steady motions
 COLUMN_MEASURES = {
@@ -22,11 +22,11 @@ COLUMN_MEASURES = {
     "acceleration_distortion": "acceleration_distortion",
 }
 # relative error of the measures of an event-driven motion from a given state, which has round-off only
-READ = 1e-9
+EXACT_RELATIVE_ERROR = 1e-9
 HARMONIC_ROUND_OFF = (
     1e-12  # round-off of the third harmonic of the acceleration relative to the first
 )
-POINTS = 121  # number of points of a curve over frequency before its refinement
+N_SWEEP_POINTS = 121  # number of points of a curve over frequency before its refinement
 # The neighbourhood of a peak ends where the curve falls below this fraction of the peak; no other peak may
 # exceed this fraction.
 PEAK_END_RATIO = 0.8
@@ -34,7 +34,9 @@ MAX_PEAK_FRACTION = (
     0.75  # largest width of a neighbourhood over that of the sweep; a wider one is not used
 )
 N_START_POINTS = 7  # number of points of the curve in a neighbourhood before its refinement
-SHARE = 0.01  # largest relative error of the linear interpolation between the points of a curve
+INTERPOLATION_TOL = (
+    0.01  # largest relative error of the linear interpolation between the points of a curve
+)
 
 
 class CurvePoint(NamedTuple):
@@ -75,13 +77,13 @@ class CurvePoint(NamedTuple):
         )
 
 
-def exact_errors(values: dict, residual: float) -> dict:
+def estimate_exact_errors(values: dict, residual: float) -> dict:
     """Estimate the errors of an event-driven steady motion from its residual over a period."""
     errors = {}
     for name, value in values.items():
         if value is not None:
             round_off = HARMONIC_ROUND_OFF * (name == "acceleration_distortion")
-            errors[name] = abs(value) * (READ + residual) + round_off
+            errors[name] = abs(value) * (EXACT_RELATIVE_ERROR + residual) + round_off
     return errors
 
 
@@ -126,7 +128,7 @@ def make_missing_point(drive) -> CurvePoint:
     return CurvePoint(drive, {}, {}, "not found", np.nan, False, Outcome.NOT_CONVERGED)
 
 
-class Followed:
+class TracedCurve:
     """Curve of steady motions over frequency, whose points a subclass computes.
 
     leaves: see `top.refine_peak`.
@@ -156,8 +158,8 @@ class Followed:
 def trace_curve(modes, drive, find) -> list:
     """Compute the curve of steady motions of a sweep, refined where it bends.
 
-    The curve starts with POINTS frequencies and those of the modes, and is refined until linear
-    interpolation between its points has an error of at most SHARE.
+    The curve starts with N_SWEEP_POINTS frequencies and those of the modes, and is refined until linear
+    interpolation between its points has an error of at most INTERPOLATION_TOL.
 
     Parameters
     ----------
@@ -175,21 +177,23 @@ def trace_curve(modes, drive, find) -> list:
         point = find(sine, before and before[1].near)
         return point.values.get(COLUMN_MEASURES["amplitude"], np.nan), point
 
-    samples = sample_adaptively(sample, start_frequencies(modes, drive), SHARE)[1]
+    samples = sample_adaptively(sample, choose_start_frequencies(modes, drive), INTERPOLATION_TOL)[
+        1
+    ]
     return [point for _, point in samples]
 
 
-def start_frequencies(modes, drive) -> np.ndarray:
+def choose_start_frequencies(modes, drive) -> np.ndarray:
     """Return the frequencies [Hz] with which the curve of a sweep starts.
 
-        These are POINTS frequencies over the range, and the frequencies of the modes in it, where a peak may
+        These are N_SWEEP_POINTS frequencies over the range, and the frequencies of the modes in it, where a peak may
     be narrower than the spacing.
     """
     space = np.geomspace if drive.logarithmic else np.linspace
     ends = sorted((drive.low, drive.high))
     own = modes.omega / (2 * np.pi)
     places = np.union1d(
-        space(*ends, drive.starts or POINTS), own[(own > ends[0]) & (own < ends[1])]
+        space(*ends, drive.starts or N_SWEEP_POINTS), own[(own > ends[0]) & (own < ends[1])]
     )
     places = places[np.append(True, np.diff(places) > 1e-9 * places[1:])]
     return places if drive.low < drive.high else places[::-1]
@@ -205,7 +209,7 @@ def sweep_around_peak(drive, curve: dict, at: float):
     ----------
     drive : SweepDrive
     curve : dict
-        Columns from `curve_columns`.
+        Columns from `tabulate_curve`.
     at : float
         Frequency of the largest amplitude [Hz].
 
@@ -235,7 +239,7 @@ def sweep_around_peak(drive, curve: dict, at: float):
     return replace(drive, low=float(low), high=float(high), starts=N_START_POINTS)
 
 
-def index_of_largest(points) -> int:
+def find_largest_point(points) -> int:
     """Return the index of the curve point with the largest stable amplitude.
 
     If no point is stable, all points count.
@@ -245,7 +249,7 @@ def index_of_largest(points) -> int:
     return int(np.argmax(np.where(lasting | ~lasting.any(), sizes, -2.0)))
 
 
-def curve_columns(points, folds=()) -> dict:
+def tabulate_curve(points, folds=()) -> dict:
     """Return the columns of a curve of steady motions by name; NaN for unbounded motions.
 
     The columns are frequency [Hz], level [m s-2], regime, multiplier, and each of COLUMN_MEASURES with
@@ -266,11 +270,11 @@ def curve_columns(points, folds=()) -> dict:
     }
 
 
-def motion_at_levels(finder, drive):
+def solve_levels(finder, drive):
     """Find the steady motions at all levels of a drive, and return the largest.
 
     Each level starts from the motion at the previous one, as in a test. The Solution has the curve
-    of all levels, the Level of each, and a probe for `levels.onset`. A level without a steady
+    of all levels, the Level of each, and a probe for `levels.find_onset`. A level without a steady
     motion is kept as not converged with a note.
 
     Raises
@@ -292,8 +296,8 @@ def motion_at_levels(finder, drive):
             points.append(make_missing_point(sine))
             failures.append(failure)
             continue
-        points.append(curve_point(sine, seen_by_gauge(finder.model, solution), near))
-        if best is None or index_of_largest(points) == len(points) - 1:
+        points.append(curve_point(sine, replace_output_by_gauge(finder.model, solution), near))
+        if best is None or find_largest_point(points) == len(points) - 1:
             best = solution, sine
         failures += [solution.message] if solution.message else []
     if best is None:
@@ -308,7 +312,7 @@ def motion_at_levels(finder, drive):
     notes = tuple(f"{lost_ones}{one}" for one in failures[:1])
     return replace(
         best[0],
-        extra=best[0].extra | {"curve": curve_columns(points), "at": best[1]},
+        extra=best[0].extra | {"curve": tabulate_curve(points), "at": best[1]},
         probe=probe,
         levels=tuple(point.level for point in points),
         notes=(*best[0].notes, *notes),

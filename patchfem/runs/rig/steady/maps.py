@@ -25,9 +25,9 @@ from ..pieces import PieceReader, RigidElements, YieldingElements
 from .curves import (
     COLUMN_MEASURES,
     CurvePoint,
-    Followed,
+    TracedCurve,
     describe_instability,
-    exact_errors,
+    estimate_exact_errors,
     trace_curve,
 )
 
@@ -68,7 +68,7 @@ class PeriodicMotion(NamedTuple):
         return float(np.abs(self.multipliers).max(initial=0.0))
 
 
-class Maps(Followed):
+class MapFinder(TracedCurve):
     """Finder of steady motions by the map of a period.
 
     `repeating` finds a motion; it starts from `near` if there are several.
@@ -135,7 +135,7 @@ class Maps(Followed):
             message=message,
             steady=(None, None),
             extra=extra,
-            errors=exact_errors(raw.values, motion.error),
+            errors=estimate_exact_errors(raw.values, motion.error),
             book=raw.book | {"iterations": float(motion.iterations)},
         ), motion.near
 
@@ -166,7 +166,7 @@ class Maps(Followed):
         return CurvePoint(
             drive=drive,
             values=values,
-            errors=exact_errors(values, motion.error),
+            errors=estimate_exact_errors(values, motion.error),
             regime=motion.words,
             multiplier=motion.size,
             stable=motion.lasting,
@@ -192,7 +192,7 @@ def _curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
     return {name: value for name, value in values.items() if value is not None}
 
 
-class YieldFinder(Maps):
+class YieldFinder(MapFinder):
     """Finder of steady motions with elastic-plastic elements, by the map from yield to yield."""
 
     name = "yields"
@@ -223,7 +223,7 @@ class YieldFinder(Maps):
         )
 
 
-class EventFinder(Maps):
+class EventFinder(MapFinder):
     """Finder of steady motions with Coulomb friction or without friction, by the event map."""
 
     name = "events"
@@ -278,7 +278,7 @@ class EventFinder(Maps):
         return CurvePoint(
             drive,
             values,
-            exact_errors(values, 0.0),
+            estimate_exact_errors(values, 0.0),
             "sliding",
             float(np.exp(self.decay * drive.period)),
             True,

@@ -19,25 +19,29 @@ from ....response.measures import peak_sampling_errors
 from ..interface import make_contact
 from ..march import MarchReader
 from ..solution import Solution
-from .curves import CurvePoint, Followed, curve_point, describe_instability, trace_curve
+from .curves import CurvePoint, TracedCurve, curve_point, describe_instability, trace_curve
 
 START_STEPS = 256  # steps per cycle of the first march of a law that is not set-valued
 MAX_STEPS = 4096  # largest number of steps per cycle to which a march is refined
-EXACT = 1024  # samples per cycle for a set-valued law, whose steps are chosen by their error
-LEAD = 30  # number of cycles from rest after which a lifted mass is assumed to stay in its grooves
-READ = 1e-9  # relative error of the measures due to round-off at the ends of steps
-LOOSE = (
+SET_VALUED_SAMPLES = (
+    1024  # samples per cycle for a set-valued law, whose steps are chosen by their error
+)
+N_CYCLES_IN_GROOVES = (
+    30  # number of cycles from rest after which a lifted mass is assumed to stay in its grooves
+)
+STEP_END_ERROR = 1e-9  # relative error of the measures due to round-off at the ends of steps
+PERIODIC_TOL = (
     1e-6  # largest change from cycle to cycle over the amplitude, up to which a motion is periodic
 )
 # Error of the Floquet multipliers due to the step length of a march; a motion is unstable only if a
 # multiplier exceeds 1 by more.
-ROUGH = 1e-2
+MULTIPLIER_TOL = 1e-2
 
 
-def solution_beyond_grooves(model, numerics, patch, drive, contact) -> Solution | None:
+def solve_leaving_grooves(model, numerics, patch, drive, contact) -> Solution | None:
     """Return the Solution of a motion whose lifted mass leaves its grooves, or None.
 
-    The mass must leave the grooves within LEAD cycles of a march from rest. The errors are the differences
+    The mass must leave the grooves within N_CYCLES_IN_GROOVES cycles of a march from rest. The errors are the differences
     from a march with half the steps.
 
     Parameters
@@ -56,17 +60,24 @@ def solution_beyond_grooves(model, numerics, patch, drive, contact) -> Solution 
     rig = model.rig.with_signal(drive, levels=DriveLevels(), waveform=SINE_WAVEFORM)
     for steps in (START_STEPS, START_STEPS // 2):
         done = engine.march(
-            rig.modes, drive, contact, LEAD, steps, 1, rig.springs.travel, keeps_samples=False
+            rig.modes,
+            drive,
+            contact,
+            N_CYCLES_IN_GROOVES,
+            steps,
+            1,
+            rig.springs.travel,
+            keeps_samples=False,
         )
         if done.outcome is not Outcome.LEAVES_GROOVES:
             return None
-        few = replace(numerics, cycles=LEAD, steps=steps, window=1)
+        few = replace(numerics, cycles=N_CYCLES_IN_GROOVES, steps=steps, window=1)
         reader = MarchReader(replace(model, rig=rig), few, patch, contact)
         solutions.append(reader.solution(done, perf_counter() - begin))
     fine, half = solutions
     errors = {}
     for name, value in fine.values.items():
-        errors[name] = abs(value - half.values.get(name, 0.0)) + READ * abs(value)
+        errors[name] = abs(value - half.values.get(name, 0.0)) + STEP_END_ERROR * abs(value)
     extra = {"regime": "leaves its grooves", "multipliers": np.zeros(0)}
     return replace(fine, errors=errors, extra=extra)
 
@@ -86,7 +97,7 @@ class CycleReading(NamedTuple):
     is_stuck: bool
 
 
-class MarchFinder(Followed):
+class MarchFinder(TracedCurve):
     """Finder of steady motions over grooves, by a march whose initial state is corrected."""
 
     # the points of the curve have errors as large as the tolerance, so that a refined peak cannot be better
@@ -99,7 +110,9 @@ class MarchFinder(Followed):
         self.frames = frames
         self.contact = make_contact(model, numerics, patch)
         exact = self.contact.set_valued
-        self.steps = model.accuracy.steps_per_cycle or (EXACT if exact else START_STEPS)
+        self.steps = model.accuracy.steps_per_cycle or (
+            SET_VALUED_SAMPLES if exact else START_STEPS
+        )
         self.numerics = replace(numerics, cycles=1.0, window=1)
         engine.warm_up(model.rig.modes, model.rig.drive.signal, self.contact, say)
 
@@ -115,7 +128,7 @@ class MarchFinder(Followed):
         left = orbits.march_to_periodic(run)
         if run.outcome is not None and run.outcome is not Outcome.EXCEEDS_TRAVEL:
             raise NotConverged(run.message)
-        if run.outcome is None and left > LOOSE:
+        if run.outcome is None and left > PERIODIC_TOL:
             raise NotConverged(
                 f"no periodic motion was found within {orbits.MAX_CYCLES} cycles: "
                 f"the motion still changes by {left:.2g} of its amplitude from one cycle to the next; "
@@ -142,7 +155,7 @@ class MarchFinder(Followed):
             return self._point(drive, near)
         except NotConverged:
             if (
-                gone := solution_beyond_grooves(
+                gone := solve_leaving_grooves(
                     self.model, self.numerics, self.patch, drive, self.contact
                 )
             ) is None:
@@ -177,14 +190,14 @@ class MarchFinder(Followed):
             regime = "stuck"
             outcome = run.outcome or Outcome.STUCK
         message = run.message
-        if not is_stuck and np.abs(multipliers).max(initial=0.0) > 1 + ROUGH:
+        if not is_stuck and np.abs(multipliers).max(initial=0.0) > 1 + MULTIPLIER_TOL:
             outcome = Outcome.NOT_CONVERGED
             message = describe_instability(multipliers)
             regime = f"{regime}, unstable"
         errors = {}
         for key, value in values.items():
             if value is not None:
-                error = abs(value - half.get(key, value)) + abs(value) * (left + READ)
+                error = abs(value - half.get(key, value)) + abs(value) * (left + STEP_END_ERROR)
                 errors[key] = error + peak_errors.get(key, 0.0)
         if "slip_start_phase" in errors:
             errors["slip_start_phase"] = (

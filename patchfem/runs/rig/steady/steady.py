@@ -11,7 +11,7 @@ from ....core import NotConverged, SineDrive
 from ..engines import PIECES, choose_steady_method
 from ..solution import Solution
 from . import balance, maps, marched
-from .curves import motion_at_levels
+from .curves import solve_levels
 from .top import solve_peak
 
 
@@ -58,5 +58,5 @@ def _solve_drive(finder, model) -> Solution:
     if isinstance(drive, SineDrive):
         return finder.point(drive)[0]
     if model.rig.drive.levels.amplitudes:
-        return motion_at_levels(finder, drive)
+        return solve_levels(finder, drive)
     return solve_peak(*finder.curve(drive), finder)

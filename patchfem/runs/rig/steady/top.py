@@ -15,20 +15,22 @@ import numpy as np
 
 from ....core import NotConverged
 from ....response.errors import absolute_change
-from ..solution import Solution, seen_by_gauge
-from .curves import COLUMN_MEASURES, curve_columns, index_of_largest
+from ..solution import Solution, replace_output_by_gauge
+from .curves import COLUMN_MEASURES, find_largest_point, tabulate_curve
 
 AMPLITUDE = COLUMN_MEASURES["amplitude"]
 MAX_ADDED_POINTS = 40  # largest number of points that refine a peak
 # Fraction of the largest amplitude above which a resonance curve is assumed concave; that of a single mode is
 # concave from 0.816 on.
-CAP = 0.8
+MIN_CONCAVE_FRACTION = 0.8
 POSITION_TOL = 3e-4  # error of the position of a peak due to round-off, over the width of the peak
-NEAREST = 1e-9  # distance over the length of the curve, below which two points are identical
-TENTH = 0.9  # fraction of the height of a peak at which its width is measured
+IDENTICAL_POINT_TOL = (
+    1e-9  # distance over the length of the curve, below which two points are identical
+)
+WIDTH_HEIGHT_FRACTION = 0.9  # fraction of the height of a peak at which its width is measured
 # Shift of a peak over (its width times the relative error of its height): the width is measured a tenth of
 # the height below the peak, so that an error of a tenth shifts the peak by its width.
-SHIFT = 10.0
+ERROR_SHIFT_FACTOR = 10.0
 
 
 class RefinedPeak(NamedTuple):
@@ -66,10 +68,10 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
     points = list(points)
     for left in range(MAX_ADDED_POINTS, -1, -1):
         s = np.cumsum([0.0, *(finder.curve_distance(a, b) for a, b in pairwise(points))])
-        y = _heights(points)
+        y = _point_amplitudes(points)
         lasting = np.array([point.stable for point in points])
-        best = index_of_largest(points)
-        reach, at = concave_bounds(s, y)
+        best = find_largest_point(points)
+        reach, at = bound_concave_curve(s, y)
         if not y[best] > 0 or not reach.size:
             return RefinedPeak(points, best, 0.0)
         if lasting.any():
@@ -80,7 +82,7 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
         if not np.isfinite(y[max(best - 1, 0) : best + 2]).all():
             return RefinedPeak(points, best, np.inf)
         above = max(float(reach.max()) - y[best], 0.0)
-        reach[np.diff(s) <= NEAREST * s[-1]] = 0.0
+        reach[np.diff(s) <= IDENTICAL_POINT_TOL * s[-1]] = 0.0
         k = int(np.argmax(reach))
         if reach[k] <= y[best] * (1 + finder.leaves[0] * tolerance):
             share = max(finder.leaves[1] * tolerance, POSITION_TOL)
@@ -112,7 +114,7 @@ def _choose_added_point(s, y, best: int, share: float) -> tuple | None:
     if not 0 < best < len(s) - 1:
         return None
     want = share * min(
-        _width(y[best:], s[best:] - s[best]), _width(y[best::-1], s[best] - s[best::-1])
+        _peak_width(y[best:], s[best:] - s[best]), _peak_width(y[best::-1], s[best] - s[best::-1])
     )
     before = s[best] - s[best - 1]
     after = s[best + 1] - s[best]
@@ -127,25 +129,25 @@ def _choose_added_point(s, y, best: int, share: float) -> tuple | None:
     return (best, off / after) if off > 0 else (best - 1, 1 + off / before)
 
 
-def _width(y, away) -> float:
+def _peak_width(y, away) -> float:
     """Return the distance from a peak at which the curve falls to a fraction of it.
 
     away: distances (k,) of the values y (k,).
     """
-    low = ~(y >= TENTH * y[0])
+    low = ~(y >= WIDTH_HEIGHT_FRACTION * y[0])
     return float(away[: (int(np.argmax(low)) if low.any() else y.size - 1) + 1].max())
 
 
-def _heights(points) -> np.ndarray:
+def _point_amplitudes(points) -> np.ndarray:
     """Return the amplitudes [m] of curve points; NaN for unbounded motions."""
     return np.array([point.values.get(AMPLITUDE, np.nan) for point in points])
 
 
-def concave_bounds(s, y) -> tuple:
+def bound_concave_curve(s, y) -> tuple:
     """Bound a concave curve in each interval by lines through the neighbouring points.
 
-    A line from points below CAP of the larger end is not used, because a curve may be convex there;
-    without any line, the bound is the larger end divided by CAP.
+    A line from points below MIN_CONCAVE_FRACTION of the larger end is not used, because a curve may be convex there;
+    without any line, the bound is the larger end divided by MIN_CONCAVE_FRACTION.
 
     Parameters
     ----------
@@ -165,8 +167,8 @@ def concave_bounds(s, y) -> tuple:
         slope = np.diff(y) / h
         # the lines through the two points on the left and on the right have these slopes
         rise, fall = np.full((2, h.size), np.nan)
-        rise[1:] = np.where(y[:-2] >= CAP * ends[1:], slope[:-1], np.nan)
-        fall[:-1] = np.where(y[2:] >= CAP * ends[:-1], slope[1:], np.nan)
+        rise[1:] = np.where(y[:-2] >= MIN_CONCAVE_FRACTION * ends[1:], slope[:-1], np.nan)
+        fall[:-1] = np.where(y[2:] >= MIN_CONCAVE_FRACTION * ends[:-1], slope[1:], np.nan)
         left = y[:-1] + rise * h
         right = y[1:] - fall * h
         # both lines intersect at this fraction of the interval
@@ -177,7 +179,7 @@ def concave_bounds(s, y) -> tuple:
         reach = np.where(
             alone,
             np.fmax(left, right),
-            np.where(np.isnan(rise) & np.isnan(fall), ends / CAP, reach),
+            np.where(np.isnan(rise) & np.isnan(fall), ends / MIN_CONCAVE_FRACTION, reach),
         )
         reach = np.where(np.isnan(ends), 0.0, np.fmax(reach, ends))
     return reach, np.where(inside, meet, 0.5)
@@ -200,14 +202,14 @@ def solve_peak(points: list, folds, finder) -> Solution:
     top = points[best]
     raw = finder.point(top.drive, top.near)[0]
     errors = dict(raw.errors or {})
-    extra = {"curve": curve_columns(points, folds), "at": top.drive}
+    extra = {"curve": tabulate_curve(points, folds), "at": top.drive}
     height = top.values.get(AMPLITUDE, 0.0)
-    y = _heights(points)
+    y = _point_amplitudes(points)
     if not height > 0 or AMPLITUDE not in raw.values:
         # the error None means that the curve has no peak
         return replace(raw, extra=raw.extra | extra | {"at_error": None if height == 0 else 0.0})
     # the point of the curve was computed with fewer samples, which adds this error
-    missed = abs(seen_by_gauge(finder.model, raw).values[AMPLITUDE] - height)
+    missed = abs(replace_output_by_gauge(finder.model, raw).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
     places = np.array([point.drive.omega for point in points]) / (2 * np.pi)
     off = 0.0
@@ -221,16 +223,20 @@ def solve_peak(points: list, folds, finder) -> Solution:
         low = ~(heights >= height - min(above, height) - 2 * error)
         number = int(np.argmax(low)) if low.any() else heights.size - 1
         far = float(away[: number + 1].max())
-        near = min(far, float(away[1]) + SHIFT * error / height * _width(heights, away))
+        near = min(
+            far, float(away[1]) + ERROR_SHIFT_FACTOR * error / height * _peak_width(heights, away)
+        )
         off = max(off, near)
-        for name, gap in _gaps(finder, points[best + direction * number], raw).items():
+        for name, gap in _compute_neighbour_differences(
+            finder, points[best + direction * number], raw
+        ).items():
             open_ones[name] = max(open_ones[name], gap * near / far if far else gap)
     open_ones[AMPLITUDE] = min(above, raw.values[AMPLITUDE]) + missed
     errors = {name: error + open_ones.get(name, 0.0) for name, error in errors.items()}
     return replace(raw, errors=errors, extra=raw.extra | extra | {"at_error": float(off)})
 
 
-def _gaps(finder, beside, raw: Solution) -> dict:
+def _compute_neighbour_differences(finder, beside, raw: Solution) -> dict:
     """Return the differences of all measures between a neighbouring point and a Solution."""
     try:
         other = finder.point(beside.drive, beside.near)[0]
