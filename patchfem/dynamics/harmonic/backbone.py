@@ -1,13 +1,13 @@
-"""Backbone of a mode with a contact: frequency and damping ratio over amplitude.
+"""Backbone of a mode with friction: natural frequency and damping ratio over amplitude.
 
 A negative damping that balances friction sustains the motion.
 
 z'' + (D - 2 zeta omega) z' + Omega^2 z + faces^T F/m = 0 has, for every amplitude of the mode's
 coordinate, one periodic motion with its own omega and zeta: zeta is the loss of a cycle over 8 pi
-times the mean kinetic energy, what a slow free decay loses (extended periodic motion concept: Krack
+times the mean kinetic energy, as in a slow free decay (extended periodic motion concept: Krack
 2015). With one harmonic and one mode of slide s this is omega^2 = omega_0^2 + s^2 K_eq/m and zeta =
-zeta_0 omega_0/omega + loss/(2 pi m omega^2 A^2), K_eq and the loss those of the contact's own loop
-on a bench.
+zeta_0 omega_0/omega + loss/(2 pi m omega^2 A^2), where K_eq and the loss are those of the friction loop
+of the contact alone.
 """
 
 from typing import NamedTuple
@@ -18,17 +18,17 @@ from ...core import NotConverged
 from ...formatting import format_length
 from .harmonic import Balance, LinearPart, System, pack_harmonics, solve_damped, unpack_harmonics
 
-# amplitudes that are tried between two given ones where the motion is not found
+# largest number of times that the step between two amplitudes is halved where no motion is found
 MAX_HALVINGS = 6
 
 
 class FreeMotion(NamedTuple):
-    """A free motion of one mode.
+    """Periodic free motion of one mode at an amplitude, sustained by negative damping.
 
-    - amplitude: of the coordinate of the mode [m]
+    - amplitude: amplitude of the coordinate of the mode [m]
     - omega, zeta: frequency [rad/s] and damping ratio
-    - slides, forces: (i, H + 1) [m], [N]
-    - modal: (H + 1, n) [m]
+    - slides, forces: (i, H + 1) harmonics of the slides [m] and friction forces [N]
+    - modal: (H + 1, n) harmonics of the modal coordinates [m]
     """
 
     amplitude: float
@@ -40,14 +40,16 @@ class FreeMotion(NamedTuple):
 
 
 class FreeBalance:
-    """Equations of the free motion of one mode that a negative damping keeps up.
+    """Harmonic balance of the free motion of one mode that negative damping sustains.
 
-    - balance: Balance of the rows
-    - mode: coordinate whose amplitude is given
-    - h: harmonics; scale: of the frequency [rad/s]
+    - balance: HarmonicBalance of the interface rows
+    - mode: index of the modal coordinate whose amplitude is prescribed
+    - h: number of harmonics
 
-    The unknowns are the packed slides of `Balance` over the amplitude, omega/scale and zeta. The
-    given coordinate has no receptance; its two equations determine omega and zeta.
+    - scale: scale of the frequency [rad/s]
+
+    The unknowns are the packed slides of `HarmonicBalance` over the amplitude, omega/scale and zeta. The
+    prescribed coordinate has no receptance; its two equations determine omega and zeta.
     """
 
     def __init__(self, balance: Balance, mode: int, harmonics: int, scale: float):
@@ -57,9 +59,9 @@ class FreeBalance:
         self.scale = scale
 
     def linear(self, omega: float, zeta: float) -> LinearPart:
-        """Return the linear part at omega [rad/s] with the damping -2 zeta omega added.
+        """Return the receptances of the modes with the damping -2 zeta omega added.
 
-        The given coordinate is free.
+        The coordinate of prescribed amplitude has no receptance. omega: frequency [rad/s].
         """
         m = self.balance.modes
         k = np.arange(self.h + 1)[:, None, None]
@@ -81,7 +83,11 @@ class FreeBalance:
         return LinearPart(inverse, slope, ((1, right, left, left @ p[1][:, self.mode]),))
 
     def system(self, x, amplitude: float) -> System:
-        """Return the equations at unknowns x (N,) and an amplitude [m], lengths over it."""
+        """Evaluate the balance equations of a free motion at given unknowns and amplitude.
+
+        x: unknowns (N,); amplitude [m], by which all lengths of the equations are divided.
+
+        """
         omega = x[-2] * self.scale
         zeta = x[-1]
         balance = self.balance
@@ -91,7 +97,7 @@ class FreeBalance:
         one = balance.system(
             np.append(x[:-2] * amplitude, [amplitude, 0.0]), omega, 0.0, self.h, here
         )
-        # of the linear part, times the motion
+        # derivative of the dynamic stiffness with respect to zeta, times the motion
         by_zeta = -2j * np.arange(self.h + 1)[:, None] * omega**2 * one.modal
         turned = balance.faces @ np.einsum("kab,kb->ak", here.inverse, by_zeta)
         last = here.free[0][2] @ by_zeta[1] / omega**2
@@ -101,7 +107,9 @@ class FreeBalance:
         return one._replace(residual=one.residual / amplitude, jacobian=jacobian)
 
     def solve(self, x, amplitude: float) -> tuple:
-        """Solve at an amplitude [m] from unknowns x (N,).
+        """Solve for the free motion at an amplitude by Newton's method.
+
+        x: unknowns (N,) of the initial guess; amplitude [m].
 
         Returns
         -------
@@ -133,12 +141,14 @@ class FreeBalance:
         )
 
     def towards(self, x, done: float, target: float) -> np.ndarray:
-        """Follow the motion from unknowns x (N,) at amplitude `done` [m] to the amplitude `target`.
+        """Follow a free motion from one amplitude to another by natural continuation.
+
+        x: unknowns (N,) at the amplitude `start` [m]; target: the other amplitude [m].
 
         Raises
         ------
         NotConverged
-            If MAX_HALVINGS steps in a row are too long.
+            If a step fails after MAX_HALVINGS halvings.
         """
         stops = [float(target)]
         while stops:
@@ -153,7 +163,11 @@ class FreeBalance:
 
 
 def _invert(p) -> np.ndarray:
-    """Return inverses (k, n, n); a coordinate that nothing holds at rest keeps its mean."""
+    """Return the inverses of matrices (k, n, n), or pseudoinverses if one is singular.
+
+    A matrix is singular where nothing determines the mean of a coordinate.
+
+    """
     try:
         found = np.linalg.inv(p)
         if np.isfinite(found).all():
@@ -164,16 +178,16 @@ def _invert(p) -> np.ndarray:
 
 
 def trace_free_motions(equations: FreeBalance, amplitudes, omega: float, shape) -> list:
-    """Return the free motions at increasing amplitudes (k,) [m], from a linear mode.
+    """Compute the free motions of a mode at increasing amplitudes from its linear mode.
 
     Parameters
     ----------
     equations : FreeBalance
     amplitudes : array_like
     omega : float
-        [rad/s].
+        Natural frequency of the linear mode [rad/s].
     shape : ndarray
-        (n,).
+        (n,) shape of the linear mode.
 
     Returns
     -------

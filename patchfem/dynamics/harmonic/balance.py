@@ -1,4 +1,4 @@
-"""Steady motion of a harmonic balance as histories, energies and regime."""
+"""Time histories, energies per cycle and friction regime of a steady motion."""
 
 import numpy as np
 
@@ -7,16 +7,17 @@ from ..integrated import find_accelerations
 from .laws import Jenkins, SampledSlide, evaluate_series
 from .point import SteadyMotion, find_slip, friction_force
 
-# slip over the bond length, below which bonds count as sticking
+# range of the slip over the bond length, below which bonds count as sticking
 STUCK_SLIDE_RATIO = 1e-3
 
 
 def find_regime(periodic: SteadyMotion) -> tuple:
-    """Return the regime of a motion and the fraction of the friction limit that slips.
+    """Return the friction regime of a steady motion and the fraction of the limit that slips.
 
-    The regimes are "stuck", "partial slip", "slides" and "no friction". An elastic-plastic element
+    The regimes are "stuck", "partial slip", "slides" and "no friction". The fraction is that of the
+    friction limits of all laws. An elastic-plastic element
     slips where the range of its slide exceeds twice its yield slide, bonds where their slip
-    exceeds STUCK_SLIDE_RATIO bond lengths; a law of the velocity always slides.
+    exceeds STUCK_SLIDE_RATIO bond lengths; a velocity-dependent law always slides.
     """
     slipping_limit = 0.0
     total_limit = 0.0
@@ -45,9 +46,10 @@ def find_regime(periodic: SteadyMotion) -> tuple:
 
 
 def find_cycle_energies(periodic: SteadyMotion, modes) -> dict:
-    """Return work of the drive, viscous loss and work of the laws in a cycle [J], by Parseval.
+    """Return drive work, viscous loss and friction work of a steady motion per cycle [J].
 
-    `balance` is what is missing over the work of the drive [1]. A spring among the laws adds
+    They follow from the harmonics by Parseval's theorem. `balance` is the imbalance of these energies
+    over the work of the drive [1]. A spring among the laws adds
     nothing.
     """
     k = np.arange(periodic.modal.shape[0])
@@ -69,9 +71,9 @@ def find_cycle_energies(periodic: SteadyMotion, modes) -> dict:
 
 
 def make_cycle_response(periodic: SteadyMotion, modes, drive, samples: int = 1000) -> Response:
-    """Return one cycle of a steady motion as histories of the first row.
+    """Return time histories of the modes and the first interface over a steady cycle.
 
-    The forces are those of the laws at each instant, so the accelerations do not oscillate as a
+    The forces are evaluated from the laws at each instant, so the accelerations do not oscillate like a
     truncated series.
 
     Parameters
@@ -80,7 +82,7 @@ def make_cycle_response(periodic: SteadyMotion, modes, drive, samples: int = 100
     modes : ModalBasis
     drive
     samples : int, optional
-        Equal steps of the cycle.
+        Number of equal steps of the cycle.
 
     Returns
     -------

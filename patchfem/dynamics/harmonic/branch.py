@@ -1,4 +1,4 @@
-"""Curves of steady motions, all motions at one drive, and the backbone."""
+"""Branches of steady motions, all steady motions at one drive, and backbones."""
 
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -26,12 +26,12 @@ from .starts import find_one_harmonic_roots
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Branch:
-    """Points of a curve in order.
+    """Branch of steady motions over frequency or drive level, in order along the curve.
 
     - points: tuple of SteadyMotion
     - parameter: "frequency" [Hz] or "level" [m s-2]
-    - folds, crossings: values of the parameter there; at a crossing another branch meets
-    - ended: see `continuation.CurvePath`, or "listed" for given values
+    - folds, crossings: values of the parameter at folds and at bifurcations to another branch
+    - ended: see `continuation.CurvePath`, or "listed" for prescribed values of the parameter
     """
 
     points: tuple
@@ -42,20 +42,24 @@ class Branch:
 
     @property
     def values(self) -> np.ndarray:
-        """Value of the parameter at every point (k,) [Hz] or [m s-2]."""
+        """Parameter values (k,) of the branch: drive frequency [Hz] or drive level [m s-2]."""
         if self.parameter == "frequency":
             return np.array([point.omega / (2 * np.pi) for point in self.points])
         return np.array([point.level for point in self.points])
 
     def amplitudes(self, row) -> np.ndarray:
-        """Return half the range [m] of row @ coordinates at every point (k,)."""
+        """Return the displacement amplitudes (k,) [m] along the branch.
+
+        The displacement is row @ modal coordinates; its amplitude is half its range.
+
+        """
         return np.array([point.amplitude(row) for point in self.points])
 
 
 def trace_over_frequency(
     modes, drive: SineDrive, group, frequencies, stability: bool = False, **how
 ) -> Branch:
-    """Find steady motions over frequency at the amplitude of the drive.
+    """Trace the branch of steady motions over drive frequency at constant drive amplitude.
 
     Parameters
     ----------
@@ -82,7 +86,7 @@ def trace_over_frequency(
 def trace_over_level(
     modes, drive: SineDrive, group, accelerations, stability: bool = False, **how
 ) -> Branch:
-    """Find steady motions over the amplitude of the drive [m s-2] at its frequency.
+    """Trace the branch of steady motions over drive amplitude [m s-2] at constant frequency.
 
     Parameters
     ----------
@@ -103,12 +107,12 @@ def trace_over_level(
 
 
 class CurveNumerics(NamedTuple):
-    """Numerical settings of a curve.
+    """Numerical settings for tracing a branch of steady motions.
 
-    - harmonics: exactly so many; None for as many as the tolerance needs
-    - tolerance
-    - start: see `point.find_point`
-    - longest: longest step of the arc
+    - harmonics: number of harmonics, or None for as many as the tolerance needs
+    - tolerance: relative error of each motion
+    - start: initial guess, see `point.find_point`
+    - longest: longest step of the arc length
     """
 
     harmonics: int | None = None
@@ -125,7 +129,7 @@ def _check_values(given, what: str, noun: str) -> np.ndarray:
 
 
 def _trace(parameter: str, modes, drives, group, how: CurveNumerics, stability: bool) -> Branch:
-    """Return the branch through the drives, with its stability if that is requested."""
+    """Trace a branch of steady motions over prescribed drives, with stability on request."""
     solve = _solve_curve if len(drives) == 2 else _solve_each
     branch = solve(modes, drives, make_group(modes, group), parameter, how)
     if not stability:
@@ -143,9 +147,9 @@ def _solve_each(modes, drives, group, parameter, how: CurveNumerics) -> Branch:
 
 
 def _solve_curve(modes, drives, group, parameter, how: CurveNumerics) -> Branch:
-    """Follow a curve by arc length with the same number of harmonics everywhere.
+    """Trace a branch by arc length with the same number of harmonics at all points.
 
-    It is raised where the harmonics above are not small.
+    The number is raised until the harmonics above it are negligible at all points.
     """
     harmonics, tolerance, start, longest = how
     first = find_point(modes, drives[0], group, harmonics, tolerance, start)
@@ -168,9 +172,9 @@ def _solve_curve(modes, drives, group, parameter, how: CurveNumerics) -> Branch:
 
 
 def _follow_harmonics(modes, drives, group, parameter, h, first, longest) -> tuple:
-    """Follow a curve with h harmonics and enough samples for the widest slide.
+    """Trace a branch with h harmonics and enough samples per cycle for the largest slide.
 
-    Returns the points, the largest part of a motion above h, the CurvePath and the unit of its
+    Returns the points, the largest fraction of a motion above h, the CurvePath and the unit of its
     parameter.
     """
     samples = max(first.samples // 2, group.samples or group.samples_for(h))
@@ -201,13 +205,17 @@ def _follow_harmonics(modes, drives, group, parameter, h, first, longest) -> tup
 
 
 def _find_amplitude(coefficients, min_samples: int):
-    """Return half the range (...) of slides with harmonics (..., H + 1), from samples of a cycle."""
+    """Return the amplitudes (...) of slides from their harmonics (..., H + 1).
+
+    The amplitude is half the range of equidistant samples of a cycle.
+
+    """
     samples = evaluate_series(coefficients, 2 ** min_samples.bit_length())
     return np.ptp(samples, axis=-1) / 2
 
 
 def measure_distance(one: SteadyMotion, other: SteadyMotion, width: float) -> float:
-    """Return the distance between two points of a branch relative to the size of the motion.
+    """Return the distance between two points of a branch in scaled unknowns and frequency.
 
     Parameters
     ----------
@@ -222,7 +230,7 @@ def measure_distance(one: SteadyMotion, other: SteadyMotion, width: float) -> fl
 
 
 def _find_scaled_step(one: SteadyMotion, other: SteadyMotion, width: float) -> tuple:
-    """Return the scaled step (N + 1,) between two points, and the size of the motion."""
+    """Return the scaled step (N + 1,) between two points of a branch, and the motion size."""
     size = max(float(np.linalg.norm(one.unknowns)), float(np.linalg.norm(other.unknowns))) or 1.0
     return np.append(
         (other.unknowns - one.unknowns) / size, (other.omega - one.omega) / width
@@ -232,16 +240,16 @@ def _find_scaled_step(one: SteadyMotion, other: SteadyMotion, width: float) -> t
 def find_point_between(
     modes, drive, one: SteadyMotion, other: SteadyMotion, share: float, width: float
 ) -> SteadyMotion:
-    """Find the point of a frequency branch at a fraction of the way between two of its points.
+    """Find the point of a frequency branch at a fraction of the step between two points.
 
-    Newton's method goes across the straight line that joins them, so folds are no obstacle.
+    Newton's method corrects the linear interpolation perpendicular to the step, so folds are no obstacle.
 
     Parameters
     ----------
     modes, drive
     one, other : SteadyMotion
     share : float
-        Fraction of the way.
+        Fraction of the step.
     width : float
         See `measure_distance`.
 
@@ -252,7 +260,7 @@ def find_point_between(
     Raises
     ------
     NotConverged
-        If it leads elsewhere.
+        If Newton's method finds no motion near the interpolated one.
     """
     balance = make_balance(modes, one.group, one.base_samples)
     step, size = _find_scaled_step(one, other, width)
@@ -275,7 +283,7 @@ def find_point_between(
 def find_branches(
     modes, drive: SineDrive, group, tolerance: float = 1e-3, stability: bool = True
 ) -> list:
-    """Find all steady motions at a drive that the roots of the one-harmonic balance lead to.
+    """Find coexisting steady motions at a drive from all roots of the one-harmonic balance.
 
     Parameters
     ----------
@@ -320,12 +328,12 @@ def _subtract_padded(a: SteadyMotion, b: SteadyMotion) -> float:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Backbone:
-    """Backbone of a mode.
+    """Backbone curve of a mode: frequency and damping ratio over amplitude.
 
-    - amplitude: (k,) of the coordinate of the mode [m]
-    - frequency, damping: (k,) [Hz], [1]
-    - slide: (k,) amplitude of the first row [m]
-    - loss: (k,) of the contact per cycle [J]
+    - amplitude: (k,) amplitude of the coordinate of the mode [m]
+    - frequency, damping: (k,) frequency [Hz] and damping ratio [1]
+    - slide: (k,) amplitude of the slide of the first interface row [m]
+    - loss: (k,) friction loss per cycle [J]
     """
 
     amplitude: np.ndarray
@@ -336,14 +344,16 @@ class Backbone:
 
 
 def find_backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Backbone:
-    """Find frequency and damping of a mode over its amplitude, see `harmonic.backbone`.
+    """Compute the backbone curve of a mode: frequency and damping ratio over amplitude.
+
+    See `harmonic.backbone` for the equations.
 
     Parameters
     ----------
     modes : ModalBasis
     group : LawGroup, or what `point.make_group` takes
     amplitudes : array_like
-        (k,) of the coordinate of the mode, increasing [m].
+        (k,) increasing amplitudes of the coordinate of the mode [m].
     mode : int, optional
         Mode of the stuck contact from which the path starts.
     harmonics : int, optional

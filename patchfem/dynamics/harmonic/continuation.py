@@ -1,6 +1,6 @@
 """Curves of solutions r(x, p) = 0 through folds: pseudo-arc-length continuation.
 
-The arc is measured in motion and parameter scaled to the same size, so that both count. At a fold
+The arc length is measured in scaled unknowns and a scaled parameter, so that both count. At a fold
 the parameter reverses; at a crossing the determinant of the bordered system changes
 sign, and another branch meets. Method: Keller 1977; Seydel, Practical Bifurcation and Stability
 Analysis, 2010, ch. 4.
@@ -15,25 +15,25 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ...core import NotConverged
 
-# change of a motion over its size, below which Newton's method ends
+# relative change of the unknowns below which Newton's method has converged
 NEWTON_TOL = 1e-9
-# largest number of Newton steps of a point
+# largest number of Newton steps for one point; a point that needs more is approached in shorter steps
 MAX_NEWTON_STEPS = 12
-# step of the arc below which the curve is given up
+# arc-length step below which the continuation stops
 MIN_STEP = 1e-7
-# cosine of the largest angle between a step and the tangent, 45 degrees
+# smallest cosine of the angle (45 degrees) between a step and the tangent; a step at a larger angle has jumped
 MIN_STEP_COSINE = 0.7
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CurvePath:
-    """Points of a curve in order.
+    """Solution curve of r(x, p) = 0 as a sequence of points in order of arc length.
 
     - x, p: (k, N), (k,) solutions and parameters
-    - turn, arc: (k,) dp/ds, and arc s
-    - folds: parameters where the curve turns back, from a cubic through the neighbours
-    - crossings: parameters where a branch meets
-    - ended: "end"; "start" where the curve came back through the other bound; "points"; "step" where
+    - turn, arc: (k,) dp/ds, and arc length s
+    - folds: parameters at the folds, from a cubic between neighbouring points
+    - crossings: parameters at bifurcations
+    - ended: "end"; "start" if the curve returned to the other bound; "points"; "step" if
       no step was short enough
     """
 
@@ -47,13 +47,13 @@ class CurvePath:
 
 
 class PathSettings(NamedTuple):
-    """Numerical settings of a path.
+    """Numerical settings of arc-length continuation.
 
-    - first_step, max_step: first and longest step of the arc, in which the width of the bounds and
+    - first_step, max_step: first and longest step of the arc length, in which the width of the bounds and
       the size of the motion count 1
     - max_points: largest number of points
     - tolerance: change of the motion over its size at which Newton's method ends
-    - size: size of the motion; 0 for the larger of that at the start and half of the largest so far
+    - size: scale of the unknowns; 0 for the larger of that at the start and half of the largest so far
     """
 
     first_step: float = 0.02
@@ -64,14 +64,14 @@ class PathSettings(NamedTuple):
 
 
 class Scales(NamedTuple):
-    """Size of the motion, and width of the bounds of the parameter."""
+    """Scales of arc-length continuation: norm of the unknowns and width of the parameter range."""
 
     size: float
     width: float
 
 
 class CorrectedPoint(NamedTuple):
-    """A point of a curve, and the Newton steps that led to it."""
+    """Converged point of a solution curve, and its number of Newton steps."""
 
     x: np.ndarray
     p: float
@@ -79,7 +79,11 @@ class CorrectedPoint(NamedTuple):
 
 
 class _PathPoint(NamedTuple):
-    """A point of a path: solution, parameter, unit tangent (N + 1,), arc, sign of the determinant."""
+    """Point of a solution curve with its unit tangent (N + 1,) and arc length.
+
+    sign: sign of the determinant of the bordered Jacobian, which changes at a bifurcation.
+
+    """
 
     x: np.ndarray
     p: float
@@ -91,7 +95,7 @@ class _PathPoint(NamedTuple):
 def follow_curve(
     system, x, p: float, bounds: tuple, forward: bool = True, settings: PathSettings | None = None
 ) -> CurvePath:
-    """Follow the curve through (x, p) until p leaves the bounds.
+    """Trace a solution curve of r(x, p) = 0 by arc-length continuation within parameter bounds.
 
     Parameters
     ----------
@@ -99,7 +103,7 @@ def follow_curve(
         system(x, p) -> residual (N,), d/dx (N, N), d/dp (N,).
     x : array_like
     p : float
-        Start, which is corrected first.
+        Initial guess of the first point, which is corrected first.
     bounds : tuple
         Lowest and highest p; the last point lies on one of them.
     forward : bool, optional
@@ -113,7 +117,7 @@ def follow_curve(
     Raises
     ------
     NotConverged
-        If the first point is not reached.
+        If the first point is not found.
     """
     settings = settings or PathSettings()
     tolerance = settings.tolerance
@@ -167,19 +171,27 @@ def follow_curve(
 
 
 def _parameter_direction(x) -> np.ndarray:
-    """Return the unit vector (N + 1,) of the parameter."""
+    """Return the unit vector (N + 1,) in the direction of the continuation parameter."""
     return np.append(np.zeros(x.size), 1.0)
 
 
 def _step_factor(n_newton_steps: int) -> float:
-    """Return the factor of the next step; few Newton steps show that the curve is straight here."""
+    """Return the factor for the next arc-length step from the number of Newton steps.
+
+    Few Newton steps show that the curve is nearly straight.
+
+    """
     if n_newton_steps <= 3:
         return 1.5
     return 1.1 if n_newton_steps <= 5 else 0.6
 
 
 def _take_step(system, here: _PathPoint, step, scales, tolerance) -> CorrectedPoint | None:
-    """Return the point at a step along the tangent, None where it is not found on this curve."""
+    """Take a predictor step along the tangent and correct it.
+
+    Returns None if the corrector fails or jumps to another part of the curve.
+
+    """
     t = here.tangent
     guess = (here.x + step * scales.size * t[:-1], here.p + step * scales.width * t[-1])
     new = correct_point(system, guess, t, scales, tolerance)
@@ -193,7 +205,7 @@ def _take_step(system, here: _PathPoint, step, scales, tolerance) -> CorrectedPo
 
 
 def _make_bordered_matrix(jacobian, by_p, t, scales: Scales) -> np.ndarray:
-    """Return the matrix (N + 1, N + 1) of the scaled system and of a step across the tangent."""
+    """Return the scaled Jacobian bordered by the tangent, (N + 1, N + 1)."""
     n = by_p.size
     matrix = np.empty((n + 1, n + 1))
     matrix[:n, :n] = jacobian
@@ -205,7 +217,7 @@ def _make_bordered_matrix(jacobian, by_p, t, scales: Scales) -> np.ndarray:
 def correct_point(
     system, guess: tuple, tangent, scales: Scales, tolerance: float, fixed: float | None = None
 ) -> CorrectedPoint | None:
-    """Correct a guess by Newton's method across the tangent.
+    """Correct a predicted point by Newton's method perpendicular to the tangent.
 
     Parameters
     ----------
@@ -217,9 +229,9 @@ def correct_point(
         (N + 1,) unit tangent.
     scales : Scales
     tolerance : float
-        Change of the motion over its size at which the steps end.
+        Relative change of the unknowns at which the method has converged.
     fixed : float, optional
-        Value at which the parameter stays.
+        Fixed value of the parameter, if it must not change.
 
     Returns
     -------
@@ -248,9 +260,9 @@ def correct_point(
 def _make_path_point(
     system, point: CorrectedPoint, arc: float, last_tangent, scales: Scales
 ) -> _PathPoint:
-    """Return a point with its unit tangent and the sign of the bordered determinant.
+    """Return a corrected point with its unit tangent and the sign of the bordered determinant.
 
-    last_tangent: tangent at the point before, None at the first point, where p increases.
+    last_tangent: tangent at the previous point; None at the first point, where p increases.
     """
     _, jacobian, by_p = system(point.x, point.p)
     upright = _parameter_direction(point.x)
@@ -264,9 +276,11 @@ def _make_path_point(
 
 
 def _find_folds(points: list, width: float) -> tuple:
-    """Return the folds: extremes of p between points whose dp/ds differ in sign.
+    """Return the parameter values at folds by cubic interpolation between points.
 
-    The cubic takes values and slopes over the way along the first tangent, which a step covers
+    A fold is an extremum of p between two points whose dp/ds differ in sign.
+
+    The cubic interpolates values and slopes over the distance along the first tangent, which a step covers
     exactly.
     """
     out = []

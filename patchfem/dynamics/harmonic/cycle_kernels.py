@@ -1,7 +1,7 @@
-"""Turning points of a periodic slide, and Jenkins elements along one cycle of it (compiled).
+"""Reversals of a periodic slide, and Jenkins elements along one cycle of it (compiled).
 
-A rate-independent law is followed from turning point to turning point, which are those of the
-harmonics and not samples. So the memory is that of the continuous motion; a sample takes a few ns
+A rate-independent law is followed from reversal to reversal, which are located from the
+harmonics and not at samples. So the memory is that of the continuous motion; a sample takes a few ns
 for any number of elements.
 """
 
@@ -14,7 +14,7 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 
 
 class SlideValues(NamedTuple):
-    """Slide and its first and second derivative by the angle [m]."""
+    """Value, first and second derivative of a periodic slide by the angle [m]."""
 
     value: float
     rate: float
@@ -23,12 +23,12 @@ class SlideValues(NamedTuple):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def evaluate_slide(re, im, angle):
-    """Return value, first and second derivative of Re sum X_k exp(i k angle).
+    """Evaluate a Fourier series Re sum X_k exp(i k angle) and its first two derivatives.
 
     Parameters
     ----------
     re, im : ndarray
-        (H + 1,) parts of the harmonics X_k [m].
+        (H + 1,) real and imaginary parts of the harmonics X_k [m].
     angle : float
         [rad].
 
@@ -57,23 +57,23 @@ def evaluate_slide(re, im, angle):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def find_turning_points(re, im, rate, angle, place, cell):
-    """Find the turning points of a slide whose rate at N equal angles is known.
+    """Find the reversals of a periodic slide from its harmonics and its sampled rate.
 
     Parameters
     ----------
     re, im : ndarray
         (H + 1,) harmonics of the slide [m].
     rate : ndarray
-        (N,) dq/dtheta [m].
+        (N,) dq/dtheta [m] at N equidistant angles.
     angle, place, cell : ndarray
-        (N,) become angle, slide and the sample before each turning point.
+        (N,) outputs: angle, slide and index of the sample before each reversal.
 
     Returns
     -------
     count : int
-        Number of turning points.
+        Number of reversals.
     start : float
-        Direction at the first sample.
+        Direction of the slide at the first sample.
     """
     n = rate.size
     count = 0
@@ -126,9 +126,9 @@ def find_turning_points(re, im, rate, angle, place, cell):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def sample_jenkins(q, turning_points, yield_slides, sums, groups, samples):
-    """Follow parallel Jenkins elements along the samples of a cycle.
+    """Compute the periodic force of parallel Jenkins elements at the samples of a cycle.
 
-    They start from the virgin state; the second of two cycles is periodic.
+    The elements start from the virgin state; the second of two cycles is periodic.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def sample_jenkins(q, turning_points, yield_slides, sums, groups, samples):
         (N,) slide [m].
     turning_points : laws.TurningPoints
     yield_slides : ndarray
-        (t,) in increasing order [m].
+        (t,) yield slides in increasing order [m].
     sums : laws.JenkinsSums
     groups : laws.JenkinsGroups
         Workspace for 2 R + 3 groups.
@@ -180,7 +180,7 @@ def sample_jenkins(q, turning_points, yield_slides, sums, groups, samples):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def _write_sample(i, slide, direction, n_slipping, n_groups, groups, sums, samples):
-    """Write force, slopes and stretch of the elements at sample i."""
+    """Write force, stiffnesses and stretch of the Jenkins elements at a sample."""
     force = direction * sums.limit[n_slipping]
     stretch = direction * sums.square[n_slipping]
     low = n_slipping
@@ -202,7 +202,11 @@ def _write_sample(i, slide, direction, n_slipping, n_groups, groups, sums, sampl
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _slip_elements(slide, direction, n_slipping, n_groups, groups, yield_slides):
-    """Let the elements slip that must at a slide; return the numbers of groups and of slipping ones."""
+    """Let the Jenkins elements slip that exceed their limit at a slide.
+
+    Returns the number of groups of sticking elements and the number of slipping elements.
+
+    """
     while n_groups > 0:
         group = n_groups - 1
         sign = groups.sign[group]
@@ -220,7 +224,11 @@ def _slip_elements(slide, direction, n_slipping, n_groups, groups, yield_slides)
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _store_turning_point(slide, direction, n_slipping, n_groups, groups, mark):
-    """Store the slipping elements as a group at a turning point; return the number of groups."""
+    """Push the slipping Jenkins elements as a new group at a reversal.
+
+    Returns the number of groups.
+
+    """
     if n_slipping == 0:
         return n_groups
     groups.end[n_groups] = n_slipping

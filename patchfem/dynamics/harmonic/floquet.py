@@ -1,10 +1,10 @@
-"""Floquet multipliers of a steady motion: growth of small disturbances over a cycle.
+"""Monodromy matrix of a steady motion: growth of small perturbations over a cycle.
 
-The state is the motion of the modes and what the contacts remember. A law without memory gives a
-slope over the slide and over its rate. Elastic-plastic elements remember, for each turning point,
-where the slide was: the disturbance there is a state, and the stiffness that sticks since then
-acts on it. The force is continuous, so nothing jumps; a turning point may shift, but the slide is
-at rest there, so its shift does not count. Elements that slip forget, so t elements have t - R
+The state is the motion of the modes and the memory of the contacts. A law without memory gives a
+slope over the slide and over its rate. Elastic-plastic elements remember, for each reversal,
+the slide at which it occurred: its perturbation is a state, and the stiffness that sticks since then
+acts on it. The force is continuous, so nothing jumps; a reversal may shift in time, but the slide is
+at rest there, so the shift has no effect to first order. Elements that slip lose their memory, so t elements have t - R
 multipliers that are zero and are left out. An element that never slips within the cycle is a
 spring; its offset, which no cycle changes (multiplier 1), is left out too. Bonds remember one
 number per row.
@@ -23,10 +23,10 @@ from ..propagator import matrix_exponentials
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TurningPoint:
-    """Memory of a turning point.
+    """Perturbed slide at a reversal, which the sticking elements remember.
 
-    - row, cell, share: its row, its cell and its place [0, 1] there
-    - hold: (N,) force per disturbance of the slide at the turn [N/m], per cell
+    - row, cell, share: interface row, cell of the cycle, and position [0, 1] in this cell
+    - hold: (N,) force in each cell per perturbation of the slide at the reversal [N/m]
     """
 
     row: int
@@ -37,11 +37,11 @@ class TurningPoint:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FadingMemory:
-    """Memory u of bonds or of a flow: u' = gain q' - loss u, with the force limit u.
+    """Fading memory u of a friction law: u' = gain q' - loss u, with the force limit * u.
 
     - row
-    - gain, loss: (N,) per slide and per angle [1], per cell
-    - limit: [N], one number or per cell (N,)
+    - gain, loss: (N,) coefficients in each cell, per slide and per angle [1]
+    - limit: friction limit [N], a number or (N,) for the cells
     """
 
     row: int
@@ -53,7 +53,9 @@ class FadingMemory:
 def find_monodromy(
     modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), fading=()
 ) -> np.ndarray:
-    """Return the map over one cycle of (z, dz/dtheta, memories), theta = omega t from 0.
+    """Return the monodromy matrix of modes and contact memories over one cycle.
+
+    The state is (z, dz/dtheta, memories) with theta = omega t from 0.
 
     Parameters
     ----------
@@ -62,9 +64,9 @@ def find_monodromy(
         (i, n) rows of the interfaces.
     omega : float
     slope, by_rate : ndarray
-        (i, N) means per cell of the local stiffness [N/m] and damping [N s/m].
+        (i, N) mean local stiffness [N/m] and damping [N s/m] in each cell.
     marks, fading : sequence, optional
-        TurningPoints and FadingMemories.
+        TurningPoint and FadingMemory records.
 
     Returns
     -------
@@ -108,9 +110,9 @@ def find_monodromy(
 
 
 def _find_equal_cells(coefficients: list, marks) -> np.ndarray:
-    """Return the first cells (r,) of runs of neighbours with equal coefficients (..., N).
+    """Return the first cell of each run of adjacent cells with equal coefficients (..., N).
 
-    A cell with a turning point is a run of its own.
+    A cell with a reversal is a run of its own.
     """
     table = np.concatenate(
         [coefficient.reshape(-1, coefficient.shape[-1]) for coefficient in coefficients]
@@ -122,7 +124,7 @@ def _find_equal_cells(coefficients: list, marks) -> np.ndarray:
 
 
 def multiply_pairwise(steps) -> np.ndarray:
-    """Return steps[N - 1] ... steps[1] steps[0] of matrices (N, s, s), by pairs."""
+    """Return the ordered product of matrices (N, s, s), the first one rightmost, by pairs."""
     while len(steps) > 1:
         rest = steps[-1:] if len(steps) % 2 else steps[:0]
         steps = np.concatenate([steps[1::2] @ steps[0 : len(steps) - len(rest) : 2], rest])

@@ -1,7 +1,7 @@
-"""A law whose memory is one number z, along the samples of a cycle (compiled).
+"""Periodic state of a friction law with one memory variable along a cycle (compiled).
 
-The samples and the turning points between them are the nodes of the cycle. From one node to the
-next the slide changes linearly; forces are those at the nodes, at their velocity.
+The samples and the reversals between them are the nodes of the cycle. From one node to the
+next the slide changes linearly; forces are evaluated at the nodes, with the velocity there.
 """
 
 from math import inf
@@ -10,16 +10,16 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws import stretch_kernels as law
 
-# cycles that are computed until the end of one meets its start
+# largest number of cycles in which the memory becomes periodic
 MAX_CYCLES = 60
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def solve_cycle(num, q, speed, dt, z, steps, force, slopes):
-    """Solve for the periodic state of a law along a cycle of M nodes.
+    """Solve for the periodic state of a friction law with one memory variable over a cycle.
 
-    The first cycle is that of a virgin contact; Newton's steps on the memory at the first node
-    follow, if a cycle forgets any of it.
+    The first cycle starts from a virgin contact; Newton steps on the memory at the first node
+    follow if the memory fades within a cycle.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def solve_cycle(num, q, speed, dt, z, steps, force, slopes):
             kept *= steps[0, i]
             largest = max(largest, abs(now))
         miss = abs(now - start)
-        # round-off
+        # the periodicity error has reached round-off or no longer decreases
         if miss <= 1e-14 * largest * min(1 - kept, 1.0) or (turn > 2 and miss > 0.5 * last):
             break
         last = miss
@@ -69,10 +69,10 @@ def solve_cycle(num, q, speed, dt, z, steps, force, slopes):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def solve_tangents(steps, out):
-    """Solve for the derivatives (M, p) of z in the periodic state with respect to p parameters.
+    """Solve for the derivatives (M, p) of the periodic memory with respect to p parameters.
 
-    out: at first what every step takes of the parameters: the increment of the slide, in the last
-    column that of the time.
+    out: on entry the derivative of the slide increment of every step, in the last
+    column that of the time increment; on return the derivatives of the memory.
     """
     n, p = out.shape
     for k in range(p):

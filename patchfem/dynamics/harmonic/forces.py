@@ -1,4 +1,4 @@
-"""Forces of laws on rows as harmonics of a cycle (alternating frequency and time)."""
+"""Harmonics of friction forces by the alternating frequency/time method."""
 
 from functools import lru_cache
 
@@ -8,16 +8,17 @@ from ...core import PatchfemError, frozen_array
 from .harmonic import ContactResponse
 from .laws import Jenkins, SampledSlide, evaluate_series, find_harmonics, make_law
 
-# bounds of the samples of a cycle
+# smallest and largest number of samples per cycle
 MIN_SAMPLES = 256
 MAX_SAMPLES = 65536
 
 
 class LawGroup:
-    """Laws on rows: a law, a pair (row, law) or a list of them.
+    """Friction laws and springs on the interface rows of a modal basis.
 
-    A row is the number of an interface of `modes` or participations (n,); a law alone sits on
-    interface 0; a ContactModel becomes its law. rows: (i, n); laws: a tuple of laws for every row.
+    `parts` is a law, a pair (row, law) or a list of them. A row is the number of an interface of
+    `modes` or participations (n,); a law alone acts on
+    interface 0; a ContactModel is converted to its law. rows: (i, n); laws: a tuple of laws for every row.
     A call with the harmonics (i, H + 1) of the slides and omega returns a
     `harmonic.ContactResponse`.
     """
@@ -44,7 +45,7 @@ class LawGroup:
         self.samples = samples
 
     def with_samples(self, samples: int) -> "LawGroup":
-        """Return the same laws on the same rows with `samples` per cycle."""
+        """Return a copy with another number of samples per cycle."""
         other = object.__new__(LawGroup)
         other.rows = self.rows
         other.laws = self.laws
@@ -52,9 +53,9 @@ class LawGroup:
         return other
 
     def with_elements(self, change) -> "LawGroup":
-        """Return the same laws with other elements.
+        """Return a copy with replaced elastic-plastic elements.
 
-        change: (stiffness (t,) [N/m], yield slide (t,) [m]) -> the same of other elements.
+        change: function of stiffness (t,) [N/m] and yield slide (t,) [m] that returns both of the new elements.
         """
         other = self.with_samples(self.samples)
 
@@ -67,11 +68,11 @@ class LawGroup:
         return other
 
     def samples_for(self, harmonics: int, amplitudes=None) -> int:
-        """Return the samples, a power of two, for H harmonics and the shortest stick.
+        """Return the number of samples per cycle that resolves the harmonics and stick phases.
 
-        amplitudes: (i,) of the slides [m].
+        The number is a power of two. amplitudes: (i,) amplitudes of the slides [m].
 
-        What aliases is the corner of a law, so a law counts by the root of its fraction of all
+        Only the corners of a force alias, so a law is weighted by the square root of its fraction of all
         corners.
         """
         samples = max(MIN_SAMPLES, 12 * harmonics)
@@ -88,20 +89,20 @@ class LawGroup:
         return int(min(2 ** int(np.ceil(np.log2(samples))), MAX_SAMPLES))
 
     def stiffness(self) -> np.ndarray:
-        """Return the tangent stiffness of every row at rest (i,) [N/m]."""
+        """Return the tangent stiffness at rest of the laws on each interface row, (i,) [N/m]."""
         return np.array([sum(law.total for law in laws) for laws in self.laws])
 
     def tracks(self, q, omega: float, samples: int = 0) -> list:
-        """Return the SampledSlide of every row.
+        """Sample the slide of every interface row over a cycle.
 
         Parameters
         ----------
         q : ndarray
             (i, H + 1) harmonics of the slides [m].
         omega : float
-            [rad/s].
+            Frequency of the drive [rad/s].
         samples : int, optional
-            Per cycle; 0 for those of the group, or as many as H needs.
+            Samples per cycle; 0 for the number of the group, or as many as H needs.
 
         Returns
         -------
@@ -113,7 +114,7 @@ class LawGroup:
         return [SampledSlide(x, omega, n, v, r) for x, v, r in zip(q, values, rates)]
 
     def forces(self, q, omega: float, samples: int = 0) -> np.ndarray:
-        """Return the forces (i, N) [N] at the samples of a cycle.
+        """Return the friction forces (i, N) [N] of all interface rows at the samples of a cycle.
 
         Parameters
         ----------
@@ -132,7 +133,7 @@ class LawGroup:
         )
 
     def force(self, q, omega: float, harmonics: int, samples: int) -> np.ndarray:
-        """Return harmonics (i, harmonics + 1) of the forces [N] from those of the slides.
+        """Return the harmonics (i, harmonics + 1) of the friction forces [N] at given slides.
 
         Parameters
         ----------
@@ -153,10 +154,11 @@ class LawGroup:
 
 
 def find_response(tracks: list, sampled: list) -> ContactResponse:
-    """Return harmonics of forces and slopes from laws sampled along tracks of i rows.
+    """Return the harmonics of sampled friction forces and of their derivatives.
 
-    The local slope K(theta) enters by its harmonics up to 2 H, as a Toeplitz and a Hankel part; a
-    turning point by the harmonics of its fraction and the basis at its angle. One transform serves
+    tracks: SampledSlide of each row; sampled: SampledForces of the laws of each row. The local slope
+    K(theta) enters by its harmonics up to 2 H, as a Toeplitz and a Hankel part; a
+    reversal by the harmonics of its stiffness and the basis at its angle. One transform serves
     all rows.
     """
     x = np.array([t.x for t in tracks])
@@ -207,9 +209,9 @@ def find_response(tracks: list, sampled: list) -> ContactResponse:
 
 
 def _sum_laws(laws: list, name: str) -> np.ndarray | None:
-    """Return the sum of a field over the SampledForces of a row, None where no law has it.
+    """Return the sum of a field of SampledForce over all laws of an interface row.
 
-    A law with a tangent counts by its force alone.
+    The result is None if no law has the field. A law with a tangent contributes its force alone.
     """
     total = None
     for sampled in laws:
@@ -228,12 +230,12 @@ def _coefficient_positions(h: int) -> tuple:
 
 
 def find_local_jacobians(k) -> np.ndarray:
-    """Return the Jacobians (i, H + 1, 2 H + 1) of the harmonics of K(theta) q(theta).
+    """Return the Jacobians (i, H + 1, 2 H + 1) of the harmonics of a force K(theta) q(theta).
 
-    k: (i, 2 H + 1) harmonics of K.
+    k: (i, 2 H + 1) harmonics of the local stiffness K.
     """
     h = k.shape[1] // 2
-    # of exp(i m theta), m = -2 H..2 H
+    # complex Fourier coefficients of exp(i m theta), m = -2 H..2 H
     two = np.concatenate([k[:, :0:-1].conj() / 2, k[:, :1], k[:, 1:] / 2], axis=1)
     less, more = (two[:, place] for place in _coefficient_positions(h))
     out = np.empty((len(k), h + 1, 2 * h + 1), complex)

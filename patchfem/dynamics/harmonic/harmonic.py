@@ -1,16 +1,16 @@
-"""Harmonic balance under a sine, with the interface rows as unknowns.
+"""Harmonic balance under sinusoidal drive, with the interface slides as unknowns.
 
-The linear part is exact.
+The linear part of the structure is exact.
 
 With theta = omega t every quantity is x(theta) = Re sum_k X_k exp(i k theta), k = 0..H, and the
-modes are condensed to the rows that touch: q_k = q_k(drive) - G_k F_k, G_k = faces (Omega^2 - k^2
+modes are condensed to the interface rows: q_k = q_k(drive) - G_k F_k, G_k = faces (Omega^2 - k^2
 omega^2 + i k omega D)^-1 faces^T/m. The contact is any callable from the harmonics of the slides to
-those of the forces with their Jacobian (alternating frequency/time), so the laws stay outside.
-Harmonics above H of the force that the contact returns tell what the truncation leaves out.
+those of the forces with their Jacobian (alternating frequency/time), so the laws are independent of it.
+Harmonics of the force above H estimate the truncation error.
 
-A mode that a harmonic finds without stiffness and damping (a rigid mode at k = 0, an undamped one
-at its own frequency) has no receptance: its coordinate becomes an unknown of its own and the
-balance of its forces an equation of its own.
+A mode without dynamic stiffness at a harmonic (a rigid mode at k = 0, an undamped one
+at its natural frequency) has no receptance: its coordinate becomes an additional unknown and the
+balance of its forces an additional equation.
 
 Method: Krack & Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019; damped Newton:
 Deuflhard 2004.
@@ -29,7 +29,7 @@ SINGULAR_RATIO = 1e-10
 
 
 class ContactResponse(NamedTuple):
-    """Forces of the laws along a cycle, as harmonics.
+    """Harmonics of the contact forces of a cycle, and their derivatives.
 
     - force: (i, K + 1) complex [N], K >= H
     - slope: (i, H + 1, 2 H + 1) complex [N/m], derivative with respect to Re q_0..Re q_H, Im
@@ -43,15 +43,15 @@ class ContactResponse(NamedTuple):
 
 
 def pack_harmonics(x) -> np.ndarray:
-    """Return complex harmonics (r, H + 1) as real numbers (r (2 H + 1),).
+    """Pack complex harmonics (r, H + 1) into a real vector (r (2 H + 1),).
 
-    Each row has the real parts of k = 0 to H, then the imaginary ones of k = 1 to H.
+    Each row has the real parts of k = 0 to H, then the imaginary parts of k = 1 to H.
     """
     return np.concatenate([x.real, x.imag[:, 1:]], axis=1).ravel()
 
 
 def unpack_harmonics(v, rows: int) -> np.ndarray:
-    """Return complex harmonics (rows, H + 1) from the real numbers of `pack_harmonics`."""
+    """Unpack complex harmonics (rows, H + 1) from the real vector of `pack_harmonics`."""
     v = v.reshape(rows, -1)
     h = v.shape[1] // 2
     x = v[:, : h + 1].astype(complex)
@@ -60,16 +60,16 @@ def unpack_harmonics(v, rows: int) -> np.ndarray:
 
 
 def _to_real_equations(c) -> np.ndarray:
-    """Return complex equations (H + 1, ...) as real ones (2 H + 1, ...)."""
+    """Split complex equations (H + 1, ...) into real equations (2 H + 1, ...)."""
     return np.concatenate([c.real, c.imag[1:]], axis=0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LinearPart:
-    """The modes at one frequency.
+    """Receptances of the modes at the harmonics of one frequency.
 
-    - inverse, slope: (H + 1, n, n) R_k and d(R_k^-1)/d omega
-    - free: of every coordinate without receptance (k, right (n,), left (n,), stiffness)
+    - inverse, slope: (H + 1, n, n) receptance R_k and d(R_k^-1)/d omega
+    - free: (k, right (n,), left (n,), stiffness) of every coordinate without receptance
     """
 
     inverse: np.ndarray
@@ -78,7 +78,9 @@ class LinearPart:
 
 
 def make_linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearPart:
-    """Return the linear part (Omega^2 - k^2 omega^2 + i k omega D)^-1 for k = 0 to `harmonics`.
+    """Return the modal receptances at the harmonics of a frequency.
+
+    They are (Omega^2 - k^2 omega^2 + i k omega D)^-1 for k = 0 to `harmonics`.
 
     Parameters
     ----------
@@ -129,11 +131,11 @@ def make_linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearP
 
 
 class System(NamedTuple):
-    """Equations of the balance at one point.
+    """Residual and Jacobian of the harmonic balance at given unknowns.
 
     - residual: (N,), jacobian: (N, N)
     - by_omega, by_level: (N,) derivatives with respect to omega and to the amplitude of the drive
-    - fold: response of the contact
+    - fold: forces of the contact
     - modal: (H + 1, n) modal harmonics [m]
     """
 
@@ -146,19 +148,19 @@ class System(NamedTuple):
 
 
 class Balance:
-    """Equations of the rows (i, n) of interfaces of a ModalBasis.
+    """Harmonic balance of a modal basis with contact forces on interface rows.
 
-    contact: (q (i, H + 1), omega) -> ContactResponse.
+    rows: (i, n); contact: (q (i, H + 1), omega) -> ContactResponse.
 
-    More rows than modes lie in the space of the modes; the unknowns are then `rank` combinations
-    of them, q = lift y. The unknowns are the packed harmonics of y, then the coordinates without
+    If the rows are linearly dependent, the unknowns are `rank` combinations
+    y of the slides, q = lift y. The unknowns are the packed harmonics of y, then the coordinates without
     receptance. PatchfemError is raised where no mode moves the rows.
     """
 
     def __init__(self, modes: ModalBasis, rows, contact):
         rows = np.asarray(rows, float)
         u, s, vt = np.linalg.svd(rows, full_matrices=False)
-        # round-off of rows that depend on others
+        # singular values of linearly dependent rows are below this round-off limit
         rank = int(np.sum(s > 1e-12 * s[0])) if s[0] > 0 else 0
         if rank == 0:
             raise PatchfemError(
@@ -174,13 +176,13 @@ class Balance:
         self._linear = {}
 
     def with_contact(self, contact) -> "Balance":
-        """Return the same rows and modes with another contact."""
+        """Return a copy of the harmonic balance with another contact."""
         other = object.__new__(Balance)
         other.__dict__.update(self.__dict__, contact=contact)
         return other
 
     def linear(self, omega: float, harmonics: int) -> LinearPart:
-        """Return `make_linear_part` at omega [rad/s]; up to nine frequencies are kept."""
+        """Return the modal receptances at a frequency [rad/s], from a cache of nine frequencies."""
         key = (omega, harmonics)
         if key not in self._linear:
             if len(self._linear) > 8:
@@ -189,12 +191,12 @@ class Balance:
         return self._linear[key]
 
     def size(self, omega: float, harmonics: int) -> int:
-        """Return the number N of real unknowns at omega [rad/s]."""
+        """Return the number of real unknowns at a frequency omega [rad/s]."""
         free = self.linear(omega, harmonics).free
         return self.lift.shape[1] * (2 * harmonics + 1) + sum(1 if k == 0 else 2 for k, *_ in free)
 
     def slides(self, x, omega: float, harmonics: int) -> np.ndarray:
-        """Return the slides (i, H + 1) [m] of unknowns (N,).
+        """Unpack the harmonics of the interface slides (i, H + 1) [m] from the unknowns.
 
         Parameters
         ----------
@@ -210,7 +212,7 @@ class Balance:
         return self.lift @ unpack_harmonics(x[: r * (2 * harmonics + 1)], r)
 
     def motion(self, x, omega: float, level: float, harmonics: int, force) -> np.ndarray:
-        """Return the modal harmonics (K + 1, n) [m] under a force (i, K + 1) [N] and a drive.
+        """Return the modal harmonics (K + 1, n) [m] under drive and contact forces.
 
         Parameters
         ----------
@@ -255,7 +257,7 @@ class Balance:
     def system(
         self, x, omega: float, level: float, harmonics: int, here: LinearPart | None = None
     ) -> System:
-        """Return the equations at unknowns x (N,).
+        """Evaluate residual and Jacobian of the harmonic balance at given unknowns.
 
         Parameters
         ----------
@@ -264,7 +266,7 @@ class Balance:
             Frequency [rad/s] and amplitude [m s-2] of the drive.
         harmonics : int
         here : LinearPart, optional
-            A linear part other than that of the modes.
+            Receptances in place of those of the modes.
 
         Returns
         -------
@@ -305,14 +307,14 @@ class Balance:
         )
 
     def free_residual(self, free, c, omega: float, level: float, force) -> complex:
-        """Return the residual of a coordinate without receptance, over omega^2.
+        """Return the force residual of a modal coordinate without receptance, over omega^2 [m].
 
         Parameters
         ----------
         free : tuple
-            (k, left, stiffness) of the coordinate.
+            Harmonic, left vector and stiffness of the coordinate.
         c : float
-            Coordinate [m].
+            Value of the coordinate [m].
         omega : float
             [rad/s].
         level : float
@@ -333,9 +335,9 @@ class Balance:
         ) / omega**2
 
     def combine_slopes(self, slope) -> np.ndarray:
-        """Return the slopes of the rows as those of the forces on y with respect to y.
+        """Transform force derivatives of the interface rows to the reduced slides y.
 
-        They are (i, H + 1, 2 H + 1) and (H + 1, r, r (2 H + 1)).
+        Their shapes are (i, H + 1, 2 H + 1) and (H + 1, r, r (2 H + 1)).
         """
         count, r = self.lift.shape
         h = slope.shape[1] - 1
@@ -346,9 +348,9 @@ class Balance:
     def is_rounding(
         self, here: System, left, omega: float, level: float, harmonics: int, size: float
     ) -> bool:
-        """Return whether the residual that a step leaves is round-off.
+        """Return whether the residual after the last Newton step is due to round-off.
 
-        A least-squares step can vanish where nothing balances.
+        A least-squares step can vanish at a point that is no solution.
 
         Parameters
         ----------
@@ -373,15 +375,15 @@ class Balance:
         )
         for part, own in ((slice(0, low), size), (slice(low, None), push)):
             scale = own + abs(level) * float(np.linalg.norm(here.by_level[part]))
-            # a true root leaves round-off, a minimum of the residual more
+            # the residual of a solution is round-off; at a minimum of the residual without a root it is larger
             if float(np.linalg.norm(left[part])) > 1e-7 * scale:
                 return False
         return True
 
     def _free(self, here, coordinates, jacobian, parts, fold, z, level, linked, omega, size):
-        """Add rows and columns of the coordinates without receptance.
+        """Append the equations of modal coordinates without receptance to the balance.
 
-        Their equations are over omega^2 [m].
+        The equations are divided by omega^2 [m].
         """
         h = z.shape[0] - 1
         r = self.lift.shape[1]
@@ -412,26 +414,26 @@ class Balance:
 def solve_damped(
     system, x, is_accepted, tolerance: float = 1e-10, max_steps: int = 40
 ) -> tuple | None:
-    """Solve equations by Newton's method with the natural monotonicity test.
+    """Solve equations by damped Newton iteration with the natural monotonicity test.
 
     Parameters
     ----------
     system : callable
-        system(x) -> System.
+        system(x) -> BalanceEquations.
     x : ndarray
-        (N,) start.
+        (N,) initial guess.
     is_accepted : callable
-        is_accepted(System, what its last step leaves of the residual, size of x) -> whether that is
+        is_accepted(BalanceEquations, linearised residual after the last step, norm of x) -> whether it is
         round-off.
     tolerance : float, optional
-        Step over x, below which it ends.
+        Relative step below which the iteration has converged.
     max_steps : int, optional
-        Steps.
+        Largest number of Newton steps.
 
     Returns
     -------
     tuple or None
-        Unknowns, System before the last step, and steps; None where it does not end.
+        Unknowns, BalanceEquations before the last step, and number of steps; None without convergence.
     """
     here = system(x)
     for count in range(1, max_steps + 1):
@@ -455,8 +457,8 @@ def solve_damped(
             residual = float(np.linalg.norm(solve(there.residual)))
             if best is None or residual < best[0] or not np.isfinite(best[0]):
                 best = (residual, trial, there)
-            # natural monotonicity (Deuflhard): the next simplified step is shorter; a tiny step is taken as
-            # it is
+            # natural monotonicity (Deuflhard): the next simplified step must be shorter; a tiny step is always
+            # accepted
             if (
                 residual <= (1 - fraction / 4) * length
                 or fraction < 0.02
@@ -471,28 +473,28 @@ def solve_damped(
 def solve_newton(
     balance: Balance, x, omega: float, level: float, harmonics: int, max_steps: int = 40
 ):
-    """Solve a balance by `solve_damped`.
+    """Solve a harmonic balance by damped Newton iteration from an initial guess.
 
     Parameters
     ----------
     balance : Balance
     x : ndarray
-        (N,) start.
+        (N,) initial guess.
     omega, level : float
         Frequency [rad/s] and amplitude [m s-2] of the drive.
     harmonics : int
     max_steps : int, optional
-        Steps.
+        Largest number of Newton steps.
 
     Returns
     -------
     tuple
-        Unknowns, System before the last step, and steps.
+        Unknowns, BalanceEquations before the last step, and number of steps.
 
     Raises
     ------
     NotConverged
-        If the residual is not round-off by then.
+        If the residual does not decrease to round-off within `max_steps`.
     """
 
     def is_accepted(here, left, size) -> bool:

@@ -1,9 +1,9 @@
-"""Laws of an interface row, each sampled along one cycle of a periodic slide.
+"""Friction laws and springs sampled along one cycle of a periodic slide.
 
 Forces are taken at instants, not as means over steps: the mean of a trigonometric polynomial over
 equal samples is exact up to their number, so only the corners of the force alias, by (slope
-jump)(2 pi/N)^2/12, while a mean over a step damps every harmonic by (k pi/N)^2/6. Turning points
-lie where the harmonics have them, not at samples.
+jump)(2 pi/N)^2/12, while a mean over a step damps every harmonic by (k pi/N)^2/6. Reversals
+are located from the harmonics, not at samples.
 """
 
 from collections.abc import Callable
@@ -17,35 +17,35 @@ from ...compiled import instantiate, load
 from ...core import PatchfemError, frozen_array
 from ...friction.protocol import Element
 
-# samples of a cycle while an element goes from one limit to the other
+# number of samples while an element passes from one friction limit to the other
 SAMPLES_PER_STICK = 48
 
 
 @cache
 def load_cycle_kernels():
-    """Return the compiled loops over the samples of a cycle, `cycle_kernels`."""
+    """Load the compiled kernels for reversals and elastic-plastic elements along a cycle."""
     return load("dynamics.harmonic.cycle_kernels")
 
 
 @cache
 def load_speed_kernels(law: str):
-    """Return the loop over the samples for a compiled law without memory."""
+    """Load the compiled sampling kernel of a velocity-dependent law without memory."""
     return instantiate("dynamics.harmonic.speed_kernels", {"law": load(law)})
 
 
 @cache
 def load_flow_kernels(law: str):
-    """Return the loop over the samples for a compiled law with one number of memory."""
+    """Load the compiled periodic-state kernel of a law with one memory variable."""
     return instantiate("dynamics.harmonic.flow_kernels", {"law": load(law)})
 
 
 class SampledForce(NamedTuple):
-    """Force of a law along N samples of a cycle.
+    """Force of a friction law at N samples of a cycle, with its derivatives.
 
-    - force, slope, by_rate: [N], derivative over the slide [N/m] and over its velocity [N s/m]
-    - hold: (R, N) derivatives with respect to the slides of R turning points [N/m]
+    - force, slope, by_rate: force [N], derivative with respect to slide [N/m] and velocity [N s/m]
+    - hold: (R, N) derivatives with respect to the slides at R reversals [N/m]
     - limit, stretch: friction limit [N], and elastic stretch times it (N,) [N m]
-    - tangent: of a law whose memory is not that of turning points, a function that returns the
+    - tangent: for a law whose memory is not that of reversals, a function that returns the
       derivatives of the force with respect to the harmonics of the slide (N, 2 H + 1), real parts
       first, and to the frequency (N,)
     """
@@ -60,10 +60,10 @@ class SampledForce(NamedTuple):
 
 
 class TurningPoints(NamedTuple):
-    """Turning points of a periodic slide.
+    """Reversals of a periodic slide within a cycle.
 
-    - angles, slides: (R,) [rad], [m]
-    - cells: (R,) numbers of the samples before them
+    - angles, slides: (R,) angle [rad] and slide [m] at each reversal
+    - cells: (R,) index of the sample before each reversal
     - start: direction of the slide at the first sample
     """
 
@@ -74,7 +74,11 @@ class TurningPoints(NamedTuple):
 
 
 class JenkinsSums(NamedTuple):
-    """Sums (t + 1,) over the first elements: k [N/m], k limit [N] and k limit^2 [N m]."""
+    """Cumulative sums (t + 1,) over Jenkins elements in order of their yield slide.
+
+    They are sums of the stiffness k [N/m], k limit [N] and k limit^2 [N m].
+
+    """
 
     stiffness: np.ndarray
     limit: np.ndarray
@@ -82,11 +86,13 @@ class JenkinsSums(NamedTuple):
 
 
 class JenkinsGroups(NamedTuple):
-    """Groups of elements between turning points, innermost last; workspace of a kernel.
+    """Groups of Jenkins elements that last slipped up to the same reversal (workspace).
 
-    - end: number of the elements up to the end of a group
-    - mark: number of the turning point, -1 before the first one
-    - sign, base: direction of the slip and slide [m] at the turning point
+    The innermost group is the last one.
+
+    - end: number of elements up to the end of a group
+    - mark: index of the reversal, -1 before the first one
+    - sign, base: direction of the slip, and slide [m] at the reversal
     """
 
     end: np.ndarray
@@ -96,11 +102,11 @@ class JenkinsGroups(NamedTuple):
 
 
 class JenkinsSamples(NamedTuple):
-    """Results of a kernel for Jenkins elements along N samples.
+    """Forces and stiffnesses of parallel Jenkins elements at N samples of a cycle.
 
-    - force: (N,) [N]
-    - slope: (N,) stiffness of the elements that stick [N/m]
-    - hold: (R, N) minus the stiffness that belongs to each turning point [N/m]
+    - force: (N,) total force [N]
+    - slope: (N,) stiffness of the sticking elements [N/m]
+    - hold: (R, N) derivatives of the force with respect to the slides at R reversals [N/m]
     - stretch: (N,) sum of k limit stretch [N m]
     """
 
@@ -111,7 +117,7 @@ class JenkinsSamples(NamedTuple):
 
 
 class SampledSlide:
-    """A periodic slide on equal samples of the cycle.
+    """Periodic slide sampled at equidistant instants of the cycle.
 
     - x: (H + 1,) harmonics [m]; omega [rad/s]; samples: N
     - q, rate: (N,) slide and dq/d(omega t) [m]
@@ -126,7 +132,7 @@ class SampledSlide:
 
     @cached_property
     def turning_points(self) -> "TurningPoints":
-        """Turning points of the slide."""
+        """Reversals of the slide within the cycle."""
         n = self.samples
         angle = np.empty(n)
         place = np.empty(n)
@@ -140,7 +146,7 @@ class SampledSlide:
 
 
 def evaluate_series(x, samples: int) -> np.ndarray:
-    """Return samples (..., N) of a cycle of Re sum X_k exp(i k theta)."""
+    """Evaluate Fourier series Re sum X_k exp(i k theta) at N samples of a cycle."""
     if 2 * x.shape[-1] > samples:
         every = -(-2 * x.shape[-1] // samples)
         return evaluate_series(x, samples * every)[..., ::every]
@@ -151,7 +157,11 @@ def evaluate_series(x, samples: int) -> np.ndarray:
 
 
 def find_harmonics(values, harmonics: int) -> np.ndarray:
-    """Return harmonics (..., H + 1) of samples (..., N) of a cycle, H <= N/2."""
+    """Return the complex harmonics (..., H + 1) of samples (..., N) of a cycle.
+
+    H must not exceed N/2.
+
+    """
     n = values.shape[-1]
     out = np.fft.rfft(values, axis=-1)[..., : harmonics + 1] * (2 / n)
     out[..., 0] /= 2
@@ -159,28 +169,32 @@ def find_harmonics(values, harmonics: int) -> np.ndarray:
 
 
 class Law:
-    """A law of a row.
+    """Force law of an interface row for harmonic balance.
 
-    total: tangent stiffness at rest [N/m], 0 of one that creeps under any force.
+    total: tangent stiffness at rest [N/m], 0 for a law that creeps under any force.
     """
 
     __slots__ = ()
     total = 0.0
 
     def count_samples(self, amplitude: float) -> int:
-        """Return the samples of a cycle that resolve the corners at an amplitude [m], or 0."""
+        """Return the number of samples per cycle that resolves the corners of the force.
+
+        amplitude: amplitude of the slide [m]. The number is 0 for a smooth force.
+
+        """
         return 0
 
     def sample(self, track: "SampledSlide") -> "SampledForce":
-        """Return the periodic state along a slide that a virgin contact reaches."""
+        """Return the steady periodic force along a slide, starting from a virgin contact."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Jenkins(Law):
-    """Parallel elastic-plastic elements.
+    """Parallel elastic-plastic (Jenkins) elements on an interface row.
 
-    stiffness: (t,) [N/m] > 0; limit_slide: (t,) yield slides [m] >= 0.
+    stiffness: (t,) stiffnesses [N/m] > 0; limit_slide: (t,) yield slides [m] >= 0.
     """
 
     stiffness: np.ndarray
@@ -217,12 +231,16 @@ class Jenkins(Law):
         return float(self.sums.stiffness[-1])
 
     def count_samples(self, amplitude: float) -> int:
-        """Return the samples of a cycle that resolve a stick at an amplitude [m]."""
+        """Return the number of samples per cycle that resolves the stick phases.
+
+        amplitude: amplitude of the slide [m].
+
+        """
         stick_fraction = float(self.sums.limit[-1]) / self.total / max(amplitude, 1e-300)
         return _count_samples(stick_fraction)
 
     def sample(self, track: SampledSlide) -> SampledForce:
-        """Return the periodic state that a virgin contact reaches."""
+        """Return the steady periodic force along a slide, starting from a virgin contact."""
         n = track.samples
         n_turning_points = track.turning_points.slides.size
         max_groups = 2 * n_turning_points + 3
@@ -250,7 +268,7 @@ class Jenkins(Law):
 
 @dataclass(frozen=True, slots=True)
 class Spring(Law):
-    """Bonded spring with stiffness [N/m] and a cubic part [N/m3] q^3."""
+    """Bonded spring with linear stiffness [N/m] and cubic stiffness [N/m3]."""
 
     stiffness: float = 0.0
     cubic: float = 0.0
@@ -261,7 +279,7 @@ class Spring(Law):
         return self.stiffness
 
     def sample(self, track: SampledSlide) -> SampledForce:
-        """Return force and slope at the samples."""
+        """Return the force and its derivative at the samples of a periodic slide."""
         q = track.q
         return SampledForce(
             q * (self.stiffness + self.cubic * q * q), self.stiffness + 3 * self.cubic * q * q
@@ -270,7 +288,11 @@ class Spring(Law):
 
 @dataclass(frozen=True, slots=True)
 class Interlock(Law):
-    """Interlocking peaks: stiffness wavelength/(2 pi) sin(2 pi q/wavelength), [N/m] and [m]."""
+    """Sinusoidal restoring force of interlocking peaks.
+
+    The force is stiffness wavelength/(2 pi) sin(2 pi q/wavelength), in [N/m] and [m].
+
+    """
 
     stiffness: float
     wavelength: float
@@ -281,11 +303,11 @@ class Interlock(Law):
         return self.stiffness
 
     def count_samples(self, amplitude: float) -> int:
-        """Return the samples for the wavelengths that a cycle passes."""
+        """Return the number of samples per cycle that resolves the wavelengths passed."""
         return int(16 * min(2 * np.pi * amplitude / self.wavelength, 1000.0))
 
     def sample(self, track: SampledSlide) -> SampledForce:
-        """Return force and slope at the samples."""
+        """Return the force and its derivative at the samples of a periodic slide."""
         angle = 2 * np.pi / self.wavelength * track.q
         return SampledForce(
             self.stiffness * self.wavelength / (2 * np.pi) * np.sin(angle),
@@ -295,12 +317,12 @@ class Interlock(Law):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SpeedLaw(Law):
-    """A law without memory, whose force follows the velocity: its Element of form "speed"."""
+    """Velocity-dependent friction law without memory, from an Element of form "speed"."""
 
     element: Element
 
     def sample(self, track: SampledSlide) -> SampledForce:
-        """Return force and slope at the samples."""
+        """Return the force and its derivative at the samples of a periodic slide."""
         force = np.empty(track.samples)
         slope = np.empty(track.samples)
         load_speed_kernels(self.element.kernels).sample_forces(
@@ -311,13 +333,13 @@ class SpeedLaw(Law):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FlowLaw(Law):
-    """A law whose memory is its stretch alone: its Element of form "flow"."""
+    """Friction law whose only memory is its stretch, such as an Element of form "flow"."""
 
     element: Element
 
     @property
     def length(self) -> float:
-        """Slide over which it stretches before it slips [m]."""
+        """Stretch at which the law slips [m]."""
         return self.element.length
 
     @property
@@ -326,11 +348,15 @@ class FlowLaw(Law):
         return self.element.limit / self.element.length
 
     def count_samples(self, amplitude: float) -> int:
-        """Return the samples of a cycle that resolve a reversal at a slide amplitude [m]."""
+        """Return the number of samples per cycle that resolves the force after a reversal.
+
+        amplitude: amplitude of the slide [m].
+
+        """
         return _count_samples(self.length / max(amplitude, 1e-300))
 
     def find_periodic_state(self, track: SampledSlide) -> "FlowNodes":
-        """Return the periodic state at samples and turning points."""
+        """Return the periodic state of the law at the samples and reversals of a cycle."""
         angles, slides, cells, _ = track.turning_points
         n = track.samples
         own = np.ones(track.samples + len(cells), bool)
@@ -352,10 +378,10 @@ class FlowLaw(Law):
         return FlowNodes(angle, own, dt, z, steps, force, slopes)
 
     def sample(self, track: SampledSlide) -> SampledForce:
-        """Return the force at the samples of the periodic state.
+        """Return the steady periodic force at the samples of a slide.
 
-        Where the law does not depend on time, the slopes are those over the slide and the turning
-        points, else those over the harmonics.
+        For a rate-independent law the derivatives are those with respect to the slide and its
+        reversals, otherwise those with respect to the harmonics.
         """
         one = self.find_periodic_state(track)
         own = one.own
@@ -368,7 +394,7 @@ class FlowLaw(Law):
                 stretch=stretch,
                 tangent=lambda: self._tangent(track, one),
             )
-        # dz/dq at the end of a step is the slope of z over the slide; at its start this slope is also divided by the
+        # dz/dq at the end of a step is the derivative of z by the slide; at its start this derivative is also divided by the
         # fraction of z that the step keeps
         before = np.roll(one.steps[1], 1)
         after = one.steps[1] / np.maximum(one.steps[0], 1e-300)
@@ -383,7 +409,11 @@ class FlowLaw(Law):
         )
 
     def _tangent(self, track: SampledSlide, one: "FlowNodes") -> tuple:
-        """Return the derivatives of the force at the samples, see `SampledForce.tangent`."""
+        """Return the derivatives of the force by the harmonics of the slide and the frequency.
+
+        See `SampledForce.tangent`.
+
+        """
         k = np.arange(track.x.size)
         own = one.own
         turned = np.exp(1j * np.outer(one.angle, k))
@@ -401,12 +431,12 @@ class FlowLaw(Law):
 
 
 class FlowNodes(NamedTuple):
-    """A FlowLaw at the M samples and turning points of a cycle.
+    """Periodic state of a FlowLaw at the M samples and reversals of a cycle.
 
-    - angle: (M,); own: (M,) which are samples; dt: (M,) time to the next [s]
+    - angle: (M,) [rad]; own: (M,) true for samples; dt: (M,) time to the next node [s]
     - z: (M,) stretch [m]
-    - steps: (3, M) derivatives of the next stretch over stretch, slide and time
-    - force, slopes: (M,) [N], (2, M) its derivatives over stretch and velocity
+    - steps: (3, M) derivatives of the next stretch with respect to stretch, slide and time
+    - force, slopes: (M,) force [N], (2, M) its derivatives with respect to stretch and velocity
     """
 
     angle: np.ndarray
@@ -418,9 +448,9 @@ class FlowNodes(NamedTuple):
     slopes: np.ndarray
 
     def find_remainders(self, nodes) -> np.ndarray:
-        """Return the remainder (r, M) at every node of a disturbance of z at some nodes.
+        """Return the remaining fraction (r, M) at all nodes of stretch perturbations at r nodes.
 
-        It is 0 for a law that forgets nothing.
+        It is 0 for a law whose memory does not fade.
         """
         fall = np.append(0.0, np.cumsum(np.log(np.maximum(self.steps[0], 1e-300))))
         since = (
@@ -432,7 +462,7 @@ class FlowNodes(NamedTuple):
         return np.exp(since) / forgets if forgets > 1e-12 else np.zeros_like(since)
 
     def find_cell_factors(self) -> tuple:
-        """Return the fraction of the stretch kept by every cell, and its slope over the slide (N,)."""
+        """Return the decay factor (N,) of the stretch per cell and its derivative by the slide."""
         kept, by_slide, _ = self.steps
         first = np.flatnonzero(self.own)
         turns = ~self.own
@@ -445,16 +475,16 @@ class FlowNodes(NamedTuple):
 
 
 def _count_samples(stick_fraction: float) -> int:
-    """Return the samples of a cycle for a stick over a fraction of the amplitude.
+    """Return the number of samples per cycle that resolves a stick phase.
 
-    The stick takes the angle acos(1 - 2 stick_fraction).
+    stick_fraction: yield slide over amplitude. The stick phase spans the angle acos(1 - 2 stick_fraction).
     """
     angle = np.arccos(max(1 - 2 * stick_fraction, -1.0))
     return int(min(SAMPLES_PER_STICK * 2 * np.pi / max(angle, 1e-9), 65536))
 
 
 def make_law(model):
-    """Return the law of a dynamics.march.models.ContactModel.
+    """Return the harmonic-balance law of a contact model (`march.models.ContactModel`).
 
     Raises
     ------
@@ -468,7 +498,7 @@ def make_law(model):
         return Jenkins(one.numbers[2 : 2 + count], one.numbers[2 + count :])
     if form == "speed":
         return SpeedLaw(one)
-    # points of bonds that do not grow and break at once remember one stretch
+    # bond points whose bonds neither grow nor break gradually have one stretch as their memory
     if form == "flow" or (form == "points" and one.numbers[3] < 0 and not one.numbers[8]):
         return FlowLaw(one)
     if model.set_valued:

@@ -1,45 +1,45 @@
-"""Periodic motions by a march: found by extrapolation, shown over a cycle, disturbed.
+"""Periodic motions by time marching with extrapolation, and their Floquet multipliers.
 
 A motion is marched, and every few cycles the limit of its states is extrapolated from their
-differences: reduced rank extrapolation, which is exact where a disturbance dies out linearly
-(Sidi, J. Comput. Appl. Math. 36, 305, 1991). The memory of the contact follows in the cycles
+differences: reduced rank extrapolation, which is exact where a perturbation decays linearly
+(Sidi, J. Comput. Appl. Math. 36, 305, 1991). The memory of the contact adapts in the cycles
 between. Elements that slip a little further in every cycle come to rest by themselves; after an
-extrapolation that did not help, the next one waits.
+extrapolation that did not reduce the change per cycle, the next one is postponed.
 """
 
 import numpy as np
 
 from ..march.recording import make_mark, read_output_extremes
 
-# cycles from the start to the first extrapolation
+# number of cycles from the start to the first extrapolation
 FIRST_CYCLES = 6
-# cycles after an extrapolation in which the memory of the contact follows
+# number of cycles after an extrapolation in which the memory of the contact adapts to the new state
 MEMORY_CYCLES = 2
 # largest number of cycles that are marched
 MAX_CYCLES = 600
-# change of the state after an extrapolation over that before; if it is larger, the next one waits twice as long
+# ratio of the changes per cycle after and before an extrapolation; above it the next one is postponed twice as long
 MIN_GAIN = 0.1
-# change of the state in a cycle over the largest state, below which the motion repeats
+# relative change of the state in a cycle, below which the motion counts as periodic
 PERIODIC_TOL = 1e-8
-# motion over that of a free mass under the drive, below which nothing moves
+# motion over that of a free mass under the drive, below which the rig counts as at rest
 REST_RATIO = 1e-9
-# disturbance over the largest state, from which multipliers are estimated
+# perturbation over the largest state for the estimate of multipliers: far above round-off, yet nearly linear
 DISTURBANCE = 1e-6
-# cycles in which the contact takes up a disturbance
+# number of cycles in which the memory of the contact adapts to a perturbation
 SETTLING_CYCLES = 2
-# cycles that are marched with a disturbance
+# number of cycles that are marched after a perturbation
 N_DISTURBED_CYCLES = 8
-# singular value of the disturbances over the largest one, below which it is round-off
+# smallest singular value of the perturbations, over the largest one, that is not round-off
 MIN_SINGULAR_RATIO = 1e-3
-# disturbance over its start, below which it has died out
+# perturbation over its initial value, below which it has decayed
 MIN_DISTURBANCE = 1e-5
 
 
 def march_to_periodic(run) -> float:
-    """March a Run until it repeats; returns the change in the last cycle over the largest state.
+    """March a run to its periodic motion; return the relative change in the last cycle.
 
-    It is more than PERIODIC_TOL where no motion repeats within MAX_CYCLES; `run.outcome` is set
-    where the march ended.
+    The change exceeds PERIODIC_TOL if no periodic motion is reached within MAX_CYCLES; `run.outcome` is set
+    if the march ended early.
     """
     size = 2 * run.state.shape[1] + 2
     done = 0
@@ -65,7 +65,7 @@ def march_to_periodic(run) -> float:
         change = _size(kept[-1] - kept[-2]) / max(_size(kept[-1]), least)
         if change <= PERIODIC_TOL or run.outcome is not None:
             break
-        if waiting == 0:  # the cycles since the last guess
+        if waiting == 0:  # judge the last extrapolation by the cycles since
             misses = 0 if change < MIN_GAIN * last else misses + 1
             waiting = 2**misses
         waiting -= 1
@@ -78,9 +78,9 @@ def march_to_periodic(run) -> float:
 
 
 def march_cycle(run, frames: int = 0) -> tuple:
-    """March one more cycle of a Run; returns its Mark and snapshots of the interface.
+    """March one more cycle of a run; return its samples and snapshots of the interface.
 
-    The energies of the Mark are those of this cycle.
+    The samples are a `Mark`, whose energies are those of this cycle.
     """
     run.reset_balance()
     snapshots = []
@@ -90,12 +90,12 @@ def march_cycle(run, frames: int = 0) -> tuple:
 
 
 def estimate_multipliers(run) -> np.ndarray:
-    """Estimate the Floquet multipliers (2 n,) of a Run, the largest first.
+    """Estimate the Floquet multipliers (2 n,) of a periodic march by perturbed marches.
 
-    Every mode is disturbed in a march of its own from the present state. In the first
-    SETTLING_CYCLES the contact takes up the disturbance; the map of a cycle fits the cycles that
-    follow in least squares. Memories that fade slowly bend the fit: no multiplier counts as larger
-    than 1 unless the disturbance grew so.
+    They are in decreasing magnitude. Each march perturbs one number of the present state. In the first
+    SETTLING_CYCLES the memory of the contact adapts; the map of a cycle is fitted to the cycles that
+    follow in least squares. Memories that fade slowly bias the fit: no multiplier counts as larger
+    than 1 unless the perturbation grew as much.
     """
     here = _state(run)
     found = []
@@ -110,7 +110,7 @@ def estimate_multipliers(run) -> np.ndarray:
             twin.march_cycle(twin.prop.steps, 0, [])
             states.append(_state(twin))
         found.append(states)
-    # (cycles, 2 n, 2 n)
+    # perturbations (cycles, 2 n, 2 n) after each cycle
     after = np.moveaxis(np.array(found[1:]) - np.array(found[0]), 0, 2) / nudge
     sizes = np.abs(after).max(axis=(1, 2))
     last = SETTLING_CYCLES + int(
@@ -139,7 +139,7 @@ def estimate_multipliers(run) -> np.ndarray:
 
 
 def _state(run) -> np.ndarray:
-    """Return coordinates [m] and rates over the fastest rate [m] (2 n,)."""
+    """Return the state (2 n,) [m] of a run: coordinates, and rates over the fastest rate."""
     return np.concatenate([run.state[0], run.state[1] / _fastest_rate(run)])
 
 
@@ -148,7 +148,7 @@ def _fastest_rate(run) -> float:
 
 
 def _split_state(run, state) -> tuple:
-    """Return coordinates and rates (n,) of a state."""
+    """Return the modal coordinates and rates (n,) of a state vector."""
     n = run.state.shape[1]
     return state[:n], state[n:] * _fastest_rate(run)
 
@@ -158,9 +158,10 @@ def _size(state) -> float:
 
 
 def _extrapolate(kept):
-    """Return the limit of successive states (k, 2 n), None where extrapolation does not help.
+    """Extrapolate the limit of successive states (k, 2 n) by reduced rank extrapolation.
 
-    It is the mean with the weights that make its change smallest.
+    The limit is the weighted mean of the states with the smallest change. The result is None if the
+    extrapolation is ill-conditioned.
     """
     states = np.array(kept)
     changes = np.diff(states, axis=0)

@@ -1,8 +1,8 @@
-"""One steady motion by harmonic balance, with its error.
+"""Single steady motion by harmonic balance, with an estimate of its error.
 
-The balance is solved for H harmonics. Those above H follow from the force that they leave over
+The balance is solved for H harmonics. Those above H follow from the harmonics of the force
 (q_k = -G_k F_k, a contraction once the inertia of k > H outweighs the stiffness of the contact),
-and what that changes below H shows what H has missed. `point` raises H until this error meets the
+and their effect below H estimates the truncation error. `find_point` raises H until this error meets the
 tolerance.
 """
 
@@ -18,17 +18,17 @@ from .harmonic import Balance, System, pack_harmonics, solve_linear, solve_newto
 from .laws import Interlock, SampledSlide, evaluate_series
 from .starts import find_one_harmonic_roots
 
-# numbers of harmonics that are tried
+# numbers of harmonics that are tried in turn, each about twice the one before
 HARMONIC_COUNTS = (7, 15, 31, 63, 127, 255)
-# harmonics that follow from the force over those that are solved for
+# ratio of all harmonics to those that Newton's method solves for; the others follow from the force
 FOLLOWING_RATIO = 4
-# numbers of harmonics on the way from few to many
+# numbers of harmonics that are solved in turn where the direct solution with many harmonics fails
 CLIMB_COUNTS = (11, 15, 23, 31, 47, 63, 95, 127, 191)
-# sweeps of the harmonics that follow
+# largest number of sweeps over the harmonics that follow from the force
 MAX_SWEEPS = 40
-# change in the last sweep over the tolerance
+# change in the last sweep over the tolerance, so that the sweeps add no error
 SWEEP_TOL_RATIO = 1e-5
-# tolerance of the harmonics that follow where the caller gives none
+# relative tolerance of the sweeps where the caller gives none
 DEFAULT_TOLERANCE = 1e-3
 
 
@@ -38,19 +38,19 @@ class _Unbounded(NotConverged):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SteadyMotion:
-    """A steady motion.
+    """Steady periodic motion under sinusoidal drive, from harmonic balance.
 
     - omega, level: frequency [rad/s] and amplitude [m s-2] of the drive
     - coefficients, forces: (i, K + 1) harmonics of the slides [m] and forces [N] of the rows of
       `group`
     - modal: (K + 1, n) modal harmonics [m]
-    - harmonics, samples: H solved for (K >= H), and samples of the cycle
-    - residual: rms of the force that is not balanced in time, on twice the samples, over the rms
+    - harmonics, samples: H that were solved for (K >= H), and samples per cycle
+    - residual: rms of the unbalanced force in time, on twice the samples, over the rms
       of the force
-    - error: of the motion, relative
-    - iterations
-    - unknowns: (N,) of the balance, a start for a neighbour
-    - left: relative change that sweeps of the higher harmonics would still make
+    - error: relative error of the motion
+    - iterations: number of Newton steps
+    - unknowns: (N,) unknowns of the balance, the initial guess for a neighbouring motion
+    - left: relative change that further sweeps of the higher harmonics would make
     - stable, multipliers: None until they are computed
     """
 
@@ -72,20 +72,24 @@ class SteadyMotion:
 
     @property
     def base_samples(self) -> int:
-        """Samples on which the unknowns were solved for."""
+        """Number of samples per cycle with which the unknowns were solved."""
         return (
             self.samples // 2 if self.coefficients.shape[1] > self.harmonics + 1 else self.samples
         )
 
     def amplitude(self, row, samples: int = 4096) -> float:
-        """Return half the range [m] of row @ coordinates, row (n,), between samples by parabolas."""
+        """Return the displacement amplitude [m], half the range of row @ modal coordinates.
+
+        row: (n,); extremes between samples are interpolated by parabolas.
+
+        """
         y = evaluate_series(self.modal @ np.asarray(row, float), samples)
         return (find_peak(y) + find_peak(-y)) / 2
 
     def turns(self) -> tuple:
-        """Return slide [m], force [N] and slip [m] of the first row at both reversals.
+        """Return slide [m], friction force [N] and slip [m] of the first row at both reversals.
 
-        It is () for a row at rest.
+        The result is () for an interface at rest.
         """
         angles, places, _, _ = SampledSlide(
             self.coefficients[0], self.omega, self.samples
@@ -113,7 +117,7 @@ class SteadyMotion:
 
 
 def friction_force(laws: tuple, sampled: list) -> np.ndarray:
-    """Return the force (N,) [N] of the laws of a row at its samples, without an interlock.
+    """Return the friction force (N,) [N] of an interface row, without interlocking springs.
 
     The interlock of [structure.bonded] is a spring parallel to the contact, so its force is not
     friction.
@@ -123,14 +127,18 @@ def friction_force(laws: tuple, sampled: list) -> np.ndarray:
 
 
 def find_slip(track: SampledSlide, found: list) -> np.ndarray:
-    """Return the slip (N,) [m] of a row from the laws sampled along it; 0 without friction."""
+    """Return the slip (N,) [m] of an interface row from its sampled laws.
+
+    The slip is the slide minus the mean elastic stretch; it is 0 without friction.
+
+    """
     limit = sum(one.limit for one in found)
     stretch = sum(one.stretch for one in found if one.stretch is not None)
     return track.q - stretch / limit if limit > 0 else np.zeros(track.samples)
 
 
 def find_peak(y) -> float:
-    """Return the largest value of a cycle (N,), between samples by a parabola.
+    """Return the maximum of a sampled cycle (N,), interpolated by a parabola.
 
     The largest of 4096 samples of a sine can be (pi/4096)^2/2 = 3e-7 too small.
     """
@@ -143,12 +151,16 @@ def find_peak(y) -> float:
 
 
 def make_group(modes, group) -> LawGroup:
-    """Return a LawGroup from a LawGroup, a law, a model or (row, law) pairs."""
+    """Return the laws of a rig as a LawGroup.
+
+    group: a LawGroup, a law, a contact model or (row, law) pairs.
+
+    """
     return group if isinstance(group, LawGroup) else LawGroup(modes, group)
 
 
 def make_balance(modes, group: LawGroup, samples: int) -> Balance:
-    """Return the balance of the rows of `group` on `samples` of a cycle.
+    """Return the harmonic balance of a law group with a number of samples per cycle.
 
     Parameters
     ----------
@@ -167,7 +179,7 @@ def make_balance(modes, group: LawGroup, samples: int) -> Balance:
 def find_point(
     modes, drive, group, harmonics: int | None = None, tolerance: float = 1e-3, start=None
 ) -> SteadyMotion:
-    """Find a steady motion under a sine.
+    """Find a steady motion under sinusoidal drive by harmonic balance.
 
     Parameters
     ----------
@@ -175,10 +187,10 @@ def find_point(
     drive : core.SineDrive
     group : LawGroup, or what `make_group` takes
     harmonics : int, optional
-        Exactly so many; as many as the tolerance needs by default.
+        Number of harmonics; as many as the tolerance needs by default.
     tolerance : float, optional
     start : SteadyMotion or ndarray, optional
-        A motion nearby; else the stuck contact, the motions of one harmonic, and weaker drives are
+        Initial guess; otherwise the stuck contact, the one-harmonic motions and weaker drives are
         tried.
 
     Returns
@@ -224,7 +236,7 @@ def find_point(
 
 
 def _min_harmonics(modes, drive, group) -> float:
-    """Return the harmonics (<= 63) from which inertia outweighs the contact stiffness."""
+    """Return the number of harmonics (<= 63) above which inertia exceeds the contact stiffness."""
     stiff = float(np.sum(group.stiffness() * np.sum(group.rows**2, axis=1))) / modes.mass
     return min(np.sqrt(stiff) / drive.omega, 63)
 
@@ -238,15 +250,15 @@ def _next_harmonics(h: int) -> int:
 
 
 def with_harmonics(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
-    """Return unknowns for `harmonics` harmonics from those for h.
+    """Convert the unknowns of a balance with h harmonics to another number of harmonics.
 
     Parameters
     ----------
     balance : Balance
     slides : ndarray
-        (i, K + 1) harmonics of the slides [m]; they are cut or filled up with zeros.
+        (i, K + 1) harmonics of the slides [m]; they are truncated or padded with zeros.
     unknowns : ndarray
-        (N,); what follows the slides in them is kept.
+        (N,) unknowns for h harmonics; those of coordinates without receptance are copied.
     h, harmonics : int
 
     Returns
@@ -260,9 +272,9 @@ def with_harmonics(balance, slides, unknowns, h: int, harmonics: int) -> np.ndar
 
 
 def refine_point(found: SteadyMotion, modes, drive) -> SteadyMotion:
-    """Return the same motion with twice its harmonics and samples.
+    """Recompute a steady motion with twice its harmonics and samples.
 
-    From one harmonic they become three, as a symmetric law has no even ones. NotConverged where it
+    One harmonic becomes three, because a symmetric law has no even ones. NotConverged is raised if it
     is not found.
 
     Parameters
@@ -293,11 +305,11 @@ def refine_point(found: SteadyMotion, modes, drive) -> SteadyMotion:
 def _solve_harmonics(
     modes, drive, group, h, x, wider, tolerance=DEFAULT_TOLERANCE, near=0
 ) -> SteadyMotion:
-    """Solve the balance with h harmonics, and then add the harmonics up to `wider` times h.
+    """Solve the balance with h harmonics, then add harmonics that follow from the force.
 
-    The samples resolve the shortest stick.
+    The harmonics that are added extend up to `wider` times h. The samples resolve the shortest stick phase.
 
-    near: samples that a neighbour took.
+    near: number of samples of a neighbouring motion, 0 for none.
     """
     samples = group.samples or max(group.samples_for(h * wider), near)
     balance = make_balance(modes, group, samples)
@@ -318,7 +330,7 @@ def _solve_harmonics(
 
 
 def _solve_balance(balance, x, drive, h: int):
-    """Solve by `solve_newton` from each start in turn, and last along weaker drives."""
+    """Solve a harmonic balance from several initial guesses in turn, last from weaker drives."""
     omega = drive.omega
     level = drive.acceleration
     for start in _iterate_starts(balance, x, omega, level, h):
@@ -330,7 +342,7 @@ def _solve_balance(balance, x, drive, h: int):
 
 
 def _iterate_starts(balance, x, omega, level, h: int):
-    """Yield unknowns from which Newton's method may lead to a motion, the likeliest first."""
+    """Yield initial guesses for Newton's method, the most promising first."""
     r = balance.lift.shape[1]
     if x is not None:
         free = sum(1 if k == 0 else 2 for k, *_ in balance.linear(omega, h).free)
@@ -347,7 +359,11 @@ def _iterate_starts(balance, x, omega, level, h: int):
 
 
 def _climb_harmonics(balance, omega, level, h: int) -> np.ndarray:
-    """Return unknowns by way of few harmonics, which are cheap to follow from weaker drives."""
+    """Return an initial guess by raising the number of harmonics step by step.
+
+    Few harmonics are inexpensive to follow from weaker drives.
+
+    """
     below = min(HARMONIC_COUNTS[0], h)
     x = _follow_levels(balance, omega, level, below)
     for more in [k for k in CLIMB_COUNTS if below < k < h] + [h] * (h > below):
@@ -361,7 +377,7 @@ def _climb_harmonics(balance, omega, level, h: int) -> np.ndarray:
 
 
 def _follow_levels(balance, omega, level, h: int) -> np.ndarray:
-    """Return unknowns by following the motion from a thousandth of the amplitude of the drive."""
+    """Return the unknowns at a drive level by continuation from a thousandth of it."""
     path = follow_curve(
         lambda v, p: evaluate_by_level(balance, v, omega, p, h),
         _solve_stuck(balance, omega, level, h) * 1e-3,
@@ -387,7 +403,7 @@ def _follow_levels(balance, omega, level, h: int) -> np.ndarray:
 
 
 def evaluate_by_level(balance, x, omega, level, h) -> tuple:
-    """Return residual, Jacobian and derivative by the drive level, for `continuation`.
+    """Return residual, Jacobian and derivative of a balance by the drive level.
 
     Parameters
     ----------
@@ -403,7 +419,7 @@ def evaluate_by_level(balance, x, omega, level, h) -> tuple:
 
 
 def evaluate_by_omega(balance, x, omega, level, h) -> tuple:
-    """Return residual, Jacobian and derivative by omega, for `continuation`.
+    """Return residual, Jacobian and derivative of a balance by the drive frequency.
 
     Parameters
     ----------
@@ -419,7 +435,7 @@ def evaluate_by_omega(balance, x, omega, level, h) -> tuple:
 
 
 def make_point(balance, x, drive, h: int) -> tuple:
-    """Return the SteadyMotion of solved unknowns, and what h more harmonics would add.
+    """Return the steady motion of solved unknowns, and the size of the truncated harmonics.
 
     Parameters
     ----------
@@ -430,7 +446,8 @@ def make_point(balance, x, drive, h: int) -> tuple:
 
     Returns
     -------
-    SteadyMotion, float
+    tuple
+    SteadyMotion, and norm of h further harmonics over that of the motion.
     """
     here = balance.system(x, drive.omega, drive.acceleration, h)
     found = _add_harmonics(balance, SweepStart(x, here), drive, h, 1, 1.0)
@@ -441,14 +458,14 @@ def make_point(balance, x, drive, h: int) -> tuple:
 
 
 def _solve_stuck(balance, omega, level, h: int) -> np.ndarray:
-    """Return unknowns with every contact at its stiffness at rest: one linear step from zero."""
+    """Return the unknowns of the linear motion with all contacts stuck."""
     x = np.zeros(balance.size(omega, h))
     here = balance.system(x, omega, level, h)
     return -solve_linear(here.jacobian)(here.residual)
 
 
 class SweepStart(NamedTuple):
-    """Start of the sweeps of the higher harmonics.
+    """Initial values of the sweeps over the higher harmonics.
 
     - x, system, count: unknowns (N,), their equations, and iterations so far
     - slides: (i, K + 1) [m] with harmonics above those of the unknowns, or None
@@ -461,9 +478,9 @@ class SweepStart(NamedTuple):
 
 
 def _add_harmonics(balance, start: SweepStart, drive, h, wider, tolerance) -> SteadyMotion:
-    """Add harmonics above h by sweeps with the Jacobian of those below, and estimate the error.
+    """Add harmonics above h by fixed-point sweeps, and estimate the truncation error.
 
-    The last sweep takes twice the samples.
+    The harmonics up to h are corrected with their Jacobian. The last sweep takes twice the samples.
     """
     x, here, count, known = start
     omega = drive.omega
@@ -500,7 +517,7 @@ def _add_harmonics(balance, start: SweepStart, drive, h, wider, tolerance) -> St
 
 
 def _make_diverged(balance, start: SweepStart, drive, h, samples) -> SteadyMotion:
-    """Return the motion of h harmonics if those above h diverge; its error is unknown."""
+    """Return the steady motion of h harmonics with unknown error, if higher harmonics diverge."""
     x, here, count, _ = start
     q = balance.slides(x, drive.omega, h)
     z = balance.motion(x, drive.omega, drive.acceleration, h, here.fold.force)
@@ -521,7 +538,7 @@ def _make_diverged(balance, start: SweepStart, drive, h, samples) -> SteadyMotio
 
 
 def _find_residual(balance, x, omega, level, h, force, z) -> np.ndarray:
-    """Return the residual (N,) under forces with more harmonics than the unknowns."""
+    """Return the residual (N,) of a balance under forces with additional harmonics."""
     low = balance.lift.shape[1] * (2 * h + 1)
     at = 0
     y = unpack_harmonics(x[:low], balance.lift.shape[1])
@@ -548,7 +565,7 @@ def _make_periodic(balance, x, drive, h, top, samples, changes, size, count, q) 
     error = max(changes)
     left = 0.0
     if top > h:
-        # what is left of the sweeps, and what lies beyond the top: as below it, falling like k^-5/2
+        # error of the unfinished sweeps, and of the harmonics above `top`, which decrease like k^-5/2
         ratio = (
             min((changes[-2] / changes[1]) ** (1 / max(len(changes) - 3, 1)), 0.9)
             if len(changes) > 3

@@ -1,7 +1,7 @@
-"""Backbone of a mode by statics: a force along its shape, and the loops of the laws.
+"""Quasi-static backbone of a mode: static force along its shape, and friction loops.
 
 A force alpha m phi along the shape phi of the mode with the contact stuck moves the coordinates to
-z: m omega_i^2 z_i + (rows^T F)_i = alpha m phi_i. The slides turn together, so each law runs
+z: m omega_i^2 z_i + (rows^T F)_i = alpha m phi_i. The slides reverse together, so each law runs
 through its own loop, whose tip is F. The frequency is omega^2 = alpha/q for the part q = phi
 z/(phi phi) of z along phi, and the damping is what the loops lose of 2 pi alpha q m phi phi. Where
 a law follows Masing's rule the loop is its curve of first loading, twice as large: one static
@@ -19,29 +19,29 @@ from ...friction.laws.elastic_plastic import masing_loop
 from .forces import LawGroup
 from .laws import Jenkins, SampledSlide
 
-# step over a slide, for the finite difference of the force at the tip of a loop
+# relative slide increment for the finite difference of the force at the tip of a loop
 SLOPE_STEP = 1e-6
-# ratio of two rates of a cycle, by which a law is tested for a dependence on time
+# ratio of two drive frequencies at which the force of a law is compared, to detect a dependence on speed
 RATE_RATIO = 2.0
-# change of a force over the force that round-off may cause
+# largest relative change of a force that is due to round-off
 FORCE_TOL = 1e-9
 SPEED_MESSAGE = "a friction force that depends on the sliding speed has no static loop"
 
 
 class StaticLoops(NamedTuple):
-    """Loops of the laws of a row at an amplitude of its slide: tip [N] and area [J]."""
+    """Tip force [N] and area [J] of the friction loop of an interface row."""
 
     tip: float
     area: float
 
 
 class StaticMotion(NamedTuple):
-    """Static motion of a mode.
+    """Quasi-static motion of a mode with its frequency and damping ratio.
 
-    - amplitude: of the motion along the shape of the stuck mode [m]
+    - amplitude: amplitude of the motion along the shape of the stuck mode [m]
     - omega, zeta: frequency [rad/s] and damping ratio
-    - z: (n,) coordinates [m]
-    - loss: of the laws per cycle [J]
+    - z: (n,) modal coordinates at the reversal [m]
+    - loss: friction loss per cycle [J]
     """
 
     amplitude: float
@@ -52,7 +52,7 @@ class StaticMotion(NamedTuple):
 
 
 def find_loops(laws, u: float, samples: int) -> StaticLoops:
-    """Return the loops of the laws on one row at an amplitude of its slide.
+    """Return tip force and area of the friction loop of an interface row.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def find_loops(laws, u: float, samples: int) -> StaticLoops:
 
 
 def _sample_loops(law, u: float, samples: int) -> StaticLoops:
-    """Return tip and area of the loop of a law that does not depend on time, by samples."""
+    """Return tip force and area of the loop of a rate-independent law, by sampling a cycle."""
     if u == 0:
         return StaticLoops(0.0, 0.0)
     track = SampledSlide(np.array([0.0, u], complex), 1.0, samples)
@@ -88,7 +88,11 @@ def _sample_loops(law, u: float, samples: int) -> StaticLoops:
 
 
 def depends_on_speed(group: LawGroup, u: float) -> bool:
-    """Return whether a force changes with the rate of a cycle of amplitude u [m]."""
+    """Return whether a friction force of the group depends on the sliding speed.
+
+    u: amplitude of the slide [m] at which the laws are sampled.
+
+    """
     for law in (one for laws in group.laws for one in laws if not isinstance(one, Jenkins)):
         slow, fast = (
             law.sample(SampledSlide(np.array([0.0, u], complex), rate, 512)).force
@@ -102,12 +106,12 @@ def depends_on_speed(group: LawGroup, u: float) -> bool:
 def find_static_motions(
     modes: ModalBasis, group: LawGroup, amplitudes, stuck_mode: tuple, samples: int = 4096, row=None
 ) -> list:
-    """Return the static motions (k,) of a mode at amplitudes (k,) [m].
+    """Compute the quasi-static motions of a mode at prescribed amplitudes.
 
     Parameters
     ----------
     modes : ModalBasis
-        Without the contact.
+        Modes without the contact.
     group : LawGroup
         Laws on the rows.
     amplitudes : array_like
@@ -115,7 +119,7 @@ def find_static_motions(
     stuck_mode : tuple
         Frequency [rad/s] and shape (n,) of the stuck mode.
     samples : int, optional
-        Of a cycle, for laws without a closed form.
+        Samples per cycle, for laws without a closed form.
     row : ndarray, optional
         (n,) displacement per coordinate to which the amplitudes belong, such as that of the output;
         the component along the shape by default.
@@ -123,7 +127,7 @@ def find_static_motions(
     Returns
     -------
     list of StaticMotion
-        With NaN where no equilibrium is found.
+        One motion per amplitude, with NaN where no equilibrium is found.
 
     Raises
     ------
@@ -161,7 +165,7 @@ def find_static_motions(
 def find_static_motions_from_loops(
     modes: ModalBasis, row, stuck_mode: tuple, slides, loops
 ) -> list:
-    """Return the static motions of a mode whose one interface runs through known loops.
+    """Compute the quasi-static motions of a mode with one interface of known friction loops.
 
     Parameters
     ----------
@@ -171,9 +175,9 @@ def find_static_motions_from_loops(
     stuck_mode : tuple
         See `find_static_motions`.
     slides : array_like
-        (k,) [m].
+        (k,) amplitudes of the slide [m].
     loops : sequence of StaticLoops
-        (k,).
+        (k,) loop at each amplitude.
 
     Returns
     -------
@@ -195,9 +199,10 @@ def find_static_motions_from_loops(
 def _solve_equilibrium(
     modes, group, mode: tuple, amplitude: float, near, samples: int
 ) -> np.ndarray:
-    """Return z/amplitude and alpha/(omega^2 amplitude) at the equilibrium of an amplitude [m].
+    """Solve for the static equilibrium of a mode at an amplitude [m].
 
-    mode: frequency [rad/s] and shape of the stuck mode, and the row of the amplitude.
+    Returns z/amplitude and alpha/(omega^2 amplitude). mode: frequency [rad/s] and shape of the stuck mode, and
+    the row of the amplitude.
     """
     omega, shape, row = mode
     m = modes.mass
@@ -233,13 +238,17 @@ def _solve_equilibrium(
 
 
 def _find_tip_slope(laws, u: float, samples: int) -> float:
-    """Return the slope [N/m] of the tips of loops over the amplitude."""
+    """Return the derivative [N/m] of the tip force of friction loops by the slide amplitude."""
     step = max(SLOPE_STEP * u, 1e-30)
     return (find_loops(laws, u + step, samples).tip - find_loops(laws, u, samples).tip) / step
 
 
 def _make_static(modes, shape, motion: tuple) -> StaticMotion:
-    """Return the StaticMotion of (z (n,) [m], alpha [m s-2], loss [J])."""
+    """Return the quasi-static motion with the frequency and damping ratio of an equilibrium.
+
+    motion: z (n,) [m], alpha [m s-2] and loss [J].
+
+    """
     z, alpha, loss = motion
     share = float(shape @ z / (shape @ shape))
     omega = float(np.sqrt(alpha / share)) if alpha * share > 0 else np.nan

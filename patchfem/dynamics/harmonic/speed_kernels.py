@@ -1,4 +1,4 @@
-"""A law without memory along the samples of a cycle; compiled for any law of the velocity."""
+"""Forces of a velocity-dependent law without memory along a cycle (compiled)."""
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
@@ -7,7 +7,7 @@ from ...friction.laws import tanh_kernels as law
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def sample_forces(num, speed, force, slope):
-    """Write force and slope of a law at velocities.
+    """Write force and derivative of a velocity-dependent law at given velocities.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Floquet multipliers of a steady motion, from the slopes and memories of its laws."""
+"""Stability of a steady motion: Floquet multipliers from the derivatives of its laws."""
 
 from dataclasses import replace
 
@@ -10,14 +10,14 @@ from .laws import FlowLaw, FlowNodes
 
 
 def add_stability(periodic, modes, cells: int = 0):
-    """Return the SteadyMotion with its Floquet multipliers and whether it is stable.
+    """Add Floquet multipliers and stability to a steady motion.
 
     Parameters
     ----------
     periodic : SteadyMotion
     modes : ModalBasis
     cells : int, optional
-        Of the cycle; 0 for 1024, or as many as it was sampled in.
+        Number of cells of the cycle; 0 for 1024, or for the samples of the motion if they are more.
 
     Returns
     -------
@@ -28,7 +28,7 @@ def add_stability(periodic, modes, cells: int = 0):
 
 
 def find_motion_monodromy(periodic, modes, cells: int = 0) -> np.ndarray:
-    """Return the map of a small change of a SteadyMotion over one period of the drive.
+    """Return the monodromy matrix of a steady motion over one period of the drive.
 
     Parameters
     ----------
@@ -64,15 +64,19 @@ def find_motion_monodromy(periodic, modes, cells: int = 0) -> np.ndarray:
 
 
 def _average_cells(values, share) -> np.ndarray:
-    """Return means per cell (..., N); share: weight of the value at the end of a cell."""
+    """Return the weighted mean of sampled values in each cell, (..., N).
+
+    share: weight of the value at the end of a cell.
+
+    """
     return (1 - share) * values + share * np.roll(values, -1, axis=-1)
 
 
 def _weigh_samples(track, found):
-    """Return the weight (N,) of the later sample in the mean slope of a cell.
+    """Return the weights (N,) of the later sample in the mean stiffness of each cell.
 
-    The mean is the secant of the force over the cell, or follows the place of a turning point in
-    it; it is half where the force does not follow the slide alone.
+    The mean is the secant of the force over the cell, or follows the position of a reversal in
+    it; the weight is 0.5 where the force does not depend on the slide alone.
     """
     if found.slope is None:
         return 0.5
@@ -92,21 +96,22 @@ def _weigh_samples(track, found):
 
 
 def _set_turning_cells(track, share):
-    """Return the weights (N,) with those of the cells of the turning points set from their positions."""
+    """Set the weights of the cells with a reversal from its position in the cell."""
     cells = track.turning_points.cells
     share[cells] = 1 - _place_in_cell(track)
     return share
 
 
 def _place_in_cell(track) -> np.ndarray:
-    """Return the position [0, 1] of every turning point in its cell."""
+    """Return the relative position [0, 1] of every reversal in its cell."""
     return track.turning_points.angles * (track.samples / (2 * np.pi)) - track.turning_points.cells
 
 
 def _make_turning_points(row: int, track, hold, share, slope) -> list:
-    """Return the TurningPoints of a track; one whose elements never slip is no memory.
+    """Return the reversals of a slide that the sticking elements remember.
 
-    In its own cell a turning point holds nothing yet: the slide has not left it by more than the
+    The list has no reversal whose elements never slip. In the cell of a reversal its stiffness does not act yet:
+    the slide has not left it by more than the
     square of the cell.
     """
     out = []

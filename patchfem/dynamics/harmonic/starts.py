@@ -1,30 +1,30 @@
-"""Start values for harmonic balance: all motions of the balance of one harmonic."""
+"""Initial guesses for harmonic balance: all solutions of the one-harmonic balance."""
 
 from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-# samples of a cycle, which suffice for one harmonic
+# number of samples per cycle, which suffices for one harmonic
 N_SAMPLES = 512
 
 
 def find_one_harmonic_roots(balance, omega: float, level: float, count: int = 240) -> list:
-    """Return the unknowns of all roots of the one-harmonic balance.
+    """Find all solutions of the one-harmonic balance at a drive.
 
-    They lie between 1e-7 and 1e4 of the free linear motion.
+    They are searched between 1e-7 and 1e4 of the linear motion without contact.
 
-    The balance is scanned over the amplitude along the free linear motion; that is exact for one
-    row and a start for more. None is found where a mode without receptance is driven at its own
+    The balance is scanned over the amplitude along that linear motion; this is exact for one
+    row and an initial guess for more. None is found where an undamped mode is driven at its natural
     frequency.
 
     Parameters
     ----------
     balance : Balance
     omega, level : float
-        Of the drive [rad/s], [m s-2].
+        Frequency [rad/s] and amplitude [m s-2] of the drive.
     count : int, optional
-        Amplitudes that are scanned.
+        Number of amplitudes that are scanned.
 
     Returns
     -------
@@ -62,9 +62,9 @@ def find_one_harmonic_roots(balance, omega: float, level: float, count: int = 24
 
 
 def _bracket_roots(miss, grid, values) -> list:
-    """Return intervals (a, b) around all changes of sign of a function on a grid (k,).
+    """Return intervals (a, b) around all sign changes of a function on a grid (k,).
 
-    A value that is closer to zero than its neighbours announces two roots between them.
+    A sample closer to zero than its neighbours may hide two roots; its minimum is then located.
     """
     points = list(zip(grid, values))
     for k in range(1, len(grid) - 1):
